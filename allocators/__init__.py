@@ -1,0 +1,26 @@
+"""Methods that allocate, behind one contract; `solve` runs and scores any of them."""
+
+from alloc.allocators.base import Allocator, Proposal, RefusedError
+from alloc.allocators.method import Kind, Method
+from alloc.allocators.registry import describe, load, names
+from alloc.allocators.result import Result, Status
+from alloc.allocators.search import Budget, Improvement, Search, StopReason
+from alloc.allocators.solve import solve
+
+__all__ = [
+    "Allocator",
+    "Budget",
+    "Improvement",
+    "Kind",
+    "Method",
+    "Proposal",
+    "RefusedError",
+    "Result",
+    "Search",
+    "Status",
+    "StopReason",
+    "describe",
+    "load",
+    "names",
+    "solve",
+]

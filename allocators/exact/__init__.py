@@ -1,0 +1,1 @@
+"""Exact methods: proven optima and bounds."""

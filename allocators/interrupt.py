@@ -1,0 +1,76 @@
+"""Stopping a run from outside: signals, and solvers in native code that only a second thread can stop."""
+
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import TypeVar
+
+Answer = TypeVar("Answer")
+
+POLL_S = 0.02
+GRACE_S = 0.3
+"""How long a native solver may take to obey before its thread is left behind."""
+
+
+@contextmanager
+def signals_set(stop: threading.Event) -> Iterator[None]:
+    """Let SIGINT and SIGTERM set `stop` while the block runs; does nothing outside the main thread.
+
+    A second SIGINT does what it did before, so that a run that hangs can still be ended.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+
+    def ask_to_stop(number: int, frame: FrameType | None) -> None:
+        stop.set()
+        signal.signal(number, before[signal.Signals(number)])
+
+    for number in before:
+        signal.signal(number, ask_to_stop)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def run_native(work: Callable[[], Answer], should_stop: Callable[[], bool], halt: Callable[[], None]) -> Answer | None:
+    """Run `work` on another thread, and call `halt` once `should_stop` says so.
+
+    Parameters
+    ----------
+    work : callable
+        Calls the solver; its exceptions are raised here.
+    should_stop : callable
+        Asked every 20 ms in the calling thread, where signal handlers run.
+    halt : callable
+        Asks the solver to end; called once.
+
+    Returns
+    -------
+    object or None
+        The answer of `work`; None if it did not obey within 0.3 s of `halt`, its thread then being left behind.
+    """
+    answers: list[Answer] = []
+    errors: list[BaseException] = []
+
+    def target() -> None:
+        try:
+            answers.append(work())
+        except BaseException as error:
+            errors.append(error)
+
+    thread = threading.Thread(target=target, daemon=True, name="alloc-native-solver")
+    thread.start()
+    while thread.is_alive() and not should_stop():
+        thread.join(POLL_S)
+    if thread.is_alive():
+        halt()
+        thread.join(GRACE_S)
+    if errors:
+        raise errors[0]
+    return answers[0] if answers else None

@@ -1,0 +1,1 @@
+"""Learned methods: policies trained by reinforcement learning."""

@@ -1,0 +1,137 @@
+"""Methods by name, imported when they are needed; third parties add theirs by entry point."""
+
+import importlib
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any
+
+from alloc.allocators.base import Allocator
+from alloc.allocators.method import Kind, Method
+from alloc.problems import InputError
+from alloc.problems.errors import nearest
+
+ENTRY_POINT_GROUP = "alloc.allocators"
+
+_TARGETS = {
+    "greedy": "alloc.allocators.heuristic.greedy:Greedy",
+    "milp": "alloc.allocators.exact.milp:Milp",
+    "cpsat": "alloc.allocators.exact.cpsat:CpSat",
+    "ga": "alloc.allocators.heuristic.ga:GeneticAlgorithm",
+    "gappo": "alloc.allocators.learned.gappo:Gappo",
+}
+
+BUILT_IN = {
+    method.name: method
+    for method in (
+        Method(
+            name="greedy",
+            summary="largest ability first, to the task that is worst served",
+            finite_speeds=True,
+            citation="Deuermeyer, Friesen and Langston (1982), doi:10.1137/0603019",
+        ),
+        Method(
+            name="milp",
+            summary="proven optimum by a mixed-integer programme over classes of agents (cvxpy + HiGHS)",
+            kind=Kind.EXACT,
+            requires=("cvxpy", "highspy"),
+            finite_speeds=True,
+            proves=True,
+            warm_start=True,
+            anytime=True,
+            citation="Huangfu and Hall (2018), doi:10.1007/s12532-017-0130-5",
+        ),
+        Method(
+            name="cpsat",
+            summary="proven optimum by constraint programming over classes of agents (OR-Tools)",
+            kind=Kind.EXACT,
+            requires=("ortools",),
+            finite_speeds=True,
+            proves=True,
+            warm_start=True,
+            anytime=True,
+            citation="Perron, Didier and Gay (2023), doi:10.4230/LIPIcs.CP.2023.3",
+        ),
+        Method(
+            name="ga",
+            summary="genetic algorithm over assignments (DEAP)",
+            requires=("deap",),
+            warm_start=True,
+            anytime=True,
+            citation="Fortin et al. (2012), JMLR 13:2171-2175",
+        ),
+        Method(
+            name="gappo",
+            summary="learned policy: a population of actor-critics, trained by PPO and bred by a GA",
+            kind=Kind.LEARNED,
+            requires=("torch", "safetensors"),
+            warm_start=True,
+            anytime=True,
+            options=("policy", "device"),
+            citation="Fang et al. (2025), doi:10.20944/preprints202502.0192.v1",
+        ),
+    )
+}
+
+
+def names() -> list[str]:
+    """Return the names of all methods: ours, then those of installed plugins."""
+    return [*BUILT_IN, *_plugins()]
+
+
+def describe(name: str) -> Method:
+    """Return what is known of a method; ours are not imported for it, a plugin is.
+
+    Raises
+    ------
+    InputError
+        If there is no such method, or its plugin cannot be imported.
+    """
+    return BUILT_IN[name] if name in BUILT_IN else _plugin_class(name).method
+
+
+def load(name: str, **options: Any) -> Allocator:
+    """Return a method, ready to be used many times and from several threads.
+
+    Parameters
+    ----------
+    name : str
+        One of `names`.
+    **options
+        Options of the method, such as ``policy`` of ``gappo``; those that are None are left out.
+
+    Raises
+    ------
+    InputError
+        If there is no such method, it takes no such option, or what it requires is not installed.
+    """
+    method = describe(name)
+    given = {key: value for key, value in options.items() if value is not None}
+    for key in given:
+        if key not in method.options:
+            raise InputError(f"method {name!r} takes no option {key!r}{nearest(key, method.options)}", key)
+    if method.missing:
+        modules = " ".join(method.missing)
+        raise InputError(f"method {name!r} needs {modules}; install with: pip install {modules}", "method")
+    if name not in BUILT_IN:
+        return _plugin_class(name)(**given)
+    module, _, attribute = _TARGETS[name].partition(":")
+    allocator = getattr(importlib.import_module(module), attribute)(**given)
+    assert isinstance(allocator, Allocator)
+    return allocator
+
+
+def _plugins() -> dict[str, EntryPoint]:
+    """Entry points of other packages; a name of ours cannot be taken."""
+    return {entry.name: entry for entry in entry_points(group=ENTRY_POINT_GROUP) if entry.name not in BUILT_IN}
+
+
+def _plugin_class(name: str) -> type[Allocator]:
+    plugins = _plugins()
+    if name not in plugins:
+        raise InputError(f"there is no method {name!r}{nearest(name, [*BUILT_IN, *plugins, 'auto'])}", "method")
+    try:
+        plugin = plugins[name].load()
+    except Exception as error:
+        raise InputError(f"plugin {name!r} ({plugins[name].value}) cannot be imported: {error}", "method") from error
+    if not (isinstance(plugin, type) and issubclass(plugin, Allocator) and hasattr(plugin, "method")):
+        raise InputError(f"plugin {name!r} ({plugins[name].value}) is not an Allocator with a `method`", "method")
+    return plugin

@@ -1,0 +1,30 @@
+"""What is to be solved, and how good an answer is; knows nothing of allocators."""
+
+from alloc.problems.allocation import Allocation
+from alloc.problems.bounds import energy_lower_bound, lp_makespan_lower_bound, makespan_lower_bound
+from alloc.problems.classes import AgentClasses, agent_classes
+from alloc.problems.errors import InputError
+from alloc.problems.evaluation import Evaluation, Objective, Violation, evaluate
+from alloc.problems.instance import IDLE, Instance
+from alloc.problems.matching import contested_tasks, fewest_unserved, serve_all
+from alloc.problems.reach import Reach
+
+__all__ = [
+    "IDLE",
+    "AgentClasses",
+    "Allocation",
+    "Evaluation",
+    "InputError",
+    "Instance",
+    "Objective",
+    "Reach",
+    "Violation",
+    "agent_classes",
+    "contested_tasks",
+    "energy_lower_bound",
+    "evaluate",
+    "fewest_unserved",
+    "lp_makespan_lower_bound",
+    "makespan_lower_bound",
+    "serve_all",
+]

@@ -1,0 +1,103 @@
+"""Agents alike in all that matters: an exact model counts them per class instead of deciding each one."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from alloc.problems.allocation import Allocation
+from alloc.problems.instance import IDLE, FloatArray, Instance, IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class AgentClasses:
+    """Classes of interchangeable agents.
+
+    Attributes
+    ----------
+    class_of_agent : ndarray of int, shape (n,)
+        Class of each agent.
+    count : ndarray of int, shape (k,)
+        Agents in each class.
+    ability, speed : ndarray, shape (k,)
+        Work per hour, and distance per hour (``inf`` where travel takes no time).
+    distance : ndarray, shape (k, m)
+        Distance to each task; that of one member where classes were not told apart by place.
+    mask : ndarray of bool, shape (k, m)
+        Which tasks the class can take.
+    """
+
+    class_of_agent: IntArray
+    count: IntArray
+    ability: FloatArray
+    speed: FloatArray
+    distance: FloatArray
+    mask: NDArray[np.bool_]
+
+    @property
+    def size(self) -> int:
+        """Number of classes, k."""
+        return len(self.count)
+
+    def spread(self, counts: IntArray) -> Allocation:
+        """Turn numbers of agents per class and task into an allocation; the agents left over are idle.
+
+        Parameters
+        ----------
+        counts : ndarray of int, shape (k, m)
+            Agents of each class on each task; no row sums to more than its class has.
+        """
+        task = np.full(len(self.class_of_agent), IDLE, dtype=np.intp)
+        order = np.argsort(self.class_of_agent, kind="stable")
+        first = np.concatenate([[0], np.cumsum(self.count)])
+        kind, goal = np.nonzero(counts)
+        used = np.zeros(self.size, dtype=np.intp)
+        for k, j in zip(kind.tolist(), goal.tolist(), strict=True):
+            begin = first[k] + used[k]
+            used[k] += counts[k, j]
+            task[order[begin : begin + counts[k, j]]] = j
+        if (used > self.count).any():
+            raise ValueError("more agents used than a class has")
+        return Allocation(task)
+
+    def tally(self, allocation: Allocation) -> IntArray:
+        """Return the number of agents per class and task, shape (k, m): the inverse of `spread`."""
+        counts = np.zeros(self.mask.shape, dtype=np.intp)
+        working = np.flatnonzero(allocation.task_of_agent != IDLE)
+        np.add.at(counts, (self.class_of_agent[working], allocation.task_of_agent[working]), 1)
+        return counts
+
+
+def agent_classes(instance: Instance, *, by_place: bool) -> AgentClasses:
+    """Group the agents of `instance` that are interchangeable.
+
+    Parameters
+    ----------
+    by_place : bool
+        Whether the place matters, as it does for energy; if not, agents with the same ability that can take the same
+        tasks are alike wherever they are, unless travel takes time.
+    """
+    reach = instance.reach
+    if by_place or instance.has_travel_time:
+        row = np.arange(len(reach.mask))
+    else:
+        packed = np.ascontiguousarray(np.packbits(reach.mask, axis=1))
+        _, row = np.unique(packed.view(np.dtype((np.void, packed.shape[1])))[:, 0], return_inverse=True)
+    keys = (instance.speed, row[reach.origin], instance.ability)
+    order = np.lexsort(keys)
+    new = np.zeros(instance.n, dtype=bool)
+    new[0] = True
+    for key in keys:
+        new[1:] |= key[order][1:] != key[order][:-1]
+    kind = np.cumsum(new) - 1
+    class_of_agent = np.empty(instance.n, dtype=np.intp)
+    class_of_agent[order] = kind
+    example = order[new]
+    return AgentClasses(
+        class_of_agent=class_of_agent,
+        count=np.bincount(kind),
+        ability=instance.ability[example],
+        speed=instance.speed[example],
+        distance=reach.distance[reach.origin[example]],
+        mask=reach.mask[reach.origin[example]],
+    )

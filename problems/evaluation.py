@@ -1,0 +1,216 @@
+"""The one scorer of the project: how good an allocation is."""
+
+import sys
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from alloc.problems.allocation import Allocation
+from alloc.problems.errors import InputError
+from alloc.problems.instance import IDLE, FloatArray, Instance
+
+RELATIVE_TOLERANCE = 1e-9
+"""Makespans and energies this close, relatively, are equal."""
+
+
+class Objective(StrEnum):
+    """What is optimised, in this order, after the number of unserved tasks."""
+
+    MAKESPAN = "makespan"
+    MAKESPAN_ENERGY = "makespan-energy"
+
+
+@dataclass(frozen=True)
+class Violation:
+    """An agent sent to a task that it cannot take; its ability does not count there, nor does its flight."""
+
+    agent: int
+    task: int
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """Scores of one allocation; see `evaluate`.
+
+    Attributes
+    ----------
+    completion_time : ndarray, shape (m,)
+        T_j in hours (4): 0 without workload, ``inf`` where a workload has no agent.
+    group_ability : ndarray, shape (m,)
+        W_j, work per hour of the agents on each task.
+    coverage : ndarray, shape (m,)
+        W_j - h_j, the left side of (2).
+    makespan : float or None
+        max T_j in hours; None while a task is unserved.
+    served_makespan : float
+        max T_j over the served tasks, 0 if there is none.
+    distance, energy : float
+        Flown directly from the start to the final task, summed over agents, and `distance` times the energy per
+        unit of distance (19).
+    battery_remaining_percent : float or None
+        Mean over the agents with a battery, idle ones at 100; None if no agent has one.
+    reward : float
+        Sum over tasks of (3), R_j = -tau^(W_j - h_j).
+    reward_saturated : bool
+        Whether a term of (3) was too large for a float: `reward` then is the most negative finite float.
+    unserved_tasks : tuple of int
+        Tasks with workload and without an agent.
+    violations : tuple of Violation
+        Agents sent where they cannot go.
+    """
+
+    completion_time: FloatArray
+    group_ability: FloatArray
+    coverage: FloatArray
+    makespan: float | None
+    served_makespan: float
+    distance: float
+    energy: float
+    battery_remaining_percent: float | None
+    reward: float
+    reward_saturated: bool
+    unserved_tasks: tuple[int, ...]
+    violations: tuple[Violation, ...]
+
+    def key(self, objective: Objective) -> tuple[float, ...]:
+        """Return what is compared first, second and third; smaller is better."""
+        first = (float(len(self.unserved_tasks)), self.served_makespan)
+        return first if objective is Objective.MAKESPAN else (*first, self.energy)
+
+    def is_better_than(self, other: "Evaluation", objective: Objective) -> bool:
+        """Whether this scores better than `other`, with values within 1e-9 relative counted as equal."""
+        for mine, theirs in zip(self.key(objective), other.key(objective), strict=True):
+            if abs(mine - theirs) > RELATIVE_TOLERANCE * max(abs(mine), abs(theirs)):
+                return mine < theirs
+        return False
+
+
+def evaluate(instance: Instance, allocation: Allocation) -> Evaluation:
+    """Score `allocation` on `instance`.
+
+    Takes O(n + m) time, O(n log n) where agents have speeds.
+
+    Raises
+    ------
+    InputError
+        If the allocation has another number of agents, or a task index out of range.
+
+    References
+    ----------
+    Fang et al. (2025), equations (1)-(4) and (19), doi:10.20944/preprints202502.0192.v1.
+    """
+    task = _checked_tasks(instance, allocation)
+    sent = np.flatnonzero(task != IDLE)
+    allowed = instance.reach.allows(sent, task[sent])
+    agent, goal = sent[allowed], task[sent[allowed]]
+    distance = instance.reach.distance_of(agent, goal)
+    group_ability: FloatArray = np.bincount(goal, weights=instance.ability[agent], minlength=instance.m).astype(
+        np.float64
+    )
+    time = _completion_times(instance, agent, goal, distance, group_ability)
+    unserved = np.isinf(time)
+    reward, saturated = _reward(group_ability - instance.workload, instance.tau)
+    served_makespan = float(time[~unserved].max(initial=0.0))
+    for array in (time, group_ability):
+        array.setflags(write=False)
+    return Evaluation(
+        completion_time=time,
+        group_ability=group_ability,
+        coverage=group_ability - instance.workload,
+        makespan=None if unserved.any() else served_makespan,
+        served_makespan=served_makespan,
+        distance=float(distance.sum()),
+        energy=float(distance.sum() * instance.energy_per_distance),
+        battery_remaining_percent=_battery_percent(instance, agent, distance),
+        reward=reward,
+        reward_saturated=saturated,
+        unserved_tasks=tuple(np.flatnonzero(unserved).tolist()),
+        violations=tuple(_violations(instance, sent[~allowed], task)),
+    )
+
+
+def _checked_tasks(instance: Instance, allocation: Allocation) -> NDArray[np.intp]:
+    task = allocation.task_of_agent
+    if len(task) != instance.n:
+        raise InputError(f"the allocation has {len(task)} agents, instance {instance.name!r} has {instance.n}")
+    if task.min() < IDLE or task.max() >= instance.m:
+        raise InputError(f"task indices must lie between -1 and {instance.m - 1}")
+    return task
+
+
+def _completion_times(
+    instance: Instance, agent: NDArray[np.intp], goal: NDArray[np.intp], distance: FloatArray, group_ability: FloatArray
+) -> FloatArray:
+    work = instance.workload
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        time = np.where(work > 0, work / group_ability, 0.0)
+    if not instance.has_travel_time:
+        return time
+    arrival = distance / instance.speed[agent]
+    late = np.zeros(instance.m, dtype=bool)
+    late[goal[arrival > 0]] = True
+    order = np.argsort(goal, kind="stable")
+    bounds = np.searchsorted(goal[order], np.arange(instance.m + 1))
+    for task in np.flatnonzero(late & (work > 0)):
+        group = order[bounds[task] : bounds[task + 1]]
+        time[task] = completion_time(work[task], instance.ability[agent[group]], arrival[group])
+    return time
+
+
+def completion_time(workload: float, ability: FloatArray, arrival: FloatArray) -> float:
+    """Return the hour T at which a group is done whose members start on arrival.
+
+    T is the root of ``sum_i ability_i * max(0, T - arrival_i) = workload``, the least over k of what the first k
+    to arrive would need alone.
+
+    Parameters
+    ----------
+    workload : float
+        Work to be done, > 0.
+    ability, arrival : ndarray, shape (k,)
+        Work per hour, and hour of arrival, of each member; k >= 1.
+    """
+    order = np.argsort(arrival)
+    rate = np.cumsum(ability[order])
+    return float(((workload + np.cumsum(ability[order] * arrival[order])) / rate).min())
+
+
+def _reward(coverage: FloatArray, tau: float) -> tuple[float, bool]:
+    exponent = coverage * np.log(tau)
+    limit = np.log(sys.float_info.max)
+    with np.errstate(over="ignore", under="ignore"):
+        total = float(np.exp(np.minimum(exponent, limit)).sum())
+    if (exponent > limit).any() or not np.isfinite(total):
+        return -sys.float_info.max, True
+    return -total, False
+
+
+def _battery_percent(instance: Instance, agent: NDArray[np.intp], distance: FloatArray) -> float | None:
+    has_battery = np.isfinite(instance.battery)
+    if not has_battery.any():
+        return None
+    used = np.zeros(instance.n)
+    used[agent] = distance * instance.energy_per_distance
+    used, capacity = used[has_battery], instance.battery[has_battery]
+    share = np.divide(used, capacity, out=np.zeros_like(used), where=capacity > 0)
+    return float(100 * (1 - np.minimum(share, 1)).mean())
+
+
+def _violations(instance: Instance, agents: NDArray[np.intp], task: NDArray[np.intp]) -> list[Violation]:
+    found = []
+    for agent in agents.tolist():
+        goal = int(task[agent])
+        away = float(instance.reach.distance[instance.reach.origin[agent], goal])
+        allowed = None if instance.allowed_tasks is None else instance.allowed_tasks[agent]
+        if allowed is not None and goal not in allowed:
+            reason = "the agent may not do this task"
+        elif away > instance.communication_range[agent]:
+            reason = f"distance {away:g} exceeds the range {instance.communication_range[agent]:g}"
+        else:
+            needed = instance.energy_per_distance * away
+            reason = f"energy {needed:g} exceeds the battery {instance.battery[agent]:g}"
+        found.append(Violation(agent, goal, reason))
+    return found

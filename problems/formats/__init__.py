@@ -1,0 +1,1 @@
+"""File formats of instances and allocations, and their readers and writers."""
