@@ -5,6 +5,7 @@ from alloc.problems.bounds import energy_lower_bound, lp_makespan_lower_bound, m
 from alloc.problems.classes import AgentClasses, agent_classes
 from alloc.problems.errors import InputError
 from alloc.problems.evaluation import Evaluation, Objective, Violation, evaluate
+from alloc.problems.generate import Family, paper, paper_like, random_instance
 from alloc.problems.instance import IDLE, Instance
 from alloc.problems.matching import contested_tasks, fewest_unserved, serve_all
 from alloc.problems.reach import Reach
@@ -14,6 +15,7 @@ __all__ = [
     "AgentClasses",
     "Allocation",
     "Evaluation",
+    "Family",
     "InputError",
     "Instance",
     "Objective",
@@ -26,5 +28,8 @@ __all__ = [
     "fewest_unserved",
     "lp_makespan_lower_bound",
     "makespan_lower_bound",
+    "paper",
+    "paper_like",
+    "random_instance",
     "serve_all",
 ]

@@ -1,0 +1,361 @@
+"""Seeded instances: the four scenarios of the paper, and a general family of random ones."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from alloc.problems.errors import InputError
+from alloc.problems.instance import FloatArray, Instance, IntArray
+
+MOST = 10_000_000
+"""Agents or tasks beyond which no instance is generated."""
+
+Spread = float | tuple[float, float] | None
+"""One value for all, the ends of a uniform distribution, or None: no limit."""
+
+
+class Distribution(StrEnum):
+    """How abilities or workloads spread."""
+
+    EQUAL = "equal"
+    UNIFORM = "uniform"
+    LOGNORMAL = "lognormal"
+    PARETO = "pareto"
+    DIRICHLET = "dirichlet"
+
+
+class Sites(StrEnum):
+    """How places lie in the world."""
+
+    UNIFORM = "uniform"
+    CLUSTERED = "clustered"
+
+
+class Starts(StrEnum):
+    """Where agents begin."""
+
+    TASKS = "tasks"
+    OWN = "own"
+    DEPOTS = "depots"
+    UNKNOWN = "unknown"
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """One scenario of the paper: sizes, total of all abilities and of all workloads, and battery (ours)."""
+
+    agents: int
+    tasks: int
+    total: int
+    battery: float
+
+
+SCENARIOS = {
+    1: Scenario(100, 20, 400, 20.0),
+    2: Scenario(300, 30, 1200, 30.0),
+    3: Scenario(500, 30, 2400, 30.0),
+    4: Scenario(500, 50, 2400, 30.0),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Family:
+    """What random instances look like.
+
+    Parameters
+    ----------
+    agents, tasks : int
+        How many of each.
+    ability : Distribution or str
+        ``equal``: all `ability_max`; ``uniform`` from `ability_min` to `ability_max`; ``lognormal``: 95 % of the agents
+        between the two; ``pareto``: at least `ability_min`, shape 1.5, mean three times that, no upper end.
+    ability_min, ability_max : float
+        Work per hour, > 0.
+    workload : Distribution or str
+        Shares of the total: ``equal``, ``uniform`` (from a tenth to one, before scaling), ``dirichlet`` (with all
+        parameters 2), ``lognormal`` (sigma 1) or ``pareto`` (shape 1.5).
+    load : float
+        Total workload over total ability, > 0; with `integer` as near as whole numbers come, and each at least 1.
+    integer : bool
+        Whether abilities and workloads are whole numbers.
+    sites : Sites or str
+        ``uniform`` in the world, or ``clustered`` around `clusters` centres (normal, a twentieth of the world).
+    clusters : int
+    dimensions : int
+        2 or 3.
+    world_size : float
+        Side of the square or cube, in units of distance, > 0.
+    starts : Starts or str
+        Each agent begins at a random task (``tasks``), at a place of its ``own`` that lies like the sites, at one of
+        `depots` random ``depots``, or nowhere known (``unknown``).
+    depots : int
+    communication_range, battery, speed : float, (float, float) or None
+        In units of distance, of energy, and in distance per hour; None for no limit.
+    priority : float or (float, float)
+    allowed_fraction : float
+        Share of the tasks that each agent may do, > 0; each gets a random set of this share, one task at the least.
+    energy_per_distance, tau : float
+        As in `Instance`.
+
+    Raises
+    ------
+    InputError
+        If a value is out of its range; the error's place is the field.
+    """
+
+    agents: int = 100
+    tasks: int = 20
+    ability: Distribution | str = Distribution.UNIFORM
+    ability_min: float = 1.0
+    ability_max: float = 10.0
+    workload: Distribution | str = Distribution.DIRICHLET
+    load: float = 1.0
+    integer: bool = True
+    sites: Sites | str = Sites.UNIFORM
+    clusters: int = 4
+    dimensions: int = 3
+    world_size: float = 1.0
+    starts: Starts | str = Starts.TASKS
+    depots: int = 1
+    communication_range: Spread = None
+    battery: Spread = 20.0
+    speed: Spread = None
+    priority: float | tuple[float, float] = 1.0
+    allowed_fraction: float = 1.0
+    energy_per_distance: float = 6.0
+    tau: float = 0.5
+
+    def __post_init__(self) -> None:
+        for name in ("agents", "tasks", "clusters", "depots"):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 1 <= value <= MOST:
+                raise InputError(f"must be a whole number from 1 to {MOST}, got {value!r}", name)
+        for name in ("ability_min", "ability_max", "load", "world_size", "allowed_fraction"):
+            _number(getattr(self, name), name, positive=True)
+        if self.ability_max < self.ability_min:
+            raise InputError(
+                f"must be at least ability_min = {self.ability_min:g}, got {self.ability_max:g}", "ability_max"
+            )
+        if self.allowed_fraction > 1:
+            raise InputError(f"must be > 0 and at most 1, got {self.allowed_fraction:g}", "allowed_fraction")
+        if self.dimensions not in (2, 3):
+            raise InputError(f"must be 2 or 3, got {self.dimensions!r}", "dimensions")
+        for name in ("communication_range", "battery", "speed", "priority"):
+            _spread(getattr(self, name), name)
+        choices = {"ability": Distribution, "workload": Distribution, "sites": Sites, "starts": Starts}
+        for name, kind in choices.items():
+            object.__setattr__(self, name, _choice(kind, getattr(self, name), name))
+        if self.ability is Distribution.DIRICHLET:
+            raise InputError("dirichlet shares a total out, and is for workloads alone", "ability")
+
+
+def paper(scenario: int, seed: int) -> Instance:
+    """Return an instance of one of the paper's four scenarios.
+
+    Parameters
+    ----------
+    scenario : int
+        1 to 4.
+    seed : int
+        Source of all randomness, >= 0.
+
+    Raises
+    ------
+    InputError
+        If `scenario` or `seed` is out of its range.
+
+    References
+    ----------
+    Fang et al. (2025), section 5, doi:10.20944/preprints202502.0192.v1. Sizes and totals are the paper's; the unit
+    cube, the spread of the workloads, 6 units of energy per unit of distance, the batteries and tau are ours.
+    """
+    if scenario not in SCENARIOS:
+        raise InputError(f"must be 1, 2, 3 or 4, got {scenario!r}", "scenario")
+    sizes = SCENARIOS[scenario]
+    return paper_like(
+        sizes.agents, sizes.tasks, sizes.total, seed, battery=sizes.battery, name=f"paper-{scenario}-seed-{seed}"
+    )
+
+
+def paper_like(
+    agents: int, tasks: int, total: int, seed: int, *, battery: float = 20.0, name: str | None = None
+) -> Instance:
+    """Return an instance like those of the paper, of any size.
+
+    Parameters
+    ----------
+    agents, tasks : int
+    total : int
+        Sum of all abilities (whole numbers from 1 to 10), and of all workloads (distinct positive whole numbers).
+    seed : int
+    battery : float
+        Energy of each agent; a unit of distance costs 6.
+    name : str, optional
+
+    Raises
+    ------
+    InputError
+        If no such abilities or workloads exist.
+    """
+    if not 0 < agents <= total <= 10 * agents:
+        raise InputError(f"must lie from 1 to 10 per agent, got {total} for {agents} agents", "total")
+    if not 0 < tasks * (tasks + 1) // 2 <= total:
+        raise InputError(f"must be at least {tasks * (tasks + 1) // 2} for {tasks} distinct workloads", "total")
+    rng = _generator(seed)
+    return Instance(
+        name=name or f"paper-like-{agents}x{tasks}-seed-{seed}",
+        ability=_abilities_summing_to(total, agents, rng),
+        workload=_distinct_workloads(total, tasks, rng),
+        task_position=rng.random((tasks, 3)),
+        start_task=rng.integers(0, tasks, agents),
+        battery=np.full(agents, battery),
+        energy_per_distance=6.0,
+        tau=0.5,
+    )
+
+
+def random_instance(family: Family, seed: int, *, name: str | None = None) -> Instance:
+    """Return a random instance of `family`; the same seed gives the same instance."""
+    rng = _generator(seed)
+    n, m = family.agents, family.tasks
+    ability = _abilities(family, rng)
+    workload = _workloads(family, float(ability.sum()), rng)
+    centres = rng.random((family.clusters, family.dimensions)) * family.world_size
+    sites = _places(family, m, centres, rng)
+    start_task, own = None, None
+    if family.starts is Starts.TASKS:
+        start_task = rng.integers(0, m, n)
+    elif family.starts is Starts.OWN:
+        own = _places(family, n, centres, rng)
+    elif family.starts is Starts.DEPOTS:
+        own = _places(family, family.depots, centres, rng)[rng.integers(0, family.depots, n)]
+    return Instance(
+        name=name or f"random-{n}x{m}-seed-{seed}",
+        ability=ability,
+        workload=workload,
+        agent_position=own,
+        task_position=sites,
+        start_task=start_task,
+        communication_range=_draw(family.communication_range, n, rng),
+        battery=_draw(family.battery, n, rng),
+        speed=_draw(family.speed, n, rng),
+        priority=_draw(family.priority, m, rng),
+        allowed_tasks=None if family.allowed_fraction == 1 else _allowed(family, rng),
+        energy_per_distance=family.energy_per_distance,
+        tau=family.tau,
+    )
+
+
+def _generator(seed: int) -> np.random.Generator:
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise InputError(f"must be a whole number >= 0, got {seed!r}", "seed")
+    return np.random.default_rng(seed)
+
+
+def _abilities_summing_to(total: int, agents: int, rng: np.random.Generator) -> IntArray:
+    """Whole numbers from 1 to 10: uniform at first, then moved by 1 at random agents until the sum is right."""
+    ability = rng.integers(1, 11, agents)
+    while (gap := total - int(ability.sum())) != 0:
+        moves = np.bincount(rng.integers(0, agents, abs(gap)), minlength=agents)
+        ability = np.clip(ability + np.sign(gap) * moves, 1, 10)
+    return ability
+
+
+def _distinct_workloads(total: int, tasks: int, rng: np.random.Generator) -> IntArray:
+    """Distinct positive whole numbers: a Dirichlet(2) spread over the staircase 1, 2, ..., m."""
+    spare = total - tasks * (tasks + 1) // 2
+    spread = np.sort(np.floor(rng.dirichlet(np.full(tasks, 2.0)) * spare).astype(np.int64))
+    spread += np.arange(1, tasks + 1)
+    spread[-1] += total - spread.sum()
+    return rng.permutation(spread)
+
+
+def _abilities(family: Family, rng: np.random.Generator) -> FloatArray:
+    low, high, n = family.ability_min, family.ability_max, family.agents
+    if family.ability is Distribution.EQUAL:
+        ability = np.full(n, high)
+    elif family.ability is Distribution.LOGNORMAL:
+        ability = np.exp(rng.normal(np.log(low * high) / 2, np.log(high / low) / (2 * 1.96), n))
+    elif family.ability is Distribution.PARETO:
+        ability = low * (1 + rng.pareto(1.5, n))
+    elif family.integer:
+        least = max(1, int(np.ceil(low)))
+        ability = rng.integers(least, max(least, int(high)) + 1, n).astype(np.float64)
+    else:
+        ability = rng.uniform(low, high, n)
+    return np.maximum(1.0, np.round(ability)) if family.integer else ability
+
+
+def _workloads(family: Family, ability: float, rng: np.random.Generator) -> FloatArray:
+    m = family.tasks
+    if family.workload is Distribution.EQUAL:
+        weight = np.ones(m)
+    elif family.workload is Distribution.UNIFORM:
+        weight = rng.uniform(0.1, 1.0, m)
+    elif family.workload is Distribution.DIRICHLET:
+        weight = rng.gamma(2.0, 1.0, m)  # in proportion, that is Dirichlet(2)
+    elif family.workload is Distribution.LOGNORMAL:
+        weight = rng.lognormal(0.0, 1.0, m)
+    else:
+        weight = 1 + rng.pareto(1.5, m)
+    share, total = weight / weight.sum(), family.load * ability
+    return _whole(share, max(m, round(total))) if family.integer else share * total
+
+
+def _whole(share: FloatArray, total: int) -> FloatArray:
+    """Round `total` times `share` to whole numbers >= 1 of this total, by the largest remainder."""
+    exact = share * (total - len(share))
+    whole = np.floor(exact)
+    left = int(total - len(share) - whole.sum())
+    whole[np.argsort(whole - exact, kind="stable")[:left]] += 1
+    return whole + 1
+
+
+def _places(family: Family, count: int, centres: FloatArray, rng: np.random.Generator) -> FloatArray:
+    if family.sites is Sites.UNIFORM:
+        return rng.random((count, family.dimensions)) * family.world_size
+    around = centres[rng.integers(0, len(centres), count)]
+    return np.clip(rng.normal(around, 0.05 * family.world_size), 0.0, family.world_size)
+
+
+def _draw(spread: Spread, count: int, rng: np.random.Generator) -> FloatArray | None:
+    if spread is None:
+        return None
+    return rng.uniform(*spread, count) if isinstance(spread, tuple) else np.full(count, float(spread))
+
+
+def _allowed(family: Family, rng: np.random.Generator) -> list[IntArray]:
+    """One random set of tasks per agent, drawn in blocks to bound the memory."""
+    n, m = family.agents, family.tasks
+    size, block = max(1, round(family.allowed_fraction * m)), max(1, 1_000_000 // m)
+    lists: list[IntArray] = []
+    for first in range(0, n, block):
+        order = np.argsort(rng.random((min(block, n - first), m)), axis=1)
+        lists.extend(np.sort(order[:, :size], axis=1))
+    return lists
+
+
+def _number(value: object, name: str, *, positive: bool) -> None:
+    number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
+    if not number or not np.isfinite(value) or value < 0 or (positive and value == 0):  # type: ignore[arg-type, operator, call-overload]
+        raise InputError(f"must be a finite number {'> 0' if positive else '>= 0'}, got {value!r}", name)
+
+
+def _spread(spread: object, name: str) -> None:
+    if spread is None and name != "priority":
+        return
+    ends = spread if isinstance(spread, tuple) else (spread, spread)
+    if len(ends) != 2:
+        raise InputError(f"must be one number, or the two ends of a range, got {spread!r}", name)
+    for end in ends:
+        _number(end, name, positive=name == "speed")
+    if ends[0] > ends[1]:
+        raise InputError(f"must not end ({ends[1]:g}) below its beginning ({ends[0]:g})", name)
+
+
+def _choice(kind: type[StrEnum], value: object, name: str) -> StrEnum:
+    try:
+        return kind(value)  # type: ignore[arg-type]
+    except ValueError:
+        raise InputError(f"must be one of {', '.join(kind)}; got {value!r}", name) from None
