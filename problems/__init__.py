@@ -5,6 +5,7 @@ from alloc.problems.bounds import energy_lower_bound, lp_makespan_lower_bound, m
 from alloc.problems.classes import AgentClasses, agent_classes
 from alloc.problems.errors import InputError
 from alloc.problems.evaluation import Evaluation, Objective, Violation, evaluate
+from alloc.problems.formats import read_allocation, read_instance, write_allocation, write_instance
 from alloc.problems.generate import Family, paper, paper_like, random_instance
 from alloc.problems.instance import IDLE, Instance
 from alloc.problems.matching import contested_tasks, fewest_unserved, serve_all
@@ -31,5 +32,9 @@ __all__ = [
     "paper",
     "paper_like",
     "random_instance",
+    "read_allocation",
+    "read_instance",
     "serve_all",
+    "write_allocation",
+    "write_instance",
 ]

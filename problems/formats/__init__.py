@@ -1,1 +1,26 @@
 """File formats of instances and allocations, and their readers and writers."""
+
+from alloc.problems.formats.allocation_file import (
+    allocation_from_document,
+    allocation_to_document,
+    read_allocation,
+    write_allocation,
+)
+from alloc.problems.formats.document import from_document, to_document
+from alloc.problems.formats.files import read_bytes, read_text, write_bytes_atomically, write_text_atomically
+from alloc.problems.formats.instance_file import read_instance, write_instance
+
+__all__ = [
+    "allocation_from_document",
+    "allocation_to_document",
+    "from_document",
+    "read_allocation",
+    "read_bytes",
+    "read_instance",
+    "read_text",
+    "to_document",
+    "write_allocation",
+    "write_bytes_atomically",
+    "write_instance",
+    "write_text_atomically",
+]

@@ -1,0 +1,99 @@
+"""Allocations as files (alloc-allocation/1), and those inside results (alloc-result/1)."""
+
+from typing import Any
+
+from alloc.problems.allocation import Allocation
+from alloc.problems.errors import InputError
+from alloc.problems.formats import json_text
+from alloc.problems.formats.columns import check_texts, require_format
+from alloc.problems.formats.document import require_known
+from alloc.problems.formats.files import PathLike, named, read_text, write_text_atomically
+from alloc.problems.formats.messages import described, quoted, told
+from alloc.problems.instance import Instance
+
+ALLOCATION_FORMAT = "alloc-allocation/1"
+RESULT_FORMAT = "alloc-result/1"
+
+ALLOCATION_FIELDS = ("format", "instance", "assignment")
+
+
+def read_allocation(path: PathLike, instance: Instance) -> tuple[Allocation, str | None]:
+    """Read an allocation, or the allocation in a result.
+
+    Parameters
+    ----------
+    path : str or path
+        A JSON file whatever its suffix, or ``-`` for standard input.
+    instance : Instance
+        What the ids belong to.
+
+    Returns
+    -------
+    allocation : Allocation
+        Agents that the file leaves out are idle.
+    warning : str or None
+        One line, where the file names another instance.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, breaks the rules of its format, or names an unknown agent or task.
+    """
+    source = named(path)
+    try:
+        document = json_text.parse(read_text(path))
+        allocation, name = allocation_from_document(document, instance)
+    except InputError as error:
+        raise told(error, source) from error.__cause__
+    if name is None or name == instance.name:
+        return allocation, None
+    return allocation, f"{source}: made for instance {quoted(name)}, used for {quoted(instance.name)}"
+
+
+def write_allocation(allocation: Allocation, instance: Instance, path: PathLike) -> None:
+    """Write an allocation as JSON; ``-`` is standard output.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    """
+    try:
+        write_text_atomically(path, json_text.lines(allocation_to_document(allocation, instance)))
+    except InputError as error:
+        raise told(error, named(path, output=True)) from error.__cause__
+
+
+def allocation_to_document(allocation: Allocation, instance: Instance) -> dict[str, Any]:
+    """Return `allocation` as plain objects; every agent appears, idle ones with None."""
+    check_texts([instance.name], "instance")
+    check_texts(instance.agent_ids, "agents[{}].id")
+    check_texts(instance.task_ids, "tasks[{}].id")
+    return {"format": ALLOCATION_FORMAT, "instance": instance.name, "assignment": allocation.to_ids(instance)}
+
+
+def allocation_from_document(document: Any, instance: Instance) -> tuple[Allocation, str | None]:
+    """Return the allocation in plain objects, and the name of the instance that it was made for, if given.
+
+    Raises
+    ------
+    InputError
+        If the document breaks the rules of the format, or names an unknown agent or task.
+    """
+    fields = json_text.require_object(document)
+    require_format(fields.get("format"), (ALLOCATION_FORMAT, RESULT_FORMAT))
+    if fields["format"] == ALLOCATION_FORMAT:
+        require_known(fields, ALLOCATION_FIELDS, "")
+    elif fields.get("status") == "no_solution":
+        raise InputError("this result holds no allocation; give one with another status", "status")
+    name = fields.get("instance")
+    if not isinstance(name, str | None):
+        raise InputError(f"must be a string, got {described(name)}", "instance")
+    if fields.get("assignment") is None:
+        raise InputError("is missing; it must give the task of each agent", "assignment")
+    assignment = json_text.require_object(fields["assignment"], "assignment")
+    if not set(map(type, assignment.values())) <= {str, type(None)}:
+        for agent, task in assignment.items():
+            if not isinstance(task, str | None):
+                raise InputError(f"must be the id of a task, or null, got {described(task)}", f"assignment.{agent}")
+    return Allocation.from_ids(instance, assignment), name

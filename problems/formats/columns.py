@@ -1,0 +1,170 @@
+"""An instance as files hold it: by columns, tasks by their ids, NaN and None for null."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from alloc.problems.errors import InputError, nearest
+from alloc.problems.formats.messages import described, quoted
+from alloc.problems.instance import IDLE, FloatArray, Instance, IntArray
+
+INSTANCE_FORMAT = "alloc-instance/1"
+
+AGENT_FIELDS = ("id", "ability", "position", "start_task", "battery", "range", "speed", "tasks")
+TASK_FIELDS = ("id", "workload", "position", "priority")
+
+DEFAULT_NAME = "instance"
+DEFAULT_TAU = 0.5
+DEFAULT_ENERGY_PER_DISTANCE = 1.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Columns:
+    """What a reader gathered; `build` checks references and makes the instance.
+
+    Attributes
+    ----------
+    agent_ids, task_ids : sequence of str
+    ability, battery, communication_range, speed : ndarray, shape (n,)
+    workload, priority : ndarray, shape (m,)
+        NaN where the file says null.
+    agent_position, task_position : ndarray, shape (n, 3) and (m, 3), or None
+        NaN rows where the file says null; two columns are 2-D positions.
+    start_task : sequence of (str or None), or None
+        Task id of each agent.
+    tasks : sequence of (sequence of str, or None), or None
+        Task ids that each agent may do.
+    """
+
+    agent_ids: Sequence[str]
+    task_ids: Sequence[str]
+    ability: FloatArray
+    workload: FloatArray
+    name: str
+    tau: float = DEFAULT_TAU
+    energy_per_distance: float = DEFAULT_ENERGY_PER_DISTANCE
+    agent_position: FloatArray | None = None
+    task_position: FloatArray | None = None
+    start_task: Sequence[str | None] | None = None
+    battery: FloatArray | None = None
+    communication_range: FloatArray | None = None
+    speed: FloatArray | None = None
+    tasks: Sequence[Sequence[str] | None] | None = None
+    priority: FloatArray | None = None
+
+    def build(self) -> Instance:
+        """Return the instance.
+
+        Raises
+        ------
+        InputError
+            If a value breaks a rule or a reference leads nowhere; its place is in the terms of the JSON format.
+        """
+        check_texts([self.name], "name")
+        check_texts(self.agent_ids, "agents[{}].id")
+        check_texts(self.task_ids, "tasks[{}].id")
+        _require_all(self.ability, "agents[{}].ability", "> 0")
+        _require_all(self.workload, "tasks[{}].workload", ">= 0")
+        index = {name: number for number, name in enumerate(self.task_ids)}
+        return Instance(
+            name=self.name,
+            agent_ids=self.agent_ids,
+            task_ids=self.task_ids,
+            ability=self.ability,
+            workload=self.workload,
+            agent_position=self.agent_position,
+            task_position=self.task_position,
+            start_task=_starts(self.start_task, index),
+            battery=_unlimited(self.battery, "battery"),
+            communication_range=_unlimited(self.communication_range, "range"),
+            speed=_unlimited(self.speed, "speed"),
+            allowed_tasks=_allowed(self.tasks, index),
+            priority=None if self.priority is None else np.where(np.isnan(self.priority), 1.0, self.priority),
+            tau=self.tau,
+            energy_per_distance=self.energy_per_distance,
+        )
+
+
+def check_texts(texts: Sequence[str], place: str) -> None:
+    """Raise `InputError` if a text holds what not every format can keep: NUL, or half a surrogate pair."""
+    if _is_plain("".join(texts)):
+        return
+    row = next(row for row, text in enumerate(texts) if not _is_plain(text))
+    raise InputError(f"must be valid Unicode without NUL characters, got {quoted(texts[row])}", place.format(row))
+
+
+def require_format(found: object, expected: Sequence[str] = (INSTANCE_FORMAT,)) -> None:
+    """Raise `InputError` unless `found` is one of the format names in `expected`."""
+    if found is None:
+        raise InputError(f'is missing; add "format": "{expected[0]}"', "format")
+    if found not in expected:
+        raise InputError(f"must be {' or '.join(map(repr, expected))}, got {described(found)}", "format")
+
+
+def unknown_field(name: str, known: Sequence[str], kind: str = "field") -> str:
+    """Return what to say of a field that no format knows."""
+    return f"unknown {kind} {quoted(name)}{nearest(name[:60], known)}"
+
+
+def plain_numbers(values: FloatArray) -> list[float | int | None]:
+    """Return numbers as written to text: whole ones without a fraction, None for NaN and inf."""
+    numbers: list[float | int | None] = values.tolist()
+    whole = (values == np.floor(values)) & (np.abs(values) < 2**53) & ~((values == 0) & np.signbit(values))
+    for row in np.flatnonzero(whole | ~np.isfinite(values)).tolist():
+        numbers[row] = int(values[row]) if whole[row] else None
+    return numbers
+
+
+def _is_plain(text: str) -> bool:
+    try:
+        text.encode("utf-8")
+    except UnicodeEncodeError:
+        return False
+    return "\0" not in text
+
+
+def _require_all(values: FloatArray, place: str, rule: str) -> None:
+    missing = np.isnan(values)
+    if missing.any():
+        raise InputError(f"is missing; it must be a number {rule}", place.format(int(np.argmax(missing))))
+
+
+def _unlimited(values: FloatArray | None, field: str) -> FloatArray | None:
+    """Turn null into ``inf``, which is how an instance says that there is no limit."""
+    if values is None:
+        return None
+    wrong = np.isinf(values)
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        message = f"must be a finite number, or null for no limit, got {described(float(values[row]))}"
+        raise InputError(message, f"agents[{row}].{field}")
+    return np.where(np.isnan(values), np.inf, values)
+
+
+def _starts(names: Sequence[str | None] | None, index: dict[str, int]) -> IntArray | None:
+    if names is None:
+        return None
+    starts = [IDLE if name is None else index.get(name, IDLE - 1) for name in names]
+    if IDLE - 1 in starts:
+        row = starts.index(IDLE - 1)
+        raise _unknown_task(str(names[row]), index, f"agents[{row}].start_task")
+    return np.array(starts, dtype=np.intp)
+
+
+def _allowed(lists: Sequence[Sequence[str] | None] | None, index: dict[str, int]) -> list[list[int] | None] | None:
+    if lists is None:
+        return None
+    allowed: list[list[int] | None] = []
+    for row, names in enumerate(lists):
+        try:
+            allowed.append(None if names is None else [index[name] for name in names])
+        except KeyError as error:
+            raise _unknown_task(error.args[0], index, f"agents[{row}].tasks") from None
+    return allowed
+
+
+def _unknown_task(name: str, index: dict[str, int], place: str) -> InputError:
+    some = [known[:60] for known in list(index)[:1000]]
+    hint = nearest(name[:60], some) if len(some) <= 12 else nearest(name[:60], some).partition(" (known")[0]
+    return InputError(f"there is no task {quoted(name)}{hint}", place)

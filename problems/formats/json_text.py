@@ -1,0 +1,82 @@
+"""JSON text to plain objects, with every fault told by its line or its place."""
+
+import json
+from collections.abc import Iterable
+from json import JSONDecodeError
+from typing import Any
+
+from alloc.problems.errors import InputError
+from alloc.problems.formats.messages import described, quoted
+
+encode = json.JSONEncoder(ensure_ascii=False, allow_nan=False).encode
+
+
+class RepeatedKey(dict[str, Any]):
+    """An object in which a key occurs twice; found when the object's place is known."""
+
+    repeated = ""
+
+
+def parse(text: str) -> Any:
+    """Return the value of a JSON text; numbers are floats, and those out of range infinite.
+
+    Raises
+    ------
+    InputError
+        If it is no JSON.
+    """
+    if not text.strip():
+        raise InputError("is empty; expected a JSON object")
+    try:
+        # float takes whole numbers of any length, int does not
+        return json.loads(text, object_pairs_hook=_object, parse_int=float)
+    except JSONDecodeError as error:
+        end = " (the file ends here; is it cut off?)" if not text[error.pos :].strip() else ""
+        message = f"is not JSON: {error.msg[0].lower()}{error.msg[1:]}{end}"
+        raise InputError(message, f"line {error.lineno} column {error.colno}") from None
+    except RecursionError:
+        raise InputError("is nested too deeply; the formats need no more than four levels") from None
+
+
+def require_object(value: Any, place: str = "") -> dict[str, Any]:
+    """Return `value` if it is an object whose keys all differ.
+
+    Raises
+    ------
+    InputError
+        If it is not.
+    """
+    if isinstance(value, RepeatedKey):
+        raise InputError(f"the field {quoted(value.repeated)} occurs twice; remove one", place)
+    if not isinstance(value, dict):
+        raise InputError(f"must be a JSON object, got {described(value)}", place)
+    return value
+
+
+def lines(document: dict[str, Any]) -> str:
+    """Return a document as JSON text; its lists and objects take one line per entry."""
+    return "{\n" + ",\n".join(f"{encode(key)}: {_block(value)}" for key, value in document.items()) + "\n}\n"
+
+
+def _block(value: Any) -> str:
+    if isinstance(value, list) and value:
+        return "[\n" + ",\n".join(_indented(map(encode, value))) + "\n]"
+    if isinstance(value, dict) and value:
+        return "{\n" + ",\n".join(_indented(f"{encode(key)}: {encode(entry)}" for key, entry in value.items())) + "\n}"
+    return encode(value)
+
+
+def _indented(entries: Iterable[str]) -> Iterable[str]:
+    return (f"  {entry}" for entry in entries)
+
+
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    plain = dict(pairs)
+    if len(plain) == len(pairs):
+        return plain
+    marked, seen = RepeatedKey(plain), set[str]()
+    for key, _ in pairs:
+        if key in seen:
+            marked.repeated = key
+        seen.add(key)
+    return marked

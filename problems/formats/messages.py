@@ -1,0 +1,42 @@
+"""Values, names and errors in words that fit on one line."""
+
+from typing import Any
+
+from alloc.problems.errors import InputError
+
+LONGEST_NAME = 40
+LONGEST_MESSAGE = 300
+
+
+def described(value: Any) -> str:
+    """Return what a JSON value is, in at most about 50 characters."""
+    if value is None:
+        return "null"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return quoted(value)
+    if isinstance(value, int):
+        return str(value) if abs(value) < 10**20 else "a number of too many digits"
+    if isinstance(value, float):
+        return {"nan": "NaN", "inf": "Infinity", "-inf": "-Infinity"}.get(f"{value:.12g}", f"{value:.12g}")
+    kinds = {list: "a list", tuple: "a list", dict: "an object"}
+    return next((words for kind, words in kinds.items() if isinstance(value, kind)), f"a {type(value).__name__}")
+
+
+def quoted(text: str) -> str:
+    """Return `text` in quotes, with control characters escaped and a long end cut off."""
+    return repr(text if len(text) <= LONGEST_NAME else text[: LONGEST_NAME - 3] + "...")
+
+
+def one_line(text: str, longest: int = LONGEST_MESSAGE) -> str:
+    """Return `text` without line breaks and other control characters, a long middle cut out."""
+    if len(text) > longest:
+        text = f"{text[: longest - 100]} ... {text[-90:]}"
+    return text if text.isprintable() else "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
+
+
+def told(error: InputError, source: str) -> InputError:
+    """Return the same error with its source, fit for one line."""
+    place = one_line(error.place, 100 + LONGEST_NAME)
+    return InputError(one_line(error.message), place, one_line(error.source or source, 4096))
