@@ -6,7 +6,8 @@ from alloc.problems.classes import AgentClasses, agent_classes
 from alloc.problems.errors import InputError
 from alloc.problems.evaluation import Evaluation, Objective, Violation, evaluate
 from alloc.problems.formats import read_allocation, read_instance, write_allocation, write_instance
-from alloc.problems.generate import Family, paper, paper_like, random_instance
+from alloc.problems.generate import paper, paper_like, random_instance
+from alloc.problems.generate_family import Family
 from alloc.problems.instance import IDLE, Instance
 from alloc.problems.matching import contested_tasks, fewest_unserved, serve_all
 from alloc.problems.reach import Reach

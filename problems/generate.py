@@ -1,44 +1,12 @@
-"""Seeded instances: the four scenarios of the paper, and a general family of random ones."""
+"""Seeded instances: the four scenarios of the paper, and those of a general family."""
 
 from dataclasses import dataclass
-from enum import StrEnum
 
 import numpy as np
 
 from alloc.problems.errors import InputError
+from alloc.problems.generate_family import Distribution, Family, Sites, Spread, Starts
 from alloc.problems.instance import FloatArray, Instance, IntArray
-
-MOST = 10_000_000
-"""Agents or tasks beyond which no instance is generated."""
-
-Spread = float | tuple[float, float] | None
-"""One value for all, the ends of a uniform distribution, or None: no limit."""
-
-
-class Distribution(StrEnum):
-    """How abilities or workloads spread."""
-
-    EQUAL = "equal"
-    UNIFORM = "uniform"
-    LOGNORMAL = "lognormal"
-    PARETO = "pareto"
-    DIRICHLET = "dirichlet"
-
-
-class Sites(StrEnum):
-    """How places lie in the world."""
-
-    UNIFORM = "uniform"
-    CLUSTERED = "clustered"
-
-
-class Starts(StrEnum):
-    """Where agents begin."""
-
-    TASKS = "tasks"
-    OWN = "own"
-    DEPOTS = "depots"
-    UNKNOWN = "unknown"
 
 
 @dataclass(frozen=True)
@@ -57,97 +25,6 @@ SCENARIOS = {
     3: Scenario(500, 30, 2400, 30.0),
     4: Scenario(500, 50, 2400, 30.0),
 }
-
-
-@dataclass(frozen=True, kw_only=True)
-class Family:
-    """What random instances look like.
-
-    Parameters
-    ----------
-    agents, tasks : int
-        How many of each.
-    ability : Distribution or str
-        ``equal``: all `ability_max`; ``uniform`` from `ability_min` to `ability_max`; ``lognormal``: 95 % of the agents
-        between the two; ``pareto``: at least `ability_min`, shape 1.5, mean three times that, no upper end.
-    ability_min, ability_max : float
-        Work per hour, > 0.
-    workload : Distribution or str
-        Shares of the total: ``equal``, ``uniform`` (from a tenth to one, before scaling), ``dirichlet`` (with all
-        parameters 2), ``lognormal`` (sigma 1) or ``pareto`` (shape 1.5).
-    load : float
-        Total workload over total ability, > 0; with `integer` as near as whole numbers come, and each at least 1.
-    integer : bool
-        Whether abilities and workloads are whole numbers.
-    sites : Sites or str
-        ``uniform`` in the world, or ``clustered`` around `clusters` centres (normal, a twentieth of the world).
-    clusters : int
-    dimensions : int
-        2 or 3.
-    world_size : float
-        Side of the square or cube, in units of distance, > 0.
-    starts : Starts or str
-        Each agent begins at a random task (``tasks``), at a place of its ``own`` that lies like the sites, at one of
-        `depots` random ``depots``, or nowhere known (``unknown``).
-    depots : int
-    communication_range, battery, speed : float, (float, float) or None
-        In units of distance, of energy, and in distance per hour; None for no limit.
-    priority : float or (float, float)
-    allowed_fraction : float
-        Share of the tasks that each agent may do, > 0; each gets a random set of this share, one task at the least.
-    energy_per_distance, tau : float
-        As in `Instance`.
-
-    Raises
-    ------
-    InputError
-        If a value is out of its range; the error's place is the field.
-    """
-
-    agents: int = 100
-    tasks: int = 20
-    ability: Distribution | str = Distribution.UNIFORM
-    ability_min: float = 1.0
-    ability_max: float = 10.0
-    workload: Distribution | str = Distribution.DIRICHLET
-    load: float = 1.0
-    integer: bool = True
-    sites: Sites | str = Sites.UNIFORM
-    clusters: int = 4
-    dimensions: int = 3
-    world_size: float = 1.0
-    starts: Starts | str = Starts.TASKS
-    depots: int = 1
-    communication_range: Spread = None
-    battery: Spread = 20.0
-    speed: Spread = None
-    priority: float | tuple[float, float] = 1.0
-    allowed_fraction: float = 1.0
-    energy_per_distance: float = 6.0
-    tau: float = 0.5
-
-    def __post_init__(self) -> None:
-        for name in ("agents", "tasks", "clusters", "depots"):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 1 <= value <= MOST:
-                raise InputError(f"must be a whole number from 1 to {MOST}, got {value!r}", name)
-        for name in ("ability_min", "ability_max", "load", "world_size", "allowed_fraction"):
-            _number(getattr(self, name), name, positive=True)
-        if self.ability_max < self.ability_min:
-            raise InputError(
-                f"must be at least ability_min = {self.ability_min:g}, got {self.ability_max:g}", "ability_max"
-            )
-        if self.allowed_fraction > 1:
-            raise InputError(f"must be > 0 and at most 1, got {self.allowed_fraction:g}", "allowed_fraction")
-        if self.dimensions not in (2, 3):
-            raise InputError(f"must be 2 or 3, got {self.dimensions!r}", "dimensions")
-        for name in ("communication_range", "battery", "speed", "priority"):
-            _spread(getattr(self, name), name)
-        choices = {"ability": Distribution, "workload": Distribution, "sites": Sites, "starts": Starts}
-        for name, kind in choices.items():
-            object.__setattr__(self, name, _choice(kind, getattr(self, name), name))
-        if self.ability is Distribution.DIRICHLET:
-            raise InputError("dirichlet shares a total out, and is for workloads alone", "ability")
 
 
 def paper(scenario: int, seed: int) -> Instance:
@@ -334,28 +211,3 @@ def _allowed(family: Family, rng: np.random.Generator) -> list[IntArray]:
         order = np.argsort(rng.random((min(block, n - first), m)), axis=1)
         lists.extend(np.sort(order[:, :size], axis=1))
     return lists
-
-
-def _number(value: object, name: str, *, positive: bool) -> None:
-    number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
-    if not number or not np.isfinite(value) or value < 0 or (positive and value == 0):  # type: ignore[arg-type, operator, call-overload]
-        raise InputError(f"must be a finite number {'> 0' if positive else '>= 0'}, got {value!r}", name)
-
-
-def _spread(spread: object, name: str) -> None:
-    if spread is None and name != "priority":
-        return
-    ends = spread if isinstance(spread, tuple) else (spread, spread)
-    if len(ends) != 2:
-        raise InputError(f"must be one number, or the two ends of a range, got {spread!r}", name)
-    for end in ends:
-        _number(end, name, positive=name == "speed")
-    if ends[0] > ends[1]:
-        raise InputError(f"must not end ({ends[1]:g}) below its beginning ({ends[0]:g})", name)
-
-
-def _choice(kind: type[StrEnum], value: object, name: str) -> StrEnum:
-    try:
-        return kind(value)  # type: ignore[arg-type]
-    except ValueError:
-        raise InputError(f"must be one of {', '.join(kind)}; got {value!r}", name) from None
