@@ -1,0 +1,87 @@
+"""Stored policies: weights in safetensors with a description that must match; a policy file never runs code."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+
+import torch
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save
+
+from alloc.allocators.learned.network import ActorCritic, NetworkSize
+from alloc.problems import InputError
+from alloc.problems.game import FEATURE_SET, PAIR_FEATURES, TASK_FEATURES
+
+POLICY_FORMAT = "alloc-policy/1"
+
+
+def save_policy(path: Path | str, networks: Sequence[ActorCritic], method: str) -> None:
+    """Store networks, the best first.
+
+    Parameters
+    ----------
+    path : Path or str
+    networks : sequence of ActorCritic
+        All of one size.
+    method : str
+        The method that trained them.
+    """
+    tensors = {
+        f"{number}.{name}": weight.contiguous()
+        for number, network in enumerate(networks)
+        for name, weight in network.state_dict().items()
+    }
+    Path(path).write_bytes(save(tensors, metadata=_description(networks[0].size, len(networks), method)))
+
+
+def _description(size: NetworkSize, count: int, method: str) -> dict[str, str]:
+    return {
+        "format": POLICY_FORMAT,
+        "method": method,
+        "features": FEATURE_SET,
+        "feature_counts": json.dumps([PAIR_FEATURES, TASK_FEATURES]),
+        "networks": str(count),
+        "size": json.dumps(asdict(size)),
+    }
+
+
+def load_policy(path: Path | str, method: str, device: str = "cpu") -> list[ActorCritic]:
+    """Read networks, the best first, ready to be used.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, was made by another method, or for other features or sizes than this version has.
+    """
+    source = str(path)
+    try:
+        with safe_open(source, framework="pt", device=device) as file:
+            said = file.metadata() or {}
+            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
+    except FileNotFoundError:
+        raise InputError("no such policy file", "", source) from None
+    except (OSError, SafetensorError) as error:
+        raise InputError(
+            f"is not a policy file ({str(error).splitlines()[0]}); use one by `alloc train`", "", source
+        ) from None
+    try:
+        size, count = NetworkSize(**json.loads(said["size"])), int(said["networks"])
+    except (KeyError, TypeError, ValueError):
+        raise InputError("does not describe its networks; use a file by `alloc train`", "metadata", source) from None
+    expected = _description(size, count, method)
+    for key in ("format", "method", "features", "feature_counts"):
+        if said.get(key) != expected[key]:
+            raise InputError(f"is {said.get(key)!r}, this version needs {expected[key]!r}; train anew", key, source)
+    try:
+        return [_network(size, tensors, number, device) for number in range(count)]
+    except (RuntimeError, ValueError) as error:
+        reason = str(error).splitlines()[0]
+        raise InputError(f"holds other weights than its size says ({reason})", "size", source) from None
+
+
+def _network(size: NetworkSize, tensors: dict[str, torch.Tensor], number: int, device: str) -> ActorCritic:
+    network = ActorCritic(size).to(device)
+    prefix = f"{number}."
+    network.load_state_dict({name.removeprefix(prefix): t for name, t in tensors.items() if name.startswith(prefix)})
+    return network.eval().requires_grad_(False)

@@ -1,0 +1,154 @@
+"""A population of actor-critics, bred by a genetic algorithm with DEAP's operators.
+
+References
+----------
+Fang et al. (2025), Algorithm 1 and equation (12), doi:10.20944/preprints202502.0192.v1; Fortin et al. (2012),
+JMLR 13:2171-2175 (DEAP). Unlike Algorithm 1, which evolves only after all training, generations and gradient steps
+alternate here, as in population-based training (Jaderberg et al. 2017, arXiv:1711.09846).
+"""
+
+import copy
+import random
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from deap import base, tools
+from torch.nn.utils import parameters_to_vector, vector_to_parameters
+
+from alloc.allocators.learned.network import ActorCritic
+
+
+@dataclass(frozen=True)
+class BreedingParameters:
+    """How a generation follows from the last.
+
+    Attributes
+    ----------
+    elite : int
+        Members that pass unchanged.
+    tournament : int
+        Members that compete to be a parent.
+    crossover_probability : float
+        Chance that a child blends the weights of two parents.
+    mutation_probability : float
+        Chance that a child's weights are disturbed.
+    mutated_share : float
+        Share of the weights that a mutation disturbs.
+    mutation_size : float
+        Standard deviation of the disturbance.
+    return_weight, entropy_weight, cost_weight : float
+        alpha, beta and gamma of (12).
+    """
+
+    elite: int = 2
+    tournament: int = 2
+    crossover_probability: float = 0.3
+    mutation_probability: float = 0.5
+    mutated_share: float = 0.1
+    mutation_size: float = 0.01
+    return_weight: float = 1.0
+    entropy_weight: float = 0.02
+    cost_weight: float = 0.02
+
+
+@dataclass(eq=False)
+class Member:
+    """One actor-critic with its optimiser; training changes it in place."""
+
+    network: ActorCritic
+    optimiser: torch.optim.Optimizer
+
+    @property
+    def learning_rate(self) -> float:
+        """Step size of the optimiser, adapted by PPO and disturbed by mutation."""
+        return float(self.optimiser.param_groups[0]["lr"])
+
+
+class _Fitness(base.Fitness):  # type: ignore[misc]
+    weights = (1.0,)
+
+
+class _Genome(list):  # type: ignore[type-arg]
+    """All weights of a network, as DEAP's operators want them."""
+
+    def __init__(self, weights: Sequence[float], number: int, fitness: float) -> None:
+        super().__init__(weights)
+        self.number = number
+        self.fitness = _Fitness((fitness,))
+
+
+def new_member(network: ActorCritic, learning_rate: float) -> Member:
+    """Give `network` a fresh Adam optimiser."""
+    return Member(network, torch.optim.Adam(network.parameters(), learning_rate))
+
+
+def fitness(
+    returns: Sequence[float], entropies: Sequence[float], evaluations: Sequence[int], parameters: BreedingParameters
+) -> list[float]:
+    """Equation (12): returns and entropies count for a member, its cost against it, each over the largest.
+
+    Parameters
+    ----------
+    returns : sequence of float
+        Cumulative reward of each member on the validation games.
+    entropies : sequence of float
+        Mean entropy of each policy.
+    evaluations : sequence of int
+        Network evaluations that each member spent, the cost E_i.
+    """
+    terms = (
+        (parameters.return_weight, returns),
+        (parameters.entropy_weight, entropies),
+        (-parameters.cost_weight, evaluations),
+    )
+    total = np.zeros(len(returns))
+    for weight, values in terms:
+        scores = np.asarray(values, dtype=float)
+        total += weight * scores / max(float(np.abs(scores).max()), 1e-12)
+    return [float(value) for value in total]
+
+
+def breed(
+    members: Sequence[Member], scores: Sequence[float], parameters: BreedingParameters, seed: int
+) -> list[Member]:
+    """Return the next generation: the elite, and children of tournament winners by crossover and mutation."""
+    genomes = [
+        _Genome(parameters_to_vector(member.network.parameters()).tolist(), number, score)
+        for number, (member, score) in enumerate(zip(members, scores, strict=True))
+    ]
+    elite = tools.selBest(genomes, parameters.elite)
+    following = [members[genome.number] for genome in elite]
+    with _seeded(seed):
+        while len(following) < len(members):
+            mother, father = tools.selTournament(genomes, 2, parameters.tournament)
+            following.append(_child(members[mother.number], mother, father, parameters))
+    return following
+
+
+def _child(parent: Member, mother: _Genome, father: _Genome, parameters: BreedingParameters) -> Member:
+    genome = copy.deepcopy(mother)
+    if random.random() < parameters.crossover_probability:
+        genome, _ = tools.cxBlend(genome, copy.deepcopy(father), alpha=0.0)
+    factor = 1.0
+    if random.random() < parameters.mutation_probability:
+        (genome,) = tools.mutGaussian(genome, 0.0, parameters.mutation_size, parameters.mutated_share)
+        factor = random.choice((0.8, 1.25))
+    child = new_member(copy.deepcopy(parent.network), parent.learning_rate)
+    child.optimiser.load_state_dict(copy.deepcopy(parent.optimiser.state_dict()))
+    child.optimiser.param_groups[0]["lr"] = parent.learning_rate * factor
+    vector_to_parameters(torch.tensor(list(genome)), child.network.parameters())
+    return child
+
+
+@contextmanager
+def _seeded(seed: int) -> Iterator[None]:
+    """DEAP draws from the global generator: seed it, and give it back as it was."""
+    before = random.getstate()
+    random.seed(seed)
+    try:
+        yield
+    finally:
+        random.setstate(before)

@@ -1,0 +1,241 @@
+"""Playing many games at once on one instance, scoring anew after a move only what it touched."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import torch
+from torch import Tensor
+
+from alloc.allocators.learned.network import BARRED, ActorCritic
+from alloc.problems.game import (
+    Board,
+    State,
+    begin,
+    deficit,
+    flown,
+    group_ability,
+    observe_pairs,
+    observe_tasks,
+    pair_features,
+)
+
+SCORE_CHUNK = 250_000
+"""Pairs scored at once, to bound the memory."""
+
+TIE = 1e-5
+"""Relative difference below which two makespans in single precision are taken for equal."""
+
+
+@dataclass(frozen=True, eq=False)
+class Best:
+    """The best position that each game passed through.
+
+    Attributes
+    ----------
+    task : Tensor of int, shape (B, n)
+    unserved : Tensor, shape (B,)
+    time : Tensor, shape (B,)
+        Makespan of the served tasks over the reference makespan.
+    distance : Tensor, shape (B,)
+    """
+
+    task: Tensor
+    unserved: Tensor
+    time: Tensor
+    distance: Tensor
+
+    def improved_by(self, other: "Best") -> "Best":
+        """Return the better of two positions for each game: fewer unserved, then sooner, then nearer."""
+        same = (other.time - self.time).abs() <= TIE * self.time
+        sooner = (other.time < self.time) & ~same
+        better = (other.unserved < self.unserved) | (
+            (other.unserved == self.unserved) & (sooner | (same & (other.distance < self.distance)))
+        )
+        return Best(
+            torch.where(better[:, None], other.task, self.task),
+            torch.where(better, other.unserved, self.unserved),
+            torch.where(better, other.time, self.time),
+            torch.where(better, other.distance, self.distance),
+        )
+
+
+def repeat(board: Board, price: Tensor) -> Board:
+    """Return as many copies of a board with one game as there are prices; the copies share their memory."""
+
+    def copies(tensor: Tensor) -> Tensor:
+        return tensor.expand(len(price), *tensor.shape[1:])
+
+    return Board(
+        copies(board.ability),
+        copies(board.target),
+        copies(board.distance),
+        copies(board.legal),
+        copies(board.start),
+        price,
+    )
+
+
+@torch.no_grad()
+def play(
+    network: ActorCritic,
+    board: Board,
+    *,
+    steps: int,
+    moves_per_step: int = 1,
+    temperature: float = 0.0,
+    generator: torch.Generator | None = None,
+    should_stop: Callable[[], bool] = lambda: False,
+) -> Best:
+    """Play the games on `board` and return the best positions on the way.
+
+    Parameters
+    ----------
+    network : ActorCritic
+    board : Board
+        Copies of one game, see `repeat`.
+    steps : int
+        Most steps.
+    moves_per_step : int
+        Bids granted at once, at most; they share no task and no agent.
+    temperature : float
+        0 grants the best bid; above 0 bids are drawn with their logits divided by it.
+    generator : torch.Generator
+        Source of the draws.
+    should_stop : callable
+        Asked before each step, and between chunks of the first scoring.
+    """
+    state = begin(board)
+    best = _position(board, state)
+    game = _Game(network, board, state, should_stop)
+    for _ in range(steps):
+        if should_stop() or bool(state.done.all()):
+            break
+        logits = game.logits(state)
+        if temperature > 0:
+            noise = torch.empty_like(logits).exponential_(generator=generator).log_()
+            logits = logits / temperature - noise
+        state = game.move(state, logits, moves_per_step)
+        best = best.improved_by(_position(board, state))
+    return best
+
+
+class _Game:
+    """Local scores of all pairs, kept up to date move by move."""
+
+    def __init__(self, network: ActorCritic, board: Board, state: State, should_stop: Callable[[], bool]) -> None:
+        self.network, self.board = network, board
+        self.target = board.target.clamp(min=1e-3)
+        self.barred = torch.zeros(board.legal.shape[1:]).masked_fill_(~board.legal[0], BARRED)
+        self.score = torch.full(board.shape, BARRED)
+        for agents in _chunks(board, SCORE_CHUNK):
+            if should_stop():
+                break
+            part = replace(
+                board,
+                ability=board.ability[:, agents],
+                distance=board.distance[:, agents],
+                legal=board.legal[:, agents],
+            )
+            there = State(state.task[:, agents], state.group, state.done)
+            self.score[:, agents] = network.local(observe_pairs(part, there))[..., 0]
+
+    def logits(self, state: State) -> Tensor:
+        """Return the logits of all bids and of stopping, shape (B, n * (m + 1) + 1)."""
+        token = self.network.tasks(observe_tasks(self.board, state))
+        bid = self.network.pointer(token, state.task, self.board.ability)
+        bid += self.score
+        bid += self.barred
+        bid.scatter_(2, state.task[..., None], BARRED)
+        return torch.cat([bid.flatten(1), self.network.heads(token)[0][:, None]], 1)
+
+    def move(self, state: State, logits: Tensor, moves: int) -> State:
+        """Grant bids in every game that is not done, and score anew what they touched."""
+        _, n, places = self.board.shape
+        choice = logits.argmax(1)
+        done = state.done | (choice == n * places)
+        task = state.task.clone()
+        rows, agents, goals = _granted(choice, done, places) if moves == 1 else _disjoint(logits, state, places, moves)
+        sources = task[rows, agents]
+        task[rows, agents] = goals
+        after = State(task, group_ability(self.board, task), done)
+        if len(rows):
+            self._score_columns(after, rows, torch.stack([sources, goals], 1))
+            self._score_rows(after, rows, agents, sources, goals)
+        return after
+
+    def _own(self, lack: Tensor, state: State) -> tuple[Tensor, Tensor, Tensor]:
+        return (
+            lack.gather(1, state.task),
+            self.target.gather(1, state.task),
+            self.board.distance.gather(2, state.task[..., None])[..., 0],
+        )
+
+    def _score_columns(self, state: State, rows: Tensor, columns: Tensor) -> None:
+        """What every agent of the games `rows` thinks of the tasks `columns`, shape (k, 2)."""
+        lack = deficit(self.board, state)
+        own_lack, own_target, own_distance = self._own(lack, state)
+        own = (own_lack[rows, :, None], own_target[rows, :, None], own_distance[rows, :, None])
+        distance = self.board.distance[rows[:, None], :, columns].transpose(1, 2)
+        other = (lack[rows].gather(1, columns)[:, None], self.target[rows].gather(1, columns)[:, None], distance)
+        seen = pair_features(self.board.price[rows, None, None], self.board.ability[rows, :, None], own, other)
+        self.score[rows[:, None], :, columns] = self.network.local(seen)[..., 0].transpose(1, 2)
+
+    def _score_rows(self, state: State, rows: Tensor, agents: Tensor, sources: Tensor, goals: Tensor) -> None:
+        """What those who moved, and those at the tasks that changed, think of all tasks."""
+        touched = torch.zeros(self.board.target.shape, dtype=torch.bool)
+        touched[rows, sources] = True
+        touched[rows, goals] = True
+        touched[:, -1] = False  # those who are idle see no change in their own place
+        concerned = touched.gather(1, state.task)
+        concerned[rows, agents] = True
+        game, agent = torch.nonzero(concerned, as_tuple=True)
+        lack = deficit(self.board, state)
+        own_lack, own_target, own_distance = (part[game, agent, None] for part in self._own(lack, state))
+        other = (lack[game], self.target[game], self.board.distance[game, agent])
+        seen = pair_features(
+            self.board.price[game, None],
+            self.board.ability[game, agent, None],
+            (own_lack, own_target, own_distance),
+            other,
+        )
+        self.score[game, agent] = self.network.local(seen)[..., 0]
+
+
+def _chunks(board: Board, size: int) -> Iterator[slice]:
+    batch, n, places = board.shape
+    width = max(1, size // (batch * places))
+    return (slice(first, first + width) for first in range(0, n, width))
+
+
+def _granted(choice: Tensor, done: Tensor, places: int) -> tuple[Tensor, Tensor, Tensor]:
+    rows = torch.nonzero(~done)[:, 0]
+    return rows, choice[rows] // places, choice[rows] % places
+
+
+def _disjoint(logits: Tensor, state: State, places: int, moves: int) -> tuple[Tensor, Tensor, Tensor]:
+    """The best bids that share no task (but the place of the idle) and no agent, up to `moves` per game."""
+    stop = logits.shape[1] - 1
+    top = logits.topk(min(8 * moves, stop), dim=1)
+    granted: list[tuple[int, int, int]] = []
+    for game, actions in enumerate(top.indices.tolist()):
+        used: set[int] = set()
+        agents: set[int] = set()
+        for action in [] if bool(state.done[game]) else actions:
+            if action == stop or len(agents) == moves:
+                break
+            agent, goal = divmod(action, places)
+            source = int(state.task[game, agent])
+            if agent in agents or source in used or goal in used:
+                continue
+            agents.add(agent)
+            used |= {source, goal} - {places - 1}
+            granted.append((game, agent, goal))
+    return tuple(torch.tensor(granted, dtype=torch.long).reshape(-1, 3).unbind(1))  # type: ignore[return-value]
+
+
+def _position(board: Board, state: State) -> Best:
+    target, group = board.target[:, :-1], state.group[:, :-1]
+    needed = target > 0
+    empty = needed & (group <= 0)
+    time = (target / group.clamp(min=1e-9)).masked_fill(~needed | empty, 0.0).amax(1)
+    return Best(state.task, empty.sum(1), time, flown(board, state))
