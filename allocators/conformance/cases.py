@@ -1,0 +1,97 @@
+"""Instances small enough to know their optimum by trying everything, each with something that methods stumble over."""
+
+from functools import cache
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from alloc.problems import IDLE, Allocation, Evaluation, Instance, Objective, evaluate
+
+NAN, INF = np.nan, np.inf
+
+
+def _case(name: str, **changes: Any) -> Instance:
+    """Return five agents of integer ability around three tasks, but for `changes`; None takes a field away."""
+    fields: dict[str, Any] = {
+        "ability": (5, 3, 3, 2, 1),
+        "workload": (6, 5, 3),
+        "agent_position": ((0.5, 0.0), (3.0, 0.5), (1.0, 1.0), (0.0, 2.5), (4.0, 3.0)),
+        "task_position": ((0.0, 0.0), (4.0, 0.0), (0.0, 3.0)),
+    }
+    return Instance(name=name, **fields | changes)
+
+
+def _bare(name: str, **fields: Any) -> Instance:
+    """Return an instance without positions."""
+    return _case(name, **{"agent_position": None, "task_position": None} | fields)
+
+
+CASES: dict[str, Instance] = {
+    case.name: case
+    for case in (
+        _case("integer"),
+        _case("real", ability=(0.731, 2.25, 1.9, 0.404, 1.11), workload=(1.37, 3.3, 0.951)),
+        _case("ranges", communication_range=(3.0, 2.0, 1.5, 3.0, 4.5)),
+        _case("batteries", battery=(9.0, 4.0, 5.0, INF, 12.0), energy_per_distance=2.5, tau=0.9),
+        _case("allowed tasks", allowed_tasks=([0, 1], None, [2], [], [1, 2])),
+        _case("zero workloads", workload=(0, 4, 0)),
+        _bare("nothing to do", ability=(2, 1), workload=(0, 0)),
+        _bare("fewer agents than tasks", ability=(3, 1), workload=(2, 5, 1, 4)),
+        _case("unreachable task", task_position=((0, 0), (4, 0), (99, 99)), communication_range=(9,) * 5),
+        _bare("contested agent", ability=(3, 2, 2), workload=(4, 1, 2), allowed_tasks=([0, 1], [2], [2])),
+        _bare("one way to serve all", ability=(9, 1, 1), workload=(1, 5, 5), allowed_tasks=(None, [0], [0, 2])),
+        _case(
+            "missing positions",
+            agent_position=((0.5, 0), (NAN, NAN), (1, 1), (NAN, NAN), (4, 3)),
+            task_position=((0, 0), (NAN, NAN), (0, 3)),
+            communication_range=(3.5,) * 5,
+        ),
+        _case("start tasks", agent_position=None, start_task=(0, 0, 2, 1, IDLE), battery=(4,) * 5),
+        _case("alike", ability=(2,) * 5, workload=(7, 5, 5), agent_position=None, start_task=(0,) * 5),
+        _bare("one agent, one task", ability=(2,), workload=(3,)),
+        _bare("large numbers", ability=(7e8, 3e9, 2e9, 9e8), workload=(8e11, 5e11, 2e11), tau=0.01),
+        _bare("small numbers", ability=(7e-9, 3e-8, 2e-8, 9e-9), workload=(8e-12, 5e-12, 2e-12)),
+        _case("travel times", speed=(1.0, 2.0, 4.0, 2.0, 8.0)),
+        _case("some travel times", speed=(INF, 0.5, 3.0, INF, 1.0), communication_range=(4,) * 5),
+    )
+}
+
+
+def large_case() -> Instance:
+    """Return an instance that takes every method a while: real numbers, ranges, no two agents alike."""
+    rng = np.random.default_rng(20250101)
+    n, m = 150, 15
+    return Instance(
+        name="large",
+        ability=rng.uniform(1, 10, n),
+        workload=rng.uniform(10, 100, m),
+        agent_position=rng.random((n, 3)),
+        task_position=rng.random((m, 3)),
+        communication_range=rng.uniform(0.5, 1.2, n),
+    )
+
+
+@cache
+def every_evaluation(case: str) -> tuple[Evaluation, ...]:
+    """Return the scores of all allocations of a case that leave as few tasks unserved as can be."""
+    instance = CASES[case]
+    options = [[IDLE, *np.flatnonzero(row).tolist()] for row in instance.reach.mask[instance.reach.origin]]
+    scores = [evaluate(instance, Allocation(choice)) for choice in product(*options)]
+    fewest = min(len(score.unserved_tasks) for score in scores)
+    return tuple(score for score in scores if len(score.unserved_tasks) == fewest)
+
+
+@cache
+def optimum(case: str, objective: Objective) -> Evaluation:
+    """Return the best scores that any allocation of a case has."""
+    best, *others = every_evaluation(case)
+    for score in others:
+        if score.is_better_than(best, objective):
+            best = score
+    return best
+
+
+def least_energy(case: str, makespan: float) -> float:
+    """Return the least energy of the allocations of a case with at most this makespan."""
+    return min(score.energy for score in every_evaluation(case) if score.served_makespan <= makespan * (1 + 1e-9))

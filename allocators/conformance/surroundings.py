@@ -1,0 +1,41 @@
+"""What an allocator must leave as it was: the instance, and what a process has but once."""
+
+import os
+import pickle
+import random
+import signal
+import sys
+from dataclasses import fields
+
+import numpy as np
+
+from alloc.problems import Instance
+
+
+def instance_state(instance: Instance) -> dict[str, object]:
+    """Return every field of `instance`, and its reach, as values that can be compared."""
+    state = {field.name: pickle.dumps(getattr(instance, field.name)) for field in fields(instance)}
+    for name in ("origin", "distance", "mask"):
+        state[f"reach.{name}"] = getattr(instance.reach, name).tobytes()
+    return dict(state)
+
+
+def process_state() -> dict[str, object]:
+    """Return the global generators and settings that a method might disturb, as values that can be compared."""
+    state: dict[str, object] = {
+        "random": random.getstate(),
+        "numpy.random": pickle.dumps(np.random.get_state()),  # noqa: NPY002 (the global state is what is watched)
+        "numpy.errstate": tuple(np.geterr().items()),
+        "environment": dict(os.environ),
+        "working directory": os.getcwd(),
+        "signal handlers": (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)),
+        "recursion limit": sys.getrecursionlimit(),
+    }
+    torch = sys.modules.get("torch")
+    if torch is not None:
+        state["torch.random"] = torch.get_rng_state().numpy().tobytes()
+        state["torch.dtype"] = torch.get_default_dtype()
+        state["torch.grad"] = torch.is_grad_enabled()
+        state["torch.threads"] = torch.get_num_threads()
+        state["torch.deterministic"] = torch.are_deterministic_algorithms_enabled()
+    return state
