@@ -14,6 +14,7 @@ from alloc.problems import (
     Objective,
     evaluate,
     makespan_lower_bound,
+    serve_all,
 )
 
 PROVEN = 1e-6
@@ -86,7 +87,7 @@ class Search:
     budget : Budget
     seed : int
     start : Allocation or None
-        A warm start, already submitted.
+        A warm start, already submitted; agents sent where they cannot go are idle in it.
     threads : int
         Threads that the method may use.
     lower_bound : float
@@ -116,7 +117,9 @@ class Search:
         self.trace: list[Improvement] = []
         self.lower_bound = makespan_lower_bound(instance)
         if start is not None:
-            self.submit(start)
+            evaluate(instance, start)  # says what is wrong with a start of another size
+            self.start = serve_all(instance, start)  # agents that can no longer go where they were sent are idle
+            self.submit(self.start)
 
     @property
     def elapsed_s(self) -> float:
