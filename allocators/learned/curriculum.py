@@ -11,7 +11,8 @@ import numpy as np
 
 from alloc.problems import Instance, lp_makespan_lower_bound, makespan_lower_bound
 from alloc.problems.game import Board, make_board
-from alloc.problems.generate import Family, paper_like, random_instance
+from alloc.problems.generate import paper_like, random_instance
+from alloc.problems.generate_family import Family
 
 TRAINING_SEED = 10**9
 VALIDATION_SEED = 2 * 10**9

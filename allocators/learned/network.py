@@ -60,14 +60,14 @@ class ActorCritic(nn.Module):
         token = torch.relu(self.embed(features))
         token = token + self.attend(token, token, token, need_weights=False)[0]
         token = token + self.mix(token)
-        return nn.functional.layer_norm(token, token.shape[-1:])
+        return nn.functional.layer_norm(token, list(token.shape[-1:]))
 
     def pointer(self, token: Tensor, task: Tensor, ability: Tensor) -> Tensor:
         """Compare each agent's group with each task: shape (B, n, m + 1)."""
         group = token.gather(1, task[..., None].expand(-1, -1, token.shape[2]))
         query = self.query(torch.cat([group, ability[..., None] - 1], -1))
         likeness: Tensor = query @ self.key(token).transpose(1, 2)
-        return likeness / token.shape[2] ** 0.5
+        return likeness.div(token.shape[2] ** 0.5)
 
     def heads(self, token: Tensor) -> tuple[Tensor, Tensor]:
         """Return the logit of stopping and the value of the state, both of shape (B,)."""

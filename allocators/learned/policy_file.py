@@ -11,6 +11,7 @@ from safetensors.torch import save
 
 from alloc.allocators.learned.network import ActorCritic, NetworkSize
 from alloc.problems import InputError
+from alloc.problems.formats import write_bytes_atomically
 from alloc.problems.game import FEATURE_SET, PAIR_FEATURES, TASK_FEATURES
 
 POLICY_FORMAT = "alloc-policy/1"
@@ -32,7 +33,7 @@ def save_policy(path: Path | str, networks: Sequence[ActorCritic], method: str) 
         for number, network in enumerate(networks)
         for name, weight in network.state_dict().items()
     }
-    Path(path).write_bytes(save(tensors, metadata=_description(networks[0].size, len(networks), method)))
+    write_bytes_atomically(path, save(tensors, metadata=_description(networks[0].size, len(networks), method)))
 
 
 def _description(size: NetworkSize, count: int, method: str) -> dict[str, str]:
@@ -63,7 +64,9 @@ def load_policy(path: Path | str, method: str, device: str = "cpu") -> list[Acto
         raise InputError("no such policy file", "", source) from None
     except (OSError, SafetensorError) as error:
         raise InputError(
-            f"is not a policy file ({str(error).splitlines()[0]}); use one by `alloc train`", "", source
+            f"is not a policy file ({next(iter(str(error).splitlines()), type(error).__name__)}); use one by `alloc train`",
+            "",
+            source,
         ) from None
     try:
         size, count = NetworkSize(**json.loads(said["size"])), int(said["networks"])
@@ -76,7 +79,7 @@ def load_policy(path: Path | str, method: str, device: str = "cpu") -> list[Acto
     try:
         return [_network(size, tensors, number, device) for number in range(count)]
     except (RuntimeError, ValueError) as error:
-        reason = str(error).splitlines()[0]
+        reason = next(iter(str(error).splitlines()), type(error).__name__)
         raise InputError(f"holds other weights than its size says ({reason})", "size", source) from None
 
 

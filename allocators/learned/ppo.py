@@ -174,7 +174,7 @@ def update(
             entropy = policy.entropy()
             objective = loss(shift.exp(), advantage[index], value, target[index], entropy, parameters)
             optimiser.zero_grad(set_to_none=True)
-            objective.backward()  # type: ignore[no-untyped-call]
+            objective.backward()
             nn.utils.clip_grad_norm_(network.parameters(), parameters.max_gradient_norm)
             optimiser.step()
             divergences.append(float((shift.detach().exp() - 1 - shift.detach()).mean()))

@@ -7,6 +7,7 @@ Fang et al. (2025), Algorithm 1, doi:10.20944/preprints202502.0192.v1.
 
 import copy
 import csv
+import json
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, fields
@@ -106,12 +107,21 @@ class Trainer:
         self.scores = [0.0] * len(self.members)
         self._validation = validation_boards()
 
-    def advance(self) -> Report:
-        """Train, judge and breed one generation."""
+    def advance(self, should_stop: Callable[[], bool] = lambda: False) -> Report | None:
+        """Train, judge and breed one generation.
+
+        Returns
+        -------
+        Report or None
+            None if `should_stop`, asked between updates, said so: the generation then is unfinished, and the run can
+            only be taken up from its last checkpoint.
+        """
         began = time.monotonic()
         statistics, costs = [], []
         for member in self.members:
-            member_statistics, cost = self._train(member)
+            member_statistics, cost = self._train(member, should_stop)
+            if should_stop():
+                return None
             statistics.append(member_statistics)
             costs.append(cost)
         self.evaluations += sum(costs)
@@ -136,11 +146,13 @@ class Trainer:
         )
         return report
 
-    def _train(self, member: Member) -> tuple[UpdateStatistics, int]:
+    def _train(self, member: Member, should_stop: Callable[[], bool]) -> tuple[UpdateStatistics, int]:
         """Update one member; also return how many network evaluations, states times pairs, that took."""
         curriculum, ppo = self.parameters.curriculum, self.parameters.ppo
         cost, result = 0, UpdateStatistics(0.0, 0.0, 0)
         for _ in range(self.parameters.updates_per_generation):
+            if should_stop():
+                break
             board = curriculum.draw(self.rng)
             played = collect(member.network, board, curriculum.steps(board), ppo, self.generator)
             result = update(member.network, member.optimiser, board, played, ppo, self.generator)
@@ -161,7 +173,6 @@ class Trainer:
         beside.replace(path)
 
     def _state(self) -> dict[str, Any]:
-        numpy_state = self.rng.bit_generator.state["state"]
         return {
             "format": CHECKPOINT_FORMAT,
             "seed": self.seed,
@@ -169,7 +180,7 @@ class Trainer:
             "seconds": self.seconds,
             "evaluations": self.evaluations,
             "network": asdict(self.parameters.network),
-            "numpy": {key: str(value) for key, value in numpy_state.items()},
+            "numpy": json.dumps(self.rng.bit_generator.state),
             "torch": self.generator.get_state(),
             "members": [(m.network.state_dict(), m.optimiser.state_dict()) for m in self.members],
         }
@@ -190,15 +201,14 @@ class Trainer:
         except FileNotFoundError:
             raise InputError("no such checkpoint", "", str(path)) from None
         except Exception as error:
-            reason = str(error).splitlines()[0][:100]
+            reason = next(iter(str(error).splitlines()), type(error).__name__)[:100]
             raise InputError(f"is not a checkpoint of this version ({reason})", "", str(path)) from None
         trainer = cls(parameters, seed=state["seed"])
         if len(state["members"]) != len(trainer.members) or state["network"] != asdict(trainer.parameters.network):
             raise InputError("was made with another population or network size; use the same", "", str(path))
         trainer.generation, trainer.seconds = state["generation"], state["seconds"]
         trainer.evaluations = state["evaluations"]
-        numbers = {key: int(value) for key, value in state["numpy"].items()}
-        trainer.rng.bit_generator.state = {**trainer.rng.bit_generator.state, "state": numbers}
+        trainer.rng.bit_generator.state = json.loads(state["numpy"])
         trainer.generator.set_state(state["torch"])
         for member, (network, optimiser) in zip(trainer.members, state["members"], strict=True):
             member.network.load_state_dict(network)
@@ -253,7 +263,7 @@ def train(
     minutes : float, optional
         Training time after which to stop, counted from the beginning of the run.
     should_stop : callable
-        Asked between generations.
+        Asked between updates; what the unfinished generation brought is dropped.
     on_report : callable
         Called with every `Report`.
     """
@@ -262,7 +272,9 @@ def train(
             return
         if minutes is not None and trainer.seconds >= 60 * minutes:
             return
-        report = trainer.advance()
+        report = trainer.advance(should_stop)
+        if report is None:
+            return
         save_policy(output, [member.network for member in trainer.members], "gappo")
         trainer.save(checkpoint)
         _append(log, report)

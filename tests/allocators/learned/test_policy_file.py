@@ -1,0 +1,81 @@
+"""Stored policies: round trip, and refusal of whatever does not fit."""
+
+import pickle
+from pathlib import Path
+
+import pytest
+import torch
+from safetensors.torch import save_file
+
+from alloc.allocators.learned.network import ActorCritic, NetworkSize
+from alloc.allocators.learned.policy_file import load_policy, save_policy
+from alloc.problems import InputError
+
+
+@pytest.fixture
+def networks() -> list[ActorCritic]:
+    torch.manual_seed(0)
+    return [ActorCritic(NetworkSize(8, 8, 2)) for _ in range(2)]
+
+
+def test_round_trip(tmp_path: Path, networks: list[ActorCritic]) -> None:
+    """Networks come back in order, weight for weight."""
+    save_policy(tmp_path / "p.safetensors", networks, "gappo")
+    for before, after in zip(networks, load_policy(tmp_path / "p.safetensors", "gappo"), strict=True):
+        assert after.size == before.size
+        for name, weight in before.state_dict().items():
+            assert torch.equal(weight, after.state_dict()[name])
+
+
+def test_absent_file(tmp_path: Path) -> None:
+    """A missing file is named."""
+    with pytest.raises(InputError, match=r"nowhere\.safetensors: no such policy file"):
+        load_policy(tmp_path / "nowhere.safetensors", "gappo")
+
+
+@pytest.mark.parametrize("content", [b"", b"\0" * 7, b"hello, world", pickle.dumps({"a": 1}), b"\xff" * 64])
+def test_other_files(tmp_path: Path, content: bytes) -> None:
+    """Whatever is no policy is refused in one line, pickles without being run."""
+    path = tmp_path / "p.safetensors"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match="is not a policy file") as caught:
+        load_policy(path, "gappo")
+    assert "\n" not in str(caught.value)
+
+
+def test_a_folder_is_no_policy(tmp_path: Path) -> None:
+    """A folder is refused as well."""
+    with pytest.raises(InputError, match="is not a policy file"):
+        load_policy(tmp_path, "gappo")
+
+
+def test_policy_of_another_method(tmp_path: Path, networks: list[ActorCritic]) -> None:
+    """A policy that another method trained is not used by mistake."""
+    save_policy(tmp_path / "p.safetensors", networks, "dqn")
+    with pytest.raises(InputError, match="method: is 'dqn', this version needs 'gappo'"):
+        load_policy(tmp_path / "p.safetensors", "gappo")
+
+
+def test_policy_of_another_feature_set(tmp_path: Path, networks: list[ActorCritic]) -> None:
+    """A policy for other observations is an error, not a wrong answer."""
+    save_policy(tmp_path / "p.safetensors", networks, "gappo")
+    path = tmp_path / "p.safetensors"
+    path.write_bytes(path.read_bytes().replace(b"bidding-1", b"bidding-0"))
+    with pytest.raises(InputError, match="features"):
+        load_policy(path, "gappo")
+
+
+def test_weights_that_do_not_fit(tmp_path: Path, networks: list[ActorCritic]) -> None:
+    """Weights of other sizes than the description says are refused."""
+    save_policy(tmp_path / "p.safetensors", networks, "gappo")
+    path = tmp_path / "p.safetensors"
+    path.write_bytes(path.read_bytes().replace(b'pair_width\\": 8', b'pair_width\\": 9'))
+    with pytest.raises(InputError, match="size"):
+        load_policy(path, "gappo")
+
+
+def test_tensors_without_description(tmp_path: Path) -> None:
+    """A safetensors file from elsewhere is no policy."""
+    save_file({"a": torch.zeros(2)}, tmp_path / "p.safetensors")
+    with pytest.raises(InputError, match="does not describe its networks"):
+        load_policy(tmp_path / "p.safetensors", "gappo")

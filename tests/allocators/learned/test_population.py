@@ -1,0 +1,76 @@
+"""The population: fitness (12), and breeding by DEAP's operators."""
+
+import random
+
+import pytest
+import torch
+from torch.nn.utils import parameters_to_vector
+
+from alloc.allocators.learned.network import ActorCritic, NetworkSize
+from alloc.allocators.learned.population import BreedingParameters, Member, breed, fitness, new_member
+
+SMALL = NetworkSize(pair_width=4, task_width=4, heads=1)
+
+
+def members(count: int) -> list[Member]:
+    torch.manual_seed(0)
+    return [new_member(ActorCritic(SMALL), 1e-3 * (number + 1)) for number in range(count)]
+
+
+def weights(member: Member) -> torch.Tensor:
+    return parameters_to_vector(member.network.parameters()).detach()
+
+
+def test_fitness_by_hand() -> None:
+    """(12): each term over the largest of the population; the cost counts against."""
+    parameters = BreedingParameters(return_weight=1.0, entropy_weight=0.5, cost_weight=0.25)
+    got = fitness([2.0, 4.0], [1.0, 0.5], [100, 50], parameters)
+    assert got == pytest.approx([0.5 + 0.5 - 0.25, 1.0 + 0.25 - 0.125])
+
+
+def test_elite_passes_unchanged() -> None:
+    """The two fittest are in the next generation as they are."""
+    before = members(4)
+    after = breed(before, [0.1, 0.9, 0.5, 0.2], BreedingParameters(), seed=1)
+    assert len(after) == 4
+    assert after[0] is before[1]
+    assert after[1] is before[2]
+
+
+def test_children_without_mutation_lie_between_their_parents() -> None:
+    """Crossover blends weight by weight, so that each lies between those of two members."""
+    before = members(3)
+    parameters = BreedingParameters(elite=1, crossover_probability=1.0, mutation_probability=0.0)
+    for child in breed(before, [1.0, 2.0, 3.0], parameters, seed=3)[1:]:
+        everyone = torch.stack([weights(member) for member in before])
+        assert (weights(child) >= everyone.amin(0) - 1e-6).all()
+        assert (weights(child) <= everyone.amax(0) + 1e-6).all()
+
+
+def test_mutation_changes_some_weights_a_little() -> None:
+    """About a tenth of the weights are disturbed; the parent keeps its own."""
+    before = members(2)
+    kept = [weights(member).clone() for member in before]
+    parameters = BreedingParameters(elite=1, crossover_probability=0.0, mutation_probability=1.0)
+    child = breed(before, [5.0, 0.0], parameters, seed=5)[1]
+    changed = min((weights(child) != old).float().mean().item() for old in kept)
+    assert 0.02 < changed < 0.3
+    assert all(torch.equal(weights(member), old) for member, old in zip(before, kept, strict=True))
+
+
+def test_children_learn_on_their_own() -> None:
+    """A child's optimiser holds the child's weights, not its parent's."""
+    before = members(2)
+    child = breed(before, [1.0, 0.0], BreedingParameters(elite=1), seed=0)[1]
+    held = {id(weight) for group in child.optimiser.param_groups for weight in group["params"]}
+    assert held == {id(weight) for weight in child.network.parameters()}
+
+
+def test_breeding_is_seeded_and_leaves_the_global_generator_alone() -> None:
+    """The same seed breeds the same children, and Python's own generator goes on as if nothing had happened."""
+    random.seed(42)
+    expected = random.Random(42).random()
+    one = breed(members(4), [1.0, 2.0, 3.0, 4.0], BreedingParameters(), seed=7)
+    other = breed(members(4), [1.0, 2.0, 3.0, 4.0], BreedingParameters(), seed=7)
+    assert all(torch.equal(weights(a), weights(b)) for a, b in zip(one, other, strict=True))
+    assert random.random() == expected
