@@ -23,8 +23,8 @@ from alloc.problems.formats.document import (
     require_known,
     to_document,
 )
-from alloc.problems.formats.files import read_text, write_text_atomically
-from alloc.problems.formats.messages import one_line, quoted
+from alloc.problems.formats.files import read_text, reason, write_text_atomically
+from alloc.problems.formats.messages import quoted
 from alloc.problems.instance import FloatArray, Instance
 
 AGENT_COLUMNS = ("id", "ability", "x", "y", "z", "start_task", "battery", "range", "speed", "tasks")
@@ -132,7 +132,7 @@ def write_folder(instance: Instance, folder: Path) -> None:
         "tasks.csv": _table_text(tasks, TASK_COLUMNS),
         "instance.json": json_text.lines(document),
     }
-    if folder.exists():
+    if os.path.lexists(folder):
         for name, text in texts.items():
             write_text_atomically(folder / name, text)
         return
@@ -142,8 +142,10 @@ def write_folder(instance: Instance, folder: Path) -> None:
         for name, text in texts.items():
             write_text_atomically(beside / name, text)
         os.rename(beside, folder)
-    except OSError as error:
-        raise InputError(f"cannot be written: {error.strerror}", source=one_line(str(folder))) from error
+    except InputError as error:
+        raise InputError(error.message) from error  # without the name of the temporary file
+    except (OSError, ValueError) as error:
+        raise InputError(f"cannot be written: {reason(error)}") from error
     finally:
         shutil.rmtree(beside, ignore_errors=True)
 

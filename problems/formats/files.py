@@ -50,7 +50,7 @@ def read_bytes(path: PathLike) -> bytes:
     except (OSError, ValueError) as error:
         if isinstance(error, InputError):
             raise
-        raise InputError(f"cannot be read: {_reason(error)}", source=source) from error
+        raise InputError(f"cannot be read: {reason(error)}", source=source) from error
     except MemoryError:
         raise InputError("does not fit into memory", source=source) from None
 
@@ -107,7 +107,7 @@ def write_bytes_atomically(path: PathLike, data: bytes) -> None:
     except (OSError, ValueError) as error:
         if isinstance(error, InputError):
             raise
-        raise InputError(f"cannot be written: {_reason(error)}", source=source) from error
+        raise InputError(f"cannot be written: {reason(error)}", source=source) from error
 
 
 def _refuse_unless_regular(mode: int, source: str) -> None:
@@ -162,6 +162,7 @@ def _replace(target: Path, data: bytes) -> None:
         raise
 
 
-def _reason(error: Exception) -> str:
+def reason(error: Exception) -> str:
+    """Return the words of a system error, to stand after a colon."""
     words = getattr(error, "strerror", None) or str(error) or type(error).__name__
     return one_line(words[0].lower() + words[1:])

@@ -1,0 +1,116 @@
+"""Instances of every kind, and what it means that two are the same."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import strategies as st
+
+from alloc.problems import InputError, Instance, read_instance
+
+ARRAYS = (
+    "ability",
+    "workload",
+    "agent_position",
+    "task_position",
+    "start_task",
+    "battery",
+    "communication_range",
+    "speed",
+    "priority",
+)
+
+
+def assert_same(left: Instance, right: Instance) -> None:
+    """Compare every field exactly, the sign of zero included."""
+    for field in ARRAYS:
+        a, b = getattr(left, field), getattr(right, field)
+        np.testing.assert_array_equal(a, b, err_msg=field)
+        assert (np.signbit(a) == np.signbit(b))[~np.isnan(a)].all(), field
+    assert (left.name, left.agent_ids, left.task_ids) == (right.name, right.agent_ids, right.task_ids)
+    assert (left.tau, left.energy_per_distance) == (right.tau, right.energy_per_distance)
+    assert (left.allowed_tasks is None) == (right.allowed_tasks is None)
+    for one, other in zip(left.allowed_tasks or (), right.allowed_tasks or (), strict=True):
+        assert (one is None) == (other is None)
+        assert one is None or np.array_equal(one, other)
+
+
+def the_error(path: Any, read: Callable[[Any], object] = read_instance) -> InputError:
+    """Return the error of reading `path`, after checking that it fits on one readable line."""
+    with pytest.raises(InputError) as caught:
+        read(path)
+    error, text = caught.value, str(caught.value)
+    assert text == ": ".join(part for part in (error.source, error.place, error.message) if part)
+    assert text.isprintable(), text
+    assert len(text) < 600, text
+    assert error.source == ("standard input" if path == "-" else str(path))
+    assert error.message
+    return error
+
+
+@pytest.fixture
+def same() -> Callable[[Instance, Instance], None]:
+    return assert_same
+
+
+@pytest.fixture
+def full() -> Instance:
+    """Two tasks and three agents that use every field, with names that need care."""
+    return Instance(
+        name="demo",
+        ability=[4, 2.5, 0.1],
+        workload=[20, 0],
+        agent_ids=["a1", 'Zoë; \\ or "so"', "line\r\nbreak,"],
+        task_ids=["t;1", "t2\\"],
+        agent_position=[[0.1, 0.2, 0.3], [np.nan] * 3, [-0.0, 1e-300, 1e300]],
+        task_position=[[0, 0, 0], [np.nan] * 3],
+        start_task=[1, -1, 0],
+        battery=[20, np.inf, 0],
+        communication_range=[np.inf, 0.5, 1],
+        speed=[np.inf, 2, 1 / 3],
+        allowed_tasks=[None, [], [0, 1]],
+        priority=[1, 2.5],
+        tau=0.25,
+        energy_per_distance=6,
+    )
+
+
+TEXT = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), min_size=1, max_size=8)
+TRICKY = st.text(st.sampled_from(list(';\\",\r\n \ta1')), min_size=1, max_size=5)
+IDS = st.one_of(TEXT, TRICKY)
+FINITE = st.floats(-1e100, 1e100)
+
+
+def _row(free: bool) -> st.SearchStrategy[list[float]]:
+    position = st.lists(FINITE, min_size=3, max_size=3)
+    return st.one_of(st.just([np.nan] * 3), position) if free else position
+
+
+@st.composite
+def instances(draw: st.DrawFn) -> Instance:
+    """Any instance whatever, small."""
+    n, m = draw(st.integers(1, 4)), draw(st.integers(1, 4))
+    positive, limit = st.floats(1e-100, 1e100), st.one_of(st.just(np.inf), st.floats(0, 1e100))
+
+    def column(values: st.SearchStrategy[float], count: int) -> list[float]:
+        return draw(st.lists(values, min_size=count, max_size=count))
+
+    subset = st.one_of(st.none(), st.lists(st.integers(0, m - 1), max_size=4))
+    return Instance(
+        name=draw(st.one_of(st.just(""), IDS)),
+        agent_ids=draw(st.lists(IDS, min_size=n, max_size=n, unique=True)),
+        task_ids=draw(st.lists(IDS, min_size=m, max_size=m, unique=True)),
+        ability=column(positive, n),
+        workload=column(st.one_of(st.just(0.0), st.integers(0, 2**60), positive), m),
+        agent_position=column(_row(free=True), n),
+        task_position=column(_row(free=draw(st.booleans())), m),
+        start_task=column(st.integers(-1, m - 1), n),
+        battery=column(limit, n),
+        communication_range=column(limit, n),
+        speed=column(st.one_of(st.just(np.inf), positive), n),
+        allowed_tasks=column(subset, n),
+        priority=column(st.floats(0, 1e100), m),
+        tau=draw(st.floats(0, 1, exclude_min=True, exclude_max=True)),
+        energy_per_distance=draw(st.floats(0, 1e100)),
+    )
