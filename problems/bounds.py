@@ -60,8 +60,8 @@ def _arrival_bound(instance: Instance) -> float:
     """All agents at once, each from the hour at which it could reach its nearest task."""
     needed = instance.workload > 0
     nearest = np.where(instance.reach.mask & needed, instance.reach.distance, np.inf).min(axis=1)
-    arrival = nearest[instance.reach.origin] / instance.speed
-    arrival = np.where(np.isnan(arrival), np.inf, arrival)
+    nearest = nearest[instance.reach.origin]
+    arrival = np.divide(nearest, instance.speed, out=np.full(instance.n, np.inf), where=np.isfinite(nearest))
     able = np.isfinite(arrival)
     if not able.any():
         return 0.0

@@ -1,0 +1,74 @@
+"""The recipe of the exact methods: a start, the least makespan, then the least energy at it."""
+
+from abc import abstractmethod
+from typing import ClassVar
+
+import numpy as np
+
+from alloc.allocators.base import Allocator, Proposal
+from alloc.allocators.exact.energy import least_energy
+from alloc.allocators.exact.makespan import LeastMakespan
+from alloc.allocators.exact.question import Answer, Question, Watch
+from alloc.allocators.heuristic.greedy import greedy
+from alloc.allocators.search import Budget, Search
+from alloc.problems import Instance, Objective, agent_classes, fewest_unserved, serve_all
+
+MAKESPAN_SHARE = 0.6
+"""Part of the time limit after which the makespan gives way to the energy, proven or not."""
+
+
+class ExactAllocator(Allocator):
+    """Proves optima with a solver for integer programmes; subclasses say how to ask it.
+
+    Parameters
+    ----------
+    descent : bool
+        Whether a descent looks for a plan before the solver is asked.
+
+    Attributes
+    ----------
+    most_pairs : int
+        Pairs of agent class and task beyond which no model is built.
+    pairs_per_second : int
+        Pairs of which a model is built in a second.
+    """
+
+    most_pairs: ClassVar[int]
+    pairs_per_second: ClassVar[int]
+
+    def __init__(self, *, descent: bool = True) -> None:
+        self._descent = descent
+
+    def refusal(self, instance: Instance, objective: Objective, budget: Budget) -> str | None:
+        """Refuse models that would take most of the time only to be built."""
+        limit, seconds = self.most_pairs, budget.time_limit_s
+        if seconds is not None:
+            limit = min(limit, max(self.pairs_per_second // 4, int(self.pairs_per_second * seconds / 2)))
+        pairs = count_pairs(instance, objective)
+        if pairs <= limit:
+            return None
+        in_time = "" if seconds is None else f" within {seconds:g} s"
+        return f"it takes {limit} pairs of agent class and task{in_time}, this has {pairs}"
+
+    def allocate(self, search: Search) -> Proposal:
+        """Return bounds; every plan on the way is submitted."""
+        instance = search.instance
+        search.submit(serve_all(instance, greedy(instance, search)))
+        serve = int((instance.workload > 0).sum()) - fewest_unserved(instance)
+        if serve == 0:
+            return Proposal(energy_lower_bound=0.0)
+        energy_counts = search.objective is Objective.MAKESPAN_ENERGY
+        limit = search.budget.time_limit_s
+        until_s = np.inf if limit is None else limit * (MAKESPAN_SHARE if energy_counts else 1.0)
+        LeastMakespan(search, self.ask, serve, until_s, descent=self._descent).run()
+        return Proposal(energy_lower_bound=least_energy(search, self.ask, serve) if energy_counts else None)
+
+    @abstractmethod
+    def ask(self, question: Question, watch: Watch) -> Answer:
+        """Put `question` to the solver."""
+
+
+def count_pairs(instance: Instance, objective: Objective) -> int:
+    """Return the number of pairs of agent class and task that the largest model for `objective` has."""
+    classes = agent_classes(instance, by_place=objective is Objective.MAKESPAN_ENERGY)
+    return classes.size * int((instance.workload > 0).sum())

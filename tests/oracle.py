@@ -1,0 +1,87 @@
+"""The optimum by brute force, from the definitions alone: nothing of it comes from the code that it checks."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from alloc.problems import Instance
+
+CHUNK = 20_000
+"""Plans that are scored at once."""
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """Scores of the best plan: fewest tasks unserved, then the least makespan, then the least energy.
+
+    `energy` is the least among the plans with that makespan (within 1e-9 relative); `plan` is one of them.
+    """
+
+    unserved: int
+    makespan: float
+    energy: float
+    plan: tuple[int, ...]
+
+
+def brute_force(instance: Instance) -> Optimum:
+    """Try all (m + 1)^n allocations; those that send an agent where it cannot go are left out."""
+    distance, able = reachable(instance)
+    options = [[-1, *np.flatnonzero(row).tolist()] for row in able]
+    plans = np.array(np.meshgrid(*options, indexing="ij"), dtype=np.int64).reshape(instance.n, -1).T
+    scores = [_score(instance, distance, plans[row : row + CHUNK]) for row in range(0, len(plans), CHUNK)]
+    unserved, makespan, energy = (np.concatenate(part) for part in zip(*scores, strict=True))
+    few = unserved == unserved.min()
+    least = makespan[few].min()
+    fast = few & (makespan <= least * (1 + 1e-9))
+    best = int(np.flatnonzero(fast)[energy[fast].argmin()])
+    return Optimum(int(unserved[best]), float(least), float(energy[best]), tuple(plans[best].tolist()))
+
+
+def reachable(instance: Instance) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Return distances (1), shape (n, m), and who can take what, agent by agent."""
+    distance, able = np.zeros((instance.n, instance.m)), np.ones((instance.n, instance.m), dtype=bool)
+    for i in range(instance.n):
+        place = instance.agent_position[i]
+        if np.isnan(place).any() and instance.start_task[i] >= 0:
+            place = instance.task_position[instance.start_task[i]]
+        for j in range(instance.m):
+            away = float(np.linalg.norm(place - instance.task_position[j]))
+            distance[i, j] = 0.0 if np.isnan(away) else away
+            able[i, j] = distance[i, j] <= instance.communication_range[i] + 1e-9
+            able[i, j] &= instance.energy_per_distance * distance[i, j] <= instance.battery[i] + 1e-9
+            if instance.allowed_tasks is not None and instance.allowed_tasks[i] is not None:
+                able[i, j] &= j in instance.allowed_tasks[i]
+    return distance, able
+
+
+def _score(
+    instance: Instance, distance: NDArray[np.float64], plans: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    """Unserved tasks, makespan of the served ones and energy of each plan, each of shape (len(plans),)."""
+    unserved, makespan = np.zeros(len(plans), dtype=np.int64), np.zeros(len(plans))
+    for j in np.flatnonzero(instance.workload > 0).tolist():
+        there = plans == j
+        served = there.any(axis=1)
+        unserved += ~served
+        time = _finished(instance.workload[j], instance.ability, distance[:, j] / instance.speed, there)
+        makespan = np.maximum(makespan, np.where(served, time, 0.0))
+    flown = np.where(plans >= 0, distance[np.arange(instance.n), plans], 0.0).sum(axis=1)
+    return unserved, makespan, flown * instance.energy_per_distance
+
+
+def _finished(
+    workload: float, ability: NDArray[np.float64], arrival: NDArray[np.float64], there: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """Root T of sum_i w_i max(0, T - arrival_i) = h: walk through the arrivals in order, each group at its own rate."""
+    done, rate, clock = np.zeros(len(there)), np.zeros(len(there)), np.zeros(len(there))
+    finish = np.full(len(there), np.inf)
+    for i in [*np.argsort(arrival, kind="stable").tolist(), None]:
+        until = np.inf if i is None else arrival[i]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            root = np.where(rate > 0, clock + (workload - done) / rate, np.inf)
+        finish = np.where(np.isinf(finish) & (root <= until), root, finish)
+        if i is not None:
+            done, clock = done + rate * (until - clock), np.full(len(there), until)
+            rate = rate + ability[i] * there[:, i]
+    return finish

@@ -1,0 +1,34 @@
+"""Random instances small enough for brute force, over everything that an instance can have."""
+
+import numpy as np
+
+from alloc.problems import Instance
+
+
+def tiny_instance(seed: int) -> Instance:
+    """Return instance number `seed`: at most 5 agents and 4 tasks; each feature is there about every other time."""
+    rng = np.random.default_rng([2025, seed])
+    n, m = int(rng.integers(1, 6)), int(rng.integers(1, 5))
+    coin = rng.random(9) < 0.5
+    whole = coin[0]
+    ability = rng.integers(1, 5, n) if whole else rng.uniform(0.5, 4, n).round(int(rng.choice([1, 2, 12])))
+    workload = rng.integers(1, 12, m).astype(float) if whole or coin[1] else rng.uniform(0.5, 12, m)
+    workload[rng.random(m) < (0.3 if coin[2] else 0.0)] = 0
+    task_position, agent_position = rng.random((m, 3)), rng.random((n, 3))
+    task_position[rng.random(m) < (0.3 if coin[3] else 0.0)] = np.nan
+    start = np.full(n, -1) if coin[4] else rng.integers(-1, m, n)
+    agent_position[(start >= 0) | (rng.random(n) < (0.3 if coin[3] else 0.0))] = np.nan
+    lists = [rng.choice(m, int(rng.integers(1, m + 1)), replace=False).tolist() for _ in range(n)]
+    return Instance(
+        name=f"tiny-{seed}",
+        ability=ability,
+        workload=workload,
+        agent_position=agent_position,
+        task_position=task_position,
+        start_task=start,
+        battery=rng.uniform(1, 5, n) if coin[5] else None,
+        communication_range=np.where(rng.random(n) < 0.5, rng.uniform(0.3, 1.2, n), np.inf) if coin[6] else None,
+        allowed_tasks=[entry if rng.random() < 0.5 else None for entry in lists] if coin[7] else None,
+        speed=np.where(rng.random(n) < 0.7, rng.uniform(0.2, 3, n), np.inf) if coin[8] else None,
+        energy_per_distance=float(rng.choice([1.0, 6.0])),
+    )
