@@ -43,7 +43,7 @@ class Curriculum:
     agents_per_task: tuple[float, float] = (3.5, 9.0)
     most_agents: int = 72
     paper_share: float = 0.6
-    price: tuple[float, float] = (0.2, 1.6)
+    price: tuple[float, float] = (0.2, 2.4)
     games: int = 20
     steps_per_agent: float = 0.6
 

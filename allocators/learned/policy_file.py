@@ -63,11 +63,8 @@ def load_policy(path: Path | str, method: str, device: str = "cpu") -> list[Acto
     except FileNotFoundError:
         raise InputError("no such policy file", "", source) from None
     except (OSError, SafetensorError) as error:
-        raise InputError(
-            f"is not a policy file ({next(iter(str(error).splitlines()), type(error).__name__)}); use one by `alloc train`",
-            "",
-            source,
-        ) from None
+        reason = next(iter(str(error).splitlines()), type(error).__name__)
+        raise InputError(f"is not a policy file ({reason}); use one by `alloc train`", "", source) from None
     try:
         size, count = NetworkSize(**json.loads(said["size"])), int(said["networks"])
     except (KeyError, TypeError, ValueError):

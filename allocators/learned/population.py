@@ -50,8 +50,8 @@ class BreedingParameters:
     mutated_share: float = 0.1
     mutation_size: float = 0.01
     return_weight: float = 1.0
-    entropy_weight: float = 0.02
-    cost_weight: float = 0.02
+    entropy_weight: float = 0.005
+    cost_weight: float = 0.005
 
 
 @dataclass(eq=False)

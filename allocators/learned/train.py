@@ -9,7 +9,7 @@ import copy
 import csv
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
@@ -118,8 +118,9 @@ class Trainer:
         """
         began = time.monotonic()
         statistics, costs = [], []
+        boards = [self.parameters.curriculum.draw(self.rng) for _ in range(self.parameters.updates_per_generation)]
         for member in self.members:
-            member_statistics, cost = self._train(member, should_stop)
+            member_statistics, cost = self._train(member, boards, should_stop)
             if should_stop():
                 return None
             statistics.append(member_statistics)
@@ -146,14 +147,15 @@ class Trainer:
         )
         return report
 
-    def _train(self, member: Member, should_stop: Callable[[], bool]) -> tuple[UpdateStatistics, int]:
-        """Update one member; also return how many network evaluations, states times pairs, that took."""
+    def _train(
+        self, member: Member, boards: Sequence[Board], should_stop: Callable[[], bool]
+    ) -> tuple[UpdateStatistics, int]:
+        """Update one member on every board, the same for all members; also return the network evaluations it took."""
         curriculum, ppo = self.parameters.curriculum, self.parameters.ppo
         cost, result = 0, UpdateStatistics(0.0, 0.0, 0)
-        for _ in range(self.parameters.updates_per_generation):
+        for board in boards:
             if should_stop():
                 break
-            board = curriculum.draw(self.rng)
             played = collect(member.network, board, curriculum.steps(board), ppo, self.generator)
             result = update(member.network, member.optimiser, board, played, ppo, self.generator)
             cost += int(played.alive.sum()) * (1 + ppo.epochs)
