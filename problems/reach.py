@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 TOLERANCE = 1e-9
 """Slack on ranges (in distance) and batteries (in energy)."""
 
+BLOCK = 1 << 16
+"""Distances that are worked out together."""
+
 
 @dataclass(frozen=True, eq=False)
 class Reach:
@@ -59,11 +62,10 @@ def build_reach(instance: Instance) -> Reach:
     lists = _list_numbers(instance)
     keys = np.column_stack([instance.start_position, instance.communication_range, instance.battery, lists])
     first, origin = _unique_rows(keys)
-    place, goal = instance.start_position[first], instance.task_position
-    distance = np.sqrt(((place[:, None, :] - goal[None, :, :]) ** 2).sum(axis=2))
-    distance = np.where(np.isnan(distance), 0.0, distance)
+    distance = _distances(instance.start_position[first], instance.task_position)
     mask = distance <= instance.communication_range[first, None] + TOLERANCE
-    mask &= instance.energy_per_distance * distance <= instance.battery[first, None] + TOLERANCE
+    if np.isfinite(instance.battery).any():
+        mask &= instance.energy_per_distance * distance <= instance.battery[first, None] + TOLERANCE
     if instance.allowed_tasks is not None:
         for row, agent in enumerate(first):
             allowed = instance.allowed_tasks[agent]
@@ -72,6 +74,21 @@ def build_reach(instance: Instance) -> Reach:
     for array in (origin, distance, mask):
         array.setflags(write=False)
     return Reach(origin, distance, mask)
+
+
+def _distances(place: NDArray[np.float64], goal: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return Euclidean distances, shape (places, goals), 0 where a coordinate is NaN; in blocks that fit a cache."""
+    distance = np.zeros((len(place), len(goal)))
+    rows = max(1, BLOCK // len(goal))
+    for first in range(0, len(place), rows):
+        block = distance[first : first + rows]
+        for axis in range(place.shape[1]):
+            step = np.subtract.outer(place[first : first + rows, axis], goal[:, axis])
+            block += np.multiply(step, step, out=step)
+        np.sqrt(block, out=block)
+    distance[np.isnan(place).any(axis=1)] = 0.0
+    distance[:, np.isnan(goal).any(axis=1)] = 0.0
+    return distance
 
 
 def _list_numbers(instance: Instance) -> NDArray[np.float64]:

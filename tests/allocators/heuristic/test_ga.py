@@ -1,0 +1,163 @@
+"""The genetic algorithm as a method."""
+
+import random
+import threading
+
+import numpy as np
+import pytest
+
+from alloc.allocators import Result, StopReason, load, solve
+from alloc.problems import Allocation, Instance, evaluate, fewest_unserved
+from alloc.problems.generate import paper
+
+
+def hard(n: int = 30, m: int = 10, seed: int = 0) -> Instance:
+    """Wide abilities and few agents a task: no perfect partition."""
+    rng = np.random.default_rng(seed)
+    return Instance(
+        ability=rng.uniform(1, 100, n),
+        workload=rng.uniform(20, 100, m),
+        task_position=rng.random((m, 3)),
+        start_task=rng.integers(0, m, n),
+        allowed_tasks=[rng.choice(m, 5, replace=False) for _ in range(n)],
+    )
+
+
+@pytest.mark.parametrize(("scenario", "seed"), [(1, 0), (1, 1), (4, 0)])
+def test_finds_perfect_partitions_of_the_paper(scenario: int, seed: int) -> None:
+    """On the paper's instances it reaches T = 1, and stops because that is the lower bound."""
+    result = solve(paper(scenario, seed), "ga", time_limit_s=30)
+    assert result.makespan == pytest.approx(1.0, rel=1e-9)
+    assert result.stop_reason is StopReason.PROVEN
+
+
+def test_improves_on_greedy() -> None:
+    """A few hundred generations close most of the gap that list scheduling leaves on a hard instance."""
+    greedy, ga = solve(hard(), "greedy"), solve(hard(), "ga", time_limit_s=None, iterations=300)
+    assert ga.makespan is not None
+    assert greedy.gap is not None
+    assert ga.gap is not None
+    assert ga.gap < 0.7 * greedy.gap
+
+
+@pytest.mark.parametrize("objective", ["makespan", "makespan-energy"])
+def test_never_proposes_violations(objective: str) -> None:
+    """Everything that it submits respects lists of tasks."""
+    result = solve(hard(), "ga", objective=objective, time_limit_s=None, iterations=60)
+    assert len(result.trace) > 2
+    assert all(not step.evaluation.violations for step in result.trace)
+
+
+def test_saves_energy_at_equal_makespan() -> None:
+    """With energy in the objective it keeps T = 1 and flies far less than without."""
+    instance = paper(1, 3)
+    fast = solve(instance, "ga", time_limit_s=None, iterations=300)
+    thrifty = solve(instance, "ga", objective="makespan-energy", time_limit_s=None, iterations=300)
+    assert thrifty.makespan == pytest.approx(1.0)
+    assert fast.energy is not None
+    assert thrifty.energy is not None
+    assert thrifty.energy < 0.5 * fast.energy
+
+
+def outcome(result: Result) -> tuple[object, ...]:
+    return result.allocation, result.makespan, result.energy, len(result.trace)
+
+
+def test_same_seed_same_answer() -> None:
+    """With an iteration budget a seed fixes the answer and the steps towards it; another seed takes other steps."""
+    answers = [solve(hard(), "ga", time_limit_s=None, iterations=40, seed=seed) for seed in (1, 1, 2)]
+    assert outcome(answers[0]) == outcome(answers[1])
+    assert outcome(answers[0]) != outcome(answers[2])
+
+
+def test_leaves_global_random_alone() -> None:
+    """Neither of the two global generators is drawn from or seeded."""
+    before, numpy_before = random.getstate(), np.random.get_state()  # noqa: NPY002
+    solve(hard(), "ga", time_limit_s=None, iterations=5)
+    assert random.getstate() == before
+    assert np.array_equal(np.random.get_state()[1], numpy_before[1])  # noqa: NPY002
+
+
+def test_threads_share_one_allocator() -> None:
+    """Runs in several threads on one object give what each gives alone."""
+    allocator, alone = (
+        load("ga"),
+        [outcome(solve(hard(seed=s), "ga", time_limit_s=None, iterations=20)) for s in (0, 1)],
+    )
+    together: dict[int, tuple[object, ...]] = {}
+
+    def run(seed: int) -> None:
+        together[seed] = outcome(solve(hard(seed=seed), allocator, time_limit_s=None, iterations=20))
+
+    threads = [threading.Thread(target=run, args=(seed,)) for seed in (0, 1)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert [together[0], together[1]] == alone
+
+
+def test_builds_on_a_start() -> None:
+    """The answer is never worse than the warm start, which is better than what one generation finds by itself."""
+    good = solve(hard(), "ga", time_limit_s=None, iterations=400)
+    assert good.allocation is not None
+    cold = solve(hard(), "ga", time_limit_s=None, iterations=1, seed=5)
+    warm = solve(hard(), "ga", time_limit_s=None, iterations=1, seed=5, start=good.allocation)
+    assert warm.makespan is not None
+    assert cold.makespan is not None
+    assert warm.makespan <= good.makespan < cold.makespan
+
+
+@pytest.mark.parametrize("iterations", [0, 1])
+def test_answers_on_the_smallest_budget(iterations: int) -> None:
+    """Even without a generation there is an allocation that serves every task."""
+    assert solve(hard(), "ga", time_limit_s=None, iterations=iterations).makespan is not None
+
+
+def test_nothing_to_do() -> None:
+    """Without any workload everybody stays idle, at makespan 0."""
+    result = solve(Instance(ability=[1, 2], workload=[0, 0, 0]), "ga")
+    assert result.allocation == Allocation([-1, -1])
+    assert result.makespan == 0
+
+
+def test_too_few_agents() -> None:
+    """Where not all tasks can be served, it serves as many as possible and makes those fast."""
+    instance = Instance(ability=[5, 1, 3], workload=[10, 20, 6, 0, 7], allowed_tasks=[[0, 1], [0, 1, 3], [0, 1]])
+    result = solve(instance, "ga", time_limit_s=None, iterations=30)
+    assert result.evaluation is not None
+    assert len(result.evaluation.unserved_tasks) == fewest_unserved(instance) == 2
+    best = min(
+        evaluate(instance, Allocation([i, j, k])).served_makespan
+        for i in (-1, 0, 1)
+        for j in (-1, 0, 1, 3)
+        for k in (-1, 0, 1)
+        if len(evaluate(instance, Allocation([i, j, k])).unserved_tasks) == 2
+    )
+    assert result.evaluation.served_makespan == pytest.approx(best)
+
+
+@pytest.mark.parametrize("ratio", [1e-150, 1e150])
+def test_extreme_units(ratio: float) -> None:
+    """Units as small or large as one likes change nothing but the figures."""
+    plain = solve(Instance(ability=[3, 2, 2, 1], workload=[5, 3]), "ga", time_limit_s=None, iterations=20)
+    scaled = solve(
+        Instance(ability=[3, 2, 2, 1], workload=[5 * ratio, 3 * ratio]), "ga", time_limit_s=None, iterations=20
+    )
+    assert plain.makespan == pytest.approx(1.0)
+    assert scaled.makespan == pytest.approx(ratio)
+
+
+def test_holds_its_time_limit_on_many_agents() -> None:
+    """Ten thousand agents with ranges, and half a second: the budget holds to 10 % + 0.5 s of processor time."""
+    rng = np.random.default_rng(0)
+    instance = Instance(
+        ability=rng.uniform(1, 10, 10_000),
+        workload=rng.uniform(1, 40, 100),
+        agent_position=rng.random((10_000, 3)),
+        task_position=rng.random((100, 3)),
+        communication_range=np.full(10_000, 0.7),
+    )
+    result = solve(instance, "ga", time_limit_s=0.5)
+    assert result.makespan is not None
+    assert result.runtime_s < 0.5 * 1.1 + 0.5
