@@ -1,0 +1,67 @@
+"""What docs/formats.md shows is what the readers take."""
+
+import re
+import textwrap
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from alloc.problems import Allocation, read_allocation, read_instance
+from alloc.problems.formats.columns import AGENT_FIELDS, TASK_FIELDS
+from alloc.problems.formats.csv_folder import AGENT_COLUMNS, TASK_COLUMNS
+from alloc.problems.formats.document import INSTANCE_FIELDS
+from alloc.problems.formats.npz import FIELDS
+
+TEXT = (Path(__file__).parents[3] / "docs" / "formats.md").read_text("utf-8")
+
+
+def section(title: str) -> str:
+    return TEXT.partition(f"\n## {title}\n")[2].partition("\n## ")[0]
+
+
+def example(title: str, first: str) -> str:
+    """The indented block of a section that begins with `first`."""
+    blocks = re.findall(r"(?:^    .*\n)+", section(title) + "\n", re.MULTILINE)
+    return next(text for text in map(textwrap.dedent, blocks) if text.startswith(first))
+
+
+def test_the_examples_are_read(tmp_path: Path) -> None:
+    """The JSON, CSV, npz and allocation examples can be read as they stand."""
+    (tmp_path / "x.json").write_text(example("Instance: JSON", "{"))
+    instance = read_instance(tmp_path / "x.json")
+    assert (instance.name, instance.n, instance.m) == ("demo", 2, 1)
+
+    tables = re.split(r"^(\w+\.csv)", example("Instance: CSV folder", "agents.csv"), flags=re.MULTILINE)[1:]
+    for name, rows in zip(tables[::2], tables[1::2], strict=True):
+        (tmp_path / name).write_text(textwrap.dedent(rows.replace("    ", "", 1)).replace(" ", ""))
+    folder = read_instance(tmp_path)
+    assert folder.allowed_tasks is not None
+    assert (folder.n, folder.m, folder.start_task.tolist()) == (2, 2, [0, -1])
+
+    call = example("Instance: npz", "numpy.savez").replace('"fleet.npz"', "path")
+    exec(call, {"numpy": np, "path": tmp_path / "fleet.npz"})
+    assert read_instance(tmp_path / "fleet.npz").battery.tolist() == [20, np.inf]
+
+    (tmp_path / "plan.json").write_text(example("Allocation", "{"))
+    assert read_allocation(tmp_path / "plan.json", instance) == (Allocation([0, -1]), None)
+
+
+@pytest.mark.parametrize(
+    ("title", "names"),
+    [
+        ("Instance: JSON", {*INSTANCE_FIELDS, *AGENT_FIELDS, *TASK_FIELDS}),
+        ("Instance: npz", set(FIELDS)),
+    ],
+)
+def test_every_field_has_its_row(title: str, names: set[str]) -> None:
+    """The tables of the documentation name exactly the fields that the readers know."""
+    cells = re.findall(r"^\| (`.*?) \|", section(title), re.MULTILINE)
+    assert {name for cell in cells for name in re.findall(r"`(\w+)`", cell)} == names
+
+
+def test_every_column_is_shown() -> None:
+    """The tables of the documentation have every column, in the order in which they are written."""
+    text = section("Instance: CSV folder")
+    assert ",".join(AGENT_COLUMNS) in text
+    assert ",".join(TASK_COLUMNS) in text
