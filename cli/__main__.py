@@ -1,0 +1,7 @@
+"""``python -m alloc.cli`` is ``alloc``."""
+
+import sys
+
+from alloc.cli.main import main
+
+sys.exit(main())

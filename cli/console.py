@@ -1,0 +1,102 @@
+"""What goes where: JSON and files asked for go to standard output, everything else to standard error."""
+
+import json
+import os
+import sys
+from collections.abc import Sequence
+from typing import Any, TextIO
+
+STANDARD = "-"
+"""The name of standard input and standard output where a file is asked for."""
+
+
+def write_out(text: str) -> None:
+    """Write to standard output; a reader that has gone away, as in ``| head``, is no error."""
+    _write(sys.stdout, text)
+
+
+def say(text: str) -> None:
+    """Write a line, or several, to standard error."""
+    _write(sys.stderr, text + "\n")
+
+
+def note(text: str) -> None:
+    """Write one line that the user should know, to standard error."""
+    say(f"note: {one_line(text)}")
+
+
+def complain(text: str) -> None:
+    """Write the one line of an error to standard error."""
+    say(f"alloc: {one_line(text)}")
+
+
+def write_json(value: Any) -> None:
+    """Write `value` as JSON to standard output."""
+    write_out(to_json(value))
+
+
+def to_json(value: Any) -> str:
+    """Return `value` as JSON that any reader takes: no NaN, ASCII alone, a line break at the end."""
+    return json.dumps(value, indent=2, allow_nan=False) + "\n"
+
+
+def one_line(text: str) -> str:
+    """Return `text` with line breaks and control characters turned into blanks."""
+    return " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
+
+
+def number(value: float | None, digits: int = 6) -> str:
+    """Return `value` for people; a dash where there is none."""
+    return "-" if value is None else f"{value:.{digits}g}"
+
+
+def percent(share: float | None) -> str:
+    """Return a share of one for people; a dash where there is none."""
+    if share is None:
+        return "-"
+    return "0 %" if share < 5e-7 else f"{100 * share:.{2 if share < 0.1 else 3}g} %"
+
+
+def table(header: Sequence[str], rows: Sequence[Sequence[str]], *, left: int = 1) -> str:
+    """Return a table with aligned columns.
+
+    Parameters
+    ----------
+    left : int
+        How many of the first columns are aligned to the left, as is the last; the others are aligned to the right.
+    """
+    widths = [max(len(row[column]) for row in [header, *rows]) for column in range(len(header))]
+
+    def line(row: Sequence[str]) -> str:
+        cells = [
+            cell.ljust(width) if column < left else cell.rjust(width)
+            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ]
+        return "  ".join(cells).rstrip()
+
+    return "\n".join([line(header), "  ".join("-" * width for width in widths), *map(line, rows)])
+
+
+def _write(stream: TextIO | None, text: str) -> None:
+    if stream is None:
+        return
+    try:
+        try:
+            stream.write(text)
+        except UnicodeEncodeError:
+            encoding = stream.encoding or "ascii"
+            stream.write(text.encode(encoding, "backslashreplace").decode(encoding))
+        stream.flush()
+    except BrokenPipeError:
+        _silence(stream)
+    except OSError as error:
+        _silence(stream)  # what cannot be written now must not fail once more at the exit
+        if stream is sys.stdout:
+            raise OSError(error.errno, error.strerror, "standard output") from error
+
+
+def _silence(stream: TextIO) -> None:
+    """Send what is still to be written nowhere, so that the run and its exit code go on undisturbed."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, stream.fileno())
+    os.close(nowhere)

@@ -1,0 +1,138 @@
+"""``alloc evaluate``."""
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from alloc.cli import options
+from alloc.cli.console import note, say, write_json
+from alloc.cli.files import read_pair
+from alloc.cli.options import examples
+
+if TYPE_CHECKING:
+    from alloc.allocators import Result
+    from alloc.problems import Allocation, Instance
+
+EXAMPLES = examples(
+    "alloc evaluate demo.json best.json",
+    "alloc evaluate demo.json best.json --json",
+    "alloc solve demo.json --json | alloc evaluate demo.json -",
+    closing="Exit code 1 if a task is unserved or an agent is sent where it cannot go.",
+)
+
+SCORES = (
+    "instance",
+    "makespan",
+    "served_makespan",
+    "lower_bound",
+    "gap",
+    "energy",
+    "distance",
+    "battery_remaining_percent",
+    "reward",
+    "unserved_tasks",
+    "violations",
+    "assignment",
+)
+"""Fields of a result that do not tell of a run."""
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to `app`."""
+    app.command("evaluate", epilog=EXAMPLES)(evaluate_command)
+
+
+def evaluate_command(
+    instance: options.InstanceArgument,
+    allocation: Annotated[
+        str,
+        typer.Argument(metavar="ALLOCATION", help="An allocation, or a result of `alloc solve`; - is standard input."),
+    ],
+    json: options.JsonOption = False,
+) -> None:
+    """Score an allocation, whoever made it."""
+    problem, answer = read_pair(instance, allocation)
+    assert answer is not None
+    result = _scored(problem, answer)
+    score = result.evaluation
+    assert score is not None
+    if json:
+        write_json({"format": "alloc-evaluation/1", **_scores(result), "tasks": _tasks(result)})
+    else:
+        _tell(result)
+    if score.reward_saturated:
+        note("the reward (3) is too large for a float and stands at its most negative value")
+    raise typer.Exit(1 if score.unserved_tasks or score.violations else 0)
+
+
+def _scored(problem: "Instance", allocation: "Allocation") -> "Result":
+    """Dress an allocation from elsewhere as a result, so that its scores read the same."""
+    from alloc.allocators import Result, StopReason
+    from alloc.problems import Objective, evaluate, makespan_lower_bound
+
+    score = evaluate(problem, allocation)
+    return Result(
+        instance=problem,
+        method="evaluate",
+        objective=Objective.MAKESPAN,
+        seed=0,
+        allocation=allocation,
+        evaluation=score,
+        lower_bound=None if score.unserved_tasks else makespan_lower_bound(problem),
+        energy_lower_bound=None,
+        stop_reason=StopReason.FINISHED,
+        runtime_s=0.0,
+        trace=(),
+    )
+
+
+def _scores(result: "Result") -> dict[str, Any]:
+    fields = result.to_dict()
+    return {name: fields[name] for name in SCORES}
+
+
+def _tasks(result: "Result") -> list[dict[str, Any]]:
+    """One entry per task, in the order of the instance."""
+    import numpy as np
+
+    problem, score, allocation = result.instance, result.evaluation, result.allocation
+    assert score is not None
+    assert allocation is not None
+    barred = {violation.agent for violation in score.violations}
+    sent = [task for agent, task in enumerate(allocation.task_of_agent.tolist()) if task >= 0 and agent not in barred]
+    agents = np.bincount(np.array(sent, dtype=np.intp), minlength=problem.m)
+    return [
+        {
+            "id": problem.task_ids[j],
+            "workload": float(problem.workload[j]),
+            "agents": int(agents[j]),
+            "ability": float(score.group_ability[j]),
+            "coverage": float(score.coverage[j]),
+            "completion_time": float(score.completion_time[j]) if np.isfinite(score.completion_time[j]) else None,
+        }
+        for j in range(problem.m)
+    ]
+
+
+def _tell(result: "Result") -> None:
+    from alloc.cli.console import number, table
+    from alloc.cli.report import figures, holdup
+
+    score = result.evaluation
+    assert score is not None
+    rows = [
+        [
+            entry["id"],
+            number(entry["workload"]),
+            str(entry["agents"]),
+            number(entry["ability"]),
+            number(entry["coverage"]),
+            "unserved" if entry["completion_time"] is None else number(entry["completion_time"]),
+        ]
+        for entry in _tasks(result)
+    ]
+    say(table(["task", "workload", "agents", "ability W", "W - h", "done at (h)"], rows))
+    say("\n".join(["", f"{result.instance.name}:", *figures(result), *holdup(result)]))
+    for violation in score.violations:
+        agent, task = result.instance.agent_ids[violation.agent], result.instance.task_ids[violation.task]
+        say(f"Violation: agent {agent} cannot take task {task}: {violation.reason}.")

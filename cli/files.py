@@ -1,0 +1,42 @@
+"""Files that commands read, and those that they are to write, looked at before a long run."""
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from alloc.cli.console import STANDARD, note
+
+if TYPE_CHECKING:
+    from alloc.problems import Allocation, Instance
+
+
+def read_pair(instance: str, allocation: str | None, *, quiet: bool = False) -> "tuple[Instance, Allocation | None]":
+    """Read an instance, and an allocation of it if there is one; another instance's name is worth a note."""
+    from alloc.problems import InputError
+    from alloc.problems.formats import read_allocation, read_instance
+
+    if instance == allocation == STANDARD:
+        raise InputError("cannot be the instance and the allocation at once", source="standard input")
+    problem = read_instance(instance)
+    if allocation is None:
+        return problem, None
+    answer, warning = read_allocation(allocation, problem)
+    if warning is not None and not quiet:
+        note(warning)
+    return problem, answer
+
+
+def check_writable(name: str | None) -> None:
+    """Raise an `InputError` if the file cannot be written as far as that can be told."""
+    if name is None or name == STANDARD:
+        return
+    from alloc.problems import InputError
+
+    path = Path(name)
+    folder = path.parent
+    if path.is_dir():
+        raise InputError("is a folder; name a file in it", source=name)
+    if not folder.is_dir():
+        raise InputError(f"there is no folder {str(folder)!r}; create it first", source=name)
+    if not os.access(path if path.exists() else folder, os.W_OK):
+        raise InputError("may not be written; choose another place", source=name)

@@ -1,0 +1,173 @@
+"""``alloc generate``."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from alloc.cli.console import STANDARD, say
+from alloc.cli.options import examples
+
+if TYPE_CHECKING:
+    from alloc.problems import Instance
+
+EXAMPLES = examples(
+    "alloc generate paper-1 --seed 7 --output demo.json",
+    "alloc generate random --agents 50 --tasks 12 --sites clustered --range 0.5 --seed 1 --output demo.json",
+    "alloc generate random --speed 20:60 --battery 10:30 --real --seed 3 --output demo.npz",
+    "alloc generate paper-4 --seed 100 --count 20 --output instances",
+    closing="SPREAD is one value for all, LOW:HIGH for a uniform draw, or none for no limit.",
+)
+
+SEED = Annotated[int, typer.Option(min=0, help="Source of all randomness; with --count the first of several.")]
+SPREADS = ("communication_range", "battery", "speed", "priority")
+
+
+class Family(StrEnum):
+    """What can be generated."""
+
+    PAPER_1 = "paper-1"
+    PAPER_2 = "paper-2"
+    PAPER_3 = "paper-3"
+    PAPER_4 = "paper-4"
+    RANDOM = "random"
+
+
+class Sites(StrEnum):
+    """As in `alloc.problems.generate`, without numpy; a test compares them."""
+
+    UNIFORM = "uniform"
+    CLUSTERED = "clustered"
+
+
+class Starts(StrEnum):
+    """As in `alloc.problems.generate`, without numpy."""
+
+    TASKS = "tasks"
+    OWN = "own"
+    DEPOTS = "depots"
+    UNKNOWN = "unknown"
+
+
+class Distribution(StrEnum):
+    """As in `alloc.problems.generate`, without numpy."""
+
+    EQUAL = "equal"
+    UNIFORM = "uniform"
+    LOGNORMAL = "lognormal"
+    PARETO = "pareto"
+    DIRICHLET = "dirichlet"
+
+
+def _option(text: str, default: str, *names: str, **more: Any) -> Any:
+    return typer.Option(*names, help=text, show_default=default, **more)
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to `app`."""
+    app.command("generate", epilog=EXAMPLES)(generate_command)
+
+
+def generate_command(
+    family: Annotated[
+        Family,
+        typer.Argument(
+            metavar="FAMILY", help="paper-1 to paper-4, a scenario of the paper, or random, with the options below."
+        ),
+    ],
+    seed: SEED = 0,
+    count: Annotated[int, typer.Option(min=1, help="How many, with the seeds that follow.")] = 1,
+    output: Annotated[
+        str,
+        typer.Option(
+            metavar="FILE|DIR", help="File to write, - for standard output; with --count a folder, a file per seed."
+        ),
+    ] = STANDARD,
+    agents: Annotated[int | None, _option("Number of agents.", "100")] = None,
+    tasks: Annotated[int | None, _option("Number of tasks.", "20")] = None,
+    ability: Annotated[Distribution | None, _option("How abilities spread; not dirichlet.", "uniform")] = None,
+    ability_min: Annotated[float | None, _option("Least ability, work per hour.", "1")] = None,
+    ability_max: Annotated[float | None, _option("Largest ability.", "10")] = None,
+    workload: Annotated[Distribution | None, _option("How workloads spread.", "dirichlet")] = None,
+    load: Annotated[float | None, _option("Total workload over total ability.", "1")] = None,
+    integer: Annotated[
+        bool | None, _option("Whole or real abilities and workloads.", "integer", "--integer/--real")
+    ] = None,
+    sites: Annotated[Sites | None, _option("How places lie.", "uniform")] = None,
+    clusters: Annotated[int | None, _option("Number of clusters.", "4")] = None,
+    dimensions: Annotated[int | None, _option("2 or 3.", "3")] = None,
+    world_size: Annotated[float | None, _option("Side of the square or cube.", "1")] = None,
+    starts: Annotated[Starts | None, _option("Where agents begin.", "tasks")] = None,
+    depots: Annotated[int | None, _option("Number of depots.", "1")] = None,
+    communication_range: Annotated[
+        str | None, _option("Farthest task, in units of distance.", "none", "--range", metavar="SPREAD")
+    ] = None,
+    battery: Annotated[str | None, _option("Energy of an agent.", "20", metavar="SPREAD")] = None,
+    speed: Annotated[str | None, _option("Distance per hour.", "none", metavar="SPREAD")] = None,
+    priority: Annotated[str | None, _option("Weight of a task in the game.", "1", metavar="SPREAD")] = None,
+    allowed_fraction: Annotated[float | None, _option("Share of the tasks that each agent may do.", "1")] = None,
+    energy_per_distance: Annotated[float | None, _option("Energy per unit of distance.", "6")] = None,
+    tau: Annotated[float | None, _option("Base of the reward (3).", "0.5")] = None,
+) -> None:
+    """Write instances like the paper's, or random ones."""
+    wanted = {name: value for name, value in locals().items() if value is not None and name not in FIXED}
+    if family is not Family.RANDOM and wanted:
+        raise typer.BadParameter(f"is for random alone, not for {family}", param_hint=f"'{_flag(next(iter(wanted)))}'")
+    if count > 1 and output == STANDARD:
+        raise typer.BadParameter("must name a folder for several instances", param_hint="'--output'")
+    for number in range(seed, seed + count):
+        instance = _instance(family, wanted, number)
+        _write(instance, output, into_folder=count > 1)
+    if output != STANDARD:
+        say(f"wrote {output}" if count == 1 else f"wrote {count} instances into {output}")
+
+
+FIXED = ("family", "seed", "count", "output")
+
+
+def _instance(family: Family, wanted: dict[str, Any], seed: int) -> "Instance":
+    from alloc.problems import Family as Parameters
+    from alloc.problems import InputError, paper, random_instance
+
+    if family is not Family.RANDOM:
+        return paper(int(family.removeprefix("paper-")), seed)
+    try:
+        values: dict[str, Any] = {
+            name: _spread(value, name) if name in SPREADS else value for name, value in wanted.items()
+        }
+        return random_instance(Parameters(**values), seed)
+    except InputError as error:
+        raise InputError(error.message, _flag(error.place) if error.place in wanted else error.place) from None
+
+
+def _write(instance: "Instance", output: str, *, into_folder: bool) -> None:
+    from alloc.problems import InputError
+    from alloc.problems.formats import write_instance
+
+    if not into_folder:
+        write_instance(instance, output)
+        return
+    folder = Path(output)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except FileExistsError:
+        raise InputError("is a file; several instances need a folder", source=output) from None
+    write_instance(instance, str(folder / f"{instance.name}.json"))
+
+
+def _flag(name: str) -> str:
+    return "--" + {"communication_range": "range", "integer": "integer/--real"}.get(name, name).replace("_", "-")
+
+
+def _spread(text: str, name: str) -> float | tuple[float, ...] | None:
+    """``none``, ``VALUE`` or ``LOW:HIGH``; the family checks the values."""
+    from alloc.problems import InputError
+
+    if text == "none":
+        return None
+    try:
+        ends = tuple(float(part) for part in text.split(":"))
+    except ValueError:
+        raise InputError(f"must be a number, LOW:HIGH or none, got {text!r}", name) from None
+    return ends[0] if len(ends) == 1 else ends

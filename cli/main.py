@@ -1,0 +1,116 @@
+"""The command `alloc`: its commands, and how errors become one line and an exit code."""
+
+import contextlib
+import os
+import sys
+import threading
+from collections.abc import Sequence
+from typing import NoReturn
+
+import typer
+
+from alloc.cli import compare, convert, evaluate, generate, methods, solve, train, validate
+from alloc.cli.console import complain, write_out
+from alloc.cli.options import examples
+
+SERVED, UNSERVED, BAD_INPUT = 0, 1, 2
+"""Exit codes: every task is served; one is not; bad usage or bad input."""
+
+DEFECT = 70
+"""Exit code of a defect in the program (EX_SOFTWARE)."""
+
+INTERRUPTED = 130
+"""Exit code after Ctrl-C, except where it ends a run that has an answer."""
+
+_USAGE_ERROR = typer.BadParameter.__mro__[1]  # its base has moved between versions of typer
+
+app = typer.Typer(
+    name="alloc",
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog=examples(
+        "alloc generate paper-1 --seed 7 --output demo.json",
+        "alloc solve demo.json --method greedy --plot demo.png",
+        "alloc compare demo.json --methods greedy,ga,cpsat --time-limit 5",
+        closing="Exit codes: 0 every task is served, 1 not, 2 bad usage or bad input.",
+    ),
+)
+for module in (solve, compare, evaluate, generate, validate, convert, methods, train):
+    module.register(app)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        write_out(f"alloc {version('alloc-mrta')}\n")
+        raise typer.Exit
+
+
+@app.callback()
+def _alloc(
+    version: bool = typer.Option(False, "--version", callback=_show_version, is_eager=True, help="Print the version."),
+) -> None:
+    """Allocate agents to tasks: exact, heuristic and learned methods behind one interface."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run `alloc` with `arguments`, those of the process by default, and return its exit code.
+
+    With the arguments of the process, it ends the process itself where a solver in native code did not obey.
+    """
+    code = _run(arguments)
+    if arguments is None and _is_solver_left():
+        _leave(code)
+    return code
+
+
+def _run(arguments: Sequence[str] | None) -> int:
+    try:
+        code = typer.main.get_command(app).main(
+            args=None if arguments is None else list(arguments), prog_name="alloc", standalone_mode=False
+        )
+    except (KeyboardInterrupt, typer.Abort):
+        return INTERRUPTED
+    except Exception as error:
+        if os.environ.get("ALLOC_TRACEBACK"):
+            raise
+        return _explain(error)
+    return code if isinstance(code, int) else SERVED
+
+
+def _is_solver_left() -> bool:
+    """Whether `run_native` had to leave a thread behind."""
+    return any(thread.name == "alloc-native-solver" for thread in threading.enumerate())
+
+
+def _leave(code: int) -> NoReturn:
+    """End the process without the interpreter's own end, in which a native thread that goes on would crash."""
+    for stream in (sys.stdout, sys.stderr):
+        if stream is not None:
+            with contextlib.suppress(OSError):
+                stream.flush()
+    os._exit(code)
+
+
+def _explain(error: Exception) -> int:
+    """Turn `error` into one line on standard error and an exit code."""
+    if isinstance(error, _USAGE_ERROR):
+        command = error.ctx.command_path if error.ctx else "alloc"  # type: ignore[attr-defined]
+        complain(f"{error.format_message().rstrip('.')}; see {command!r} --help".replace("'" + " --help", " --help'"))  # type: ignore[attr-defined]
+        return BAD_INPUT
+    from alloc.allocators import RefusedError
+    from alloc.problems import InputError
+
+    if isinstance(error, InputError | RefusedError):
+        complain(str(error))
+    elif isinstance(error, OSError):
+        complain(f"{error.filename or 'a file'}: {error.strerror or error}")
+    else:
+        complain(
+            f"defect in alloc or a plugin: {type(error).__name__}: {error};"
+            " please report it with what ALLOC_TRACEBACK=1 prints"
+        )
+        return DEFECT
+    return BAD_INPUT

@@ -1,0 +1,71 @@
+"""``alloc methods``."""
+
+from typing import Any
+
+import typer
+
+from alloc.cli import options
+from alloc.cli.console import say, table, write_json
+from alloc.cli.options import examples
+
+EXAMPLES = examples("alloc methods", "alloc methods --json")
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to `app`."""
+    app.command("methods", epilog=EXAMPLES)(methods_command)
+
+
+def methods_command(json: options.JsonOption = False) -> None:
+    """List the methods, what each can do, and what is missing for it."""
+    from alloc.allocators import names
+
+    facts = [_facts(name) for name in names()]
+    if json:
+        write_json(facts)
+        return
+    header = ["name", "kind", "objectives", "speeds", "proves", "state", "what it is"]
+    say(table(header, [_row(fact) for fact in facts], left=len(header)))
+    say("")
+    for fact in facts:
+        if fact["citation"]:
+            say(f"{fact['name']}: {fact['citation']}")
+
+
+def _facts(name: str) -> dict[str, Any]:
+    """One broken plugin must not hide the other methods."""
+    from alloc.allocators import describe
+    from alloc.problems import InputError
+
+    try:
+        method = describe(name)
+    except InputError as error:
+        return {"name": name, "error": str(error), "installed": False, "missing": [], "citation": ""}
+    return {
+        "name": name,
+        "summary": method.summary,
+        "kind": str(method.kind),
+        "objectives": [str(objective) for objective in method.objectives],
+        "finite_speeds": method.finite_speeds,
+        "proves": method.proves,
+        "warm_start": method.warm_start,
+        "anytime": method.anytime,
+        "options": list(method.options),
+        "installed": not method.missing,
+        "missing": list(method.missing),
+        "citation": method.citation,
+    }
+
+
+def _row(fact: dict[str, Any]) -> list[str]:
+    if "error" in fact:
+        return [fact["name"], "-", "-", "-", "-", "broken", fact["error"]]
+    return [
+        fact["name"],
+        fact["kind"],
+        ", ".join(fact["objectives"]),
+        "finite" if fact["finite_speeds"] else "none",
+        "yes" if fact["proves"] else "no",
+        "installed" if fact["installed"] else f"pip install {' '.join(fact['missing'])}",
+        fact["summary"],
+    ]

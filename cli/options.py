@@ -1,0 +1,57 @@
+"""Arguments and options that several commands share."""
+
+from enum import StrEnum
+from typing import Annotated
+
+import typer
+
+BUILT_IN_METHODS = ("auto", "greedy", "milp", "cpsat", "ga", "gappo")
+"""For completion alone, which must not wait for numpy; a test compares them with the registry."""
+
+READABLE = "a .json or .npz file, a folder with agents.csv and tasks.csv, or - for JSON on standard input"
+
+
+class Objective(StrEnum):
+    """As `alloc.problems.Objective`, without numpy; a test compares the two."""
+
+    MAKESPAN = "makespan"
+    MAKESPAN_ENERGY = "makespan-energy"
+
+
+def examples(*lines: str, closing: str = "") -> str:
+    """Return the examples of a command, as they stand under its help."""
+    parts = ["\b\nExamples:\n" + "\n".join(f"  {line}" for line in lines)]
+    return "\n\n".join([*parts, closing] if closing else parts)
+
+
+def complete_methods(incomplete: str) -> list[str]:
+    """Return the methods that begin with `incomplete`, or continue its list after a comma."""
+    from importlib.metadata import entry_points
+
+    done, comma, last = incomplete.rpartition(",")
+    names = [*BUILT_IN_METHODS, *(entry.name for entry in entry_points(group="alloc.allocators"))]
+    return [done + comma + name for name in dict.fromkeys(names) if name.startswith(last)]
+
+
+InstanceArgument = Annotated[str, typer.Argument(metavar="INSTANCE", help=f"The instance: {READABLE}.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON to standard output.")]
+ObjectiveOption = Annotated[
+    Objective,
+    typer.Option(help="What counts after the number of unserved tasks; the second one also counts energy."),
+]
+TimeLimitOption = Annotated[
+    float | None,
+    typer.Option(min=0, help="Seconds for one run.", show_default="10; none where --iterations is given"),
+]
+IterationsOption = Annotated[
+    int | None, typer.Option(min=0, help="Iterations of one run, in the method's own unit: the same on any machine.")
+]
+TargetGapOption = Annotated[
+    float | None, typer.Option(min=0, help="Stop at this relative gap of the makespan; 0.01 is 1 %.")
+]
+ThreadsOption = Annotated[int | None, typer.Option(min=1, help="Threads.", show_default="all processors")]
+
+
+def time_limit(given: float | None, iterations: int | None) -> float | None:
+    """Return the time limit: 10 s, unless iterations are counted, which makes runs reproducible."""
+    return 10.0 if given is None and iterations is None else given

@@ -1,0 +1,71 @@
+"""Drawing an answer into a file."""
+
+import io
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from alloc.cli.console import number, percent
+from alloc.cli.files import check_writable
+from alloc.cli.plot_sites import draw_sites, name_sites, plain_text, shortened
+from alloc.cli.plot_times import MOST_ROWS, draw_times
+from alloc.problems import InputError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from alloc.allocators import Result
+
+SUFFIXES = (".png", ".svg")
+
+
+def check_plot(path: str) -> None:
+    """Raise an `InputError` if no drawing can be written there."""
+    if Path(path).suffix.lower() not in SUFFIXES:
+        raise InputError(f"must end in {' or '.join(SUFFIXES)}", source=path)
+    check_writable(path)
+
+
+def save_plot(result: "Result", path: str) -> None:
+    """Draw `result` into a .png or .svg file, which is written whole or not at all."""
+    from alloc.problems.formats import write_bytes_atomically
+
+    kind = Path(path).suffix.lower().removeprefix(".")
+    picture = io.BytesIO()
+    draw(result).savefig(picture, format=kind, dpi=150, metadata={"Date": None} if kind == "svg" else None)
+    write_bytes_atomically(path, picture.getvalue())
+
+
+def draw(result: "Result") -> "Figure":
+    """Return the drawing of `result`, on a canvas of its own; without positions it shows completion times alone."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    if np.isnan(result.instance.task_position[:, 0]).all():
+        rows = min(result.instance.m, MOST_ROWS)
+        figure = Figure(figsize=(7.5, float(np.clip(2.0 + 0.25 * rows, 3.0, 6.2))), layout="constrained")
+        FigureCanvasAgg(figure)
+        draw_times(figure.subplots(), result)
+        figure.suptitle(_title(result), fontsize=12)
+        return figure
+    figure = Figure(figsize=(13, 6.2), layout="constrained")
+    FigureCanvasAgg(figure)
+    figure.suptitle(_title(result), fontsize=12)
+    left, right = figure.subplots(1, 2, width_ratios=[1.25, 1])
+    sites, radius = draw_sites(left, result)
+    draw_times(right, result)
+    figure.draw_without_rendering()  # settles the layout, by which names are placed
+    name_sites(left, result, sites, radius)
+    return figure
+
+
+def _title(result: "Result") -> str:
+    name = plain_text(shortened(result.instance.name, 60))
+    text = f"{name}: {result.instance.n} agents, {result.instance.m} tasks, {result.method}"
+    if result.evaluation is None:
+        return f"{text}\nno allocation found"
+    energy = f"energy {number(result.energy, 4)}"
+    if result.makespan is None:
+        return f"{text}\n{len(result.evaluation.unserved_tasks)} tasks unserved, {energy}"
+    return f"{text}\nT = {number(result.makespan, 4)} h, gap {percent(result.gap)}, {energy}"

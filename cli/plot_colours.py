@@ -1,0 +1,64 @@
+"""Colours of a drawing, to be told apart with every kind of colour vision, and in grey."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from matplotlib.colors import ListedColormap
+    from numpy.typing import NDArray
+
+    from alloc.allocators import Result
+    from alloc.problems.instance import FloatArray
+
+UNSERVED, MAKESPAN, LIMIT = "#d55e00", "#d55e00", "#56b4e9"
+"""From the palette of Okabe and Ito."""
+MOVE = "#56606b"
+
+
+def scale() -> "ListedColormap":
+    """Return the scale of completion times: the darker, the later; cividis without its harsh ends."""
+    from matplotlib import colormaps
+    from matplotlib.colors import ListedColormap
+
+    return ListedColormap(colormaps["cividis_r"](np.linspace(0.12, 0.88, 256)), name="completion")
+
+
+def colour_range(result: "Result") -> tuple[float, float]:
+    """From the earliest to the latest task served; at least a tenth of the makespan, so that trifles look alike."""
+    if result.evaluation is None:
+        return 0.0, 1.0
+    time = result.evaluation.completion_time
+    busy = time[np.isfinite(time) & (time > 0)]
+    if not len(busy):
+        return 0.0, 1.0
+    return float(min(busy.min(), 0.9 * busy.max())), float(busy.max())
+
+
+def shades(result: "Result") -> "FloatArray":
+    """Place of each task on the scale, from 0 (early) to 1 (late), shape (m,); 0 where unserved."""
+    low, high = colour_range(result)
+    time = finite_times(result)
+    return np.clip((time - low) / (high - low), 0.0, 1.0)
+
+
+def colours(result: "Result") -> "FloatArray":
+    """Colour of each task, shape (m, 4)."""
+    rgba: FloatArray = np.asarray(scale()(shades(result)), dtype=np.float64)
+    return rgba
+
+
+def finite_times(result: "Result") -> "FloatArray":
+    """Completion times in hours, 0 where unserved."""
+    if result.evaluation is None:
+        return np.zeros(result.instance.m)
+    time = result.evaluation.completion_time
+    return np.where(np.isinf(time), 0.0, time)
+
+
+def unserved_tasks(result: "Result") -> "NDArray[np.bool_]":
+    """Which tasks are unserved, shape (m,)."""
+    marked = np.zeros(result.instance.m, dtype=bool)
+    if result.evaluation is not None:
+        marked[list(result.evaluation.unserved_tasks)] = True
+    return marked

@@ -1,0 +1,110 @@
+"""``alloc solve``."""
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from alloc.cli import options
+from alloc.cli.console import STANDARD, note, say, to_json, write_out
+from alloc.cli.files import check_writable, read_pair
+from alloc.cli.options import Objective, examples
+
+if TYPE_CHECKING:
+    from alloc.allocators import Result
+
+EXAMPLES = examples(
+    "alloc solve demo.json",
+    "alloc solve demo.json --method ga --time-limit 30 --seed 1 --output best.json",
+    "alloc solve demo.json --objective makespan-energy --plot demo.png",
+    "alloc solve demo.json --start best.json --target-gap 0.01",
+    "alloc generate paper-1 --seed 7 --output - | alloc solve - --method cpsat --json",
+    closing="Ctrl-C ends a run as its time limit does: the best so far is printed and saved.",
+)
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to `app`."""
+    app.command("solve", epilog=EXAMPLES)(solve_command)
+
+
+def solve_command(
+    instance: options.InstanceArgument,
+    method: Annotated[
+        str,
+        typer.Option(autocompletion=options.complete_methods, help="One of `alloc methods`, or auto, which picks one."),
+    ] = "auto",
+    objective: options.ObjectiveOption = Objective.MAKESPAN,
+    time_limit: options.TimeLimitOption = None,
+    iterations: options.IterationsOption = None,
+    target_gap: options.TargetGapOption = None,
+    seed: Annotated[int, typer.Option(min=0, help="Source of all randomness.")] = 0,
+    start: Annotated[
+        str | None,
+        typer.Option(metavar="FILE", help="An allocation or a result to begin with; the answer is never worse."),
+    ] = None,
+    policy: Annotated[str | None, typer.Option(metavar="FILE", help="A trained policy, for learned methods.")] = None,
+    threads: options.ThreadsOption = None,
+    device: Annotated[
+        str | None, typer.Option(help="Where a learned method computes: cpu or cuda.", show_default="cpu")
+    ] = None,
+    output: Annotated[
+        str | None, typer.Option(metavar="FILE", help="Write the result here as JSON; - is standard output.")
+    ] = None,
+    plot: Annotated[str | None, typer.Option(metavar="FILE", help="Draw the answer as .png or .svg.")] = None,
+    json: options.JsonOption = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print no summary, no notes, no progress.")] = False,
+) -> None:
+    """Allocate the agents of one instance to its tasks."""
+    from alloc.allocators import solve
+    from alloc.cli.progress import Progress
+
+    check_writable(output)
+    if plot is not None:
+        from alloc.cli.plot import check_plot
+
+        check_plot(plot)
+    problem, first = read_pair(instance, start, quiet=quiet)
+    with Progress(wanted=not quiet) as progress:
+        result = solve(
+            problem,
+            method,
+            objective=objective.value,
+            time_limit_s=options.time_limit(time_limit, iterations),
+            iterations=iterations,
+            target_gap=target_gap,
+            seed=seed,
+            start=first,
+            threads=threads,
+            on_improvement=progress.update,
+            policy=policy,
+            device=device,
+        )
+    _save(result, output, json=json)
+    if not quiet:
+        _tell(result, summary=not json)
+    if plot is not None:
+        from alloc.cli.plot import save_plot
+
+        save_plot(result, plot)
+    raise typer.Exit(0 if result.evaluation is not None and not result.evaluation.unserved_tasks else 1)
+
+
+def _save(result: "Result", output: str | None, *, json: bool) -> None:
+    text = to_json(result.to_dict()) if json or output is not None else ""
+    if output is not None and output != STANDARD:
+        from alloc.problems.formats import write_text_atomically
+
+        write_text_atomically(output, text)
+    if json or output == STANDARD:
+        write_out(text)
+
+
+def _tell(result: "Result", *, summary: bool) -> None:
+    if summary:
+        from alloc.cli.report import summary as words
+
+        say(words(result))
+    for line in result.notes:
+        note(line)
+    if result.evaluation is not None and result.evaluation.reward_saturated:
+        note("the reward (3) is too large for a float and stands at its most negative value")

@@ -1,0 +1,41 @@
+import io
+import sys
+
+import pytest
+
+from alloc.cli.console import one_line, percent, say, table
+from alloc.cli.files import check_writable
+from alloc.problems import InputError
+
+
+def test_control_characters_cannot_break_the_line():
+    """Whatever an id or a file name holds, the line stays one line."""
+    assert one_line("a\nb\x1b[2J\tc") == "a b [2J c"
+
+
+@pytest.mark.parametrize(
+    ("share", "text"), [(None, "-"), (0.0, "0 %"), (4e-7, "0 %"), (0.0321, "3.2 %"), (1.0, "100 %"), (0.5, "50 %")]
+)
+def test_percent(share, text):
+    """Shares read well, and proven gaps are 0 %."""
+    assert percent(share) == text
+
+
+def test_table_is_aligned():
+    """Text columns go left, figures go right."""
+    assert table(["id", "T"], [["a", "10"], ["bcd", "9"]]) == "id    T\n---  --\na    10\nbcd   9"
+
+
+def test_streams_without_unicode(monkeypatch):
+    """A terminal that cannot show a letter gets its escape instead of an exception."""
+    stream = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
+    monkeypatch.setattr(sys, "stderr", stream)
+    say("Z\u00fcrich")
+    assert stream.buffer.getvalue() == b"Z\\xfcrich\n"  # type: ignore[attr-defined]
+
+
+def test_write_protected_places_are_told(tmp_path, monkeypatch):
+    """A place that may not be written is found before the run."""
+    monkeypatch.setattr("os.access", lambda path, mode: False)
+    with pytest.raises(InputError, match="may not be written"):
+        check_writable(str(tmp_path / "x.json"))

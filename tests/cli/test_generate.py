@@ -1,0 +1,62 @@
+from pathlib import Path
+
+import pytest
+
+from alloc.cli import generate
+from alloc.problems import Family, paper, random_instance
+from alloc.problems.formats import read_instance, to_document
+from alloc.problems.generate import Distribution, Sites, Starts
+
+
+def test_paper_scenarios_are_the_generator_s(alloc):
+    """A scenario with a seed is the same instance as from Python."""
+    assert alloc("generate", "paper-1", "--seed", "7", "--output", "p.json").code == 0
+    assert to_document(read_instance("p.json")) == to_document(paper(1, 7))
+
+
+def test_every_parameter_of_the_family_is_an_option(alloc):
+    """All options together give the instance of that family."""
+    ran = alloc(
+        "generate", "random", "--agents", "9", "--tasks", "4", "--ability", "lognormal", "--ability-min", "2",
+        "--ability-max", "6", "--workload", "pareto", "--load", "1.5", "--real", "--sites", "clustered", "--clusters",
+        "2", "--dimensions", "2", "--world-size", "10", "--starts", "depots", "--depots", "2", "--range", "3:8",
+        "--battery", "none", "--speed", "1:2", "--priority", "2", "--allowed-fraction", "0.5",
+        "--energy-per-distance", "2", "--tau", "0.4", "--seed", "5", "--output", "r.npz",
+    )  # fmt: skip
+    assert (ran.code, ran.out) == (0, "")
+    family = Family(
+        agents=9, tasks=4, ability="lognormal", ability_min=2, ability_max=6, workload="pareto", load=1.5,
+        integer=False, sites="clustered", clusters=2, dimensions=2, world_size=10, starts="depots", depots=2,
+        communication_range=(3, 8), battery=None, speed=(1, 2), priority=2, allowed_fraction=0.5,
+        energy_per_distance=2, tau=0.4,
+    )  # fmt: skip
+    assert to_document(read_instance("r.npz")) == to_document(random_instance(family, 5))
+
+
+def test_count_gives_a_file_per_seed(alloc):
+    """--count writes one file for each seed from the first on."""
+    assert alloc("generate", "paper-1", "--seed", "3", "--count", "2", "--output", "new/many").code == 0
+    files = sorted(Path("new/many").iterdir())
+    assert [read_instance(file).name for file in files] == ["paper-1-seed-3", "paper-1-seed-4"]
+
+
+def test_standard_output_is_json_alone(alloc):
+    """Without --output the instance goes to standard output, ready for a pipe."""
+    ran = alloc("generate", "random", "--agents", "3", "--tasks", "2")
+    assert ran.err == ""
+    assert ran.json["format"] == "alloc-instance/1"
+
+
+def test_errors_name_the_option(alloc):
+    """A value that the family refuses is told under the name of its option."""
+    assert alloc("generate", "random", "--ability-min", "-1").err.startswith("alloc: --ability-min: must be")
+    assert alloc("generate", "random", "--range", "5:1").err.startswith("alloc: --range: must not")
+
+
+@pytest.mark.parametrize(
+    ("ours", "theirs"),
+    [(generate.Distribution, Distribution), (generate.Sites, Sites), (generate.Starts, Starts)],
+)
+def test_choices_are_the_family_s(ours, theirs):
+    """What the options offer without numpy is what the generator knows."""
+    assert list(map(str, ours)) == list(map(str, theirs))

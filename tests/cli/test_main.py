@@ -1,0 +1,206 @@
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from alloc.allocators import RefusedError
+from alloc.allocators.registry import BUILT_IN, ENTRY_POINT_GROUP
+from alloc.cli import options
+from alloc.cli import solve as solve_module
+from alloc.problems import Objective
+
+COMMANDS = ("solve", "compare", "evaluate", "generate", "validate", "convert", "methods", "train")
+
+
+def python(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, *arguments], capture_output=True, text=True, env={**os.environ, **environment}, check=False
+    )
+
+
+def test_help_names_every_command_and_loads_no_numpy():
+    """`alloc --help` lists all commands and the process has not imported numpy."""
+    code = "import sys; from alloc.cli.main import main; main(['--help']); sys.exit('numpy' in sys.modules)"
+    ran = python("-c", code)
+    assert ran.returncode == 0
+    assert all(f"\n  {command} " in ran.stdout for command in COMMANDS)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_each_help_has_examples(alloc, command):
+    """Every command's help shows how it is called."""
+    ran = alloc(command, "--help")
+    assert ran.code == 0
+    assert "Examples:" in ran.out
+    assert f"alloc {command}" in ran.out.split("Examples:")[1]
+
+
+def test_module_and_version():
+    """`python -m alloc.cli --version` prints the version."""
+    ran = python("-m", "alloc.cli", "--version")
+    assert (ran.returncode, ran.stderr) == (0, "")
+    assert ran.stdout.startswith("alloc 0.")
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        (),
+        ("nonsense",),
+        ("solve",),
+        ("solve", "small.json", "--nonsense"),
+        ("solve", "small.json", "--seed", "x"),
+        ("solve", "small.json", "--objective", "cost"),
+        ("solve", "small.json", "--time-limit", "-1"),
+        ("solve", "small.json", "--time-limit", "nan"),
+        ("solve", "small.json", "--method", "gredy"),
+        ("solve", "small.json", "--method", "greedy", "--policy", "x"),
+        ("solve", "small.json", "--plot", "picture.gif"),
+        ("solve", "small.json", "--plot", "nowhere/picture.png"),
+        ("solve", "small.json", "--output", "nowhere/result.json"),
+        ("solve", "small.json", "--output", "."),
+        ("solve", "nowhere.json", "--json"),
+        ("solve", ".", "--json"),
+        ("solve", "small.json", "--start", "small.json"),
+        ("evaluate", "small.json", "nowhere.json", "--json"),
+        ("evaluate", "-", "-"),
+        ("validate", "nowhere.json", "--json"),
+        ("convert", "small.json", "out.xyz"),
+        ("convert", "nowhere.json", "-"),
+        ("compare", "small.json", "--methods", "greedy,gredy"),
+        ("compare", "small.json", "--methods", ","),
+        ("compare", "small.json", "--methods", "greedy", "--seeds", "1,x"),
+        ("compare", "small.json", "--methods", "greedy", "--seeds", "0"),
+        ("generate", "paper-5"),
+        ("generate", "paper-1", "--agents", "3"),
+        ("generate", "random", "--battery", "1:x"),
+        ("generate", "random", "--range", "5:3"),
+        ("generate", "random", "--agents", "0"),
+        ("generate", "random", "--count", "2"),
+        ("methods", "superfluous"),
+        ("train", "ga", "--output", "p"),
+    ],
+)
+def test_bad_usage_is_one_line(alloc, small, arguments):
+    """Bad usage ends with exit code 2, one line on standard error and nothing on standard output."""
+    ran = alloc(*arguments)
+    assert (ran.code, ran.out) == (2, "")
+    assert ran.err.startswith("alloc: ")
+    assert ran.err.count("\n") == 1
+
+
+def instance_of(agent: bytes, task: bytes = b'"workload": 1') -> bytes:
+    parts = (
+        b'{"format": "alloc-instance/1", "agents": [{"id": "a", ',
+        agent,
+        b'}], "tasks": [{"id": "t", ',
+        task,
+        b"}]}",
+    )
+    return b"".join(parts)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"{",
+        b"[]",
+        b"null",
+        b"\xff\xfe\x00",
+        b"[" * 5000,
+        b'{"format": "alloc-instance/2", "agents": [], "tasks": []}',
+        instance_of(b'"ability": NaN'),
+        instance_of(b'"abilty": 1'),
+        instance_of(b'"ability": 1', b'"workload": "x"'),
+        instance_of(b'"ability": 1, "id": "b"'),
+    ],
+)
+@pytest.mark.parametrize("command", ["solve", "validate", "convert", "evaluate", "compare"])
+def test_malformed_files_are_one_line_with_the_file(alloc, tmp_path, command, content):
+    """A malformed instance gives exit code 2 and one line that names the file, whatever the command."""
+    Path("bad.json").write_bytes(content)
+    more = {"convert": ["out.npz"], "evaluate": ["x.json"], "compare": ["--methods", "greedy"]}.get(command, ["--json"])
+    ran = alloc(command, "bad.json", *more)
+    assert (ran.code, ran.out) == (2, "")
+    assert ran.err.startswith("alloc: bad.json: ")
+    assert ran.err.count("\n") == 1
+
+
+def test_defects_are_one_line_too(alloc, small, monkeypatch):
+    """An unexpected exception gives one line and a code of its own, the traceback only where it is asked for."""
+
+    def fail(*arguments, **options):
+        raise ZeroDivisionError("in a plugin\nsomewhere")
+
+    monkeypatch.setattr("alloc.allocators.solve", fail)
+    ran = alloc("solve", "small.json")
+    assert (ran.code, ran.out, ran.err.count("\n")) == (70, "", 1)
+    assert "ZeroDivisionError: in a plugin somewhere" in ran.err
+    monkeypatch.setenv("ALLOC_TRACEBACK", "1")
+    with pytest.raises(ZeroDivisionError):
+        alloc("solve", "small.json")
+
+
+@pytest.mark.parametrize(
+    ("error", "code"), [(KeyboardInterrupt(), 130), (RefusedError("too large"), 2), (OSError(28, "full"), 2)]
+)
+def test_exit_codes_of_other_ends(alloc, small, monkeypatch, error, code):
+    """Ctrl-C outside a run is quiet; refusals and failing disks are bad input."""
+
+    def fail(*arguments, **options):
+        raise error
+
+    monkeypatch.setattr("alloc.allocators.solve", fail)
+    ran = alloc("solve", "small.json")
+    assert (ran.code, ran.out) == (code, "")
+    assert ran.err.count("\n") == (0 if code == 130 else 1)
+
+
+def test_names_known_without_numpy_are_those_of_the_registry():
+    """What completion offers without loading numpy is what there is."""
+    assert set(options.BUILT_IN_METHODS) == {"auto", *BUILT_IN}
+    assert [str(one) for one in options.Objective] == [str(one) for one in Objective]
+    assert ENTRY_POINT_GROUP == "alloc.allocators"
+    assert solve_module.EXAMPLES
+
+
+@pytest.mark.parametrize(
+    ("words", "count", "expected"),
+    [
+        ("alloc sol", 1, ["solve"]),
+        ("alloc solve x.json --method g", 4, ["greedy", "ga", "gappo"]),
+        ("alloc compare x.json --methods greedy,c", 4, ["greedy,cpsat"]),
+        ("alloc solve x", 2, []),
+    ],
+)
+def test_completion(words, count, expected):
+    """The shell gets commands and methods, and nothing for paths, which it completes itself."""
+    ran = python(
+        "-m",
+        "alloc.cli",
+        _PYTHON_M_ALLOC_CLI_COMPLETE="",
+        _ALLOC_COMPLETE="complete_bash",
+        COMP_WORDS=words,
+        COMP_CWORD=str(count),
+    )
+    assert set(ran.stdout.split()) == set(expected)
+
+
+def test_a_reader_that_leaves_is_no_error(small, tmp_path):
+    """With standard output closed early, as by `head`, the run ends quietly and as it would have."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "alloc.cli", "solve", "small.json", "--method", "greedy", "--json"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=tmp_path,
+    )
+    assert process.stdout is not None
+    process.stdout.close()
+    assert process.stderr is not None
+    with process.stderr:
+        assert process.stderr.read() == ""
+    assert process.wait() == 0

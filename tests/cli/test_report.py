@@ -1,0 +1,45 @@
+import pytest
+
+from alloc.allocators import solve
+from alloc.cli.report import holdup, rounded_up, summary
+from alloc.problems import Instance
+
+
+@pytest.mark.parametrize(
+    ("ability", "whole", "text"),
+    [(2.0, True, "2"), (2.0001, True, "3"), (0.96101, False, "0.962"), (123.4, False, "124")],
+)
+def test_abilities_are_rounded_up(ability, whole, text):
+    """What is said to be enough is enough."""
+    assert rounded_up(ability, whole=whole) == text
+
+
+def test_ties_gain_nothing():
+    """Tasks that are last together are named, and one more agent on one of them gains nothing."""
+    lines = holdup(solve(Instance(ability=[2, 2], workload=[2, 2]), "greedy", handle_signals=False))
+    assert lines[0].startswith("Last: 2 of 2 tasks together, at 1 h: t1, t2")
+    assert "gains nothing" in lines[1]
+    assert "100 % of all ability is at work" in lines[2]
+
+
+def test_single_task_says_what_a_median_agent_gains():
+    """Without a next task there is no ability that is enough; the median agent stands in."""
+    lines = holdup(solve(Instance(ability=[3], workload=[6]), "greedy", handle_signals=False))
+    assert "of ability 3, the median, gains 50 %: 1 h" in lines[1]
+
+
+def test_finite_speeds_say_so():
+    """With travel times the further agent is said to be there at once."""
+    instance = Instance(
+        ability=[3, 1], workload=[6, 1], speed=[1, 1], agent_position=[[0, 0], [0, 1]], task_position=[[1, 0], [0, 1]]
+    )
+    assert "One more agent there that is there at once" in "\n".join(
+        holdup(solve(instance, "greedy", handle_signals=False))
+    )
+
+
+def test_no_work_is_no_bottleneck():
+    """Without any work the summary says so."""
+    result = solve(Instance(ability=[3], workload=[0]), "greedy", handle_signals=False)
+    assert "There is no work to do." in summary(result)
+    assert "optimal" in summary(result)

@@ -1,0 +1,107 @@
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from alloc.problems import Family, random_instance
+from alloc.problems.formats import write_instance
+
+PATIENCE_S = 2.5
+"""A second for the run to end, and as much again, and some, for a busy machine to end the process."""
+
+LAUNCHER = """
+import contextlib, importlib, sys
+from alloc.allocators import Allocator, Method, Proposal, registry
+from alloc.allocators.heuristic.greedy import greedy
+
+class Slow(Allocator):
+    method = Method(name="slow", summary="greedy, and then it waits")
+
+    def allocate(self, search):
+        search.submit(greedy(search.instance))
+        while not search.should_stop():
+            pass
+        return Proposal()
+
+registry.BUILT_IN["slow"], registry._TARGETS["slow"] = Slow.method, "__main__:Slow"
+module = importlib.import_module("alloc.allocators.solve")
+inner = module.signals_set
+
+@contextlib.contextmanager
+def announced(stop):
+    with inner(stop):
+        print("READY", file=sys.stderr, flush=True)
+        yield
+
+module.signals_set = announced
+from alloc.cli.main import main
+sys.exit(main())
+"""
+"""Runs the command line, with one more method, and says when the solve has begun."""
+
+
+@pytest.fixture(scope="module")
+def hard(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An instance that no method finishes within seconds."""
+    path = tmp_path_factory.mktemp("hard") / "hard.json"
+    family = Family(agents=60, tasks=23, ability="lognormal", ability_max=40.0, integer=False)
+    write_instance(random_instance(family, 4), path)
+    return path
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("method", "number"),
+    [
+        ("slow", signal.SIGINT),
+        ("slow", signal.SIGTERM),
+        ("ga", signal.SIGINT),
+        ("cpsat", signal.SIGTERM),
+        ("milp", signal.SIGINT),
+    ],
+)
+def test_a_signal_ends_the_run_with_the_best_so_far(hard, tmp_path, method, number):
+    """Ctrl-C or SIGTERM in mid-solve prints and saves the best allocation at once, with the usual exit code."""
+    command = ["solve", str(hard), "--method", method, "--time-limit", "60", "--json", "--output", "best.json"]
+    process = subprocess.Popen(
+        [sys.executable, "-c", LAUNCHER, *command],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=tmp_path,
+        env={**os.environ, "OMP_NUM_THREADS": "1"},
+    )
+    assert process.stderr is not None
+    assert process.stderr.readline() == "READY\n"
+    time.sleep(1.5)
+    assert process.poll() is None, "it ended before it could be interrupted"
+    began = time.monotonic()
+    process.send_signal(number)
+    out, err = process.communicate(timeout=20)
+    took = time.monotonic() - began
+    result = json.loads(out)
+    assert (result["stop_reason"], process.returncode) == ("interrupted", 0)
+    assert json.loads((tmp_path / "best.json").read_text()) == result
+    assert "Traceback" not in err
+    assert took < PATIENCE_S
+
+
+def test_ctrl_c_outside_a_run_is_quiet(tmp_path):
+    """While waiting for its input, Ctrl-C ends the command with 130 and without a word."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "alloc.cli", "validate", "-"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=tmp_path,
+    )
+    time.sleep(1.5)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=20)
+    assert (process.returncode, out, err) == (130, "", "")

@@ -1,0 +1,77 @@
+"""validate, convert and methods."""
+
+from pathlib import Path
+
+import pytest
+
+from alloc.problems import makespan_lower_bound
+from alloc.problems.formats import read_instance, to_document
+
+
+def test_validate_tells_what_is_there(alloc, small, unservable):
+    """A valid instance is summed up: sizes, totals, reach, whether all can be served, lower bound."""
+    ran = alloc("validate", "small.json", "unservable.json", "--json")
+    assert ran.code == 0
+    first, second = ran.json
+    assert (first["agents"], first["tasks"], first["total_ability"], first["total_workload"]) == (5, 3, 19, 20)
+    assert (first["reach_density"], first["fewest_unserved"]) == (1.0, 0)
+    assert first["lower_bound"] == makespan_lower_bound(small)
+    assert (second["fewest_unserved"], second["lower_bound"], second["reach_density"]) == (1, None, 0.5)
+    ran = alloc("validate", "small.json", "unservable.json")
+    assert ran.out == ""
+    assert "small.json: ok, 5 agents" in ran.err
+    assert "at least 1 of the tasks cannot be served" in ran.err
+
+
+def test_validate_goes_on_after_a_bad_file(alloc, small):
+    """Each bad file has its own line, and the good ones are still told; the exit code is 2."""
+    Path("bad.json").write_text("{")
+    ran = alloc("validate", "bad.json", "small.json", "missing.json")
+    assert ran.code == 2
+    lines = ran.err.splitlines()
+    assert [line.split(":")[0] for line in lines] == ["alloc", "small.json", "alloc"]
+
+
+@pytest.mark.parametrize("target", ["copy.json", "copy.npz", "copy"])
+def test_convert_keeps_everything(alloc, small, target):
+    """Every format holds the same instance."""
+    assert alloc("convert", "small.json", target).code == 0
+    assert to_document(read_instance(target)) == to_document(small)
+
+
+def test_convert_to_standard_output(alloc, small):
+    """`-` writes JSON to standard output, and nothing else."""
+    ran = alloc("convert", "small.json", "-")
+    assert (ran.code, ran.err) == (0, "")
+    assert ran.json["name"] == "small"
+
+
+def test_methods_lists_all(alloc):
+    """Every method is listed with its capabilities, for people and as JSON."""
+    facts = {fact["name"]: fact for fact in alloc("methods", "--json").json}
+    assert {"greedy", "milp", "cpsat", "ga", "gappo"} <= set(facts)
+    assert facts["cpsat"]["proves"]
+    assert not facts["greedy"]["proves"]
+    ran = alloc("methods")
+    assert (ran.code, ran.out) == (0, "")
+    assert all(name in ran.err for name in facts)
+    assert "doi:10.1137/0603019" in ran.err
+
+
+def test_methods_names_what_is_missing(alloc, monkeypatch):
+    """A method whose packages are not there says how to install them."""
+    monkeypatch.setattr("alloc.allocators.method.find_spec", lambda name: None if name == "ortools" else object())
+    facts = {fact["name"]: fact for fact in alloc("methods", "--json").json}
+    assert (facts["cpsat"]["installed"], facts["cpsat"]["missing"]) == (False, ["ortools"])
+    assert "pip install ortools" in alloc("methods").err
+
+
+def test_methods_survives_a_broken_plugin(alloc, monkeypatch):
+    """A plugin that cannot be imported has a row that says so, beside all the others."""
+    from importlib.metadata import EntryPoint
+
+    broken = EntryPoint("broken", "no_such_module:Thing", "alloc.allocators")
+    monkeypatch.setattr("alloc.allocators.registry.entry_points", lambda group: [broken])
+    facts = {fact["name"]: fact for fact in alloc("methods", "--json").json}
+    assert "cannot be imported" in facts["broken"]["error"]
+    assert alloc("methods").code == 0

@@ -1,0 +1,116 @@
+import json
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from alloc.problems import Allocation, evaluate
+from alloc.problems.formats import read_instance
+
+FIELDS = [
+    "format", "method", "objective", "instance", "seed", "status", "stop_reason", "makespan", "served_makespan",
+    "lower_bound", "gap", "energy", "energy_lower_bound", "energy_gap", "distance", "battery_remaining_percent",
+    "reward", "unserved_tasks", "violations", "runtime_s", "assignment", "trace",
+]  # fmt: skip
+
+
+def test_json_is_the_result_format_and_all_there_is_on_stdout(alloc, small):
+    """Standard output holds the fields of alloc-result/1, and they are what the evaluator says."""
+    ran = alloc("solve", "small.json", "--method", "greedy", "--seed", "3", "--json")
+    result = ran.json
+    assert (ran.code, ran.err) == (0, "")
+    assert list(result) == FIELDS
+    score = evaluate(small, Allocation.from_ids(small, result["assignment"]))
+    assert (result["makespan"], result["energy"], result["seed"]) == (score.makespan, score.energy, 3)
+
+
+def test_summary_goes_to_stderr(alloc, small):
+    """Without --json the summary stands on standard error: status, figures, the last task and what would help."""
+    ran = alloc("solve", "small.json", "--method", "greedy")
+    assert (ran.code, ran.out) == (0, "")
+    for words in ("small (5 agents, 3 tasks), greedy", "makespan", "energy", "battery", "Last: ", "One more agent"):
+        assert words in ran.err
+
+
+def test_quiet_says_nothing(alloc, small):
+    """With --quiet a run that goes well prints nothing at all."""
+    ran = alloc("solve", "small.json", "--quiet", "--method", "greedy")
+    assert (ran.code, ran.out, ran.err) == (0, "", "")
+
+
+def test_auto_says_what_it_picked(alloc, small):
+    """The notes of the result, such as auto's choice, come on standard error."""
+    ran = alloc("solve", "small.json", "--json")
+    assert "note: auto picked" in ran.err
+    assert ran.json["status"] == "optimal"
+
+
+def test_unserved_tasks_give_exit_code_1(alloc, unservable):
+    """A task that nobody can take gives exit code 1, the best partial plan, and the reason."""
+    ran = alloc("solve", "unservable.json", "--method", "greedy", "--json")
+    assert ran.code == 1
+    assert ran.json["unserved_tasks"] == ["t2"]
+    assert "no agent can take task 't2'" in ran.err
+    ran = alloc("solve", "unservable.json", "--method", "greedy")
+    assert "Unserved: t2." in ran.err
+
+
+def test_output_start_and_standard_streams(alloc, small):
+    """A result written with --output starts another run, which is never worse; `-` reads and writes streams."""
+    assert alloc("solve", "small.json", "--method", "cpsat", "--output", "best.json", "-q").code == 0
+    best = json.loads(Path("best.json").read_text())
+    ran = alloc("solve", "small.json", "--method", "greedy", "--start", "best.json", "--output", "-")
+    assert ran.json["makespan"] <= best["makespan"]
+    ran = alloc("solve", "-", "--method", "greedy", "--json", stdin=Path("small.json").read_text())
+    assert ran.json["instance"] == "instance" or ran.json["instance"] == "small"
+
+
+def test_iterations_alone_are_reproducible(alloc, small):
+    """With --iterations the same seed gives the same answer, and no time limit interferes."""
+    runs = [alloc("solve", "small.json", "--method", "ga", "--iterations", "5", "--json").json for _ in range(2)]
+    assert runs[0]["assignment"] == runs[1]["assignment"]
+    assert runs[0]["stop_reason"] != "time_limit"
+
+
+def test_foreign_start_is_a_note(alloc, small):
+    """An allocation made for another instance is used, with a note that says so."""
+    Path("other.json").write_text(
+        json.dumps({"format": "alloc-allocation/1", "instance": "other", "assignment": {"a1": "t1"}})
+    )
+    ran = alloc("solve", "small.json", "--method", "greedy", "--start", "other.json", "--json")
+    assert ran.code == 0
+    assert "'other'" in ran.err
+
+
+def test_saturated_reward_is_a_note(alloc):
+    """A reward beyond the range of floats is told."""
+    document = {
+        "format": "alloc-instance/1",
+        "agents": [{"id": "a", "ability": 1}],
+        "tasks": [{"id": "t", "workload": 1e6}],
+    }
+    ran = alloc("solve", "-", "--method", "greedy", "--json", stdin=json.dumps(document))
+    assert ran.code == 0
+    assert "too large for a float" in ran.err
+    assert ran.json["reward"] < -1e300
+
+
+@pytest.mark.parametrize("suffix", ["png", "svg"])
+def test_plots_are_valid_pictures(alloc, small, suffix):
+    """--plot writes a picture of its kind, with sites and without."""
+    name = f"picture.{suffix}"
+    assert alloc("solve", "small.json", "--method", "greedy", "--plot", name, "-q").code == 0
+    content = Path(name).read_bytes()
+    if suffix == "png":
+        assert content.startswith(b"\x89PNG\r\n\x1a\n")
+        assert content.endswith(b"IEND\xaeB`\x82")
+    else:
+        assert ElementTree.fromstring(content).tag == "{http://www.w3.org/2000/svg}svg"
+    assert len(content) > 5_000
+
+
+def test_the_saved_result_is_that_of_stdout(alloc, small):
+    """--output and --json give the same document, and the instance is left alone."""
+    ran = alloc("solve", "small.json", "--method", "greedy", "--output", "result.json", "--json")
+    assert json.loads(Path("result.json").read_text()) == ran.json
+    assert read_instance("small.json").name == "small"
