@@ -1,6 +1,6 @@
 """Exact by constraint programming: OR-Tools CP-SAT over classes of agents."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from itertools import islice
 
 import numpy as np
@@ -25,6 +25,9 @@ LARGEST = 2**58
 REPEATABLE_EFFORT = 20.0
 """Limit of one call where runs must be repeatable, in the solver's deterministic seconds."""
 
+CHUNK = 10_000
+"""Variables made between two looks at whether the run is over."""
+
 WholeArray = NDArray[np.int64]
 
 
@@ -38,7 +41,7 @@ class CpSat(ExactAllocator):
 
     method = BUILT_IN["cpsat"]
     most_pairs = 2_000_000
-    pairs_per_second = 100_000
+    pairs_per_second = 60_000
 
     def ask(self, question: Question, watch: Watch) -> Answer:
         """Put `question` to CP-SAT."""
@@ -46,9 +49,10 @@ class CpSat(ExactAllocator):
         _set_parameters(solver, question)
 
         def work() -> Answer:
-            model, scale = build(question)
-            if watch.halted.is_set():
+            built = build(question, watch.halted.is_set)
+            if built is None:
                 return UNKNOWN
+            model, scale = built
             reporter = None if question.cost is None else _Reporter(len(question.demand.kind), watch)
             return _read(solver, solver.solve(model, reporter), question, scale)
 
@@ -66,28 +70,46 @@ class _Reporter(cp_model.CpSolverSolutionCallback):
         self._watch.tell(_agents(self.response_proto.solution, self._pairs))
 
 
-def build(question: Question) -> tuple[cp_model.CpModel, float]:
-    """State the question in integers, its first variables being the agents per pair; return the scale of costs too."""
+def build(question: Question, halted: Callable[[], bool] = lambda: False) -> tuple[cp_model.CpModel, float] | None:
+    """State the question in integers, its first variables being the agents per pair.
+
+    Returns
+    -------
+    (CpModel, float) or None
+        The model and the scale of its costs; None if `halted` says so before it is built.
+    """
     demand = question.demand
-    model = cp_model.CpModel()
-    x = [model.new_int_var(0, most, "") for most in demand.most.tolist()]
+    model, x = cp_model.CpModel(), []
+    for most in np.split(demand.most, range(CHUNK, len(demand.most), CHUNK)):
+        x += [model.new_int_var(0, agents, "") for agents in most.tolist()]
+        if halted():
+            return None
     weight, need = whole_numbers(demand)
     served = [model.new_bool_var("") if demand.partial else 1 for _ in need]
     for row, pairs in enumerate(_by(demand.goal, len(need))):
         done = cp_model.LinearExpr.weighted_sum([x[p] for p in pairs], weight[pairs].tolist())
         model.add(done >= int(need[row]) * served[row])
+        if halted():
+            return None
     if demand.partial:
         model.add(cp_model.LinearExpr.sum(served) == demand.serve)
     for kind, pairs in enumerate(_by(demand.kind, len(demand.count))):
         if demand.most[pairs].sum() > demand.count[kind]:
             model.add(cp_model.LinearExpr.sum([x[p] for p in pairs]) <= int(demand.count[kind]))
+        if halted():
+            return None
     for variable, agents in zip(x, [] if question.hint is None else question.hint.tolist(), strict=False):
         model.add_hint(variable, agents)
+    return model, _minimise(model, x, question)
+
+
+def _minimise(model: cp_model.CpModel, x: list[cp_model.IntVar], question: Question) -> float:
+    """Set the objective, if there is one, and return its scale."""
     if question.cost is None:
-        return model, 1.0
+        return 1.0
     cost, scale = whole_costs(question)
     model.minimize(cp_model.LinearExpr.weighted_sum(x, cost.tolist()))
-    return model, scale
+    return scale
 
 
 def whole_numbers(demand: Demand) -> tuple[WholeArray, WholeArray]:

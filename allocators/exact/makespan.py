@@ -1,20 +1,40 @@
 """The least makespan: bisection on T, each test a question of feasibility."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
 from alloc.allocators.exact.demand import Model
 from alloc.allocators.exact.descent import descend
 from alloc.allocators.exact.question import Answer, Question, Watch, is_over
+from alloc.allocators.exact.relaxation import relaxed_lower_bound
 from alloc.allocators.search import PROVEN, Search
-from alloc.problems import Evaluation, agent_classes, lp_makespan_lower_bound
+from alloc.problems import Evaluation, agent_classes
 
 TIGHT = 1e-8
 """Relative gap at which the search ends; well above the tolerance of 1e-9 that solvers and scores have."""
 
 UNLIMITED_S = 60.0
 """What the parts of the time that tests get are measured by where there is no time limit."""
+
+
+LONG, SHORT = 300, 20
+"""Kicks of a descent: where solvers have failed, and at the start."""
+
+
+@dataclass(frozen=True)
+class Test:
+    """A makespan to be tried, the seconds that it may take, and whether nothing is lost or left if they pass in vain.
+
+    A test at the `top`, just below the best plan, comes early, to see whether the plan is the optimum already; the
+    `last` one comes when bisection has met nothing but open tests.
+    """
+
+    time: float
+    seconds: float
+    top: bool = False
+    last: bool = False
 
 
 class LeastMakespan:
@@ -32,6 +52,8 @@ class LeastMakespan:
         How many tasks are to be served.
     until_s : float
         Seconds since the run began at which this must end.
+    pairs_per_second : int
+        Pairs of class and task of which the solver's model is built in a second.
     descent : bool
         Whether to descend before asking.
     """
@@ -42,6 +64,7 @@ class LeastMakespan:
         ask: Callable[[Question, Watch], Answer],
         serve: int,
         until_s: float,
+        pairs_per_second: int,
         *,
         descent: bool,
     ) -> None:
@@ -49,9 +72,10 @@ class LeastMakespan:
         self._model = Model.build(search.instance, agent_classes(search.instance, by_place=False), serve)
         self._rng = np.random.default_rng(search.seed)
         self._repeatable = search.budget.time_limit_s is None and search.budget.iterations is not None
+        self._build_s = 2 * len(self._model.kind) / pairs_per_second
         self._low = self._simple_bound()
         self._wall = 0.0
-        self._top_tried = np.inf
+        self._hard = False
 
     @property
     def _high(self) -> float:
@@ -70,34 +94,41 @@ class LeastMakespan:
         """Narrow the gap until it is closed or time is up; plans and bounds go to the search."""
         if self._descent:
             self._quick_plans()
-        self._raise_by_lp()
-        test, seconds, last = self._low, self._part(0.15), False
+        if self._search.instance.has_travel_time or not self._search.instance.reach.is_complete:
+            self._raise_by_relaxation()
+        test = Test(self._low, self._part(0.15))
         while not (self._closed or self._over):
-            found = self._test(test, seconds)
-            if last and found is None:
-                return
-            test, seconds, last = self._next(ruled_out=found is False)
+            found = self._try(test)
+            if found is None:
+                if test.last or self._near(self._low):
+                    return
+                self._wall = self._wall if test.top else max(self._wall, test.time)
+                if not self._hard:
+                    self._hard = True
+                    self._raise_by_relaxation()
+            test = self._next(ruled_out=found is False)
 
-    def _next(self, *, ruled_out: bool) -> tuple[float, float, bool]:
-        """Return the next T, the seconds it may take, and whether it is the last resort."""
+    def _next(self, *, ruled_out: bool) -> Test:
         high, floor = self._high, max(self._low, self._wall)
-        if self._wall > self._low and high - floor <= PROVEN * high:
+        if self._near(floor) and self._wall > self._low:
             self._wall = 0.0
-            return high * (1 - 0.9 * PROVEN), np.inf, True
-        if (ruled_out and self._top_tried != high) or high - floor <= PROVEN * high:
-            self._top_tried = high
-            return high * (1 - TIGHT / 2), self._part(0.1), False
-        return (float(np.sqrt(floor * high)) if high > 2 * floor else (floor + high) / 2), self._part(0.1), False
+            return Test(high * (1 - 0.9 * PROVEN), np.inf, last=True)
+        if self._near(floor) or (ruled_out and not self._hard):
+            return Test(high * (1 - TIGHT / 2), self._part(0.1), top=True)
+        return Test(float(np.sqrt(floor * high)) if high > 2 * floor else (floor + high) / 2, self._part(0.1))
 
-    def _test(self, time: float, seconds: float) -> bool | None:
-        """Whether a makespan of `time` can be had, None if that stays open."""
-        demand = self._model.at(time)
+    def _near(self, time: float) -> bool:
+        """Whether the best plan is proven to 1e-6 if `time` is a lower bound."""
+        return self._high - time <= PROVEN * self._high
+
+    def _try(self, test: Test) -> bool | None:
+        """Whether this makespan can be had, None if that stays open."""
+        demand = self._model.at(test.time)
         if demand.hopeless:
-            return self._rule_out(time)
-        if self._wall > 0 and self._descent and self._descend(time, 0.03, kicks=200 if self._repeatable else 10**9):
+            return self._rule_out(test.time)
+        if self._hard and self._descent and self._descend(test.time, 0.05, kicks=LONG):
             return True
-        until_s = min(self._search.elapsed_s + seconds, self._until_s)
-        watch = Watch(self._search, self._model, demand, until_s)
+        until_s = min(self._search.elapsed_s + test.seconds + self._build_s, self._until_s)
         question = Question(
             demand=demand,
             cost=None,
@@ -107,17 +138,14 @@ class LeastMakespan:
             seed=self._search.seed,
             repeatable=self._repeatable,
         )
-        answer = self._ask(question, watch)
+        answer, high = self._ask(question, Watch(self._search, self._model, demand, until_s)), self._high
         self._search.iteration += 1
         if answer.impossible:
-            return self._rule_out(time)
-        if answer.counts is not None:
-            high = self._high
-            score = self._search.submit(self._model.allocation(demand, answer.counts))
-            if self._is_met(score, time) and score.served_makespan < high:
-                return True
-        self._wall = max(self._wall, time)
-        return None
+            return self._rule_out(test.time)
+        if answer.counts is None:
+            return None
+        score = self._search.submit(self._model.allocation(demand, answer.counts))
+        return True if self._is_met(score, test.time) and score.served_makespan < high else None
 
     def _is_met(self, score: Evaluation, time: float) -> bool:
         served = len(self._model.tasks) - len(score.unserved_tasks)
@@ -136,22 +164,21 @@ class LeastMakespan:
             return self._search.lower_bound
         return float(np.sort(model.work)[: model.serve].sum() / (model.classes.ability @ model.classes.count))
 
-    def _raise_by_lp(self) -> None:
-        """Where reach is limited, a linear programme sees more than the simple bounds."""
-        instance = self._search.instance
-        if self._closed or self._over or instance.reach.is_complete or self._model.serve < len(self._model.tasks):
+    def _raise_by_relaxation(self) -> None:
+        """Let linear programmes push the lower bound; they see more than the simple bounds, and less than a test."""
+        if self._closed or self._over or self._model.serve < len(self._model.tasks):
             return
-        bound = lp_makespan_lower_bound(instance, min(0.5, self._part(0.05)))
-        if bound is not None:
-            self._low = max(self._low, min(bound, self._high))
-            self._search.raise_bound(self._low)
+        seconds = 1.0 if self._repeatable else self._part(0.1)
+        bound = relaxed_lower_bound(self._model, self._low, self._high, seconds, lambda: self._over)
+        if bound > self._low:
+            self._rule_out(bound)
 
     def _quick_plans(self) -> None:
         """Descend for the lower bound, then for times closer to the best plan."""
         for weight in (1.0, 0.5, 0.25):
             if self._closed or self._over:
                 return
-            self._descend(self._high + weight * (self._low - self._high), 0.03, kicks=20)
+            self._descend(self._high + weight * (self._low - self._high), 0.03, kicks=SHORT)
 
     def _descend(self, time: float, part: float, kicks: int) -> bool:
         """Descend from the best plan; whether one with makespan `time` was found."""

@@ -56,7 +56,7 @@ class Milp(ExactAllocator):
 
     method = BUILT_IN["milp"]
     most_pairs = 2_000_000
-    pairs_per_second = 100_000
+    pairs_per_second = 200_000
 
     def ask(self, question: Question, watch: Watch) -> Answer:
         """Put `question` to HiGHS."""

@@ -4,6 +4,8 @@ from abc import abstractmethod
 from typing import ClassVar
 
 import numpy as np
+import scipy.optimize
+import scipy.sparse.csgraph  # noqa: F401 - both are loaded with the method, so that no run waits for them
 
 from alloc.allocators.base import Allocator, Proposal
 from alloc.allocators.exact.energy import least_energy
@@ -60,7 +62,7 @@ class ExactAllocator(Allocator):
         energy_counts = search.objective is Objective.MAKESPAN_ENERGY
         limit = search.budget.time_limit_s
         until_s = np.inf if limit is None else limit * (MAKESPAN_SHARE if energy_counts else 1.0)
-        LeastMakespan(search, self.ask, serve, until_s, descent=self._descent).run()
+        LeastMakespan(search, self.ask, serve, until_s, self.pairs_per_second, descent=self._descent).run()
         return Proposal(energy_lower_bound=least_energy(search, self.ask, serve) if energy_counts else None)
 
     @abstractmethod

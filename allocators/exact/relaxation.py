@@ -1,0 +1,67 @@
+"""How far linear programmes alone push the makespan's lower bound, for where tests with integers take too long."""
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+from scipy.optimize import linprog
+from scipy.sparse import csr_array, hstack, vstack
+
+from alloc.allocators.exact.demand import Demand, Model
+
+MOST_PAIRS = 100_000
+"""Pairs of class and task beyond which a linear programme takes too long to be worth it."""
+
+SAFETY = 1e-6
+"""Part of the workload that a linear programme must find missing before it counts as a proof."""
+
+CLOSE = 1e-5
+"""Relative distance at which the bisection ends."""
+
+
+def relaxed_lower_bound(
+    model: Model, low: float, high: float, seconds: float, should_stop: Callable[[], bool]
+) -> float:
+    """Return the largest T between `low` and `high` found by bisection that not even fractions of agents can hold.
+
+    Parameters
+    ----------
+    model : Model
+        All of its tasks must be served.
+    low, high : float
+        Hours; a proven bound, and the makespan of a plan.
+    seconds : float
+        Time limit.
+    should_stop : callable
+        Asked between two linear programmes.
+    """
+    end = time.monotonic() + seconds
+    if len(model.kind) > MOST_PAIRS:
+        return low
+    middle = low * (1 + CLOSE)
+    while high - low > CLOSE * high and not should_stop():
+        short = _falls_short(model.at(middle), end - time.monotonic())
+        if short is None:
+            return low
+        low, high = (max(middle, model.after(middle)), high) if short else (low, middle)
+        middle = (low + high) / 2
+    return low
+
+
+def _falls_short(demand: Demand, seconds: float) -> bool | None:
+    """Whether some task stays short however agents are split; None where that is not at hand in time."""
+    if seconds <= 0:
+        return None
+    if demand.hopeless:
+        return True
+    pairs, tasks, kinds = len(demand.kind), len(demand.need), len(demand.count)
+    columns = np.arange(pairs)
+    share = csr_array((demand.weight / demand.need[demand.goal], (demand.goal, columns)), shape=(tasks, pairs))
+    used = csr_array((np.ones(pairs), (demand.kind, columns)), shape=(kinds, pairs))
+    least = csr_array(np.ones((tasks, 1)))
+    matrix = vstack([hstack([-share, least]), hstack([used, csr_array((kinds, 1))])])
+    limits = np.concatenate([np.zeros(tasks), demand.count])
+    bounds = np.column_stack([np.zeros(pairs + 1), np.append(demand.most, 1.0)])
+    cost = np.append(np.zeros(pairs), -1.0)
+    answer = linprog(cost, matrix, limits, bounds=bounds, method="highs", options={"time_limit": seconds})
+    return bool(-answer.fun < 1 - SAFETY) if answer.status == 0 else None

@@ -1,0 +1,54 @@
+import numpy as np
+import pytest
+
+from alloc.allocators import Budget
+from alloc.allocators.auto import choose
+from alloc.problems import Instance, Objective
+
+
+def scattered(n: int, m: int, *, speed: float | None = None) -> Instance:
+    """Everybody is of an ability and at a place of its own: as many classes as agents."""
+    rng = np.random.default_rng(0)
+    return Instance(
+        ability=rng.uniform(1, 9, n),
+        workload=rng.uniform(1, 9, m),
+        agent_position=rng.random((n, 3)),
+        task_position=rng.random((m, 3)),
+        speed=None if speed is None else np.full(n, speed),
+    )
+
+
+@pytest.mark.parametrize(
+    ("n", "m", "speed", "objective", "seconds", "expected"),
+    [
+        (20, 5, None, "makespan", 10, "cpsat"),
+        (20, 5, None, "makespan-energy", 10, "milp"),
+        (500, 50, None, "makespan", 3, "cpsat"),
+        (500, 50, None, "makespan-energy", 3, "gappo"),
+        (2000, 200, None, "makespan", 1, "gappo"),
+        (200, 20, 1.0, "makespan", 10, "cpsat"),
+        (200, 20, 1.0, "makespan-energy", 10, "milp"),
+        (2000, 200, 1.0, "makespan", 1, "greedy"),
+        (3000, 1000, None, "makespan", 10, "greedy"),
+    ],
+)
+def test_choice_follows_size_budget_and_objective(
+    n: int, m: int, speed: float | None, objective: str, seconds: float, expected: str
+) -> None:
+    """Small instances go to a solver, larger ones to the policy, the rest and slow travellers to greedy."""
+    method, reason = choose(scattered(n, m, speed=speed), Objective(objective), Budget(seconds))
+    assert method == expected
+    assert " for " in reason
+
+
+def test_agents_alike_count_once() -> None:
+    """Ten thousand agents of two kinds are a small model."""
+    instance = Instance(ability=np.tile([1.0, 2.0], 5000), workload=np.full(40, 100.0))
+    assert choose(instance, Objective.MAKESPAN, Budget(1.0))[0] == "cpsat"
+
+
+def test_more_time_turns_the_choice_to_a_proof() -> None:
+    """With a minute, a solver is worth trying where in a second it is not; without a limit, all the more."""
+    instance = scattered(100, 20)
+    picks = [choose(instance, Objective.MAKESPAN_ENERGY, Budget(seconds))[0] for seconds in (1.0, 60.0, None)]
+    assert picks == ["gappo", "milp", "milp"]
