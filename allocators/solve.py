@@ -13,9 +13,10 @@ from alloc.allocators.base import Allocator, Proposal, RefusedError
 from alloc.allocators.interrupt import signals_set
 from alloc.allocators.registry import load
 from alloc.allocators.result import Result
-from alloc.allocators.search import PROVEN, Budget, Improvement, Search, StopReason
+from alloc.allocators.search import PROVEN, Budget, Improvement, Search, StopReason, relative_gap
 from alloc.problems import (
     Allocation,
+    InputError,
     Instance,
     Objective,
     contested_tasks,
@@ -83,6 +84,8 @@ def solve(
     if method == "auto":
         method, reason = choose(instance, goal, budget)
         notes.append(f"auto picked {method}: {reason}")
+    if isinstance(method, Allocator) and options:
+        raise InputError(f"an allocator that is loaded already takes no options, got {', '.join(options)}", "method")
     allocator = load(method, **options) if isinstance(method, str) else method
     refuse(allocator, instance, goal, budget)
     stop = stop or threading.Event()
@@ -139,6 +142,14 @@ def _conclude(
     if infeasible:
         notes.append(_contest(instance))
     energy_bound = None if infeasible or best is None else _tighten(search, proposal)
+    proven = search.gap <= PROVEN and (
+        search.objective is Objective.MAKESPAN
+        or (
+            best is not None
+            and energy_bound is not None
+            and relative_gap(best.evaluation.energy, energy_bound) <= PROVEN
+        )
+    )
     return Result(
         instance=instance,
         method=name,
@@ -148,7 +159,7 @@ def _conclude(
         evaluation=None if best is None else best.evaluation,
         lower_bound=None if infeasible else search.lower_bound,
         energy_lower_bound=energy_bound,
-        stop_reason=stop_reason or (StopReason.PROVEN if search.gap <= PROVEN else StopReason.FINISHED),
+        stop_reason=stop_reason or (StopReason.PROVEN if proven else StopReason.FINISHED),
         runtime_s=runtime_s,
         trace=tuple(search.trace),
         notes=tuple(notes),

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from alloc.problems.allocation import Allocation
 from alloc.problems.errors import InputError
 from alloc.problems.instance import IDLE, FloatArray, Instance
+from alloc.problems.reach import TOLERANCE
 
 RELATIVE_TOLERANCE = 1e-9
 """Makespans and energies this close, relatively, are equal."""
@@ -38,7 +39,8 @@ class Evaluation:
     Attributes
     ----------
     completion_time : ndarray, shape (m,)
-        T_j in hours (4): 0 without workload, ``inf`` where a workload has no agent.
+        T_j in hours (4): 0 without workload, ``inf`` where a workload has no agent; the largest finite float where a
+        group would need longer.
     group_ability : ndarray, shape (m,)
         W_j, work per hour of the agents on each task.
     coverage : ndarray, shape (m,)
@@ -111,7 +113,7 @@ def evaluate(instance: Instance, allocation: Allocation) -> Evaluation:
         np.float64
     )
     time = _completion_times(instance, agent, goal, distance, group_ability)
-    unserved = np.isinf(time)
+    unserved = (instance.workload > 0) & (group_ability == 0)
     reward, saturated = _reward(group_ability - instance.workload, instance.tau)
     served_makespan = float(time[~unserved].max(initial=0.0))
     for array in (time, group_ability):
@@ -147,16 +149,18 @@ def _completion_times(
     work = instance.workload
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         time = np.where(work > 0, work / group_ability, 0.0)
+        time[group_ability > 0] = np.minimum(time[group_ability > 0], sys.float_info.max)
+        arrival = distance / instance.speed[agent]
     if not instance.has_travel_time:
         return time
-    arrival = distance / instance.speed[agent]
     late = np.zeros(instance.m, dtype=bool)
     late[goal[arrival > 0]] = True
     order = np.argsort(goal, kind="stable")
     bounds = np.searchsorted(goal[order], np.arange(instance.m + 1))
     for task in np.flatnonzero(late & (work > 0)):
         group = order[bounds[task] : bounds[task + 1]]
-        time[task] = completion_time(work[task], instance.ability[agent[group]], arrival[group])
+        hour = completion_time(work[task], instance.ability[agent[group]], arrival[group])
+        time[task] = min(hour, sys.float_info.max)
     return time
 
 
@@ -175,7 +179,8 @@ def completion_time(workload: float, ability: FloatArray, arrival: FloatArray) -
     """
     order = np.argsort(arrival)
     rate = np.cumsum(ability[order])
-    return float(((workload + np.cumsum(ability[order] * arrival[order])) / rate).min())
+    with np.errstate(over="ignore"):
+        return float(((workload + np.cumsum(ability[order] * arrival[order])) / rate).min())
 
 
 def _reward(coverage: FloatArray, tau: float) -> tuple[float, bool]:
@@ -207,7 +212,7 @@ def _violations(instance: Instance, agents: NDArray[np.intp], task: NDArray[np.i
         allowed = None if instance.allowed_tasks is None else instance.allowed_tasks[agent]
         if allowed is not None and goal not in allowed:
             reason = "the agent may not do this task"
-        elif away > instance.communication_range[agent]:
+        elif away > instance.communication_range[agent] + TOLERANCE:
             reason = f"distance {away:g} exceeds the range {instance.communication_range[agent]:g}"
         else:
             needed = instance.energy_per_distance * away

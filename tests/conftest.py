@@ -1,0 +1,39 @@
+"""Fixtures for all tests: tiny named instances, and how hypothesis runs."""
+
+import pytest
+from hypothesis import HealthCheck, settings
+
+from alloc.problems import Instance
+
+# the same examples in every run, and no deadline: a busy machine is no bug
+settings.register_profile(
+    "alloc", deadline=None, derandomize=True, max_examples=60, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.load_profile("alloc")
+
+
+@pytest.fixture
+def line() -> Instance:
+    """Three tasks at 0, 3 and 4 on a line; agents of ability 2, 1, 4, 3 at 0, 0, at task t2 and nowhere."""
+    nowhere = [float("nan")] * 3
+    return Instance(
+        name="line",
+        ability=[2, 1, 4, 3],
+        workload=[6, 4, 0],
+        task_position=[[0, 0, 0], [3, 0, 0], [4, 0, 0]],
+        agent_position=[[0, 0, 0], [0, 0, 0], nowhere, nowhere],
+        start_task=[-1, -1, 1, -1],
+        battery=[20, 5, float("inf"), 20],
+        energy_per_distance=2.0,
+    )
+
+
+@pytest.fixture
+def contested() -> Instance:
+    """Tasks t1, t2 and t4 have only agents a1 and a2; t3 has a3 and a4 to itself."""
+    return Instance(
+        name="contested",
+        ability=[1, 2, 3, 4],
+        workload=[2, 2, 2, 2],
+        allowed_tasks=[[0, 1, 3], [0, 1, 3], [2], [2]],
+    )

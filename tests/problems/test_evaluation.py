@@ -1,0 +1,181 @@
+"""The evaluator: values worked by hand, and laws."""
+
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from oracle import brute_force
+from strategies import allocated, instances, rebuilt
+
+from alloc.problems import Allocation, InputError, Instance, Objective, evaluate
+from alloc.problems.evaluation import completion_time
+
+NAN = float("nan")
+
+
+def test_by_hand(line: Instance) -> None:
+    """Agents of 2 and 1 do 6 in 2 h at no distance; that of 4, on its own task, does 4 in 1 h; the rest is idle."""
+    score = evaluate(line, Allocation([0, 0, 1, -1]))
+    assert score.completion_time.tolist() == [2.0, 1.0, 0.0]
+    assert score.group_ability.tolist() == [3.0, 4.0, 0.0]
+    assert score.coverage.tolist() == [-3.0, 0.0, 0.0]
+    assert (score.makespan, score.served_makespan, score.unserved_tasks) == (2.0, 2.0, ())
+    assert (score.distance, score.energy, score.battery_remaining_percent) == (0.0, 0.0, 100.0)
+    assert score.reward == pytest.approx(-(0.5**-3) - 1 - 1)
+    assert not score.reward_saturated
+
+
+def test_flights_by_hand(line: Instance) -> None:
+    """Distances 3 (agent 1), 3 (agent 3, from task 2 back to task 1), 0 (agent 4, whose place is unknown)."""
+    score = evaluate(line, Allocation([1, -1, 0, 0]))
+    assert score.distance == pytest.approx(6.0)
+    assert score.energy == pytest.approx(12.0)
+    # agent 1 used 6 of 20; agents 2 and 4 nothing; agent 3 has no battery and does not count
+    assert score.battery_remaining_percent == pytest.approx((70 + 100 + 100) / 3)
+    assert score.completion_time.tolist() == pytest.approx([6 / 7, 2.0, 0.0])
+
+
+def test_violations_by_hand(line: Instance) -> None:
+    """Agent 2 has 5 units for a flight of 3 at 2 each: neither its ability nor its flight counts."""
+    score = evaluate(line, Allocation([0, 1, -1, -1]))
+    assert [(v.agent, v.task) for v in score.violations] == [(1, 1)]
+    assert "energy 6 exceeds the battery 5" in score.violations[0].reason
+    assert score.unserved_tasks == (1,)
+    assert (score.makespan, score.served_makespan, score.energy) == (None, 3.0, 0.0)
+    assert score.completion_time[1] == np.inf
+
+
+@pytest.mark.parametrize(
+    ("limits", "reason"),
+    [
+        ({"allowed_tasks": [[1]]}, "may not do"),
+        ({"communication_range": [1.5]}, "exceeds the range 1.5"),
+        ({"battery": [1.5]}, "exceeds the battery 1.5"),
+        # within the tolerance of the range, so that the battery alone is the reason
+        ({"battery": [1.5], "communication_range": [2 - 5e-10]}, "exceeds the battery 1.5"),
+    ],
+)
+def test_reasons_of_violations(limits: dict, reason: str) -> None:
+    """Each rule that can be broken is named."""
+    instance = Instance(ability=[1], workload=[1, 1], agent_position=[[0, 0]], task_position=[[2, 0], [0, 0]], **limits)
+    assert reason in evaluate(instance, Allocation([0])).violations[0].reason
+    assert not evaluate(instance, Allocation([1])).violations
+
+
+def test_finite_speeds_by_hand() -> None:
+    """2 per hour from the start and 3 per hour from hour 2 do 10 by hour 3.2; who comes after that adds nothing."""
+    instance = Instance(
+        ability=[2, 3, 50],
+        workload=[10],
+        task_position=[[0, 0]],
+        agent_position=[[0, 0], [4, 0], [9, 0]],
+        speed=[1, 2, 1],
+    )
+    assert evaluate(instance, Allocation([0, 0, 0])).makespan == pytest.approx(3.2)
+    assert evaluate(instance, Allocation([0, 0, -1])).makespan == pytest.approx(3.2)
+    assert evaluate(instance, Allocation([-1, 0, -1])).makespan == pytest.approx(2 + 10 / 3)
+
+
+@given(st.lists(st.tuples(st.floats(0.1, 9), st.floats(0, 9)), min_size=1, max_size=6), st.floats(0.1, 50))
+def test_completion_time_is_the_root(group: list[tuple[float, float]], workload: float) -> None:
+    """At the hour that is returned, the work done by all who have arrived is the workload."""
+    ability, arrival = np.array(group).T
+    hour = completion_time(workload, ability, arrival)
+    assert (ability * np.maximum(0.0, hour - arrival)).sum() == pytest.approx(workload, rel=1e-9)
+
+
+def test_no_work_at_all() -> None:
+    """Without workload the makespan is 0, nobody is needed, and nothing is unserved."""
+    score = evaluate(Instance(ability=[1], workload=[0, 0]), Allocation([-1]))
+    assert (score.makespan, score.unserved_tasks, score.battery_remaining_percent) == (0.0, (), None)
+
+
+def test_reward_saturates() -> None:
+    """A deficit of 5000 is beyond floats: the reward is the most negative finite float, and says so."""
+    score = evaluate(Instance(ability=[1], workload=[5000], tau=0.5), Allocation([0]))
+    assert (score.reward, score.reward_saturated) == (-sys.float_info.max, True)
+    sum_only = evaluate(Instance(ability=[1], workload=[1024.9, 1024.9, 1024.9]), Allocation([-1]))
+    assert np.isfinite(sum_only.reward)
+    assert sum_only.reward_saturated
+
+
+def test_a_large_surplus_gives_no_reward_but_no_warning() -> None:
+    """tau to a large power is 0."""
+    assert evaluate(Instance(ability=[1e6], workload=[1]), Allocation([0])).reward == 0.0
+
+
+def test_served_tasks_are_never_called_unserved() -> None:
+    """Hours beyond floats, by little ability or little speed, are the largest float and not infinite."""
+    slow = Instance(ability=[1e-300], workload=[1e300])
+    assert evaluate(slow, Allocation([0])).makespan == sys.float_info.max
+    far = Instance(ability=[1], workload=[1], agent_position=[[0, 0]], task_position=[[9, 0]], speed=[5e-324])
+    assert evaluate(far, Allocation([0])).makespan == sys.float_info.max
+
+
+@pytest.mark.parametrize("tasks", [[0], [0, 0, 0], [0, 3], [-2, 0]])
+def test_wrong_shapes_and_indices(tasks: list[int]) -> None:
+    """Another number of agents, or a task that does not exist, is an error."""
+    with pytest.raises(InputError):
+        evaluate(Instance(ability=[1, 1], workload=[1, 1, 1]), Allocation(tasks))
+
+
+def test_order_of_better() -> None:
+    """Fewer unserved tasks beat makespan, makespan beats energy, and 1e-9 is no difference."""
+    instance = Instance(
+        ability=[2, 2, 1],
+        workload=[4, 2],
+        task_position=[[0, 0], [1, 0]],
+        start_task=[0, 1, 0],
+    )
+    home, swapped, one = (evaluate(instance, Allocation(t)) for t in ([0, 1, 0], [1, 0, 0], [0, 0, 0]))
+    plain, energy = Objective.MAKESPAN, Objective.MAKESPAN_ENERGY
+    assert one.served_makespan < home.served_makespan
+    assert home.is_better_than(one, plain)
+    assert not home.is_better_than(swapped, plain)
+    assert home.is_better_than(swapped, energy)
+    assert not swapped.is_better_than(home, energy)
+    nearly = Instance(ability=[2, 2 * (1 + 1e-10)], workload=[4])
+    assert not evaluate(nearly, Allocation([-1, 0])).is_better_than(evaluate(nearly, Allocation([0, -1])), plain)
+
+
+@given(allocated(), st.randoms(use_true_random=False))
+def test_relabelling_changes_nothing(case: tuple[Instance, Allocation], random: object) -> None:
+    """Agents and tasks in another order have the same scores."""
+    instance, allocation = case
+    rng = np.random.default_rng(random.getrandbits(32))
+    agents, tasks = rng.permutation(instance.n), rng.permutation(instance.m)
+    place = np.append(np.argsort(tasks), -1)
+    other = evaluate(rebuilt(instance, agents, tasks), Allocation(place[allocation.task_of_agent[agents]]))
+    score = evaluate(instance, allocation)
+    assert other.key(Objective.MAKESPAN_ENERGY) == pytest.approx(score.key(Objective.MAKESPAN_ENERGY))
+    assert other.reward == pytest.approx(score.reward)
+    assert len(other.violations) == len(score.violations)
+
+
+@given(allocated(speeds=False), st.sampled_from([0.25, 3.0, 1e6]))
+def test_scaling_workloads_scales_times(case: tuple[Instance, Allocation], scale: float) -> None:
+    """Where travel takes no time, workloads times c take c times as long, at the same energy."""
+    instance, allocation = case
+    score = evaluate(instance, allocation)
+    scaled = evaluate(rebuilt(instance, np.arange(instance.n), np.arange(instance.m), scale), allocation)
+    assert scaled.completion_time == pytest.approx(scale * score.completion_time)
+    assert scaled.energy == pytest.approx(score.energy)
+
+
+@given(instances(most_agents=4, most_tasks=3))
+def test_agrees_with_the_definitions(instance: Instance) -> None:
+    """The plan that brute force finds from the definitions alone scores what brute force says."""
+    best = brute_force(instance)
+    score = evaluate(instance, Allocation(best.plan))
+    assert not score.violations
+    assert (len(score.unserved_tasks), score.served_makespan) == pytest.approx((best.unserved, best.makespan))
+    assert score.energy == pytest.approx(best.energy)
+
+
+def test_scores_are_read_only(line: Instance) -> None:
+    """Arrays of an evaluation cannot be changed by accident."""
+    score = evaluate(line, Allocation.idle(line))
+    with pytest.raises(ValueError, match="read-only"):
+        score.completion_time[0] = 0
