@@ -1,0 +1,97 @@
+"""Lower bounds: never above the optimum, and as tight as they can be by hand."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from oracle import brute_force
+from strategies import instances, rebuilt
+
+from alloc.problems import Instance, energy_lower_bound, lp_makespan_lower_bound, makespan_lower_bound
+from alloc.problems.generate import paper
+
+ROUNDING = 1 + 1e-9
+
+
+@given(instances(most_agents=5, most_tasks=3))
+def test_never_above_the_optimum(instance: Instance) -> None:
+    """Where all tasks can be served, no bound exceeds what brute force reaches."""
+    best = brute_force(instance)
+    if best.unserved:
+        return
+    assert makespan_lower_bound(instance) <= best.makespan * ROUNDING
+    fractional = lp_makespan_lower_bound(instance)
+    assert fractional is None or fractional <= best.makespan * ROUNDING
+    energy = energy_lower_bound(instance, best.makespan)
+    assert energy is None or energy <= best.energy * ROUNDING
+
+
+@given(instances(most_agents=4, most_tasks=3))
+def test_energy_bound_holds_at_larger_makespans(instance: Instance) -> None:
+    """More time never raises the bound on the energy."""
+    best = brute_force(instance)
+    if not best.unserved:
+        tight, loose = (energy_lower_bound(instance, best.makespan * factor) for factor in (1.0, 2.0))
+        assert tight is not None
+        assert loose is not None
+        assert loose <= tight * ROUNDING + 1e-12
+
+
+@given(instances(most_agents=4, most_tasks=3))
+def test_one_more_agent_never_raises_it(instance: Instance) -> None:
+    """With a copy of the first agent, the bound is as large or smaller, unless there are too few agents anyway."""
+    more = rebuilt(instance, np.append(np.arange(instance.n), 0), np.arange(instance.m))
+    if instance.n >= (instance.workload > 0).sum():
+        assert makespan_lower_bound(more) <= makespan_lower_bound(instance) * ROUNDING
+
+
+@pytest.mark.parametrize(
+    ("fields", "bound"),
+    [
+        ({"ability": [2, 3], "workload": [5, 5]}, 5 / 2),  # one of the two has agent 2 alone
+        ({"ability": [1, 1, 1, 1], "workload": [2, 6]}, 2.0),  # all abilities against all workloads
+        ({"ability": [10, 1, 1], "workload": [4, 4, 4]}, 4.0),  # at most one task has the large agent
+        ({"ability": [5, 1], "workload": [6, 1], "allowed_tasks": [[1], [0, 1]]}, 6.0),  # its only agent
+        ({"ability": [1, 1, 1], "workload": [2, 2.5]}, 2.0),  # demands 1 + 2 fit from T = 2 on, not before
+        ({"ability": [1, 2], "workload": [0, 0]}, 0.0),
+    ],
+)
+def test_by_hand(fields: dict, bound: float) -> None:
+    """Each of the ideas behind the bound is the one that counts somewhere."""
+    assert makespan_lower_bound(Instance(**fields)) == pytest.approx(bound)
+
+
+def test_arrival_by_hand() -> None:
+    """Ability 2 that needs 3 hours to the nearest task cannot have done 4 before hour 5."""
+    instance = Instance(
+        ability=[1, 1], workload=[2, 2], agent_position=[[3, 0]] * 2, task_position=[[0, 0], [0, 0]], speed=[1, 1]
+    )
+    assert makespan_lower_bound(instance) == pytest.approx(5.0)
+    stuck = Instance(ability=[1, 1], workload=[2], speed=[1, np.inf], allowed_tasks=[None, []])
+    assert makespan_lower_bound(stuck) == pytest.approx(2.0)
+
+
+def test_linear_programme_by_hand() -> None:
+    """Tasks 1 and 2 with 6 hours of work together have only agents 1 and 2 of ability 1: 3 hours."""
+    instance = Instance(ability=[1, 1, 9], workload=[2, 4, 9], allowed_tasks=[[0, 1], [0, 1], [2]])
+    bound = lp_makespan_lower_bound(instance)
+    assert bound == pytest.approx(3.0, rel=1e-6)
+    assert bound <= 3.0
+
+
+def test_energy_by_hand() -> None:
+    """Both tasks must be done in an hour: two agents fly 1 each at 5 a unit, one of the others stays."""
+    instance = Instance(
+        ability=[2, 2, 2],
+        workload=[2, 4],
+        task_position=[[0, 0], [1, 0]],
+        start_task=[0, 0, 0],
+        energy_per_distance=5.0,
+    )
+    assert energy_lower_bound(instance, 1.0) == pytest.approx(10.0, rel=1e-6)
+    assert energy_lower_bound(instance, 0.5) is None  # not even all agents together are that fast
+
+
+@pytest.mark.parametrize("scenario", [1, 2, 3, 4])
+def test_paper_instances_need_an_hour(scenario: int) -> None:
+    """Abilities and workloads have one sum, so that no bound lies below 1 h; and none above, as 1 h is reached."""
+    assert makespan_lower_bound(paper(scenario, 0)) == pytest.approx(1.0, abs=1e-12)

@@ -1,0 +1,104 @@
+"""Fewest unserved tasks, serving them, and who competes for whom; brute force as oracle."""
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from oracle import brute_force, reachable
+from strategies import allocated, instances
+
+from alloc.problems import (
+    Allocation,
+    Instance,
+    contested_tasks,
+    evaluate,
+    fewest_unserved,
+    serve_all,
+)
+
+
+def can_all_be_served(instance: Instance, tasks: tuple[int, ...]) -> bool:
+    """Try all ways to give each of `tasks` an agent of its own."""
+    _, able = reachable(instance)
+
+    def place(rest: tuple[int, ...], used: frozenset[int]) -> bool:
+        return not rest or any(
+            able[i, rest[0]] and place(rest[1:], used | {i}) for i in range(instance.n) if i not in used
+        )
+
+    return place(tasks, frozenset())
+
+
+@given(instances(most_agents=4, most_tasks=3))
+def test_fewest_unserved_is_that_of_brute_force(instance: Instance) -> None:
+    """Matching finds the number that trying all allocations finds."""
+    assert fewest_unserved(instance) == brute_force(instance).unserved
+
+
+@given(allocated())
+def test_serve_all(case: tuple[Instance, Allocation]) -> None:
+    """The fewest tasks are unserved afterwards, those that were served still are, and nobody breaks a rule."""
+    instance, allocation = case
+    served_before = np.flatnonzero(evaluate(instance, allocation).group_ability > 0)
+    answer = serve_all(instance, allocation)
+    score = evaluate(instance, answer)
+    assert not score.violations
+    assert len(score.unserved_tasks) == fewest_unserved(instance)
+    assert not set(score.unserved_tasks) & set(served_before.tolist())
+
+
+@given(allocated())
+def test_serve_all_leaves_complete_plans_alone(case: tuple[Instance, Allocation]) -> None:
+    """Doing it twice is doing it once."""
+    instance, allocation = case
+    once = serve_all(instance, allocation)
+    if not evaluate(instance, once).unserved_tasks:
+        assert serve_all(instance, once) == once
+
+
+@given(instances())
+def test_contested_tasks_are_inclusion_minimal(instance: Instance) -> None:
+    """They cannot all be served, the rest of them can without any one, and one agent too few can take any of them."""
+    tasks = contested_tasks(instance)
+    needed = tuple(np.flatnonzero(instance.workload > 0).tolist())
+    assert (tasks is None) == can_all_be_served(instance, needed)
+    if tasks is not None:
+        rivals = tuple(tasks.tolist())
+        assert set(rivals) <= set(needed)
+        assert not can_all_be_served(instance, rivals)
+        assert all(can_all_be_served(instance, part) for part in combinations(rivals, len(rivals) - 1))
+        assert reachable(instance)[1][:, rivals].any(axis=1).sum() == len(rivals) - 1
+
+
+def test_contested_by_hand(contested: Instance) -> None:
+    """Three tasks share two agents; the fourth has its own."""
+    tasks = contested_tasks(contested)
+    assert tasks is not None
+    assert tasks.tolist() == [0, 1, 3]
+    assert fewest_unserved(contested) == 1
+
+
+def test_augmenting_path_by_hand() -> None:
+    """Task 2 has agent 0 alone, which must leave task 0 to agent 1, which must leave task 1 to the idle agent 2."""
+    instance = Instance(ability=[1, 1, 1], workload=[1, 1, 1], allowed_tasks=[[0, 2], [0, 1], [1]])
+    assert serve_all(instance, Allocation([0, 1, -1])) == Allocation([2, 0, 1])
+
+
+def test_idle_agents_are_taken_first() -> None:
+    """A task is given an idle agent, the nearest of them, before one that works."""
+    instance = Instance(
+        ability=[1, 1, 1, 1],
+        workload=[9, 1],
+        agent_position=[[5, 0], [5, 0], [3, 0], [2, 0]],
+        task_position=[[5, 0], [0, 0]],
+    )
+    assert serve_all(instance, Allocation([0, 0, -1, -1])) == Allocation([0, 0, -1, 1])
+
+
+@pytest.mark.parametrize("agents", [1, 2, 5])
+def test_without_limits_the_count_decides(agents: int) -> None:
+    """Where everyone can go everywhere, n agents serve n tasks."""
+    instance = Instance(ability=np.ones(agents), workload=[1, 0, 1, 1])
+    assert fewest_unserved(instance) == max(0, 3 - agents)
+    assert len(evaluate(instance, serve_all(instance, Allocation.idle(instance))).unserved_tasks) == max(0, 3 - agents)
