@@ -1,6 +1,7 @@
 """The command `alloc`: its commands, and how errors become one line and an exit code."""
 
 import contextlib
+import gc
 import os
 import sys
 import threading
@@ -61,8 +62,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     With the arguments of the process, it ends the process itself where a solver in native code did not obey.
     """
     code = _run(arguments)
-    if arguments is None and _is_solver_left():
-        _leave(code)
+    if arguments is None:
+        if _is_solver_left():
+            _leave(code)
+        gc.freeze()  # spares the last collection: with torch loaded, that is most of a second after Ctrl-C
     return code
 
 
