@@ -1,0 +1,101 @@
+"""Budget, clock and best so far."""
+
+import threading
+import time
+
+import pytest
+
+from alloc.allocators import Budget, Improvement, Search, StopReason
+from alloc.problems import Allocation, InputError, Instance, Objective
+
+
+@pytest.fixture
+def instance() -> Instance:
+    """Abilities 3, 2, 1 for workloads 4 and 2: T = 1 is possible; flying costs."""
+    return Instance(ability=[3, 2, 1], workload=[4, 2], task_position=[[0, 0], [1, 0]], start_task=[0, 0, 0])
+
+
+def search(instance: Instance, objective: Objective = Objective.MAKESPAN, **limits: float | None) -> Search:
+    return Search(instance, objective, Budget(**{"time_limit_s": None, **limits}))
+
+
+@pytest.mark.parametrize("field", ["time_limit_s", "iterations", "target_gap"])
+def test_budgets_are_not_negative(field: str) -> None:
+    """Neither negative nor NaN; nothing at all is allowed, and so is no limit."""
+    for wrong in (-1, float("nan")):
+        with pytest.raises(InputError):
+            Budget(**{field: wrong})
+    Budget(**{field: 0})
+    Budget(**{field: None})
+
+
+def test_keeps_the_best(instance: Instance) -> None:
+    """What is better replaces what was best, is traced and told; what is not, is scored only."""
+    told: list[Improvement] = []
+    run = Search(instance, Objective.MAKESPAN, Budget(None), on_improvement=told.append)
+    one, worse, two = Allocation([0, 1, -1]), Allocation([-1, 1, 0]), Allocation([0, 1, 0])
+    for allocation in (one, worse, two, one):
+        run.submit(allocation)
+    assert [step.allocation for step in run.trace] == [one, two] == [step.allocation for step in told]
+    assert run.best is told[-1]
+    assert run.best.evaluation.makespan == 1.0
+    assert run.gap == 0.0
+
+
+def test_reasons_to_stop(instance: Instance) -> None:
+    """Each limit ends a run for its own reason, and a run without limits goes on until it is proven."""
+    assert search(instance).stop_reason() is None
+    assert search(instance, time_limit_s=0).stop_reason() is StopReason.TIME_LIMIT
+    counted = search(instance, iterations=2)
+    assert counted.stop_reason() is None
+    counted.iteration = 2
+    assert counted.stop_reason() is StopReason.ITERATIONS
+    near = search(instance, target_gap=0.6)
+    near.submit(Allocation([0, 1, -1]))  # T = 4/3: a gap of a quarter
+    assert near.stop_reason() is StopReason.TARGET_GAP
+    proven = search(instance)
+    proven.submit(Allocation([0, 1, 0]))
+    assert proven.stop_reason() is StopReason.PROVEN
+    assert proven.should_stop()
+
+
+def test_energy_keeps_a_run_going(instance: Instance) -> None:
+    """At the least makespan, energy may still fall, unless it is 0."""
+    run = search(instance, Objective.MAKESPAN_ENERGY)
+    run.submit(Allocation([0, 1, 0]))
+    assert run.stop_reason() is None
+    still = search(Instance(ability=[3, 2, 1], workload=[4, 2]), Objective.MAKESPAN_ENERGY)
+    still.submit(Allocation([0, 1, 0]))
+    assert still.stop_reason() is StopReason.PROVEN
+
+
+def test_clock_and_interruption(instance: Instance) -> None:
+    """The clock starts with the run; an event from outside ends it at once."""
+    stop = threading.Event()
+    run = Search(instance, Objective.MAKESPAN, Budget(60), stop=stop)
+    time.sleep(0.02)
+    assert 0.02 <= run.elapsed_s <= 60
+    assert run.remaining_s <= 60 - 0.02
+    assert search(instance).remaining_s == float("inf")
+    stop.set()
+    assert run.interrupted
+    assert run.stop_reason() is StopReason.INTERRUPTED
+
+
+def test_bounds_only_rise(instance: Instance) -> None:
+    """A weaker bound changes nothing, and an unserved task leaves the gap at 1."""
+    run = search(instance)
+    run.raise_bound(0.5)
+    assert run.lower_bound == 1.0
+    run.raise_bound(1.25)
+    assert run.lower_bound == 1.25
+    run.submit(Allocation([0, -1, -1]))
+    assert run.gap == 1.0
+
+
+def test_starts_are_submitted(instance: Instance) -> None:
+    """A warm start is the first best."""
+    start = Allocation([0, 1, 0])
+    run = Search(instance, Objective.MAKESPAN, Budget(), start=start)
+    assert run.best is not None
+    assert run.best.allocation == start

@@ -1,0 +1,87 @@
+"""An instance is checked once, and read-only from then on."""
+
+import numpy as np
+import pytest
+
+from alloc.problems import InputError, Instance
+
+NAN, INF = float("nan"), float("inf")
+
+
+def test_defaults() -> None:
+    """Ability and workload are enough; all else is unlimited or unknown."""
+    instance = Instance(ability=[1, 2], workload=[3])
+    assert (instance.n, instance.m, instance.agent_ids, instance.task_ids) == (2, 1, ("a1", "a2"), ("t1",))
+    assert (instance.tau, instance.energy_per_distance, instance.allowed_tasks) == (0.5, 1.0, None)
+    assert np.isinf(instance.battery).all()
+    assert np.isinf(instance.communication_range).all()
+    assert np.isnan(instance.start_position).all()
+    assert instance.start_task.tolist() == [-1, -1]
+    assert instance.priority.tolist() == [1.0]
+    assert not instance.has_travel_time
+
+
+@pytest.mark.parametrize(
+    ("fields", "place"),
+    [
+        ({"ability": []}, "agents"),
+        ({"workload": []}, "tasks"),
+        ({"ability": [1, 0]}, "agents[1].ability"),
+        ({"ability": [INF, 1]}, "agents[0].ability"),
+        ({"ability": ["x", 1]}, "ability"),
+        ({"workload": [1, -1]}, "tasks[1].workload"),
+        ({"workload": [1, NAN]}, "tasks[1].workload"),
+        ({"priority": [1, -2]}, "tasks[1].priority"),
+        ({"battery": [-1, 1]}, "agents[0].battery"),
+        ({"battery": [NAN, 1]}, "agents[0].battery"),
+        ({"communication_range": [1, -1]}, "agents[1].range"),
+        ({"speed": [0, 1]}, "agents[0].speed"),
+        ({"tau": 1.0}, "tau"),
+        ({"tau": NAN}, "tau"),
+        ({"energy_per_distance": -1}, "energy_per_distance"),
+        ({"agent_position": [[0, 0], [INF, 0]]}, "agents[1].position"),
+        ({"start_task": [0, 2]}, "agents[1].start_task"),
+        ({"start_task": [0.5, 0]}, "start_task"),
+        ({"allowed_tasks": [None, [2]]}, "agents[1].tasks"),
+        ({"ability": [1e308, 1e308]}, ""),
+    ],
+)
+def test_errors_name_the_place(fields: dict, place: str) -> None:
+    """Whatever breaks a rule is refused with the place in the data."""
+    with pytest.raises(InputError) as caught:
+        Instance(**{"ability": [1, 1], "workload": [1, 1], **fields})
+    assert caught.value.place == place
+
+
+@pytest.mark.parametrize("kind", ["agent_ids", "task_ids"])
+def test_ids_are_unique(kind: str) -> None:
+    """Two of the same name are an error, and so is another number of names."""
+    for ids in (["x", "x"], ["x"]):
+        with pytest.raises(InputError):
+            Instance(ability=[1, 1], workload=[1, 1], **{kind: ids})
+
+
+def test_start_position() -> None:
+    """A position counts before a start task, a start task before nothing; 2-D positions lie at z = 0."""
+    instance = Instance(
+        ability=[1, 1, 1],
+        workload=[1, 1],
+        task_position=[[1, 2], [NAN, NAN]],
+        agent_position=[[5, 6], [NAN, NAN], [NAN, NAN]],
+        start_task=[0, 0, 1],
+    )
+    assert instance.start_position[:2].tolist() == [[5, 6, 0], [1, 2, 0]]
+    assert np.isnan(instance.start_position[2]).all()
+
+
+def test_read_only_and_independent() -> None:
+    """Arrays that were given can change afterwards, those of the instance cannot."""
+    given = np.array([1.0, 2.0])
+    instance = Instance(ability=given, workload=[1])
+    given[0] = 9
+    assert instance.ability.tolist() == [1, 2]
+    for array in (instance.ability, instance.start_position, instance.battery):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 5
+    with pytest.raises(AttributeError):
+        instance.tau = 0.1
