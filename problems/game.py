@@ -260,7 +260,7 @@ def pair_features(
         gain,
         (deficit < -SURPLUS / 2).float(),
     ]
-    return torch.stack([column.clamp(-2, 2) for column in torch.broadcast_tensors(*columns)], -1)
+    return torch.stack(torch.broadcast_tensors(*columns), -1).clamp(-2, 2)
 
 
 def observe_pairs(board: Board, state: State) -> Tensor:
@@ -298,4 +298,4 @@ def observe_tasks(board: Board, state: State) -> Tensor:
         5 * short[:, None].expand(everywhere),
         board.price[:, None].expand(everywhere) - 1,
     ]
-    return torch.stack([column.clamp(-2, 2) for column in columns], -1)
+    return torch.stack(columns, -1).clamp(-2, 2)

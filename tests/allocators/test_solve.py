@@ -1,0 +1,161 @@
+"""The recipe around every method."""
+
+import threading
+
+import pytest
+
+from alloc.allocators import (
+    Allocator,
+    Budget,
+    Improvement,
+    Method,
+    Proposal,
+    RefusedError,
+    Search,
+    Status,
+    StopReason,
+    load,
+    solve,
+)
+from alloc.problems import Allocation, InputError, Instance, Objective
+
+
+class Answers(Allocator):
+    """A method that proposes what it was made with."""
+
+    method = Method(name="answers", summary="for tests", objectives=(Objective.MAKESPAN,))
+
+    def __init__(self, proposal: Proposal, refusal: str | None = None) -> None:
+        self.proposal, self.reason = proposal, refusal
+
+    def refusal(self, instance: Instance, objective: Objective, budget: Budget) -> str | None:
+        return self.reason
+
+    def allocate(self, search: Search) -> Proposal:
+        return self.proposal
+
+
+@pytest.fixture
+def instance() -> Instance:
+    return Instance(ability=[3, 2, 1], workload=[4, 2], task_position=[[0, 0], [1, 0]], start_task=[0, 0, 0])
+
+
+def test_scores_what_is_proposed(instance: Instance) -> None:
+    """The makespan is the evaluator's, and proof comes from the bounds alone."""
+    result = solve(instance, Answers(Proposal(Allocation([0, 1, 0]))))
+    assert (result.makespan, result.status, result.stop_reason) == (1.0, Status.OPTIMAL, StopReason.PROVEN)
+    poor = solve(instance, Answers(Proposal(Allocation([0, 1, -1]))))
+    assert (poor.makespan, poor.status, poor.stop_reason) == (
+        pytest.approx(4 / 3),
+        Status.FEASIBLE,
+        StopReason.FINISHED,
+    )
+    assert poor.gap == pytest.approx(0.25)
+
+
+def test_serves_what_was_left_unserved(instance: Instance) -> None:
+    """A method that forgets a task is mended, whatever else it left."""
+    result = solve(instance, Answers(Proposal(Allocation([0, 0, 0]))))
+    assert result.evaluation is not None
+    assert result.evaluation.unserved_tasks == ()
+
+
+def test_infeasible_comes_with_a_plan_and_a_reason(contested: Instance) -> None:
+    """Where no allocation serves all, the best partial plan comes along and the tasks that compete are named."""
+    result = solve(contested, "greedy")
+    assert result.status is Status.INFEASIBLE
+    assert (result.makespan, result.lower_bound, result.gap) == (None, None, None)
+    assert result.evaluation is not None
+    assert len(result.evaluation.unserved_tasks) == 1
+    assert any("only 2 agents can take any of the 3 tasks 't1', 't2', 't4'" in note for note in result.notes)
+
+
+def test_nobody_can_take_a_task() -> None:
+    """The reason is put simply where it is simple."""
+    result = solve(Instance(ability=[1], workload=[1], allowed_tasks=[[]]), "greedy")
+    assert result.notes == ("no agent can take task 't1'",)
+    assert result.status is Status.INFEASIBLE
+
+
+def test_no_solution(instance: Instance) -> None:
+    """A method that proposes nothing has no solution, and no makespan."""
+    result = solve(instance, Answers(Proposal()))
+    assert (result.status, result.allocation, result.makespan) == (Status.NO_SOLUTION, None, None)
+
+
+def test_energy_must_be_proven_as_well(instance: Instance) -> None:
+    """At the least makespan, but with energy that is not known to be the least, a run is finished, not proven."""
+    far = Instance(
+        ability=[1, 2, 3], workload=[3, 3], task_position=[[1, 0], [0, 0]], start_task=[1, 0, 0], energy_per_distance=1
+    )
+    result = solve(far, "greedy", objective="makespan-energy")
+    assert result.makespan == 1.0
+    assert result.status is Status.FEASIBLE
+    assert result.stop_reason is StopReason.FINISHED
+    assert result.energy_gap is not None
+    assert result.energy_gap > 0.1
+
+
+def test_refusals(instance: Instance) -> None:
+    """The objective, finite speeds and the method's own reason refuse beforehand, and say why."""
+    idle = Proposal(Allocation.idle(instance))
+    with pytest.raises(RefusedError, match="does not optimise makespan-energy"):
+        solve(instance, Answers(idle), objective="makespan-energy")
+    with pytest.raises(RefusedError, match="too large for it"):
+        solve(instance, Answers(idle, "too large for it"))
+    moving = Instance(ability=[1], workload=[1], speed=[1.0])
+    for method in (Answers(idle), "ga"):
+        with pytest.raises(RefusedError, match="finite speeds"):
+            solve(moving, method)
+
+
+def test_a_start_is_never_lost(instance: Instance) -> None:
+    """An answer worse than the warm start gives way to it."""
+    result = solve(instance, Answers(Proposal(Allocation([1, 0, 1]))), start=Allocation([0, 1, 0]))
+    assert result.makespan == 1.0
+
+
+def test_starts_that_break_rules_are_mended() -> None:
+    """Agents that can no longer go where a start has them do not go there in the answer."""
+    instance = Instance(ability=[1, 2, 3], workload=[3, 3], allowed_tasks=[[0], [0], [1]])
+    result = solve(instance, Answers(Proposal()), start=Allocation([1, 0, 1]))
+    assert result.evaluation is not None
+    assert result.evaluation.violations == ()
+
+
+def test_stop_from_outside(instance: Instance) -> None:
+    """An event that is set ends a run that would have gone on for a minute, and says so."""
+    stop = threading.Event()
+    hard = Instance(ability=[1.1, 1.7, 2.3, 3.1, 4.9], workload=[3.3, 5.9])
+    timer = threading.Timer(0.2, stop.set)
+    timer.start()
+    result = solve(hard, "ga", time_limit_s=60, stop=stop)
+    timer.cancel()
+    assert result.stop_reason is StopReason.INTERRUPTED
+    assert result.runtime_s < 5
+    assert result.makespan is not None
+
+
+def test_callbacks_may_end_a_run(instance: Instance) -> None:
+    """What a callback raises reaches the caller."""
+
+    def enough(step: Improvement) -> None:
+        raise RuntimeError(f"T = {step.evaluation.makespan:g}")
+
+    with pytest.raises(RuntimeError, match="T = 1"):
+        solve(instance, Answers(Proposal(Allocation([0, 1, 0]))), on_improvement=enough)
+
+
+def test_options_need_a_name(instance: Instance) -> None:
+    """Options for a loaded allocator would be lost: an error instead."""
+    with pytest.raises(InputError, match="takes no options, got policy"):
+        solve(instance, load("greedy"), policy="x.safetensors")
+    with pytest.raises(InputError, match="takes no option 'policy'"):
+        solve(instance, "greedy", policy="x.safetensors")
+
+
+def test_auto_says_what_it_picked(instance: Instance) -> None:
+    """The result carries the name of the method that ran, and the reason."""
+    result = solve(instance, "auto")
+    assert result.method != "auto"
+    assert any(f"auto picked {result.method}" in note for note in result.notes)
