@@ -58,12 +58,20 @@ CASES: dict[str, Instance] = {
 }
 
 
+def medium_case() -> Instance:
+    """Return an instance that one greedy pass does not solve, and that an exact method solves in a moment."""
+    return _scattered("medium", 12, 4)
+
+
 def large_case() -> Instance:
     """Return an instance that takes every method a while: real numbers, ranges, no two agents alike."""
+    return _scattered("large", 150, 15)
+
+
+def _scattered(name: str, n: int, m: int) -> Instance:
     rng = np.random.default_rng(20250101)
-    n, m = 150, 15
     return Instance(
-        name="large",
+        name=name,
         ability=rng.uniform(1, 10, n),
         workload=rng.uniform(10, 100, m),
         agent_position=rng.random((n, 3)),

@@ -3,7 +3,9 @@
 import re
 import threading
 import time
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from itertools import pairwise
 from typing import Any, ClassVar
 
@@ -11,11 +13,11 @@ import numpy as np
 import pytest
 
 from alloc.allocators.base import Allocator, Proposal, RefusedError
-from alloc.allocators.conformance.cases import CASES, large_case, least_energy, optimum
+from alloc.allocators.conformance.cases import CASES, large_case, least_energy, medium_case, optimum
 from alloc.allocators.conformance.surroundings import instance_state, process_state
 from alloc.allocators.registry import load
 from alloc.allocators.result import Result, Status
-from alloc.allocators.search import PROVEN, Budget, Improvement, Search, StopReason
+from alloc.allocators.search import PROVEN, Budget, Improvement, Search
 from alloc.allocators.solve import refuse, solve
 from alloc.problems import Allocation, Instance, Objective, evaluate, fewest_unserved
 
@@ -39,7 +41,7 @@ class AllocatorConformance:
     iterations : int
         Budget where answers must be reproducible; choose it so that a run takes some 50 ms.
     patience_s : float
-        Time limit on the small cases, seldom reached.
+        What no run may take, as all have either few iterations or a short time limit.
     """
 
     name: ClassVar[str] = ""
@@ -61,16 +63,44 @@ class AllocatorConformance:
 
     def solve(self, subject: Allocator, instance: Instance, **settings: Any) -> Result:
         """Solve by `subject` with a budget of iterations unless told otherwise; skip what it rightly refuses."""
-        settings = {"iterations": self.iterations, "time_limit_s": self.patience_s, "threads": 1} | settings
+        objective = Objective(settings.pop("objective", subject.method.objectives[0]))
+        settings = {"iterations": self.iterations, "time_limit_s": None, "threads": 1, **settings}
         budget = Budget(settings["time_limit_s"], settings["iterations"])
-        objective = Objective(settings.get("objective", subject.method.objectives[0]))
         try:
             refuse(subject, instance, objective, budget)
         except RefusedError as refused:
             with pytest.raises(RefusedError, match=re.escape(str(refused))):
-                solve(instance, subject, **settings | {"objective": objective})
+                solve(instance, subject, objective=objective, **settings)
             pytest.skip(str(refused))
-        return solve(instance, subject, **settings | {"objective": objective})
+        with self.guard(settings.setdefault("stop", threading.Event())):
+            return solve(instance, subject, objective=objective, **settings)
+
+    def answer(self, subject: Allocator, case: str, objective: Objective) -> Result:
+        """Return what `subject` answers to a case, solved once for all checks that ask."""
+        cls = type(self)
+        if "_answers" not in vars(cls):
+            cls._answers = {}  # type: ignore[attr-defined]
+        answers: dict[tuple[Allocator, str, Objective], Result] = cls._answers  # type: ignore[attr-defined]
+        if (subject, case, objective) not in answers:
+            answers[subject, case, objective] = self.solve(subject, CASES[case], objective=objective)
+        return answers[subject, case, objective]
+
+    @contextmanager
+    def guard(self, stop: threading.Event) -> Iterator[None]:
+        """End a run that takes more than `patience_s`, and fail."""
+        late = threading.Event()
+
+        def end_it() -> None:
+            late.set()
+            stop.set()
+
+        timer = threading.Timer(self.patience_s, end_it)
+        timer.start()
+        try:
+            yield
+        finally:
+            timer.cancel()
+        assert not late.is_set(), f"the run went on for {self.patience_s} s, far beyond its budget"
 
     def test_method_is_described(self, subject: Allocator) -> None:
         """Name, summary, objectives and needs are such that ``alloc methods`` can show them."""
@@ -89,8 +119,8 @@ class AllocatorConformance:
     @every_case
     def test_proposal_is_sound(self, subject: Allocator, case: str) -> None:
         """Before `solve` mends anything, there is an answer, and it sends nobody where he cannot go."""
-        self.solve(subject, CASES[case])  # skips what is refused
-        search = Search(CASES[case], subject.method.objectives[0], Budget(self.patience_s, self.iterations))
+        self.answer(subject, case, subject.method.objectives[0])  # skips what is refused
+        search = Search(CASES[case], subject.method.objectives[0], Budget(None, self.iterations))
         proposal = subject.allocate(search)
         assert isinstance(proposal, Proposal)
         if proposal.allocation is not None:
@@ -104,7 +134,7 @@ class AllocatorConformance:
     def test_answer_is_sound(self, subject: Allocator, case: str, objective: Objective) -> None:
         """The scores are those of the allocation, nobody is sent astray, and as few tasks as possible are unserved."""
         instance = CASES[case]
-        result = self.solve(subject, instance, objective=objective)
+        result = self.answer(subject, case, objective)
         assert result.allocation is not None, "no allocation, though any would do"
         assert result.evaluation is not None, "an allocation without scores"
         again = evaluate(instance, result.allocation)
@@ -118,7 +148,7 @@ class AllocatorConformance:
     @every_objective
     def test_claims_hold(self, subject: Allocator, case: str, objective: Objective) -> None:
         """Bounds lie below the optimum found by trying everything, and the status says no more than they prove."""
-        result, best = self.solve(subject, CASES[case], objective=objective), optimum(case, objective)
+        result, best = self.answer(subject, case, objective), optimum(case, objective)
         assert result.evaluation is not None
         if best.unserved_tasks:
             assert result.status is Status.INFEASIBLE
@@ -138,18 +168,17 @@ class AllocatorConformance:
     @every_objective
     def test_same_seed_gives_same_answer(self, subject: Allocator, objective: Objective) -> None:
         """With a budget of iterations, the seed alone decides; the clock does not."""
-        first = self.solve(subject, large_case(), objective=objective, seed=7)
-        assert first.stop_reason is not StopReason.TIME_LIMIT, "did not stop after its iterations"
-        again = self.solve(subject, large_case(), objective=objective, seed=7)
+        first = self.solve(subject, medium_case(), objective=objective, seed=7)
+        again = self.solve(subject, medium_case(), objective=objective, seed=7)
         assert first.allocation == again.allocation
 
     @every_objective
     def test_start_is_never_lost(self, subject: Allocator, objective: Objective) -> None:
         """The answer is no worse than the allocation that the run starts from."""
-        good = self.solve(subject, large_case(), objective=objective, seed=1)
+        good = self.solve(subject, medium_case(), objective=objective, seed=1)
         assert good.allocation is not None
         assert good.evaluation is not None
-        warm = self.solve(subject, large_case(), objective=objective, start=good.allocation, iterations=1, seed=2)
+        warm = self.solve(subject, medium_case(), objective=objective, start=good.allocation, iterations=1, seed=2)
         assert warm.evaluation is not None
         assert not good.evaluation.is_better_than(warm.evaluation, objective)
 
@@ -170,7 +199,7 @@ class AllocatorConformance:
     def test_improvements_improve(self, subject: Allocator, objective: Objective) -> None:
         """Every improvement told is better than the one before and later; the last is the answer, the trace is all."""
         told: list[Improvement] = []
-        result = self.solve(subject, large_case(), objective=objective, on_improvement=told.append)
+        result = self.solve(subject, medium_case(), objective=objective, on_improvement=told.append)
         assert told, "nothing was told"
         assert tuple(told) == result.trace
         assert told[-1].allocation == result.allocation
@@ -207,7 +236,6 @@ class AllocatorConformance:
         result = self.solve(subject, large_case(), **budget)
         assert result.evaluation is not None
         assert not result.evaluation.unserved_tasks
-        assert result.runtime_s < self.patience_s / 2
 
     @pytest.mark.parametrize("after_s", [0.0, 0.3])
     def test_stop_event_ends_the_run(self, subject: Allocator, after_s: float) -> None:
@@ -217,7 +245,7 @@ class AllocatorConformance:
         timer.start()
         try:
             began = time.monotonic()
-            result = self.solve(subject, large_case(), iterations=None, stop=stop)
+            result = self.solve(subject, large_case(), iterations=None, time_limit_s=self.patience_s, stop=stop)
             assert time.monotonic() - began <= after_s + 1.5  # the certificate after the run included
         finally:
             timer.cancel()
@@ -225,7 +253,7 @@ class AllocatorConformance:
 
     def test_threads_do_not_meet(self, subject: Allocator) -> None:
         """One object, used by several threads at once, answers each as it would alone."""
-        instances = (CASES["ranges"], CASES["start tasks"], large_case())
+        instances = (CASES["ranges"], CASES["start tasks"], medium_case())
         jobs = [(instance, seed) for instance in instances for seed in (1, 2)]
 
         def run(job: tuple[Instance, int]) -> Allocation | None:
@@ -235,7 +263,7 @@ class AllocatorConformance:
         with ThreadPoolExecutor(4) as pool:
             assert list(pool.map(run, jobs)) == alone
 
-    @every_case
+    @pytest.mark.parametrize("case", ["integer", "batteries", "zero workloads", "contested agent", "some travel times"])
     def test_nothing_else_changes(self, subject: Allocator, case: str, capfd: pytest.CaptureFixture[str]) -> None:
         """The instance, the generators and settings shared by the process, and the terminal are left alone."""
         self.solve(subject, CASES[case])  # what is imported on first use may set itself up

@@ -1,0 +1,43 @@
+"""Every method that ships with the package passes the suite that plugins subclass."""
+
+import inspect
+import sys
+
+import pytest
+
+from alloc.allocators.conformance import AllocatorConformance
+from alloc.allocators.registry import BUILT_IN
+
+
+class TestGreedy(AllocatorConformance):
+    name = "greedy"
+
+
+class TestMilp(AllocatorConformance):
+    name = "milp"
+
+
+class TestCpsat(AllocatorConformance):
+    name = "cpsat"
+
+
+class TestGa(AllocatorConformance):
+    name = "ga"
+
+
+class TestGappo(AllocatorConformance):
+    name = "gappo"
+    iterations = 4
+
+
+def test_no_method_is_left_out():
+    """Each built-in method has its class above."""
+    classes = [value for _, value in inspect.getmembers(sys.modules[__name__], inspect.isclass)]
+    tested = {cls.name for cls in classes if issubclass(cls, AllocatorConformance)}
+    assert tested - {""} == set(BUILT_IN)
+
+
+def test_a_subclass_must_say_what_it_tests():
+    """A subclass without a name and without an allocator fails, rather than testing nothing."""
+    with pytest.raises(Exception, match="no method ''"):
+        AllocatorConformance().allocator()
