@@ -3,13 +3,13 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 CODE := pyproject.toml $(shell find problems allocators cli -name '*.py' -o -name '*.safetensors')
-EXAMPLE := examples/earthquakes/fiji.json
+EXAMPLE := examples/earthquakes/alaska.json
 
 .PHONY: solve test check format wheel clean
 
 solve: $(VENV)/.installed  ## allocate the agents of a real instance with GAPPO, and draw the plan
 	@mkdir -p out
-	$(BIN)/alloc solve $(EXAMPLE) --method gappo --objective makespan-energy --output out/fiji-result.json --plot out/fiji.png
+	$(BIN)/alloc solve $(EXAMPLE) --method gappo --objective makespan-energy --output out/alaska-result.json --plot out/alaska.png
 
 test: $(VENV)/.tested  ## run the tests
 	$(BIN)/python -m pytest

@@ -113,7 +113,7 @@ def _plan(networks: int, search: Search, pairs: int, rng: np.random.Generator) -
     """One greedy game, greedy games of every network at several prices, and then sampled ones without end."""
     energy = search.objective is Objective.MAKESPAN_ENERGY
     prices = (1.0, 0.6, 1.5, 2.0) if energy else (0.2, 0.6)
-    width = int(np.clip(200_000 // pairs, 1, 32))
+    width = int(np.clip(60_000 // pairs, 1, 16))
     yield Rollouts(0, prices[:1], 0.0)
     for number in range(networks):
         for first in range(0, len(prices), width):

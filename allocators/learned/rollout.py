@@ -159,46 +159,40 @@ class _Game:
         task[rows, agents] = goals
         after = State(task, group_ability(self.board, task), done)
         if len(rows):
-            self._score_columns(after, rows, torch.stack([sources, goals], 1))
-            self._score_rows(after, rows, agents, sources, goals)
+            self._score(after, *self._touched(after, rows, agents, sources, goals))
         return after
 
-    def _own(self, lack: Tensor, state: State) -> tuple[Tensor, Tensor, Tensor]:
-        return (
-            lack.gather(1, state.task),
-            self.target.gather(1, state.task),
-            self.board.distance.gather(2, state.task[..., None])[..., 0],
-        )
+    def _touched(
+        self, state: State, rows: Tensor, agents: Tensor, sources: Tensor, goals: Tensor
+    ) -> tuple[Tensor, Tensor, Tensor]:
+        """Game, agent and task of every pair that moves touched, each of shape (k,).
 
-    def _score_columns(self, state: State, rows: Tensor, columns: Tensor) -> None:
-        """What every agent of the games `rows` thinks of the tasks `columns`, shape (k, 2)."""
-        lack = deficit(self.board, state)
-        own_lack, own_target, own_distance = self._own(lack, state)
-        own = (own_lack[rows, :, None], own_target[rows, :, None], own_distance[rows, :, None])
-        distance = self.board.distance[rows[:, None], :, columns].transpose(1, 2)
-        other = (lack[rows].gather(1, columns)[:, None], self.target[rows].gather(1, columns)[:, None], distance)
-        seen = pair_features(self.board.price[rows, None, None], self.board.ability[rows, :, None], own, other)
-        self.score[rows[:, None], :, columns] = self.network.local(seen)[..., 0].transpose(1, 2)
-
-    def _score_rows(self, state: State, rows: Tensor, agents: Tensor, sources: Tensor, goals: Tensor) -> None:
-        """What those who moved, and those at the tasks that changed, think of all tasks."""
-        touched = torch.zeros(self.board.target.shape, dtype=torch.bool)
-        touched[rows, sources] = True
-        touched[rows, goals] = True
-        touched[:, -1] = False  # those who are idle see no change in their own place
-        concerned = touched.gather(1, state.task)
+        These are all pairs with the tasks that changed, and all pairs of the agents there; those who are idle see no
+        change in their own place.
+        """
+        _, n, places = self.board.shape
+        changed = torch.zeros(self.board.target.shape, dtype=torch.bool)
+        changed[rows, sources] = True
+        changed[rows, goals] = True
+        changed[:, -1] = False
+        concerned = changed.gather(1, state.task)
         concerned[rows, agents] = True
         game, agent = torch.nonzero(concerned, as_tuple=True)
-        lack = deficit(self.board, state)
-        own_lack, own_target, own_distance = (part[game, agent, None] for part in self._own(lack, state))
-        other = (lack[game], self.target[game], self.board.distance[game, agent])
-        seen = pair_features(
-            self.board.price[game, None],
-            self.board.ability[game, agent, None],
-            (own_lack, own_target, own_distance),
-            other,
+        where, column = torch.nonzero(changed, as_tuple=True)
+        everyone, everywhere = torch.arange(n), torch.arange(places)
+        return (
+            torch.cat([where.repeat_interleave(n), game.repeat_interleave(places)]),
+            torch.cat([everyone.repeat(len(where)), agent.repeat_interleave(places)]),
+            torch.cat([column.repeat_interleave(n), everywhere.repeat(len(game))]),
         )
-        self.score[game, agent] = self.network.local(seen)[..., 0]
+
+    def _score(self, state: State, game: Tensor, agent: Tensor, task: Tensor) -> None:
+        board, lack = self.board, deficit(self.board, state)
+        own_task = state.task[game, agent]
+        own = (lack[game, own_task], self.target[game, own_task], board.distance[game, agent, own_task])
+        other = (lack[game, task], self.target[game, task], board.distance[game, agent, task])
+        seen = pair_features(board.price[game], board.ability[game, agent], own, other)
+        self.score[game, agent, task] = self.network.local(seen)[..., 0]
 
 
 def _chunks(board: Board, size: int) -> Iterator[slice]:
