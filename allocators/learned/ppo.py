@@ -15,6 +15,9 @@ from torch.distributions import Categorical
 from alloc.allocators.learned.network import ActorCritic
 from alloc.problems.game import Board, State, begin, step, value_of
 
+LOWEST_LEARNING_RATE = 2e-5
+"""Where slowing down ends."""
+
 
 @dataclass(frozen=True)
 class PpoParameters:
@@ -149,6 +152,7 @@ def update(
     played: Trajectories,
     parameters: PpoParameters,
     generator: torch.Generator,
+    highest_learning_rate: float = 3e-3,
 ) -> UpdateStatistics:
     """Fit actor and critic to the trajectories, and adapt the learning rate to the divergence that came of it."""
     gain = advantages(
@@ -181,12 +185,17 @@ def update(
             entropies.append(float(entropy.detach().mean()))
             count += 1
     divergence = sum(divergences) / count
-    adapt_learning_rate(optimiser, divergence, parameters.kl_target)
+    adapt_learning_rate(optimiser, divergence, parameters.kl_target, highest_learning_rate)
     return UpdateStatistics(divergence, sum(entropies) / count, count)
 
 
-def adapt_learning_rate(optimiser: torch.optim.Optimizer, divergence: float, target: float) -> None:
-    """Slow down where the policy moved more than twice as far as intended, and speed up where less than half."""
+def adapt_learning_rate(
+    optimiser: torch.optim.Optimizer, divergence: float, target: float, highest: float = 3e-3
+) -> None:
+    """Slow down where the policy moved more than twice as far as intended, and speed up where less than half.
+
+    The paper's adaptive learning rate by KL target; that it stays below `highest` is ours.
+    """
     factor = 1 / 1.5 if divergence > 2 * target else 1.5 if divergence < target / 2 else 1.0
     for group in optimiser.param_groups:
-        group["lr"] = min(3e-3, max(3e-5, group["lr"] * factor))
+        group["lr"] = min(highest, max(LOWEST_LEARNING_RATE, group["lr"] * factor))

@@ -40,6 +40,8 @@ class TrainingParameters:
         PPO updates of each member between two generations.
     learning_rate : float
         First step size; adapted by the divergence, and by mutation.
+    decay : float
+        Factor per generation on three times that, the most that a step size may grow to.
     network : NetworkSize
     ppo : PpoParameters
     breeding : BreedingParameters
@@ -49,6 +51,7 @@ class TrainingParameters:
     population: int = 4
     updates_per_generation: int = 10
     learning_rate: float = 1e-3
+    decay: float = 0.96
     network: NetworkSize = field(default_factory=NetworkSize)
     ppo: PpoParameters = field(default_factory=PpoParameters)
     breeding: BreedingParameters = field(default_factory=BreedingParameters)
@@ -153,11 +156,12 @@ class Trainer:
         """Update one member on every board, the same for all members; also return the network evaluations it took."""
         curriculum, ppo = self.parameters.curriculum, self.parameters.ppo
         cost, result = 0, UpdateStatistics(0.0, 0.0, 0)
+        highest = 3 * self.parameters.learning_rate * self.parameters.decay**self.generation
         for board in boards:
             if should_stop():
                 break
             played = collect(member.network, board, curriculum.steps(board), ppo, self.generator)
-            result = update(member.network, member.optimiser, board, played, ppo, self.generator)
+            result = update(member.network, member.optimiser, board, played, ppo, self.generator, highest)
             cost += int(played.alive.sum()) * (1 + ppo.epochs)
         return result, cost
 
