@@ -14,6 +14,7 @@ from alloc.problems import Instance
 from alloc.problems.formats import write_instance
 
 HERE = Path(__file__).parent
+OUTPUT = HERE / "alaska.json"
 CENTRE = (62.0, -152.0)
 """Latitude and longitude of the middle of the map, in degrees."""
 WEST, EAST = -166.0, -129.0
@@ -33,9 +34,9 @@ FLEETS = ((LIGHT, MEDIUM), (LIGHT, LIGHT), (MEDIUM, HEAVY), (LIGHT, MEDIUM), (ME
 
 
 def main() -> None:
-    """Write the instance beside this script."""
+    """Write the instance to `OUTPUT`."""
     instance = build()
-    write_instance(instance, HERE / "alaska.json")
+    write_instance(instance, OUTPUT)
     share = instance.reach.mask[instance.reach.origin].mean()
     print(f"{instance.n} drones, {instance.m} sites; a drone reaches {100 * share:.0f} % of the sites on average")
 
