@@ -29,9 +29,9 @@ SURPLUS = 1e6
 MEAN_DISTANCE = 0.66
 """Distances are scaled to this mean, that of two points in the unit cube."""
 
-PAIR_FEATURES = 18
-TASK_FEATURES = 10
-FEATURE_SET = "bidding-1"
+PAIR_FEATURES = 21
+TASK_FEATURES = 11
+FEATURE_SET = "bidding-2"
 """Name of what `observe` returns; policies trained on another set do not load."""
 
 
@@ -52,6 +52,10 @@ class Board:
         Where each agent is when the game begins.
     price : Tensor, shape (B,)
         Weight of energy in the reward.
+    supply : Tensor, shape (B, m + 1)
+        log of the ability that can reach each task over its target, halved, less 1: low where few can help.
+    choice : Tensor, shape (B, n)
+        Share of the tasks that each agent can take.
     """
 
     ability: Tensor
@@ -60,6 +64,8 @@ class Board:
     legal: Tensor
     start: Tensor
     price: Tensor
+    supply: Tensor
+    choice: Tensor
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -122,6 +128,7 @@ def make_board(
     def real(array: np.ndarray) -> Tensor:
         return torch.from_numpy(array.astype(np.float32))
 
+    reachable = (legal * ability[..., None]).sum(axis=1)
     return Board(
         real(ability),
         real(target),
@@ -129,6 +136,8 @@ def make_board(
         torch.from_numpy(legal),
         torch.from_numpy(start.astype(np.int64)),
         torch.tensor(price, dtype=torch.float32),
+        real(np.log(np.maximum(reachable, 1e-3) / np.maximum(target, 1e-3)) / 2 - 1),
+        real(legal.mean(axis=2)),
     )
 
 
@@ -221,8 +230,9 @@ def value_of(board: Board, state: State) -> Tensor:
 def pair_features(
     price: Tensor,
     ability: Tensor,
-    own: tuple[Tensor, Tensor, Tensor],
-    other: tuple[Tensor, Tensor, Tensor],
+    choice: Tensor,
+    own: tuple[Tensor, Tensor, Tensor, Tensor],
+    other: tuple[Tensor, Tensor, Tensor, Tensor],
 ) -> Tensor:
     """Return what an agent knows of a move, shape (..., PAIR_FEATURES); the arguments broadcast to (...).
 
@@ -230,13 +240,13 @@ def pair_features(
     ----------
     price : Tensor
         Weight of energy.
-    ability : Tensor
+    ability, choice : Tensor
         Of the agent.
     own, other : tuple of Tensor
-        Deficit, target and distance of the task where the agent is, and of the one it bids for.
+        Deficit, target, supply and distance of the task where the agent is, and of the one it bids for.
     """
-    own_deficit, own_target, own_distance = own
-    deficit, target, distance = other
+    own_deficit, own_target, own_supply, own_distance = own
+    deficit, target, supply, distance = other
     further = distance - own_distance
     gain = deficit.clamp(min=0) + own_deficit.clamp(min=0)
     gain = gain - (deficit - ability).clamp(min=0) - (own_deficit + ability).clamp(min=0)
@@ -259,6 +269,9 @@ def pair_features(
         gain / ability,
         gain,
         (deficit < -SURPLUS / 2).float(),
+        own_supply,
+        supply,
+        choice,
     ]
     return torch.stack(torch.broadcast_tensors(*columns), -1).clamp(-2, 2)
 
@@ -270,10 +283,11 @@ def observe_pairs(board: Board, state: State) -> Tensor:
     own = (
         lack.gather(1, task)[..., None],
         target.gather(1, task)[..., None],
+        board.supply.gather(1, task)[..., None],
         board.distance.gather(2, task[..., None]),
     )
-    other = (lack[:, None, :], target[:, None, :], board.distance)
-    return pair_features(board.price[:, None, None], board.ability[..., None], own, other)
+    other = (lack[:, None, :], target[:, None, :], board.supply[:, None, :], board.distance)
+    return pair_features(board.price[:, None, None], board.ability[..., None], board.choice[..., None], own, other)
 
 
 def observe_tasks(board: Board, state: State) -> Tensor:
@@ -297,5 +311,6 @@ def observe_tasks(board: Board, state: State) -> Tensor:
         ratio[:, None].expand(everywhere),
         5 * short[:, None].expand(everywhere),
         board.price[:, None].expand(everywhere) - 1,
+        board.supply,
     ]
     return torch.stack(columns, -1).clamp(-2, 2)

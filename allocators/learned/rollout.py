@@ -72,6 +72,8 @@ def repeat(board: Board, price: Tensor) -> Board:
         copies(board.legal),
         copies(board.start),
         price,
+        copies(board.supply),
+        copies(board.choice),
     )
 
 
@@ -135,6 +137,7 @@ class _Game:
                 ability=board.ability[:, agents],
                 distance=board.distance[:, agents],
                 legal=board.legal[:, agents],
+                choice=board.choice[:, agents],
             )
             there = State(state.task[:, agents], state.group, state.done)
             self.score[:, agents] = network.local(observe_pairs(part, there))[..., 0]
@@ -189,9 +192,11 @@ class _Game:
     def _score(self, state: State, game: Tensor, agent: Tensor, task: Tensor) -> None:
         board, lack = self.board, deficit(self.board, state)
         own_task = state.task[game, agent]
-        own = (lack[game, own_task], self.target[game, own_task], board.distance[game, agent, own_task])
-        other = (lack[game, task], self.target[game, task], board.distance[game, agent, task])
-        seen = pair_features(board.price[game], board.ability[game, agent], own, other)
+        own, other = (
+            (lack[game, place], self.target[game, place], board.supply[game, place], board.distance[game, agent, place])
+            for place in (own_task, task)
+        )
+        seen = pair_features(board.price[game], board.ability[game, agent], board.choice[game, agent], own, other)
         self.score[game, agent, task] = self.network.local(seen)[..., 0]
 
 

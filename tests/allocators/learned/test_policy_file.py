@@ -60,7 +60,7 @@ def test_policy_of_another_feature_set(tmp_path: Path, networks: list[ActorCriti
     """A policy for other observations is an error, not a wrong answer."""
     save_policy(tmp_path / "p.safetensors", networks, "gappo")
     path = tmp_path / "p.safetensors"
-    path.write_bytes(path.read_bytes().replace(b"bidding-1", b"bidding-0"))
+    path.write_bytes(path.read_bytes().replace(b"bidding-2", b"bidding-0"))
     with pytest.raises(InputError, match="features"):
         load_policy(path, "gappo")
 
