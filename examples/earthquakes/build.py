@@ -6,6 +6,7 @@ Run ``python examples/earthquakes/build.py``. The data are real, the drones are 
 import csv
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,7 +108,7 @@ def shaken_area(quake: dict[str, str]) -> float:
     return float(20 * 10 ** (0.4 * float(quake["magnitude"])) / (1 + depth_km / 50))
 
 
-def station_drones(airfields: list[dict[str, str]]) -> Iterator[dict[str, object]]:
+def station_drones(airfields: list[dict[str, str]]) -> Iterator[dict[str, Any]]:
     """Station two drones at each airfield, with batteries 60 to 100 % full and abilities that fall with elevation."""
     for count, row in enumerate(airfields):
         elevation_km = float(row["elevation_ft"]) * 0.3048e-3

@@ -43,7 +43,7 @@ def descend(search: Search, allocation: Allocation) -> Allocation:
     instance, task = search.instance, allocation.task_of_agent.copy()
     work, reach = instance.workload, instance.reach
     busy = task != IDLE
-    group = np.bincount(task[busy], weights=instance.ability[busy], minlength=instance.m)
+    group = np.bincount(task[busy], weights=instance.ability[busy], minlength=instance.m).astype(float)
     while not search.should_stop():
         hours = completion_times(work, group)
         last = int(np.argmax(hours))
