@@ -85,17 +85,22 @@ def build(question: Question, halted: Callable[[], bool] = lambda: False) -> tup
         if halted():
             return None
     weight, need = whole_numbers(demand)
+    enough, least_used = demand.enough, demand.least_used.tolist()
     served = [model.new_bool_var("") if demand.partial else 1 for _ in need]
     for row, pairs in enumerate(_by(demand.goal, len(need))):
         done = cp_model.LinearExpr.weighted_sum([x[p] for p in pairs], weight[pairs].tolist())
-        model.add(done >= int(need[row]) * served[row])
+        if np.isfinite(demand.spare):
+            model.add_linear_constraint(done, int(need[row]), int(enough[row]))
+        else:
+            model.add(done >= int(need[row]) * served[row])
         if halted():
             return None
     if demand.partial:
         model.add(cp_model.LinearExpr.sum(served) == demand.serve)
     for kind, pairs in enumerate(_by(demand.kind, len(demand.count))):
-        if demand.most[pairs].sum() > demand.count[kind]:
-            model.add(cp_model.LinearExpr.sum([x[p] for p in pairs]) <= int(demand.count[kind]))
+        if least_used[kind] > 0 or demand.most[pairs].sum() > demand.count[kind]:
+            working = cp_model.LinearExpr.sum([x[p] for p in pairs])
+            model.add_linear_constraint(working, least_used[kind], int(demand.count[kind]))
         if halted():
             return None
     for variable, agents in zip(x, [] if question.hint is None else question.hint.tolist(), strict=False):

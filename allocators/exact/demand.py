@@ -6,7 +6,9 @@ sums to its workload over its group, so a plan with makespan T or less is an int
     sum_k weight_kj x_kj >= need_j for each task j,   sum_j x_kj <= count_k for each class k.
 
 Travel times change the weights alone. Weights are capped at the need, which keeps the integer points and cuts off
-fractional ones.
+fractional ones. Where abilities are multiples of a unit, needs are rounded up to it, and then nothing may be wasted
+beyond what is to spare: that no task gets more, and that no more agents stay idle, helps solvers a lot on
+the paper's scenarios, where nothing is to spare at the optimum.
 """
 
 from dataclasses import dataclass
@@ -43,6 +45,10 @@ class Demand:
         How many of the tasks must be served: all, t, unless too few agents can reach them.
     whole : bool
         Whether weights and needs are integers.
+    spare : float
+        Ability beyond the sum of all needs, in their unit; ``inf`` where that says nothing.
+    ability : ndarray, shape (k,)
+        Ability of each class, in the same unit.
     """
 
     time: float
@@ -54,6 +60,21 @@ class Demand:
     count: IntArray
     serve: int
     whole: bool
+    spare: float
+    ability: FloatArray
+
+    @property
+    def enough(self) -> FloatArray:
+        """What no task can get more of, as the others would lack it, shape (t,)."""
+        return self.need + self.spare
+
+    @property
+    def least_used(self) -> IntArray:
+        """How many of each class must work, as otherwise the rest would lack something, shape (k,)."""
+        if np.isinf(self.spare):
+            return np.zeros_like(self.count)
+        useful = np.bincount(self.kind, minlength=len(self.count)) > 0
+        return np.where(useful, np.maximum(0, self.count - np.floor(self.spare / self.ability)), 0).astype(np.intp)
 
     @property
     def partial(self) -> bool:
@@ -62,7 +83,9 @@ class Demand:
 
     @property
     def hopeless(self) -> bool:
-        """Whether too many tasks are out of reach even for all who could come."""
+        """Whether all abilities together are too few, or too many tasks lack what they need even if all come."""
+        if self.spare < 0:
+            return True
         all_come = np.bincount(self.goal, weights=self.weight * self.most, minlength=len(self.need))
         return int((all_come >= self.need * (1 - 1e-9)).sum()) < self.serve
 
@@ -113,12 +136,16 @@ class Model:
 
     def at(self, time: float) -> Demand:
         """Return the demand at T = `time` hours, > 0."""
+        ability, spare = self.classes.ability, np.inf
         if self.unit is None:
             need = np.full(len(self.work), 1 - ROUNDING)
             weight = np.minimum(1.0, self._rate(time) * (time / self.work[self.goal]))
         else:
-            need = self._units_needed(time)
-            weight = np.minimum(np.round(self.classes.ability / self.unit)[self.kind], need[self.goal])
+            need, ability = self._units_needed(time), np.round(self.classes.ability / self.unit)
+            weight = np.minimum(ability[self.kind], need[self.goal])
+            if self.serve == len(need):
+                useful = np.bincount(self.kind, minlength=self.classes.size) > 0
+                spare = float(ability @ (self.classes.count * useful) - need.sum())
         with np.errstate(divide="ignore"):
             enough = np.ceil(np.where(weight > 0, need[self.goal] / weight, 0.0) * (1 - ROUNDING))
         most = np.minimum(self.classes.count[self.kind], enough).astype(np.intp)
@@ -133,6 +160,8 @@ class Model:
             count=self.classes.count,
             serve=self.serve,
             whole=self.unit is not None,
+            spare=spare,
+            ability=ability,
         )
 
     def pairs_at(self, demand: Demand) -> IntArray:

@@ -96,7 +96,7 @@ class LeastMakespan:
             self._quick_plans()
         if self._search.instance.has_travel_time or not self._search.instance.reach.is_complete:
             self._raise_by_relaxation()
-        test = Test(self._low, self._part(0.15))
+        test = Test(self._low, self._part(0.25))
         while not (self._closed or self._over):
             found = self._try(test)
             if found is None:

@@ -93,6 +93,8 @@ def state(question: Question) -> tuple[cp.Problem, cp.Variable]:
         rows += [done >= diags_array(need) @ served, np.ones(len(need)) @ served >= demand.serve]
     else:
         rows += [done >= need]
+    if np.isfinite(demand.spare):
+        rows += [done <= demand.enough * scale, used >= demand.least_used]
     cost = np.zeros(len(pairs)) if question.cost is None else question.cost
     return cp.Problem(cp.Minimize(cost @ x), rows), x
 

@@ -1,6 +1,6 @@
 """Exact methods against brute force on random tiny instances: prints a table, exits with 1 on any mismatch.
 
-    python tests/benchmarks/exact_vs_brute_force.py --count 300
+python tests/benchmarks/exact_vs_brute_force.py --count 300
 """
 
 import argparse

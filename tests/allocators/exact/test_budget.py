@@ -1,0 +1,182 @@
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from alloc.allocators import Allocator, Budget, RefusedError, StopReason, load, solve
+from alloc.problems import Instance, Objective
+from alloc.problems.generate import paper, paper_like
+
+OVERHEAD_S = 0.5
+
+
+def hard(n: int = 150, m: int = 50) -> Instance:
+    """Few agents per task, abilities all different: no solver proves anything here within minutes."""
+    rng = np.random.default_rng(0)
+    return Instance(
+        ability=rng.uniform(1, 1000, n),
+        workload=rng.uniform(1, 1000, m),
+        agent_position=rng.random((n, 3)),
+        task_position=rng.random((m, 3)),
+    )
+
+
+@pytest.fixture(params=["cpsat", "milp"], scope="module")
+def exact(request: pytest.FixtureRequest) -> Allocator:
+    """Each exact method."""
+    return load(request.param)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("objective", ["makespan", "makespan-energy"])
+def test_time_limit_is_held_in_both_stages(exact, objective):
+    """A second is a second, with a plan and a bound at its end, and the energy gets its share of it."""
+    begin = time.monotonic()
+    result = solve(hard(), exact, objective=objective, time_limit_s=1.0)
+    assert time.monotonic() - begin < 1.1 + 2 * OVERHEAD_S  # the linear programmes behind the bounds come on top
+    assert result.runtime_s < 1.1 + OVERHEAD_S
+    assert result.stop_reason is StopReason.TIME_LIMIT
+    assert result.gap is not None
+    assert result.gap < 0.02
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("objective", "limit_s"), [("makespan", 60.0), ("makespan-energy", 1.0)])
+def test_event_ends_a_run_in_native_code(exact, objective, limit_s):
+    """Setting the event half-way, in the first stage or in the second, ends the run within a second."""
+    stop = threading.Event()
+    delay = 0.5 if objective == "makespan" else 0.8
+    threading.Timer(delay, stop.set).start()
+    begin = time.monotonic()
+    result = solve(hard(), exact, objective=objective, time_limit_s=limit_s, stop=stop)
+    assert time.monotonic() - begin < delay + 1.0
+    assert result.stop_reason is StopReason.INTERRUPTED
+    assert result.makespan is not None
+
+
+PROGRAMME = """
+import sys
+sys.path.insert(0, {folder!r})
+from test_budget import hard
+from alloc.allocators import load, solve
+exact, instance = load({method!r}), hard()
+solve(instance, exact, time_limit_s=0.01)
+print("READY", flush=True)
+result = solve(instance, exact, time_limit_s=60.0)
+print(result.stop_reason, result.makespan is not None, flush=True)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["cpsat", "milp"])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_signal_ends_a_run_and_leaves_the_process_in_order(method, number):
+    """The best plan is there soon after the signal, and the process ends with status 0, without a crash."""
+    code = PROGRAMME.format(folder=__file__.rpartition("/")[0], method=method)
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline().strip() == "READY"
+        time.sleep(0.8)
+        process.send_signal(number)
+        begin = time.monotonic()
+        assert process.stdout.readline().split() == ["interrupted", "True"]
+        assert time.monotonic() - begin < 1.5
+        assert process.wait(timeout=10) == 0
+
+
+def test_iterations_count_questions_and_repeat(exact):
+    """With a budget of iterations alone, the same seed gives the same answer, after that many questions."""
+    instance = hard(14, 4)
+    runs = [solve(instance, exact, time_limit_s=None, iterations=3, seed=5) for _ in range(2)]
+    assert runs[0].allocation == runs[1].allocation
+    assert runs[0].lower_bound == runs[1].lower_bound
+    assert [step.evaluation.makespan for step in runs[0].trace] == [step.evaluation.makespan for step in runs[1].trace]
+
+
+def test_no_iterations_still_give_a_plan(exact):
+    """Even where the solver may not be asked at all, every task is served."""
+    result = solve(paper(1, 0), exact, time_limit_s=None, iterations=0)
+    assert result.makespan is not None
+    assert result.stop_reason is StopReason.ITERATIONS
+
+
+def test_no_time_still_gives_a_plan(exact):
+    """With a time limit of zero every task is served, in no time."""
+    result = solve(paper(1, 0), exact, time_limit_s=0)
+    assert result.makespan is not None
+    assert result.runtime_s < OVERHEAD_S
+
+
+def test_start_is_built_on(exact):
+    """A start that is the optimum is kept, and proven."""
+    best = solve(paper(1, 0), exact)
+    again = solve(paper(1, 0), exact, start=best.allocation, objective="makespan")
+    assert again.allocation == best.allocation
+    assert str(again.status) == "optimal"
+
+
+def test_target_gap_ends_the_run(exact):
+    """A gap of 5 % is reached by the first plans and is enough, if asked for."""
+    result = solve(hard(), exact, target_gap=0.05, time_limit_s=30)
+    assert result.stop_reason is StopReason.TARGET_GAP
+    assert result.gap is not None
+    assert result.gap <= 0.05
+
+
+def test_error_of_a_callback_reaches_the_caller(exact):
+    """What `on_improvement` raises comes out of `solve`, even while a solver runs."""
+
+    def refuse_energy(improvement):
+        if len(seen) == 3:
+            raise LookupError("enough")
+        seen.append(improvement)
+
+    seen: list[object] = []
+    with pytest.raises(LookupError, match="enough"):
+        solve(
+            paper_like(50, 10, 200, 0),
+            exact,
+            objective="makespan-energy",
+            time_limit_s=20,
+            on_improvement=refuse_energy,
+        )
+
+
+def test_improvements_are_told_from_the_calling_thread(exact):
+    """Callbacks come from the thread that called `solve`, although the solver runs in another."""
+    threads = set()
+    solve(
+        paper(1, 0),
+        exact,
+        objective="makespan-energy",
+        time_limit_s=2,
+        on_improvement=lambda improvement: threads.add(threading.get_ident()),
+    )
+    assert threads == {threading.get_ident()}
+
+
+def test_models_too_large_for_the_time_are_refused(exact):
+    """The reason names the size, and what would be possible in that time; more time is enough."""
+    instance = hard(1000, 150)
+    with pytest.raises(RefusedError, match=r"it takes \d+ pairs of agent class and task within 0.1 s, this has 150000"):
+        solve(instance, exact, time_limit_s=0.1)
+    assert exact.refusal(instance, Objective.MAKESPAN, Budget(None)) is None
+
+
+def test_one_object_serves_several_threads(exact):
+    """Two threads share the allocator, and both prove their optimum."""
+    results = {}
+
+    def run(seed):
+        results[seed] = solve(paper(1, seed), exact, objective="makespan", time_limit_s=20)
+
+    threads = [threading.Thread(target=run, args=(seed,)) for seed in (1, 2, 3)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert [results[seed].makespan for seed in (1, 2, 3)] == [1.0] * 3

@@ -1,0 +1,92 @@
+import numpy as np
+import pytest
+from oracle import brute_force
+from tiny_instances import tiny_instance
+
+from alloc.allocators import Allocator, Status, StopReason, load, solve
+from alloc.problems import Instance, fewest_unserved
+from alloc.problems.generate import paper
+
+
+@pytest.fixture(params=["cpsat", "milp"], scope="module")
+def exact(request: pytest.FixtureRequest) -> Allocator:
+    """Each exact method."""
+    return load(request.param)
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_answer_is_that_of_brute_force(exact, seed):
+    """On tiny instances of every sort the answer is the optimum, or the best partial plan, and is known to be."""
+    instance = tiny_instance(seed)
+    best = brute_force(instance)
+    energy_counts = (seed % 3) > 0
+    result = solve(instance, exact, objective="makespan-energy" if energy_counts else "makespan", time_limit_s=60)
+    assert result.evaluation is not None
+    assert not result.evaluation.violations
+    assert result.status is (Status.INFEASIBLE if best.unserved else Status.OPTIMAL)
+    assert len(result.evaluation.unserved_tasks) == best.unserved == fewest_unserved(instance)
+    assert result.evaluation.served_makespan == pytest.approx(best.makespan, rel=1e-6)
+    if energy_counts:
+        assert result.evaluation.energy == pytest.approx(best.energy, rel=1e-6)
+
+
+@pytest.mark.parametrize("scenario", [1, 2, 3, 4])
+def test_paper_scenarios_are_proven(exact, scenario):
+    """T = 1 is proven in each of the paper's scenarios."""
+    result = solve(paper(scenario, 7), exact, time_limit_s=30)
+    assert (result.status, result.makespan, result.stop_reason) == (Status.OPTIMAL, 1.0, StopReason.PROVEN)
+
+
+@pytest.mark.parametrize("name", ["cpsat", "milp"])
+def test_solver_alone_proves_a_paper_scenario(name):
+    """Without the descent it is the solver that has to find the plan of T = 1, and does."""
+    exact = type(load(name))(descent=False)
+    result = solve(paper(1, 3), exact, time_limit_s=30)
+    assert (result.status, result.makespan) == (Status.OPTIMAL, 1.0)
+    assert len(result.trace) > 1
+
+
+def test_makespans_a_millionth_apart_are_told_apart(exact):
+    """Two splits that differ by 1.5e-6 relative: the better one is found."""
+    instance = Instance(ability=[1.0, 1.0000015, 0.5, 0.4999985], workload=[1.5, 1.5])
+    result = solve(instance, exact, time_limit_s=30)
+    best = brute_force(instance)
+    assert result.makespan == pytest.approx(best.makespan, rel=1e-9)
+    assert result.status is Status.OPTIMAL
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1e9])
+def test_units_do_not_matter(exact, scale):
+    """Workloads in units a milliard times as large or small give the same plan, in other hours."""
+    rng = np.random.default_rng(5)
+    ability, workload = rng.uniform(1, 3, 6), rng.uniform(1, 5, 2)
+    plain = solve(Instance(ability=ability, workload=workload), exact, time_limit_s=30)
+    other = solve(Instance(ability=ability, workload=workload * scale), exact, time_limit_s=30)
+    assert other.status is Status.OPTIMAL
+    assert plain.makespan is not None
+    assert other.makespan == pytest.approx(plain.makespan * scale, rel=1e-8)
+
+
+def test_contest_is_explained(exact):
+    """One agent for three tasks: two of them, already one too many, are named in plain words."""
+    instance = Instance(ability=[1, 1], workload=[1, 1, 1, 1], allowed_tasks=[[0, 1, 2], [3]])
+    result = solve(instance, exact)
+    assert result.status is Status.INFEASIBLE
+    assert result.lower_bound is None
+    assert any("only 1 agent can take any of the 2 tasks" in note for note in result.notes)
+
+
+def test_nothing_to_do_needs_nobody(exact):
+    """Where no task has workload, everybody is idle, at once."""
+    instance = Instance(
+        ability=[1, 2], workload=[0, 0], agent_position=[[0, 0], [1, 1]], task_position=[[2, 2], [3, 3]]
+    )
+    result = solve(instance, exact, objective="makespan-energy")
+    assert (result.status, result.makespan, result.energy) == (Status.OPTIMAL, 0.0, 0.0)
+
+
+def test_solvers_share_a_process():
+    """OR-Tools and HiGHS answer in turn in one process."""
+    instance = tiny_instance(3)
+    answers = [solve(instance, name).evaluation.served_makespan for name in ("cpsat", "milp", "cpsat", "milp")]
+    assert answers == pytest.approx([answers[0]] * 4, rel=1e-6)
