@@ -1,36 +1,48 @@
-"""GAPPO: rollouts of a trained population of actor-critics, greedy ones first, then sampled until time is up."""
+"""GAPPO: games of a trained population of actor-critics, greedy ones first, then sampled ones until time is up."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from importlib.resources import as_file, files
 from pathlib import Path
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 
 from alloc.allocators.base import Allocator, Proposal
 from alloc.allocators.learned.curriculum import reference_makespan
+from alloc.allocators.learned.network import ActorCritic
 from alloc.allocators.learned.policy_file import load_policy
 from alloc.allocators.learned.rollout import Best, play, repeat
 from alloc.allocators.registry import BUILT_IN
 from alloc.allocators.search import Budget, Search
 from alloc.problems import IDLE, Allocation, Instance, Objective, serve_all
-from alloc.problems.game import make_board
+from alloc.problems.game import Board, make_board
 
 PAIRS_PER_SECOND = 400_000
 """Pairs of agent and task that are scored, placed and tried within a second on one slow core."""
+
+LANE_PAIRS = 100_000
+"""Pairs of agent and task in the games that are played side by side."""
+
+PATIENCE = 8
+"""Steps without progress after which a game ends."""
+
+GREEDY_SHARE = 0.25
+"""Share of the time limit after which no network begins its greedy games."""
+
+AGENTS_PER_MOVE = 800
+"""Agents for each move that is granted at once."""
 
 LARGEST = 6_000_000
 """Pairs beyond which the scores of one game alone take more than a gigabyte."""
 
 
-@dataclass(frozen=True)
-class Rollouts:
-    """One batch of games: which network plays, at which prices of energy, and how boldly."""
+GREEDY_PRICES = {Objective.MAKESPAN: (0.2, 0.6), Objective.MAKESPAN_ENERGY: (1.0, 0.6, 1.5, 2.0)}
+SAMPLED_PRICES = {Objective.MAKESPAN: (0.2, 0.8), Objective.MAKESPAN_ENERGY: (0.8, 2.4)}
+"""Weights of energy that are played at; the policy was trained on 0.2 to 2.4."""
 
-    network: int
-    prices: tuple[float, ...]
-    temperature: float
+FRESH_SHARE = 0.15
+"""Share of the sampled batches that play from the beginning, rather than from the ruins of the best plan."""
 
 
 class Gappo(Allocator):
@@ -92,36 +104,91 @@ class Gappo(Allocator):
         board = make_board([instance], [reference_makespan(instance)], [1.0], rng)
         if search.start is not None:
             board = replace(board, start=_places(instance, search.start))
-        moves = max(1, instance.n // 800)
-        for batch in _plan(len(self.networks), search, instance.n * (instance.m + 1), rng):
-            if search.best is not None and search.should_stop():
-                return
-            best = play(
-                self.networks[batch.network],
-                repeat(board, torch.tensor(batch.prices)),
-                steps=int(0.8 * instance.n / moves) + 8,
-                moves_per_step=moves,
-                temperature=batch.temperature,
-                generator=generator,
-                should_stop=search.should_stop,
-            )
-            _submit(search, best)
-            search.iteration += 1
+        games = _Games(search, board, generator)
+        width = int(np.clip(LANE_PAIRS // (instance.n * (instance.m + 1)), 1, 24))
+        prices = GREEDY_PRICES[search.objective]
+        games.play(self.networks[0], board.start, prices[:1])
+        for network in self.networks:
+            if search.elapsed_s > GREEDY_SHARE * (search.budget.time_limit_s or np.inf):
+                break
+            for first in range(0, len(prices), width):
+                games.play(network, board.start, prices[first : first + width])
+        low, high = np.log(SAMPLED_PRICES[search.objective])
+        while not search.should_stop():
+            network = self.networks[int(rng.integers(len(self.networks)))]
+            drawn = tuple(np.exp(rng.uniform(low, high, width)).tolist())
+            start = board.start
+            if search.best is not None and rng.random() > FRESH_SHARE:
+                start = ruin(instance, search.best.allocation, board.start[0].numpy(), width, rng)
+            games.play(network, start, drawn, temperature=1.0)
 
 
-def _plan(networks: int, search: Search, pairs: int, rng: np.random.Generator) -> Iterator[Rollouts]:
-    """One greedy game, greedy games of every network at several prices, and then sampled ones without end."""
-    energy = search.objective is Objective.MAKESPAN_ENERGY
-    prices = (1.0, 0.6, 1.5, 2.0) if energy else (0.2, 0.6)
-    width = int(np.clip(60_000 // pairs, 1, 16))
-    yield Rollouts(0, prices[:1], 0.0)
-    for number in range(networks):
-        for first in range(0, len(prices), width):
-            yield Rollouts(number, prices[first : first + width], 0.0)
-    while True:
-        for number in range(networks):
-            drawn = np.exp(rng.uniform(np.log(min(prices)), np.log(max(prices)), width))
-            yield Rollouts(number, tuple(drawn.tolist()), 1.0)
+@dataclass(frozen=True, eq=False)
+class _Games:
+    """Plays batches of games of one run and submits the best positions."""
+
+    search: Search
+    board: Board
+    generator: torch.Generator
+
+    def play(
+        self, network: ActorCritic, start: torch.Tensor, prices: tuple[float, ...], temperature: float = 0.0
+    ) -> None:
+        """Play one game per price from `start`, shape (1 or len(prices), n), unless it is time to stop."""
+        search = self.search
+        if search.best is not None and search.should_stop():
+            return
+        lanes = replace(repeat(self.board, torch.tensor(prices)), start=start.expand(len(prices), -1))
+        moves = max(1, search.instance.n // AGENTS_PER_MOVE)
+        best = play(
+            network,
+            lanes,
+            steps=2 * search.instance.n // moves + PATIENCE,
+            patience=PATIENCE,
+            moves_per_step=moves,
+            temperature=temperature,
+            generator=self.generator,
+            should_stop=search.should_stop,
+        )
+        _submit(search, best)
+        search.iteration += 1
+
+
+def ruin(
+    instance: Instance, allocation: Allocation, home: NDArray[np.int64], count: int, rng: np.random.Generator
+) -> torch.Tensor:
+    """Send some agents of a plan back home, for the policy to allocate them anew.
+
+    Either each agent with a certain chance, or those who work at, or come from, one task and its nearest neighbours.
+
+    Parameters
+    ----------
+    home : ndarray of int, shape (n,)
+        Where each agent begins; m for idle.
+    count : int
+        How many ruins to make.
+
+    Returns
+    -------
+    Tensor of int, shape (count, n)
+
+    References
+    ----------
+    Schrimpf et al. (2000), doi:10.1006/jcph.1999.6413.
+    """
+    plan = np.where(allocation.task_of_agent == IDLE, instance.m, allocation.task_of_agent)
+    ruins = np.repeat(plan[None], count, axis=0)
+    for row in ruins:
+        if rng.random() < 0.5:
+            back = rng.random(instance.n) < rng.uniform(0.03, 0.3)
+        else:
+            centre = instance.task_position[rng.integers(instance.m)]
+            away = np.nan_to_num(((instance.task_position - centre) ** 2).sum(axis=1)) + 1e-9 * rng.random(instance.m)
+            near = np.zeros(instance.m + 1, dtype=bool)
+            near[np.argsort(away)[: rng.integers(2, max(4, instance.m // 4))]] = True
+            back = near[plan] | near[home]
+        row[back] = home[back]
+    return torch.from_numpy(ruins)
 
 
 def _submit(search: Search, best: Best) -> None:

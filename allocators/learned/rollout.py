@@ -17,6 +17,7 @@ from alloc.problems.game import (
     observe_pairs,
     observe_tasks,
     pair_features,
+    value_of,
 )
 
 SCORE_CHUNK = 250_000
@@ -24,6 +25,9 @@ SCORE_CHUNK = 250_000
 
 TIE = 1e-5
 """Relative difference below which two makespans in single precision are taken for equal."""
+
+PROGRESS = 1e-6
+"""Rise of the value that counts as one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,6 +87,7 @@ def play(
     board: Board,
     *,
     steps: int,
+    patience: int | None = None,
     moves_per_step: int = 1,
     temperature: float = 0.0,
     generator: torch.Generator | None = None,
@@ -97,6 +102,8 @@ def play(
         Copies of one game, see `repeat`.
     steps : int
         Most steps.
+    patience : int, optional
+        Steps without a new highest value, potential less energy, after which a game ends.
     moves_per_step : int
         Bids granted at once, at most; they share no task and no agent.
     temperature : float
@@ -109,6 +116,7 @@ def play(
     state = begin(board)
     best = _position(board, state)
     game = _Game(network, board, state, should_stop)
+    highest, stale = value_of(board, state), torch.zeros(len(board.price))
     for _ in range(steps):
         if should_stop() or bool(state.done.all()):
             break
@@ -118,6 +126,11 @@ def play(
             logits = logits / temperature - noise
         state = game.move(state, logits, moves_per_step)
         best = best.improved_by(_position(board, state))
+        if patience is not None:
+            value = value_of(board, state)
+            stale = (stale + 1).masked_fill(value > highest + PROGRESS, 0)
+            highest = torch.maximum(highest, value)
+            state = State(state.task, state.group, state.done | (stale >= patience))
     return best
 
 
