@@ -1,15 +1,15 @@
 """What `auto` picks, and why.
 
 The thresholds were measured on two cores. Makespan: the descent of the exact methods is within 1 % of the optimum in
-the first second as long as the solver's model can be built at all, 60,000 pairs a second. Energy: `milp` ends within
-10 % of the least, or proves it, up to about 200 pairs for each second; beyond, it may not get past its first plan.
+the first second as long as the solver's model can be built at all, 60,000 pairs a second. Energy: `milp` proves the
+least, or ends within 10 % of it, up to about 500 pairs for each second; beyond, it may not get past its first plan.
 """
 
 from alloc.allocators.search import Budget
 from alloc.problems import Instance, Objective, agent_classes
 
 MAKESPAN_PAIRS_PER_SECOND = 30_000
-ENERGY_PAIRS_PER_SECOND = 200
+ENERGY_PAIRS_PER_SECOND = 500
 UNHURRIED_S = 60.0
 """What counts as the time limit where there is none, or a longer one."""
 
@@ -24,7 +24,7 @@ def choose(instance: Instance, objective: Objective, budget: Budget) -> tuple[st
     pairs = agent_classes(instance, by_place=energy).size * tasks
     seconds = min(UNHURRIED_S, UNHURRIED_S if budget.time_limit_s is None else budget.time_limit_s)
     searchable = max(15_000, int(MAKESPAN_PAIRS_PER_SECOND * seconds))
-    provable = max(200, int(ENERGY_PAIRS_PER_SECOND * seconds)) if energy else searchable
+    provable = max(500, int(ENERGY_PAIRS_PER_SECOND * seconds)) if energy else searchable
     exact, size = "milp" if energy else "cpsat", f"{pairs} pairs of agent class and task"
     time = "without a time limit" if budget.time_limit_s is None else f"in {budget.time_limit_s:g} s"
     if pairs <= provable:
