@@ -25,7 +25,7 @@ LANE_PAIRS = 100_000
 """Pairs of agent and task in the games that are played side by side."""
 
 PATIENCE = 8
-"""Steps without progress after which a game ends."""
+"""Steps without progress after which a game ends, besides one for every 32 agents."""
 
 GREEDY_SHARE = 0.25
 """Share of the time limit after which no network begins its greedy games."""
@@ -144,7 +144,7 @@ class _Games:
             network,
             lanes,
             steps=2 * search.instance.n // moves + PATIENCE,
-            patience=PATIENCE,
+            patience=PATIENCE + search.instance.n // 32,
             moves_per_step=moves,
             temperature=temperature,
             generator=self.generator,

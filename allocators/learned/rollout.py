@@ -135,12 +135,15 @@ def play(
 
 
 class _Game:
-    """Local scores of all pairs, kept up to date move by move."""
+    """Local scores of all pairs, kept up to date move by move; nobody returns to a task that it left.
+
+    Without that rule, which training does not know, greedy games end in two agents going back and forth.
+    """
 
     def __init__(self, network: ActorCritic, board: Board, state: State, should_stop: Callable[[], bool]) -> None:
         self.network, self.board = network, board
         self.target = board.target.clamp(min=1e-3)
-        self.barred = torch.zeros(board.legal.shape[1:]).masked_fill_(~board.legal[0], BARRED)
+        self.barred = torch.zeros(board.shape).masked_fill_(~board.legal, BARRED)
         self.score = torch.full(board.shape, BARRED)
         for agents in _chunks(board, SCORE_CHUNK):
             if should_stop():
@@ -173,6 +176,7 @@ class _Game:
         rows, agents, goals = _granted(choice, done, places) if moves == 1 else _disjoint(logits, state, places, moves)
         sources = task[rows, agents]
         task[rows, agents] = goals
+        self.barred[rows, agents, sources] = BARRED
         after = State(task, group_ability(self.board, task), done)
         if len(rows):
             self._score(after, *self._touched(after, rows, agents, sources, goals))
