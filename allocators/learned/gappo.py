@@ -37,9 +37,15 @@ LARGEST = 6_000_000
 """Pairs beyond which the scores of one game alone take more than a gigabyte."""
 
 
-GREEDY_PRICES = {Objective.MAKESPAN: (0.2, 0.6), Objective.MAKESPAN_ENERGY: (1.0, 0.6, 1.5, 2.0)}
-SAMPLED_PRICES = {Objective.MAKESPAN: (0.2, 0.8), Objective.MAKESPAN_ENERGY: (0.8, 2.4)}
+GREEDY_PRICES = {Objective.MAKESPAN: (0.2, 0.6), Objective.MAKESPAN_ENERGY: (1.5, 1.0, 2.0, 0.6)}
+SAMPLED_PRICES = {Objective.MAKESPAN: (0.2, 0.8), Objective.MAKESPAN_ENERGY: (1.2, 3.0)}
 """Weights of energy that are played at; the policy was trained on 0.2 to 2.4."""
+
+RUINED_SHARE = (0.03, 0.3)
+"""Least and most chance of an agent to be sent home in a scattered ruin."""
+
+RUINED_TASKS = 0.25
+"""Share of the tasks in the largest ruin around a place."""
 
 FRESH_SHARE = 0.15
 """Share of the sampled batches that play from the beginning, rather than from the ruins of the best plan."""
@@ -180,12 +186,12 @@ def ruin(
     ruins = np.repeat(plan[None], count, axis=0)
     for row in ruins:
         if rng.random() < 0.5:
-            back = rng.random(instance.n) < rng.uniform(0.03, 0.3)
+            back = rng.random(instance.n) < rng.uniform(*RUINED_SHARE)
         else:
             centre = instance.task_position[rng.integers(instance.m)]
             away = np.nan_to_num(((instance.task_position - centre) ** 2).sum(axis=1)) + 1e-9 * rng.random(instance.m)
             near = np.zeros(instance.m + 1, dtype=bool)
-            near[np.argsort(away)[: rng.integers(2, max(4, instance.m // 4))]] = True
+            near[np.argsort(away)[: rng.integers(2, max(4, int(RUINED_TASKS * instance.m)))]] = True
             back = near[plan] | near[home]
         row[back] = home[back]
     return torch.from_numpy(ruins)
