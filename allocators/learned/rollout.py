@@ -99,7 +99,7 @@ def play(
     ----------
     network : ActorCritic
     board : Board
-        Copies of one game, see `repeat`.
+        Any games, such as copies of one; see `repeat`.
     steps : int
         Most steps.
     patience : int, optional

@@ -22,8 +22,9 @@ from alloc.allocators.learned.network import ActorCritic, NetworkSize
 from alloc.allocators.learned.policy_file import save_policy
 from alloc.allocators.learned.population import BreedingParameters, Member, breed, fitness, new_member
 from alloc.allocators.learned.ppo import PpoParameters, UpdateStatistics, collect, update
+from alloc.allocators.learned.rollout import play
 from alloc.problems import InputError
-from alloc.problems.game import Board, State, begin, flown, step, value_of
+from alloc.problems.game import Board, State, begin, group_ability, value_of
 
 CHECKPOINT_FORMAT = "alloc-checkpoint/1"
 
@@ -60,7 +61,7 @@ class TrainingParameters:
 
 @dataclass(frozen=True)
 class Validation:
-    """How one network plays the validation games, greedily, at the best point of each game.
+    """How one network plays the validation games, at the best position of each.
 
     Attributes
     ----------
@@ -165,10 +166,9 @@ class Trainer:
             cost += int(played.alive.sum()) * (1 + ppo.epochs)
         return result, cost
 
-    @torch.no_grad()
     def validate(self, network: ActorCritic) -> Validation:
-        """Play the validation games."""
-        outcomes = [_play_greedily(network, board, self.parameters.curriculum) for board in self._validation]
+        """Play the validation games, greedily and by the rules of `play`."""
+        outcomes = [_outcome(network, board, self.parameters.curriculum.steps(board)) for board in self._validation]
         reward, shortfall, distance = (torch.cat(part).mean().item() for part in zip(*outcomes, strict=True))
         return Validation(reward, shortfall, distance)
 
@@ -222,27 +222,13 @@ class Trainer:
         return trainer
 
 
-def _play_greedily(network: ActorCritic, board: Board, curriculum: Curriculum) -> tuple[torch.Tensor, ...]:
-    """Return rise of value, shortfall and distance at the best point of each game, each of shape (B,)."""
-    state = begin(board)
-    start = value_of(board, state)
-    best = start.clone()
-    shortfall, distance = _figures(board, state)
-    for _ in range(curriculum.steps(board)):
-        state = step(board, state, network(board, state)[0].argmax(1))
-        value = value_of(board, state)
-        better = value > best
-        best = torch.where(better, value, best)
-        now = _figures(board, state)
-        shortfall = torch.where(better, now[0], shortfall)
-        distance = torch.where(better, now[1], distance)
-    return best - start, shortfall, distance
-
-
-def _figures(board: Board, state: State) -> tuple[torch.Tensor, torch.Tensor]:
-    target = board.target[:, :-1]
-    ratio = (state.group[:, :-1] / target.clamp(min=1e-9)).masked_fill(target <= 0, 1.0)
-    return (1 - ratio.amin(1)).clamp(min=0), flown(board, state)
+def _outcome(network: ActorCritic, board: Board, steps: int) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+    """Return rise of value, shortfall and distance at the best position of each game, each of shape (B,)."""
+    best = play(network, board, steps=steps)
+    start = begin(board)
+    end = State(best.task, group_ability(board, best.task), start.done)
+    rise = value_of(board, end) - value_of(board, start)
+    return rise, 1 - 1 / best.time.clamp(min=1), best.distance
 
 
 def train(
