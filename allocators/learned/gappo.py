@@ -30,8 +30,8 @@ PATIENCE = 8
 GREEDY_SHARE = 0.25
 """Share of the time limit after which no network begins its greedy games."""
 
-AGENTS_PER_MOVE = 800
-"""Agents for each move that is granted at once."""
+HASTE = 1 / 16
+"""Share of the outstanding moves that are granted at once."""
 
 LARGEST = 6_000_000
 """Pairs beyond which the scores of one game alone take more than a gigabyte."""
@@ -145,13 +145,12 @@ class _Games:
         if search.best is not None and search.should_stop():
             return
         lanes = replace(repeat(self.board, torch.tensor(prices)), start=start.expand(len(prices), -1))
-        moves = max(1, search.instance.n // AGENTS_PER_MOVE)
         best = play(
             network,
             lanes,
-            steps=2 * search.instance.n // moves + PATIENCE,
+            steps=2 * search.instance.n + PATIENCE,
             patience=PATIENCE + search.instance.n // 32,
-            moves_per_step=moves,
+            haste=HASTE,
             temperature=temperature,
             generator=self.generator,
             should_stop=search.should_stop,

@@ -88,7 +88,7 @@ def play(
     *,
     steps: int,
     patience: int | None = None,
-    moves_per_step: int = 1,
+    haste: float = 0.0,
     temperature: float = 0.0,
     generator: torch.Generator | None = None,
     should_stop: Callable[[], bool] = lambda: False,
@@ -104,8 +104,9 @@ def play(
         Most steps.
     patience : int, optional
         Steps without a new highest value, potential less energy, after which a game ends.
-    moves_per_step : int
-        Bids granted at once, at most; they share no task and no agent.
+    haste : float
+        Share of the outstanding moves, the total deficit over the mean ability, that is granted at once, one at the
+        least; bids granted together share no task and no agent.
     temperature : float
         0 grants the best bid; above 0 bids are drawn with their logits divided by it.
     generator : torch.Generator
@@ -124,7 +125,7 @@ def play(
         if temperature > 0:
             noise = torch.empty_like(logits).exponential_(generator=generator).log_()
             logits = logits / temperature - noise
-        state = game.move(state, logits, moves_per_step)
+        state = game.move(state, logits, haste)
         best = best.improved_by(_position(board, state))
         if patience is not None:
             value = value_of(board, state)
@@ -167,13 +168,17 @@ class _Game:
         bid.scatter_(2, state.task[..., None], BARRED)
         return torch.cat([bid.flatten(1), self.network.heads(token)[0][:, None]], 1)
 
-    def move(self, state: State, logits: Tensor, moves: int) -> State:
+    def move(self, state: State, logits: Tensor, haste: float = 0.0) -> State:
         """Grant bids in every game that is not done, and score anew what they touched."""
         _, n, places = self.board.shape
         choice = logits.argmax(1)
         done = state.done | (choice == n * places)
+        moves = self._outstanding(state).mul(haste).long().clamp(min=1)
+        if int(moves.max()) == 1:
+            rows, agents, goals = _granted(choice, done, places)
+        else:
+            rows, agents, goals = _disjoint(logits, state, done, moves)
         task = state.task.clone()
-        rows, agents, goals = _granted(choice, done, places) if moves == 1 else _disjoint(logits, state, places, moves)
         sources = task[rows, agents]
         task[rows, agents] = goals
         self.barred[rows, agents, sources] = BARRED
@@ -181,6 +186,10 @@ class _Game:
         if len(rows):
             self._score(after, *self._touched(after, rows, agents, sources, goals))
         return after
+
+    def _outstanding(self, state: State) -> Tensor:
+        """Total deficit in units of the mean ability, shape (B,)."""
+        return (self.board.target - state.group)[:, :-1].clamp(min=0).sum(1)
 
     def _touched(
         self, state: State, rows: Tensor, agents: Tensor, sources: Tensor, goals: Tensor
@@ -228,25 +237,28 @@ def _granted(choice: Tensor, done: Tensor, places: int) -> tuple[Tensor, Tensor,
     return rows, choice[rows] // places, choice[rows] % places
 
 
-def _disjoint(logits: Tensor, state: State, places: int, moves: int) -> tuple[Tensor, Tensor, Tensor]:
-    """The best bids that share no task (but the place of the idle) and no agent, up to `moves` per game."""
-    stop = logits.shape[1] - 1
-    top = logits.topk(min(8 * moves, stop), dim=1)
+def _disjoint(logits: Tensor, state: State, done: Tensor, moves: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """The best bids that share no task (but the place of the idle) and no agent, up to `moves`, shape (B,), a game."""
+    places, stop = state.group.shape[1], logits.shape[1] - 1
+    top = logits.topk(min(8 * int(moves.max()), stop), dim=1)
     granted: list[tuple[int, int, int]] = []
-    for game, actions in enumerate(top.indices.tolist()):
+    for game, (values, actions) in enumerate(zip(top.values.tolist(), top.indices.tolist(), strict=True)):
         used: set[int] = set()
-        agents: set[int] = set()
-        for action in [] if bool(state.done[game]) else actions:
-            if action == stop or len(agents) == moves:
+        moved: set[int] = set()
+        left = 0 if bool(done[game]) else int(moves[game])
+        for value, action in zip(values, actions, strict=True):
+            if left == 0 or action == stop or value < BARRED / 2:
                 break
             agent, goal = divmod(action, places)
             source = int(state.task[game, agent])
-            if agent in agents or source in used or goal in used:
+            if agent in moved or source in used or goal in used:
                 continue
-            agents.add(agent)
+            left -= 1
+            moved.add(agent)
             used |= {source, goal} - {places - 1}
             granted.append((game, agent, goal))
-    return tuple(torch.tensor(granted, dtype=torch.long).reshape(-1, 3).unbind(1))  # type: ignore[return-value]
+    rows, agents, goals = torch.tensor(granted, dtype=torch.long).reshape(-1, 3).unbind(1)
+    return rows, agents, goals
 
 
 def _position(board: Board, state: State) -> Best:

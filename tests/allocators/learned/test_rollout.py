@@ -30,20 +30,26 @@ def network() -> ActorCritic:
     return ActorCritic().eval().requires_grad_(False)
 
 
-@pytest.mark.parametrize("moves", [1, 3])
-def test_incremental_scores_equal_full_ones(instance: Instance, network: ActorCritic, moves: int) -> None:
-    """After dozens of random moves, idle agents included, every logit is what scoring all pairs anew gives."""
+@pytest.mark.parametrize("haste", [0.0, 0.5])
+def test_incremental_scores_equal_full_ones(instance: Instance, network: ActorCritic, haste: float) -> None:
+    """After dozens of random moves every logit is what scoring all pairs anew gives, but for places left before."""
     board = board_of(instance, [0.2, 0.7, 1.5])
     generator = torch.Generator().manual_seed(0)
     state = begin(board)
     game = _Game(network, board, state, lambda: False)
+    left = torch.zeros(board.shape, dtype=torch.bool)
     for _ in range(25):
         logits, full = game.logits(state), network(board, state)[0]
         barred = full < -1e8
+        barred[:, :-1] |= left.flatten(1)
         live = ~state.done
         torch.testing.assert_close(logits[live][~barred[live]], full[live][~barred[live]], atol=1e-4, rtol=1e-4)
         assert (logits[live][barred[live]] < -1e8).all()
-        state = game.move(state, logits + 4 * torch.randn(logits.shape, generator=generator), moves)
+        after = game.move(state, logits + 4 * torch.randn(logits.shape, generator=generator), haste)
+        left.scatter_(
+            2, state.task[..., None], left.gather(2, state.task[..., None]) | (after.task != state.task)[..., None]
+        )
+        state = after
 
 
 def test_the_best_position_comes_back(instance: Instance, network: ActorCritic) -> None:
@@ -67,10 +73,10 @@ def test_disjoint_moves_share_no_task(instance: Instance, network: ActorCritic) 
     board = board_of(instance, [0.5])
     state = begin(board)
     game = _Game(network, board, state, lambda: False)
-    after: State = game.move(state, game.logits(state), 5)
+    after: State = game.move(state, game.logits(state), 1.0)
     moved = torch.nonzero(after.task[0] != state.task[0])[:, 0]
     touched = [t for i in moved.tolist() for t in (int(state.task[0, i]), int(after.task[0, i])) if t != instance.m]
-    assert 1 <= len(moved) <= 5
+    assert len(moved) > 1
     assert len(touched) == len(set(touched))
 
 
