@@ -53,12 +53,12 @@ class Allocation:
         for agent, task in assignment.items():
             if agent not in instance.agent_index:
                 raise InputError(
-                    f"no agent {agent!r} in instance {instance.name!r}{nearest(agent, instance.agent_ids[:1000])}",
+                    f"no agent {agent!r} in instance {instance.name!r}{nearest(agent, instance.agent_ids)}",
                     "assignment",
                 )
             if task is not None and task not in instance.task_index:
                 raise InputError(
-                    f"no task {task!r} in instance {instance.name!r}{nearest(str(task), instance.task_ids[:1000])}",
+                    f"no task {task!r} in instance {instance.name!r}{nearest(str(task), instance.task_ids)}",
                     f"assignment.{agent}",
                 )
             tasks[instance.agent_index[agent]] = IDLE if task is None else instance.task_index[task]

@@ -1,7 +1,14 @@
 """Errors about input, phrased so that one line tells what to mend."""
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Sequence
+from itertools import islice
+
+MOST_NAMES = 10
+"""Known names that an error lists at the most."""
+
+MOST_COMPARED, LONGEST_COMPARED = 1000, 60
+"""Known names that are compared with an unknown one, and characters of each: beyond, it would take seconds."""
 
 
 class InputError(ValueError):
@@ -21,13 +28,14 @@ class InputError(ValueError):
         self.message, self.place, self.source = message, place, source
         super().__init__(": ".join(part for part in (source, place, message) if part))
 
-    def at(self, source: str, place: str | None = None) -> "InputError":
-        """Return the same error, told of `source` (and of `place` where one is given)."""
-        return InputError(self.message, self.place if place is None else place, self.source or source)
 
-
-def nearest(name: str, known: Iterable[str]) -> str:
-    """Return a hint such as `` (did you mean 'speed'?)``, or the known names where none is near."""
-    options = sorted(known)
-    close = difflib.get_close_matches(name, options, n=1)
-    return f" (did you mean {close[0]!r}?)" if close else f" (known: {', '.join(options)})"
+def nearest(name: str, known: Sequence[str]) -> str:
+    """Return a hint such as `` (did you mean 'speed'?)``, or of the known names where none is near; empty if there are none."""
+    options = [option for option in islice(known, MOST_COMPARED) if len(option) <= LONGEST_COMPARED]
+    close = difflib.get_close_matches(name[:LONGEST_COMPARED], options, n=1)
+    if close:
+        return f" (did you mean {close[0]!r}?)"
+    if not known:
+        return ""
+    more = f" and {len(known) - MOST_NAMES} more" if len(known) > MOST_NAMES else ""
+    return f" (known: {', '.join(known[:MOST_NAMES])}{more})"

@@ -104,7 +104,7 @@ def require_format(found: object, expected: Sequence[str] = (INSTANCE_FORMAT,)) 
 
 def unknown_field(name: str, known: Sequence[str], kind: str = "field") -> str:
     """Return what to say of a field that no format knows."""
-    return f"unknown {kind} {quoted(name)}{nearest(name[:60], known)}"
+    return f"unknown {kind} {quoted(name)}{nearest(name, known)}"
 
 
 def plain_numbers(values: FloatArray) -> list[float | int | None]:
@@ -165,6 +165,4 @@ def _allowed(lists: Sequence[Sequence[str] | None] | None, index: dict[str, int]
 
 
 def _unknown_task(name: str, index: dict[str, int], place: str) -> InputError:
-    some = [known[:60] for known in list(index)[:1000]]
-    hint = nearest(name[:60], some) if len(some) <= 12 else nearest(name[:60], some).partition(" (known")[0]
-    return InputError(f"there is no task {quoted(name)}{hint}", place)
+    return InputError(f"there is no task {quoted(name)}{nearest(name, tuple(index))}", place)
