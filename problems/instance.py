@@ -1,21 +1,22 @@
 """What is to be solved: agents with abilities, tasks with workloads, and who can reach what."""
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from alloc.problems.errors import InputError
+from alloc.problems import fields
+from alloc.problems.errors import InputError, nearest
+from alloc.problems.fields import IDLE, FloatArray, IntArray
 from alloc.problems.reach import Reach, build_reach
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.intp]
+__all__ = ["IDLE", "FloatArray", "Instance", "IntArray"]
 
-IDLE = -1
-"""The task index of an agent without a task."""
+AGENT_ARRAYS = ("ability", "agent_position", "start_task", "battery", "communication_range", "speed")
+"""Fields of an instance with one row per agent; ids and allowed tasks are tuples."""
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
@@ -100,7 +101,7 @@ class Instance:
         tau: float = 0.5,
         energy_per_distance: float = 1.0,
     ) -> None:
-        w, h = _vector(ability, "ability"), _vector(workload, "workload")
+        w, h = fields.vector(ability, "ability"), fields.vector(workload, "workload")
         n, m = len(w), len(h)
         if n == 0 or m == 0:
             raise InputError("an instance needs at least one agent and one task", "tasks" if n else "agents")
@@ -109,18 +110,18 @@ class Instance:
             "ability": w,
             "workload": h,
             "name": str(name),
-            "agent_ids": _ids(agent_ids, n, "a", "agent"),
-            "task_ids": _ids(task_ids, m, "t", "task"),
-            "agent_position": _positions(agent_position, n, "agent"),
-            "task_position": _positions(task_position, m, "task"),
-            "start_task": _starts(start_task, n, m),
-            "battery": infinite if battery is None else _vector(battery, "battery", n),
+            "agent_ids": fields.ids(agent_ids, n, "a", "agent"),
+            "task_ids": fields.ids(task_ids, m, "t", "task"),
+            "agent_position": fields.positions(agent_position, n, "agent"),
+            "task_position": fields.positions(task_position, m, "task"),
+            "start_task": fields.starts(start_task, n, m),
+            "battery": infinite if battery is None else fields.vector(battery, "battery", n),
             "communication_range": infinite
             if communication_range is None
-            else _vector(communication_range, "range", n),
-            "speed": infinite if speed is None else _vector(speed, "speed", n),
-            "allowed_tasks": _allowed(allowed_tasks, n, m),
-            "priority": np.ones(m) if priority is None else _vector(priority, "priority", m),
+            else fields.vector(communication_range, "range", n),
+            "speed": infinite if speed is None else fields.vector(speed, "speed", n),
+            "allowed_tasks": fields.allowed(allowed_tasks, n, m),
+            "priority": np.ones(m) if priority is None else fields.vector(priority, "priority", m),
             "tau": float(tau),
             "energy_per_distance": float(energy_per_distance),
         }
@@ -132,16 +133,20 @@ class Instance:
 
     def _check(self) -> None:
         agents, tasks = ("agent", self.agent_ids), ("task", self.task_ids)
-        _require(np.isfinite(self.ability) & (self.ability > 0), self.ability, "ability", "a finite number > 0", agents)
-        _require(
+        fields.require(
+            np.isfinite(self.ability) & (self.ability > 0), self.ability, "ability", "a finite number > 0", agents
+        )
+        fields.require(
             np.isfinite(self.workload) & (self.workload >= 0), self.workload, "workload", "a finite number >= 0", tasks
         )
-        _require(
+        fields.require(
             np.isfinite(self.priority) & (self.priority >= 0), self.priority, "priority", "a finite number >= 0", tasks
         )
-        _require(self.battery >= 0, self.battery, "battery", "a number >= 0, or null", agents)
-        _require(self.communication_range >= 0, self.communication_range, "range", "a number >= 0, or null", agents)
-        _require(self.speed > 0, self.speed, "speed", "a number > 0, or null", agents)
+        fields.require(self.battery >= 0, self.battery, "battery", "a number >= 0, or null", agents)
+        fields.require(
+            self.communication_range >= 0, self.communication_range, "range", "a number >= 0, or null", agents
+        )
+        fields.require(self.speed > 0, self.speed, "speed", "a number > 0, or null", agents)
         if not 0 < self.tau < 1:
             raise InputError(f"must lie strictly between 0 and 1, got {self.tau:g}", "tau")
         if not (np.isfinite(self.energy_per_distance) and self.energy_per_distance >= 0):
@@ -192,88 +197,23 @@ class Instance:
         """Index of each task id."""
         return {name: index for index, name in enumerate(self.task_ids)}
 
+    def without_agents(self, gone: Collection[str]) -> "Instance":
+        """Return the same problem without these agents, as when they drop out.
 
-def _vector(values: ArrayLike, field_name: str, length: int | None = None) -> FloatArray:
-    try:
-        array = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise InputError("must be a list of numbers", field_name) from error
-    if array.ndim != 1 or (length is not None and len(array) != length):
-        expected = "a list" if length is None else f"a list of {length} numbers"
-        raise InputError(f"must be {expected}, got shape {array.shape}", field_name)
-    return array
-
-
-def _ids(names: Iterable[str] | None, count: int, prefix: str, kind: str) -> tuple[str, ...]:
-    if names is None:
-        return tuple(f"{prefix}{index}" for index in range(1, count + 1))
-    ids = tuple(names)
-    if len(ids) != count:
-        raise InputError(f"needs {count} ids, got {len(ids)}", f"{kind}_ids")
-    seen: set[str] = set()
-    for index, name in enumerate(ids):
-        if not isinstance(name, str) or not name:
-            raise InputError(f"must be a non-empty string, got {name!r}", f"{kind}s[{index}].id")
-        if name in seen:
-            raise InputError(f"the id {name!r} is used twice; ids must be unique", f"{kind}s[{index}].id")
-        seen.add(name)
-    return ids
-
-
-def _positions(values: ArrayLike | None, count: int, kind: str) -> FloatArray:
-    if values is None:
-        return np.full((count, 3), np.nan)
-    try:
-        array = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise InputError("must hold 2 or 3 numbers per row", f"{kind}_position") from error
-    if array.ndim != 2 or array.shape[0] != count or array.shape[1] not in (2, 3):
-        raise InputError(f"must have shape ({count}, 2) or ({count}, 3), got {array.shape}", f"{kind}_position")
-    if array.shape[1] == 2:
-        array = np.column_stack([array, np.where(np.isnan(array[:, 0]), np.nan, 0.0)])
-    blank = np.isnan(array).all(axis=1)
-    wrong = ~blank & ~np.isfinite(array).all(axis=1)
-    if wrong.any():
-        row = int(np.argmax(wrong))
-        raise InputError(f"must be finite numbers, got {array[row].tolist()}", f"{kind}s[{row}].position")
-    return array
-
-
-def _starts(values: ArrayLike | None, n: int, m: int) -> IntArray:
-    if values is None:
-        return np.full(n, IDLE, dtype=np.intp)
-    array = np.array(values)
-    if array.shape != (n,) or not np.issubdtype(array.dtype, np.integer):
-        raise InputError(f"must be a list of {n} task indices, -1 for none", "start_task")
-    wrong = (array < IDLE) | (array >= m)
-    if wrong.any():
-        row = int(np.argmax(wrong))
-        raise InputError(f"is {array[row]}, but tasks run from 0 to {m - 1}", f"agents[{row}].start_task")
-    return array.astype(np.intp)
-
-
-def _allowed(lists: Sequence[Iterable[int] | None] | None, n: int, m: int) -> tuple[IntArray | None, ...] | None:
-    if lists is None or all(entry is None for entry in lists):
-        return None
-    if len(lists) != n:
-        raise InputError(f"needs {n} entries, got {len(lists)}", "allowed_tasks")
-    result: list[IntArray | None] = []
-    for row, entry in enumerate(lists):
-        if entry is None:
-            result.append(None)
-            continue
-        indices = np.unique(np.array(list(entry), dtype=np.intp))
-        if len(indices) and (indices[0] < 0 or indices[-1] >= m):
-            raise InputError(f"names a task outside 0 to {m - 1}", f"agents[{row}].tasks")
-        indices.setflags(write=False)
-        result.append(indices)
-    return tuple(result)
-
-
-def _require(
-    good: NDArray[np.bool_], values: FloatArray, field_name: str, rule: str, owner: tuple[str, tuple[str, ...]]
-) -> None:
-    if not good.all():
-        row = int(np.argmin(good))
-        kind, ids = owner
-        raise InputError(f"must be {rule}, got {values[row]:g} ({kind} {ids[row]!r})", f"{kind}s[{row}].{field_name}")
+        Raises
+        ------
+        InputError
+            If an id is unknown, or no agent is left.
+        """
+        for name in gone:
+            if name not in self.agent_index:
+                raise InputError(f"no agent {name!r} in instance {self.name!r}{nearest(name, self.agent_ids)}")
+        dropped = set(gone)
+        left = [index for index, name in enumerate(self.agent_ids) if name not in dropped]
+        lists = self.allowed_tasks
+        return replace(
+            self,
+            agent_ids=tuple(self.agent_ids[index] for index in left),
+            allowed_tasks=None if lists is None else tuple(lists[index] for index in left),
+            **{name: getattr(self, name)[left] for name in AGENT_ARRAYS},
+        )

@@ -67,10 +67,12 @@ def build_reach(instance: Instance) -> Reach:
     if np.isfinite(instance.battery).any():
         mask &= instance.energy_per_distance * distance <= instance.battery[first, None] + TOLERANCE
     if instance.allowed_tasks is not None:
-        for row, agent in enumerate(first):
+        for row, agent in enumerate(first.tolist()):
             allowed = instance.allowed_tasks[agent]
             if allowed is not None:
-                mask[row] &= np.isin(np.arange(instance.m), allowed)
+                reached = mask[row, allowed]
+                mask[row] = False
+                mask[row, allowed] = reached
     for array in (origin, distance, mask):
         array.setflags(write=False)
     return Reach(origin, distance, mask)

@@ -43,6 +43,9 @@ def test_defaults() -> None:
         ({"start_task": [0, 2]}, "agents[1].start_task"),
         ({"start_task": [0.5, 0]}, "start_task"),
         ({"allowed_tasks": [None, [2]]}, "agents[1].tasks"),
+        ({"allowed_tasks": [[], [-1]]}, "agents[1].tasks"),
+        ({"allowed_tasks": [None, [0.5]]}, "agents[1].tasks"),
+        ({"allowed_tasks": [None]}, "allowed_tasks"),
         ({"ability": [1e308, 1e308]}, ""),
     ],
 )
@@ -72,6 +75,50 @@ def test_start_position() -> None:
     )
     assert instance.start_position[:2].tolist() == [[5, 6, 0], [1, 2, 0]]
     assert np.isnan(instance.start_position[2]).all()
+
+
+def test_allowed_tasks() -> None:
+    """Lists are sorted, without repetitions; none at all is something else than an empty one."""
+    lists = [(2, 0, 2), None, [], np.array([1]), {1, 0}]
+    instance = Instance(ability=np.ones(5), workload=[1, 1, 1], allowed_tasks=lists)
+    assert instance.allowed_tasks is not None
+    assert [tasks if tasks is None else tasks.tolist() for tasks in instance.allowed_tasks] == [
+        [0, 2],
+        None,
+        [],
+        [1],
+        [0, 1],
+    ]
+    assert instance.reach.mask[instance.reach.origin].astype(int).tolist() == [
+        [1, 0, 1],
+        [1, 1, 1],
+        [0, 0, 0],
+        [0, 1, 0],
+        [1, 1, 0],
+    ]
+
+
+def test_without_agents() -> None:
+    """Those who are left keep all that they have, and the tasks stay as they are."""
+    instance = Instance(
+        ability=[1, 2, 3],
+        workload=[4, 5],
+        task_position=[[0, 0], [1, 0]],
+        start_task=[0, 1, 1],
+        battery=[7, 8, 9],
+        allowed_tasks=[None, [0], [1]],
+        priority=[1, 2],
+        tau=0.25,
+    )
+    left = instance.without_agents({"a2"})
+    assert (left.agent_ids, left.task_ids) == (("a1", "a3"), ("t1", "t2"))
+    assert (left.ability.tolist(), left.battery.tolist(), left.start_task.tolist()) == ([1, 3], [7, 9], [0, 1])
+    assert left.reach.mask[left.reach.origin].tolist() == [[True, True], [False, True]]
+    assert (left.priority.tolist(), left.tau) == ([1, 2], 0.25)
+    with pytest.raises(InputError, match="no agent 'a4'"):
+        instance.without_agents(["a4"])
+    with pytest.raises(InputError, match="at least one agent"):
+        instance.without_agents(instance.agent_ids)
 
 
 def test_read_only_and_independent() -> None:
