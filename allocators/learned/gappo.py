@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from alloc.allocators.base import Allocator, Proposal
 from alloc.allocators.learned.curriculum import reference_makespan
+from alloc.allocators.learned.limits import too_large
 from alloc.allocators.learned.network import ActorCritic
 from alloc.allocators.learned.policy_file import load_policy
 from alloc.allocators.learned.rollout import Best, play, repeat
@@ -17,9 +18,6 @@ from alloc.allocators.registry import BUILT_IN
 from alloc.allocators.search import Budget, Search
 from alloc.problems import IDLE, Allocation, Instance, Objective, serve_all
 from alloc.problems.game import Board, make_board
-
-PAIRS_PER_SECOND = 400_000
-"""Pairs of agent and task that are scored, placed and tried within a second on one slow core."""
 
 LANE_PAIRS = 100_000
 """Pairs of agent and task in the games that are played side by side."""
@@ -33,13 +31,9 @@ GREEDY_SHARE = 0.25
 HASTE = 1 / 16
 """Share of the outstanding moves that are granted at once."""
 
-LARGEST = 6_000_000
-"""Pairs beyond which the scores of one game alone take more than a gigabyte."""
-
-
 GREEDY_PRICES = {Objective.MAKESPAN: (0.2, 0.6), Objective.MAKESPAN_ENERGY: (1.5, 1.0, 2.0, 0.6)}
 SAMPLED_PRICES = {Objective.MAKESPAN: (0.2, 0.8), Objective.MAKESPAN_ENERGY: (1.2, 3.0)}
-"""Weights of energy that are played at; the policy was trained on 0.2 to 2.4."""
+"""Weights of energy that are played at; training knows 0.2 to 2.4."""
 
 RUINED_SHARE = (0.03, 0.3)
 """Least and most chance of an agent to be sent home in a scattered ruin."""
@@ -81,17 +75,8 @@ class Gappo(Allocator):
                 self.networks = load_policy(shipped, "gappo", device)
 
     def refusal(self, instance: Instance, objective: Objective, budget: Budget) -> str | None:
-        """Refuse where not even one game could be laid out in time."""
-        pairs = instance.n * (instance.m + 1)
-        limit = LARGEST
-        if budget.time_limit_s is not None:
-            limit = min(limit, int(PAIRS_PER_SECOND * max(0.05, budget.time_limit_s)))
-        if pairs > limit:
-            return (
-                f"{pairs} pairs of agent and task are more than the {limit} that it can handle in this time; "
-                "give more time, or use greedy or ga"
-            )
-        return None
+        """Refuse where not even one game would end in time."""
+        return too_large(instance, budget)
 
     def allocate(self, search: Search) -> Proposal:
         """Play batch after batch and submit the best position of each game."""
