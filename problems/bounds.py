@@ -1,22 +1,29 @@
-"""Lower bounds on the makespan, and on the energy at a makespan, that hold for every allocation."""
+"""Lower bounds on the makespan, and on the energy at a makespan, that hold for every allocation.
 
+Those of linear programmes are taken from the multipliers that the solver returns, by weak duality: any multipliers
+>= 0 give a bound, so that no tolerance of the solver enters it.
+"""
+
+import sys
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from alloc.problems.classes import agent_classes
-from alloc.problems.evaluation import completion_time
-from alloc.problems.instance import FloatArray, Instance
+from alloc.problems.evaluation import RELATIVE_TOLERANCE, completion_time
+from alloc.problems.instance import FloatArray, Instance, IntArray
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
-SAFETY = 1e-7
-"""Relative amount by which a bound from floating-point linear programming is lowered."""
+ROUNDING = 1e-12
+"""Relative amount by which a bound is lowered for what sums of floats may be off."""
 
-LP_SIZE_LIMIT = 100_000
-"""Pairs of agent class and task beyond which no linear programme is built (about a second)."""
+LP_SIZE_LIMIT = 500_000
+"""Pairs of agent class and task beyond which no linear programme is built."""
+
+LP_PAIRS_PER_SECOND = 200_000
+"""Pairs beyond which a linear programme is not even begun, for each second that it may take."""
 
 
 def makespan_lower_bound(instance: Instance) -> float:
@@ -32,12 +39,13 @@ def makespan_lower_bound(instance: Instance) -> float:
         return 0.0
     ability = np.sort(instance.ability)
     usable = float(ability.sum())
-    bound = max(_dropping_bound(work, ability), _reach_bound(instance))
-    if instance.has_travel_time:
-        bound = max(bound, _arrival_bound(instance))
-    elif (ability == np.round(ability)).all() and usable < 2**53:
-        bound = max(bound, _rounding_bound(work, usable, bound))
-    return bound
+    with np.errstate(over="ignore"):
+        bound = max(_dropping_bound(work, ability), _reach_bound(instance))
+        if instance.has_travel_time:
+            bound = max(bound, _arrival_bound(instance))
+        elif (ability == np.round(ability)).all() and usable < 2**53:
+            bound = max(bound, _rounding_bound(work, usable, bound))
+    return min(bound, sys.float_info.max)
 
 
 def _dropping_bound(work: FloatArray, ability: FloatArray) -> float:
@@ -72,7 +80,7 @@ def _rounding_bound(work: FloatArray, total: float, bound: float) -> float:
     """Least T >= `bound` with sum_j ceil(h_j / T) <= total."""
 
     def demand(time: float) -> FloatArray:
-        return np.ceil(work / time * (1 - 1e-12))
+        return np.ceil(work / time * (1 - ROUNDING))
 
     if demand(bound).sum() <= total:
         return bound
@@ -89,32 +97,36 @@ def lp_makespan_lower_bound(instance: Instance, time_limit_s: float = 10.0) -> f
     """Return the makespan of the best fractional allocation, in hours, or None where that is not at hand.
 
     The linear programme gives fractions of agents, per class and task, to the tasks that they can reach. Not for
-    instances with travel times, nor beyond `LP_SIZE_LIMIT` or `time_limit_s`.
+    instances with travel times, nor where it would take more than `time_limit_s` or `LP_SIZE_LIMIT` pairs.
     """
     work = instance.workload
     classes = agent_classes(instance, by_place=False)
-    if instance.has_travel_time or not (work > 0).any() or classes.size * instance.m > LP_SIZE_LIMIT:
+    if instance.has_travel_time or not (work > 0).any() or _is_too_large(classes.size * instance.m, time_limit_s):
         return None
     from scipy.sparse import csr_matrix, hstack, vstack
 
-    scale = float(work.sum() / instance.ability.sum())
+    scale = makespan_lower_bound(instance)
     kind, task = np.nonzero(classes.mask & (work > 0))
     share = classes.ability[kind] * scale / work[task]
     cover, limit = _rows(task, -share, instance.m), _rows(kind, np.ones(len(kind)), classes.size)
     ratio = csr_matrix(np.where(work > 0, 1.0, 0.0)[:, None])  # the last variable is scale / T, to be maximised
     constraints = vstack([hstack([cover, ratio]), hstack([limit, csr_matrix((classes.size, 1))])])
-    cost = np.zeros(len(kind) + 1)
-    cost[-1] = -1.0
-    best = _minimum(cost, constraints, np.concatenate([np.zeros(instance.m), classes.count]), time_limit_s)
-    return None if best is None or best >= 0 else -scale / best * (1 - SAFETY)
+    cost = np.append(np.zeros(len(kind)), -1.0)
+    price = _multipliers(cost, constraints, np.append(np.zeros(instance.m), classes.count), time_limit_s)
+    if price is None:
+        return None
+    # scale / T sum_j price_j <= sum_jk price_j share_kj x_kj <= sum_k count_k max_j price_j share_kj
+    price = price[: instance.m] * (work > 0)
+    worth = float(classes.count @ _largest(kind, price[task] * share, classes.size))
+    return scale * float(price.sum()) / worth * (1 - ROUNDING) if worth > 0 else None
 
 
 def energy_lower_bound(instance: Instance, makespan: float, time_limit_s: float = 10.0) -> float | None:
     """Return a lower bound on the energy of every allocation with at most this makespan, or None if none is at hand.
 
     The linear programme buys ability for each task at the energy of the flight; an agent that could do a task alone
-    within `makespan` counts as just enough for it. None beyond `LP_SIZE_LIMIT` or
-    `time_limit_s`, or if `makespan` is too small.
+    within `makespan` counts as just enough for it. None where it would take more than `time_limit_s` or
+    `LP_SIZE_LIMIT` pairs, or if `makespan` is too small.
 
     Parameters
     ----------
@@ -123,7 +135,7 @@ def energy_lower_bound(instance: Instance, makespan: float, time_limit_s: float 
     """
     work = instance.workload
     classes = agent_classes(instance, by_place=True)
-    if classes.size * instance.m > LP_SIZE_LIMIT:
+    if _is_too_large(classes.size * instance.m, time_limit_s):
         return None
     from scipy.sparse import vstack
 
@@ -131,23 +143,42 @@ def energy_lower_bound(instance: Instance, makespan: float, time_limit_s: float 
     if not len(kind) or instance.energy_per_distance == 0:
         return 0.0
     distance = classes.distance[kind, task]
-    hours = np.maximum(0.0, makespan * (1 + SAFETY) - distance / classes.speed[kind])
+    hours = np.maximum(0.0, makespan * (1 + RELATIVE_TOLERANCE) - distance / classes.speed[kind])
     share = np.minimum(1.0, classes.ability[kind] * hours / work[task])
     constraints = vstack([_rows(task, -share, instance.m), _rows(kind, np.ones(len(kind)), classes.size)])
-    limits = np.concatenate([np.where(work > 0, -1.0, 0.0), classes.count])
-    best = _minimum(distance, constraints, limits, time_limit_s)
-    return None if best is None else max(0.0, best * instance.energy_per_distance * (1 - SAFETY))
+    limits = np.append(np.where(work > 0, -1.0, 0.0), classes.count)
+    price = _multipliers(distance, constraints, limits, time_limit_s)
+    if price is None:
+        return None
+    # an agent of class k that does its share saves at most max_j price_j share_kj - distance_kj, 0 if it stays idle
+    price = price[: instance.m] * (work > 0)
+    saved = float(classes.count @ _largest(kind, price[task] * share - distance, classes.size))
+    return max(0.0, float(price.sum()) * (1 - ROUNDING) - saved) * instance.energy_per_distance
 
 
-def _rows(row: NDArray[np.intp], value: FloatArray, count: int) -> "csr_matrix":
+def _is_too_large(pairs: int, time_limit_s: float) -> bool:
+    return pairs > min(LP_SIZE_LIMIT, LP_PAIRS_PER_SECOND * time_limit_s)
+
+
+def _largest(row: IntArray, value: FloatArray, count: int) -> FloatArray:
+    """Return the largest value in each row, at least 0."""
+    largest = np.zeros(count)
+    np.maximum.at(largest, row, value)
+    return largest
+
+
+def _rows(row: IntArray, value: FloatArray, count: int) -> "csr_matrix":
     """One column per pair of class and task, with a single entry in its row."""
     from scipy.sparse import csr_matrix
 
     return csr_matrix((value, (row, np.arange(len(row)))), shape=(count, len(row)))
 
 
-def _minimum(cost: FloatArray, constraints: "csr_matrix", limits: FloatArray, time_limit_s: float) -> float | None:
+def _multipliers(
+    cost: FloatArray, constraints: "csr_matrix", limits: FloatArray, time_limit_s: float
+) -> FloatArray | None:
+    """Minimise ``cost @ x`` with ``constraints @ x <= limits`` and x >= 0; return a multiplier >= 0 per constraint."""
     from scipy.optimize import linprog
 
     answer = linprog(cost, A_ub=constraints, b_ub=limits, method="highs", options={"time_limit": time_limit_s})
-    return float(answer.fun) if answer.status == 0 else None
+    return np.maximum(0.0, -answer.ineqlin.marginals) if answer.status == 0 else None

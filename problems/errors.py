@@ -30,7 +30,7 @@ class InputError(ValueError):
 
 
 def nearest(name: str, known: Sequence[str]) -> str:
-    """Return a hint such as `` (did you mean 'speed'?)``, or of the known names where none is near; empty if there are none."""
+    """Return a hint such as `` (did you mean 'speed'?)``, or of the known names if none is near."""
     options = [option for option in islice(known, MOST_COMPARED) if len(option) <= LONGEST_COMPARED]
     close = difflib.get_close_matches(name[:LONGEST_COMPARED], options, n=1)
     if close:

@@ -1,8 +1,12 @@
 """Lower bounds: never above the optimum, and as tight as they can be by hand."""
 
+from typing import Any
+from unittest import mock
+
 import numpy as np
 import pytest
 from hypothesis import given
+from hypothesis import strategies as st
 from oracle import brute_force
 from strategies import instances, rebuilt
 
@@ -95,3 +99,26 @@ def test_energy_by_hand() -> None:
 def test_paper_instances_need_an_hour(scenario: int) -> None:
     """Abilities and workloads have one sum, so that no bound lies below 1 h; and none above, as 1 h is reached."""
     assert makespan_lower_bound(paper(scenario, 0)) == pytest.approx(1.0, abs=1e-12)
+
+
+def test_a_starved_task_is_bounded_tightly() -> None:
+    """One agent alone with a thousand times the work of all others: no tolerance of the solver blurs the bound."""
+    lists = [[0], *[list(range(1, 31))] * 300]
+    instance = Instance(ability=np.ones(301), workload=[1e4, *[1] * 30], allowed_tasks=lists)
+    assert lp_makespan_lower_bound(instance) == pytest.approx(1e4, rel=1e-11)
+
+
+@given(instances(most_agents=4, most_tasks=3), st.integers(0, 2**32))
+def test_any_multipliers_give_a_bound(instance: Instance, seed: int) -> None:
+    """However wrong the solver's answer is, what is made of it holds."""
+    best, rng = brute_force(instance), np.random.default_rng(seed)
+    if best.unserved:
+        return
+
+    def wrong(cost: np.ndarray, constraints: Any, limits: np.ndarray, time_limit_s: float) -> np.ndarray:
+        return rng.exponential(size=len(limits))
+
+    with mock.patch("alloc.problems.bounds._multipliers", wrong):
+        fractional, energy = lp_makespan_lower_bound(instance), energy_lower_bound(instance, best.makespan)
+    assert fractional is None or fractional <= best.makespan * ROUNDING
+    assert energy is None or energy <= best.energy * ROUNDING
