@@ -162,7 +162,7 @@ def _layout(instance: Instance, hours: float, rng: np.random.Generator) -> tuple
 
 def begin(board: Board) -> State:
     """Return the state in which a game starts."""
-    return State(board.start, group_ability(board, board.start), torch.zeros(len(board.start), dtype=torch.bool))
+    return State(board.start, group_ability(board, board.start), torch.zeros_like(board.price, dtype=torch.bool))
 
 
 def group_ability(board: Board, task: Tensor) -> Tensor:
@@ -185,9 +185,9 @@ def step(board: Board, state: State, action: Tensor) -> State:
     action : Tensor of int, shape (B,)
         ``agent * (m + 1) + task``, or ``n * (m + 1)`` to stop; ignored in games that are done.
     """
-    batch, n, places = board.shape
+    _, n, places = board.shape
     done = state.done | (action == n * places)
-    rows = torch.arange(batch)[~done]
+    rows = torch.nonzero(~done)[:, 0]
     agent, goal = action[rows] // places, action[rows] % places
     task, group = state.task.clone(), state.group.clone()
     moved = board.ability[rows, agent]
@@ -202,7 +202,7 @@ def illegal_actions(board: Board, state: State) -> Tensor:
     batch, _, places = board.shape
     stays = torch.nn.functional.one_hot(state.task, places).bool()
     barred = (stays | ~board.legal).flatten(1) | state.done[:, None]
-    return torch.cat([barred, torch.zeros(batch, 1, dtype=torch.bool)], 1)
+    return torch.cat([barred, barred.new_zeros(batch, 1)], 1)
 
 
 def potential(board: Board, state: State) -> Tensor:

@@ -16,7 +16,7 @@ from alloc.allocators.learned.policy_file import load_policy
 from alloc.allocators.learned.rollout import Best, play, repeat
 from alloc.allocators.registry import BUILT_IN
 from alloc.allocators.search import Budget, Search
-from alloc.problems import IDLE, Allocation, Instance, Objective, serve_all
+from alloc.problems import IDLE, Allocation, InputError, Instance, Objective, serve_all
 from alloc.problems.game import Board, make_board
 
 LANE_PAIRS = 100_000
@@ -53,12 +53,12 @@ class Gappo(Allocator):
     policy : Path or str, optional
         Policy file; the one that ships with the package by default.
     device : str
-        Where the networks run, such as ``cpu``.
+        Where the networks run, such as ``cpu`` or ``cuda``.
 
     Raises
     ------
     InputError
-        If the policy file is not one, or does not fit this version.
+        If the policy file is not one, does not fit this version, or there is no such device.
 
     References
     ----------
@@ -68,11 +68,12 @@ class Gappo(Allocator):
     method = BUILT_IN["gappo"]
 
     def __init__(self, policy: Path | str | None = None, device: str = "cpu") -> None:
+        self.device = _usable(device)
         if policy is not None:
-            self.networks = load_policy(policy, "gappo", device)
+            self.networks = load_policy(policy, "gappo", self.device)
         else:
             with as_file(files("alloc.allocators.learned") / "policies" / "gappo.safetensors") as shipped:
-                self.networks = load_policy(shipped, "gappo", device)
+                self.networks = load_policy(shipped, "gappo", self.device)
 
     def refusal(self, instance: Instance, objective: Objective, budget: Budget) -> str | None:
         """Refuse where not even one game would end in time."""
@@ -91,10 +92,12 @@ class Gappo(Allocator):
     def _play_all(self, search: Search) -> None:
         instance = search.instance
         rng = np.random.default_rng(search.seed)
-        generator = torch.Generator().manual_seed(search.seed)
+        generator = torch.Generator(self.device).manual_seed(search.seed)
         board = make_board([instance], [reference_makespan(instance)], [1.0], rng)
         if search.start is not None:
             board = replace(board, start=_places(instance, search.start))
+        home = board.start[0].numpy()
+        board = board.to(self.device)
         games = _Games(search, board, generator)
         width = int(np.clip(LANE_PAIRS // (instance.n * (instance.m + 1)), 1, 24))
         prices = GREEDY_PRICES[search.objective]
@@ -110,7 +113,7 @@ class Gappo(Allocator):
             drawn = tuple(np.exp(rng.uniform(low, high, width)).tolist())
             start = board.start
             if search.best is not None and rng.random() > FRESH_SHARE:
-                start = ruin(instance, search.best.allocation, board.start[0].numpy(), width, rng)
+                start = ruin(instance, search.best.allocation, home, width, rng)
             games.play(network, start, drawn, temperature=1.0)
 
 
@@ -129,7 +132,8 @@ class _Games:
         search = self.search
         if search.best is not None and search.should_stop():
             return
-        lanes = replace(repeat(self.board, torch.tensor(prices)), start=start.expand(len(prices), -1))
+        board = repeat(self.board, torch.tensor(prices, device=self.board.price.device))
+        lanes = replace(board, start=start.to(board.start.device).expand(len(prices), -1))
         best = play(
             network,
             lanes,
@@ -140,7 +144,7 @@ class _Games:
             generator=self.generator,
             should_stop=search.should_stop,
         )
-        _submit(search, best)
+        _submit(search, best.cpu())
         search.iteration += 1
 
 
@@ -179,6 +183,15 @@ def ruin(
             back = near[plan] | near[home]
         row[back] = home[back]
     return torch.from_numpy(ruins)
+
+
+def _usable(device: str) -> torch.device:
+    try:
+        torch.zeros(1, device=device)
+        return torch.device(device)
+    except (RuntimeError, AssertionError) as error:
+        reason = next(iter(str(error).splitlines()), "unusable")[:100]
+        raise InputError(f"{device!r} cannot be used here ({reason}); use cpu", "device") from None
 
 
 def _submit(search: Search, best: Best) -> None:

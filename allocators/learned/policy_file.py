@@ -47,7 +47,7 @@ def _description(size: NetworkSize, count: int, method: str) -> dict[str, str]:
     }
 
 
-def load_policy(path: Path | str, method: str, device: str = "cpu") -> list[ActorCritic]:
+def load_policy(path: Path | str, method: str, device: torch.device | None = None) -> list[ActorCritic]:
     """Read networks, the best first, ready to be used.
 
     Raises
@@ -57,7 +57,7 @@ def load_policy(path: Path | str, method: str, device: str = "cpu") -> list[Acto
     """
     source = str(path)
     try:
-        with safe_open(source, framework="pt", device=device) as file:
+        with safe_open(source, framework="pt") as file:
             said = file.metadata() or {}
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
     except FileNotFoundError:
@@ -80,8 +80,10 @@ def load_policy(path: Path | str, method: str, device: str = "cpu") -> list[Acto
         raise InputError(f"holds other weights than its size says ({reason})", "size", source) from None
 
 
-def _network(size: NetworkSize, tensors: dict[str, torch.Tensor], number: int, device: str) -> ActorCritic:
-    network = ActorCritic(size).to(device)
+def _network(
+    size: NetworkSize, tensors: dict[str, torch.Tensor], number: int, device: torch.device | None
+) -> ActorCritic:
+    network = ActorCritic(size)
     prefix = f"{number}."
     network.load_state_dict({name.removeprefix(prefix): t for name, t in tensors.items() if name.startswith(prefix)})
-    return network.eval().requires_grad_(False)
+    return network.to(device).eval().requires_grad_(False)

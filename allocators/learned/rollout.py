@@ -48,6 +48,10 @@ class Best:
     time: Tensor
     distance: Tensor
 
+    def cpu(self) -> "Best":
+        """Return the same positions in main memory."""
+        return Best(self.task.cpu(), self.unserved.cpu(), self.time.cpu(), self.distance.cpu())
+
     def improved_by(self, other: "Best") -> "Best":
         """Return the better of two positions for each game: fewer unserved, then sooner, then nearer."""
         same = (other.time - self.time).abs() <= TIE * self.time
@@ -117,7 +121,7 @@ def play(
     state = begin(board)
     best = _position(board, state)
     game = _Game(network, board, state, should_stop)
-    highest, stale = value_of(board, state), torch.zeros(len(board.price))
+    highest, stale = value_of(board, state), torch.zeros_like(board.price)
     for _ in range(steps):
         if should_stop() or bool(state.done.all()):
             break
@@ -144,8 +148,8 @@ class _Game:
     def __init__(self, network: ActorCritic, board: Board, state: State, should_stop: Callable[[], bool]) -> None:
         self.network, self.board = network, board
         self.target = board.target.clamp(min=1e-3)
-        self.barred = torch.zeros(board.shape).masked_fill_(~board.legal, BARRED)
-        self.score = torch.full(board.shape, BARRED)
+        self.barred = board.price.new_zeros(board.shape).masked_fill_(~board.legal, BARRED)
+        self.score = board.price.new_full(board.shape, BARRED)
         for agents in _chunks(board, SCORE_CHUNK):
             if should_stop():
                 break
@@ -200,7 +204,7 @@ class _Game:
         change in their own place.
         """
         _, n, places = self.board.shape
-        changed = torch.zeros(self.board.target.shape, dtype=torch.bool)
+        changed = torch.zeros_like(self.board.target, dtype=torch.bool)
         changed[rows, sources] = True
         changed[rows, goals] = True
         changed[:, -1] = False
@@ -208,7 +212,7 @@ class _Game:
         concerned[rows, agents] = True
         game, agent = torch.nonzero(concerned, as_tuple=True)
         where, column = torch.nonzero(changed, as_tuple=True)
-        everyone, everywhere = torch.arange(n), torch.arange(places)
+        everyone, everywhere = (torch.arange(count, device=rows.device) for count in (n, places))
         return (
             torch.cat([where.repeat_interleave(n), game.repeat_interleave(places)]),
             torch.cat([everyone.repeat(len(where)), agent.repeat_interleave(places)]),
@@ -257,7 +261,7 @@ def _disjoint(logits: Tensor, state: State, done: Tensor, moves: Tensor) -> tupl
             moved.add(agent)
             used |= {source, goal} - {places - 1}
             granted.append((game, agent, goal))
-    rows, agents, goals = torch.tensor(granted, dtype=torch.long).reshape(-1, 3).unbind(1)
+    rows, agents, goals = torch.tensor(granted, dtype=torch.long, device=logits.device).reshape(-1, 3).unbind(1)
     return rows, agents, goals
 
 

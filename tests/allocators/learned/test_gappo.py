@@ -8,6 +8,7 @@ import torch
 
 from alloc.allocators import Budget, RefusedError, Status, load, solve
 from alloc.allocators.base import Allocator
+from alloc.allocators.learned.gappo import ruin
 from alloc.problems import Allocation, InputError, Instance, Objective
 from alloc.problems.generate import paper, paper_like, random_instance
 from alloc.problems.generate_family import Family
@@ -92,6 +93,26 @@ def test_unknown_policy_file() -> None:
     """A policy file that is not there is told before anything runs."""
     with pytest.raises(InputError, match="no such policy file"):
         load("gappo", policy="/nonexistent/policy.safetensors")
+
+
+@pytest.mark.parametrize("device", ["nonsense", "cuda:99", "xpu:7"])
+def test_devices_that_are_not_there(device: str) -> None:
+    """A device that cannot be used is told in one line."""
+    with pytest.raises(InputError, match=r"device: .* cannot be used here") as caught:
+        load("gappo", device=device)
+    assert "\n" not in str(caught.value)
+
+
+def test_ruins_send_some_home() -> None:
+    """In a ruin every agent is where the plan has it or at home, some of them at home, and not always the same."""
+    instance = paper_like(40, 8, 160, seed=2)
+    home = instance.start_task.astype(np.int64)
+    plan = Allocation((home + 1) % 8)
+    ruins = ruin(instance, plan, home, 20, np.random.default_rng(0)).numpy()
+    back = ruins == home
+    assert (back | (ruins == plan.task_of_agent)).all()
+    assert 0 < back.mean() < 0.8
+    assert len({row.tobytes() for row in back}) > 10
 
 
 def test_degenerate_instances(gappo: Allocator) -> None:
