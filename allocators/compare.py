@@ -2,7 +2,7 @@
 
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -159,11 +159,8 @@ def summarise(instance: Instance, method: str, results: Sequence[Result], reason
     energy_mean, energy_worst = _mean_and_worst([result.energy for result in results])
     runtime_mean_s, runtime_worst_s = _mean_and_worst([result.runtime_s for result in results])
     scores = [result.evaluation for result in results]
-    return Row(
-        instance=instance.name,
-        method=method,
-        agents=instance.n,
-        tasks=instance.m,
+    return replace(
+        first,
         picked="/".join(sorted({result.method for result in results})) if method == "auto" else "",
         runs=len(results),
         statuses="/".join(sorted({str(result.status) for result in results})),

@@ -1,13 +1,14 @@
 """What holds the makespan up: the last task, and what one more agent there would gain."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import count
 
 import numpy as np
 from numpy.typing import NDArray
 
 from alloc.problems import IDLE, Allocation, Evaluation, Instance, evaluate
 from alloc.problems.evaluation import RELATIVE_TOLERANCE
-from alloc.problems.instance import FloatArray, IntArray
+from alloc.problems.instance import IntArray
 
 
 @dataclass(frozen=True)
@@ -129,23 +130,15 @@ def _gain(instance: Instance, allocation: Allocation, task: int, ability: float)
 
 def _with_agent(instance: Instance, ability: float) -> Instance:
     """Add an agent without a place, which is near everything and can take every task."""
-
-    def more(values: FloatArray, value: float) -> FloatArray:
-        return np.append(values, value)
-
-    allowed = instance.allowed_tasks
-    return Instance(
-        name=instance.name,
-        ability=more(instance.ability, ability),
-        workload=instance.workload,
+    allowed, names = instance.allowed_tasks, set(instance.agent_ids)
+    return replace(
+        instance,
+        agent_ids=(*instance.agent_ids, next(name for name in map(str, count()) if name not in names)),
+        ability=np.append(instance.ability, ability),
         agent_position=np.vstack([instance.agent_position, np.full(3, np.nan)]),
-        task_position=instance.task_position,
         start_task=np.append(instance.start_task, IDLE),
-        battery=more(instance.battery, np.inf),
-        communication_range=more(instance.communication_range, np.inf),
-        speed=more(instance.speed, np.inf),
-        allowed_tasks=None if allowed is None else [*allowed, None],
-        priority=instance.priority,
-        tau=instance.tau,
-        energy_per_distance=instance.energy_per_distance,
+        battery=np.append(instance.battery, np.inf),
+        communication_range=np.append(instance.communication_range, np.inf),
+        speed=np.append(instance.speed, np.inf),
+        allowed_tasks=None if allowed is None else (*allowed, None),
     )

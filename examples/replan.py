@@ -46,30 +46,14 @@ class Planner:
 
     def drop(self, agents: set[str]) -> None:
         """Take agents away; the others keep their tasks until the next `replan`."""
-        left = [index for index, name in enumerate(self.instance.agent_ids) if name not in agents]
-        self.instance, plan = without(self.instance, left), self.plan.to_ids(self.instance)
+        plan = self.plan.to_ids(self.instance)
+        self.instance = self.instance.without_agents(agents)
         self.plan = Allocation.from_ids(self.instance, {name: plan[name] for name in self.instance.agent_ids})
 
     @staticmethod
     def _tell(improvement: Improvement) -> None:
         score = improvement.evaluation
         print(f"    {improvement.time_s:5.2f} s  {score.served_makespan:.4f} h, {len(score.unserved_tasks)} unserved")
-
-
-def without(instance: Instance, left: list[int]) -> Instance:
-    """Return `instance` with the agents of these indices alone."""
-    return Instance(
-        name=instance.name,
-        agent_ids=[instance.agent_ids[index] for index in left],
-        ability=instance.ability[left],
-        agent_position=instance.agent_position[left],
-        communication_range=instance.communication_range[left],
-        battery=instance.battery[left],
-        task_ids=instance.task_ids,
-        workload=instance.workload,
-        task_position=instance.task_position,
-        energy_per_distance=instance.energy_per_distance,
-    )
 
 
 def main() -> None:

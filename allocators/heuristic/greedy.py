@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from alloc.allocators.base import Allocator, Proposal
 from alloc.allocators.registry import BUILT_IN
 from alloc.allocators.search import Search
-from alloc.problems import IDLE, Allocation, Instance
+from alloc.problems import IDLE, Allocation, Instance, makespan_lower_bound
 
 CHECK_EVERY = 256
 """Agents between two looks at the clock."""
@@ -39,7 +39,8 @@ def greedy(instance: Instance, search: Search | None = None) -> Allocation:
 
 
 def _order(instance: Instance) -> list[int]:
-    return list(map(int, np.argsort(-instance.ability, kind="stable")))
+    order: list[int] = np.argsort(-instance.ability, kind="stable").tolist()
+    return order
 
 
 def _by_heap(instance: Instance, search: Search | None) -> NDArray[np.intp]:
@@ -65,21 +66,23 @@ def _by_scan(instance: Instance, search: Search | None) -> NDArray[np.intp]:
     task = np.full(instance.n, IDLE, dtype=np.intp)
     by_size = np.argsort(-work, kind="stable")
     by_size = by_size[work[by_size] > 0]
+    if not len(by_size):
+        return task
     group = np.zeros(instance.m)
-    horizon = max(search.lower_bound if search is not None else 0.0, 1e-300)
+    horizon = makespan_lower_bound(instance) if search is None else search.lower_bound
     options = [by_size[row[by_size]] for row in reach.mask]
     for count, agent in enumerate(_order(instance)):
         if count % CHECK_EVERY == 0 and search is not None and search.should_stop():
             break
         origin = reach.origin[agent]
         tasks = options[origin]
-        share = 1.0
         if instance.has_travel_time:
-            arrival = reach.distance[origin, tasks] / instance.speed[agent]
-            share = np.maximum(0.0, 1 - arrival / horizon)
-            tasks, share = tasks[share > 0], share[share > 0]
+            tasks = tasks[reach.distance[origin, tasks] < horizon * instance.speed[agent]]
         if len(tasks):
-            best = int(np.argmin(group[tasks] / work[tasks]))
-            task[agent] = tasks[best]
-            group[tasks[best]] += instance.ability[agent] * (share[best] if isinstance(share, np.ndarray) else share)
+            best = tasks[np.argmin(group[tasks] / work[tasks])]
+            task[agent] = best
+            share = 1.0
+            if instance.has_travel_time:
+                share -= reach.distance[origin, best] / (horizon * instance.speed[agent])
+            group[best] += instance.ability[agent] * share
     return task

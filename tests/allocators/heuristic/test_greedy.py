@@ -60,3 +60,18 @@ def test_stops_when_time_is_up() -> None:
     late = Search(instance, Objective.MAKESPAN, Budget(0))
     assert greedy(instance, late) == Allocation.idle(instance)
     assert solve(instance, "greedy", time_limit_s=0).makespan == pytest.approx(1.0)
+
+
+def test_alone_it_looks_ahead_as_far_as_in_a_run() -> None:
+    """Called without a search, agents that need time to travel go where those of a run go."""
+    rng = np.random.default_rng(0)
+    instance = Instance(
+        ability=rng.uniform(1, 3, 20),
+        workload=rng.uniform(5, 9, 4),
+        agent_position=rng.random((20, 2)),
+        task_position=rng.random((4, 2)),
+        speed=np.full(20, 2.0),
+    )
+    search = Search(instance, Objective.MAKESPAN, Budget(None))
+    assert greedy(instance) == greedy(instance, search)
+    assert (greedy(instance).task_of_agent >= 0).any()
