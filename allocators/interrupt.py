@@ -18,12 +18,14 @@ GRACE_S = 0.3
 def signals_set(stop: threading.Event) -> Iterator[None]:
     """Let SIGINT and SIGTERM set `stop` while the block runs; does nothing outside the main thread.
 
-    A second SIGINT does what it did before, so that a run that hangs can still be ended.
+    A second signal does what it did before, so that a run that hangs can still be ended. A handler that a program
+    which embeds this has set in C stays in place, as it could not be put back.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = {number: handler for number, handler in handlers.items() if handler is not None}
 
     def ask_to_stop(number: int, frame: FrameType | None) -> None:
         stop.set()
