@@ -2,6 +2,7 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+PIP := PYTHONWARNINGS=ignore $(BIN)/python -m pip --quiet --disable-pip-version-check
 CODE := pyproject.toml $(shell find problems allocators cli -name '*.py' -o -name '*.safetensors')
 EXAMPLE := examples/earthquakes/alaska.json
 
@@ -33,16 +34,16 @@ clean:  ## remove what the other targets made
 $(VENV)/bin/python:
 	$(PYTHON) -c 'import sys; sys.exit("alloc needs Python 3.11 or newer; call make PYTHON=...") if sys.version_info < (3, 11) else None'
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --upgrade pip
+	$(PIP) install --upgrade pip
 
 $(VENV)/.installed: $(VENV)/bin/python $(CODE)
-	$(BIN)/python -m pip install --quiet --editable .
+	$(PIP) install --editable .
 	@touch $@
 
 $(VENV)/.tested: $(VENV)/.installed
-	$(BIN)/python -m pip install --quiet --editable '.[test]'
+	$(PIP) install --editable '.[test]'
 	@touch $@
 
 $(VENV)/.checked: $(VENV)/.tested
-	$(BIN)/python -m pip install --quiet --editable '.[dev]'
+	$(PIP) install --editable '.[dev]'
 	@touch $@
