@@ -143,8 +143,10 @@ def energy_lower_bound(instance: Instance, makespan: float, time_limit_s: float 
     if not len(kind) or instance.energy_per_distance == 0:
         return 0.0
     distance = classes.distance[kind, task]
-    hours = np.maximum(0.0, makespan * (1 + RELATIVE_TOLERANCE) - distance / classes.speed[kind])
-    share = np.minimum(1.0, classes.ability[kind] * hours / work[task])
+    with np.errstate(over="ignore"):
+        latest = min(makespan * (1 + RELATIVE_TOLERANCE), sys.float_info.max)
+        hours = np.maximum(0.0, latest - distance / classes.speed[kind])
+        share = np.minimum(1.0, classes.ability[kind] * hours / work[task])
     constraints = vstack([_rows(task, -share, instance.m), _rows(kind, np.ones(len(kind)), classes.size)])
     limits = np.append(np.where(work > 0, -1.0, 0.0), classes.count)
     price = _multipliers(distance, constraints, limits, time_limit_s)
@@ -153,7 +155,8 @@ def energy_lower_bound(instance: Instance, makespan: float, time_limit_s: float 
     # an agent of class k that does its share saves at most max_j price_j share_kj - distance_kj, 0 if it stays idle
     price = price[: instance.m] * (work > 0)
     saved = float(classes.count @ _largest(kind, price[task] * share - distance, classes.size))
-    return max(0.0, float(price.sum()) * (1 - ROUNDING) - saved) * instance.energy_per_distance
+    least = max(0.0, float(price.sum()) * (1 - ROUNDING) - saved)
+    return min(least * instance.energy_per_distance, sys.float_info.max)
 
 
 def _is_too_large(pairs: int, time_limit_s: float) -> bool:

@@ -5,11 +5,10 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
 from alloc.problems.allocation import Allocation
 from alloc.problems.errors import InputError
-from alloc.problems.instance import IDLE, FloatArray, Instance
+from alloc.problems.instance import IDLE, FloatArray, Instance, IntArray
 from alloc.problems.reach import TOLERANCE
 
 RELATIVE_TOLERANCE = 1e-9
@@ -51,7 +50,7 @@ class Evaluation:
         max T_j over the served tasks, 0 if there is none.
     distance, energy : float
         Flown directly from the start to the final task, summed over agents, and `distance` times the energy per
-        unit of distance (19).
+        unit of distance (19); the largest finite float where they would be more.
     battery_remaining_percent : float or None
         Mean over the agents with a battery, idle ones at 100; None if no agent has one.
     reward : float
@@ -109,23 +108,25 @@ def evaluate(instance: Instance, allocation: Allocation) -> Evaluation:
     allowed = instance.reach.allows(sent, task[sent])
     agent, goal = sent[allowed], task[sent[allowed]]
     distance = instance.reach.distance_of(agent, goal)
-    group_ability: FloatArray = np.bincount(goal, weights=instance.ability[agent], minlength=instance.m).astype(
-        np.float64
-    )
+    group_ability = np.bincount(goal, weights=instance.ability[agent], minlength=instance.m).astype(np.float64)
     time = _completion_times(instance, agent, goal, distance, group_ability)
     unserved = (instance.workload > 0) & (group_ability == 0)
-    reward, saturated = _reward(group_ability - instance.workload, instance.tau)
+    coverage = group_ability - instance.workload
+    reward, saturated = _reward(coverage, instance.tau)
     served_makespan = float(time[~unserved].max(initial=0.0))
-    for array in (time, group_ability):
+    with np.errstate(over="ignore"):
+        flown = min(distance.sum(), sys.float_info.max)
+        energy = min(flown * instance.energy_per_distance, sys.float_info.max)
+    for array in (time, group_ability, coverage):
         array.setflags(write=False)
     return Evaluation(
         completion_time=time,
         group_ability=group_ability,
-        coverage=group_ability - instance.workload,
+        coverage=coverage,
         makespan=None if unserved.any() else served_makespan,
         served_makespan=served_makespan,
-        distance=float(distance.sum()),
-        energy=float(distance.sum() * instance.energy_per_distance),
+        distance=float(flown),
+        energy=float(energy),
         battery_remaining_percent=_battery_percent(instance, agent, distance),
         reward=reward,
         reward_saturated=saturated,
@@ -134,7 +135,7 @@ def evaluate(instance: Instance, allocation: Allocation) -> Evaluation:
     )
 
 
-def _checked_tasks(instance: Instance, allocation: Allocation) -> NDArray[np.intp]:
+def _checked_tasks(instance: Instance, allocation: Allocation) -> IntArray:
     task = allocation.task_of_agent
     if len(task) != instance.n:
         raise InputError(f"the allocation has {len(task)} agents, instance {instance.name!r} has {instance.n}")
@@ -144,7 +145,7 @@ def _checked_tasks(instance: Instance, allocation: Allocation) -> NDArray[np.int
 
 
 def _completion_times(
-    instance: Instance, agent: NDArray[np.intp], goal: NDArray[np.intp], distance: FloatArray, group_ability: FloatArray
+    instance: Instance, agent: IntArray, goal: IntArray, distance: FloatArray, group_ability: FloatArray
 ) -> FloatArray:
     work = instance.workload
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -193,18 +194,19 @@ def _reward(coverage: FloatArray, tau: float) -> tuple[float, bool]:
     return -total, False
 
 
-def _battery_percent(instance: Instance, agent: NDArray[np.intp], distance: FloatArray) -> float | None:
+def _battery_percent(instance: Instance, agent: IntArray, distance: FloatArray) -> float | None:
     has_battery = np.isfinite(instance.battery)
     if not has_battery.any():
         return None
     used = np.zeros(instance.n)
-    used[agent] = distance * instance.energy_per_distance
+    with np.errstate(over="ignore"):
+        used[agent] = distance * instance.energy_per_distance
     used, capacity = used[has_battery], instance.battery[has_battery]
     share = np.divide(used, capacity, out=np.zeros_like(used), where=capacity > 0)
     return float(100 * (1 - np.minimum(share, 1)).mean())
 
 
-def _violations(instance: Instance, agents: NDArray[np.intp], task: NDArray[np.intp]) -> list[Violation]:
+def _violations(instance: Instance, agents: IntArray, task: IntArray) -> list[Violation]:
     found = []
     for agent in agents.tolist():
         goal = int(task[agent])

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 TOLERANCE = 1e-9
 """Slack on ranges (in distance) and batteries (in energy)."""
 
+LARGEST = 1e150
+"""Coordinates beyond are scaled before distances are measured."""
+
 BLOCK = 1 << 16
 """Distances that are worked out together."""
 
@@ -65,7 +68,8 @@ def build_reach(instance: Instance) -> Reach:
     distance = _distances(instance.start_position[first], instance.task_position)
     mask = distance <= instance.communication_range[first, None] + TOLERANCE
     if np.isfinite(instance.battery).any():
-        mask &= instance.energy_per_distance * distance <= instance.battery[first, None] + TOLERANCE
+        with np.errstate(over="ignore"):
+            mask &= instance.energy_per_distance * distance <= instance.battery[first, None] + TOLERANCE
     if instance.allowed_tasks is not None:
         for row, agent in enumerate(first.tolist()):
             allowed = instance.allowed_tasks[agent]
@@ -80,6 +84,11 @@ def build_reach(instance: Instance) -> Reach:
 
 def _distances(place: NDArray[np.float64], goal: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return Euclidean distances, shape (places, goals), 0 where a coordinate is NaN; in blocks that fit a cache."""
+    farthest = max(np.nanmax(np.abs(places), initial=0.0) for places in (place, goal))
+    if farthest > LARGEST:  # its square is more than a float holds
+        with np.errstate(over="ignore"):
+            far: NDArray[np.float64] = _distances(place / farthest, goal / farthest) * farthest
+        return np.minimum(far, np.finfo(float).max)
     distance = np.zeros((len(place), len(goal)))
     rows = max(1, BLOCK // len(goal))
     for first in range(0, len(place), rows):

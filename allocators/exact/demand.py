@@ -125,7 +125,8 @@ class Model:
         """Collect the pairs of class and task with workload."""
         tasks = np.flatnonzero(instance.workload > 0)
         kind, goal = np.nonzero(classes.mask[:, tasks])
-        delay = classes.distance[kind, tasks[goal]] / classes.speed[kind] if instance.has_travel_time else None
+        with np.errstate(over="ignore"):
+            delay = classes.distance[kind, tasks[goal]] / classes.speed[kind] if instance.has_travel_time else None
         unit = None if instance.has_travel_time else _common_unit(classes.ability, classes.count)
         return cls(classes, tasks, instance.workload[tasks], kind, goal, delay, unit, serve)
 

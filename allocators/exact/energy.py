@@ -1,5 +1,6 @@
 """The least energy at a makespan: who of those alike goes where, then an integer programme over classes by place."""
 
+import sys
 from collections.abc import Callable
 
 import numpy as np
@@ -56,7 +57,7 @@ def least_energy(search: Search, ask: Callable[[Question, Watch], Answer], serve
     search.iteration += 1
     if answer.counts is not None:
         search.submit(model.allocation(demand, answer.counts))
-    return max(0.0, answer.bound * search.instance.energy_per_distance)
+    return min(max(0.0, answer.bound * search.instance.energy_per_distance), sys.float_info.max)
 
 
 def nearest_places(

@@ -101,13 +101,14 @@ class Landscape:
         with np.errstate(divide="ignore", over="ignore"):
             time = np.where(served, self.workload / group, 0.0)
             lack = np.maximum(0.0, 1 - group / self.demand(aim))
+            flown = self.distance(np.arange(self.n), genes).sum(axis=1) if with_energy else np.zeros(len(genes))
+            energy = flown * self.instance.energy_per_distance
         lack[lack < ROUNDING] = 0.0
-        flown = self.distance(np.arange(self.n), genes).sum(axis=1) if with_energy else np.zeros(len(genes))
         return Figures(
             unserved=(~served).sum(axis=1).astype(float),
             shortfall=lack.sum(axis=1).round(12),
             makespan=time.max(axis=1),
-            energy=flown * self.instance.energy_per_distance,
+            energy=energy,
             group=group,
         )
 

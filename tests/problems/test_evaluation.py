@@ -9,7 +9,15 @@ from hypothesis import strategies as st
 from oracle import brute_force
 from strategies import allocated, instances, rebuilt
 
-from alloc.problems import Allocation, InputError, Instance, Objective, evaluate
+from alloc.problems import (
+    Allocation,
+    InputError,
+    Instance,
+    Objective,
+    energy_lower_bound,
+    evaluate,
+    makespan_lower_bound,
+)
 from alloc.problems.evaluation import completion_time
 
 NAN = float("nan")
@@ -179,3 +187,23 @@ def test_scores_are_read_only(line: Instance) -> None:
     score = evaluate(line, Allocation.idle(line))
     with pytest.raises(ValueError, match="read-only"):
         score.completion_time[0] = 0
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"agent_position": [[1e200, 0], [0, 0]], "task_position": [[-1e200, 0], [0, 1]]},
+        {"agent_position": [[1e308, 1e308], [0, 0]], "task_position": [[-1e308, 0], [0, 1]], "speed": [1e-300, 1]},
+        {"agent_position": [[100, 0], [0, 0]], "task_position": [[0, 0], [0, 1]], "energy_per_distance": 1e307},
+    ],
+)
+def test_scores_and_bounds_stay_finite(fields: dict) -> None:
+    """However far apart and dear, distances and energies are floats that a file can hold, without a warning."""
+    instance = Instance(ability=[1, 2], workload=[1, 2], **fields)
+    score = evaluate(instance, Allocation([0, 1]))
+    assert score.makespan is not None
+    for value in (score.makespan, score.distance, score.energy, makespan_lower_bound(instance)):
+        assert 0 < value <= sys.float_info.max
+    assert np.isfinite(instance.reach.distance).all()
+    bound = energy_lower_bound(instance, score.makespan)
+    assert bound is None or 0 <= bound <= score.energy
