@@ -174,6 +174,8 @@ def _tighten(search: Search, proposal: Proposal) -> float | None:
         search.raise_bound(lp_makespan_lower_bound(instance, patience_s) or 0.0)
     if search.objective is Objective.MAKESPAN or search.best is None or search.best.evaluation.makespan is None:
         return None
+    if search.best.evaluation.energy == 0:
+        return 0.0
     known = proposal.energy_lower_bound
     if known is not None and known >= search.best.evaluation.energy * (1 - PROVEN):
         return known

@@ -1,7 +1,9 @@
 """The recipe around every method."""
 
 import threading
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from alloc.allocators import (
@@ -96,6 +98,16 @@ def test_energy_must_be_proven_as_well(instance: Instance) -> None:
     assert result.energy_gap > 0.1
 
 
+def test_no_energy_is_the_least() -> None:
+    """Where nobody flies the energy is proven, also where no linear programme of this size is solved."""
+    rng = np.random.default_rng(0)
+    large = Instance(ability=rng.uniform(1, 2, 3000), workload=np.ones(300), allowed_tasks=[[0]] + [None] * 2999)
+    answers = Answers(Proposal(Allocation(np.arange(3000) % 300)))
+    answers.method = replace(Answers.method, objectives=tuple(Objective))  # type: ignore[misc]
+    result = solve(large, answers, objective="makespan-energy")
+    assert (result.energy, result.energy_lower_bound, result.energy_gap) == (0.0, 0.0, 0.0)
+
+
 def test_refusals(instance: Instance) -> None:
     """The objective, finite speeds and the method's own reason refuse beforehand, and say why."""
     idle = Proposal(Allocation.idle(instance))
@@ -152,6 +164,32 @@ def test_options_need_a_name(instance: Instance) -> None:
         solve(instance, load("greedy"), policy="x.safetensors")
     with pytest.raises(InputError, match="takes no option 'policy'"):
         solve(instance, "greedy", policy="x.safetensors")
+
+
+def test_auto_takes_no_options(instance: Instance) -> None:
+    """What it picks depends on the size: an option that one method takes needs that method's name."""
+    with pytest.raises(InputError, match="for a method that you name"):
+        solve(instance, "auto", policy="x.safetensors")
+    assert solve(instance, "auto", policy=None).makespan == 1.0
+
+
+@pytest.mark.parametrize("wrong", [{"seed": -1}, {"seed": 2**63}, {"threads": 0}, {"threads": 10**20}])
+def test_numbers_that_no_solver_takes(instance: Instance, wrong: dict[str, int]) -> None:
+    """Seeds and threads out of range are told beforehand, by every method alike."""
+    with pytest.raises(InputError, match="must be a whole number from"):
+        solve(instance, "greedy", **wrong)
+
+
+def test_a_target_gap_counts_from_the_best_bound_at_hand() -> None:
+    """Reach alone makes one task long: the simple bounds miss it, and the run still ends at the gap asked for."""
+    hard = Instance(
+        ability=[1.1, 1.7, 2.3, 3.1, 4.9, 9.7], workload=[3.3, 5.9, 1.0], allowed_tasks=[[0, 1]] * 5 + [[2]]
+    )
+    plain = Search(hard, Objective.MAKESPAN, Budget())
+    result = solve(hard, "ga", time_limit_s=20, target_gap=0.2)
+    assert (result.stop_reason, result.gap is not None and result.gap <= 0.2) == (StopReason.TARGET_GAP, True)
+    assert result.makespan is not None
+    assert (result.makespan - plain.lower_bound) / result.makespan > 0.2
 
 
 def test_auto_says_what_it_picked(instance: Instance) -> None:
