@@ -3,13 +3,9 @@
 from collections import deque
 
 import numpy as np
-from numpy.typing import NDArray
 
 from alloc.problems.allocation import Allocation
-from alloc.problems.instance import IDLE, Instance
-
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.intp]
+from alloc.problems.instance import IDLE, Instance, IntArray
 
 
 class _Matching:
@@ -24,11 +20,12 @@ class _Matching:
         self.kept_task = np.full(instance.n, IDLE, dtype=np.intp)
         held = np.flatnonzero(self.keeper != IDLE)
         self.kept_task[self.keeper[held]] = held
+        self.spent = np.zeros(instance.n, dtype=bool)  # met by a search that failed: no later path leads through them
 
     def serve(self, task: int) -> IntArray | None:
-        """Serve `task` with as few moves as possible; None if done, else the tasks that compete for its agents."""
+        """Serve `task` along a path with the fewest moves; None if done, else the tasks that compete for its agents."""
         came_from: dict[int, tuple[int, int]] = {}  # task -> (task that wants its keeper, that keeper)
-        seen_agents = np.zeros(len(self.kept_task), dtype=bool)
+        seen_agents = self.spent.copy()
         queue, seen = deque([task]), {task}
         while queue:
             wanting = queue.popleft()
@@ -44,6 +41,7 @@ class _Matching:
                     seen.add(held)
                     came_from[held] = (wanting, agent)
                     queue.append(held)
+        self.spent = seen_agents
         return np.array(sorted(seen), dtype=np.intp)
 
     def _cheapest(self, agents: IntArray, task: int) -> int:
@@ -64,10 +62,10 @@ def _needs_agent(instance: Instance) -> IntArray:
 
 
 def serve_all(instance: Instance, allocation: Allocation) -> Allocation:
-    """Change `allocation` as little as possible so that as few tasks as possible are unserved.
+    """Change `allocation` so that as few tasks as possible are unserved.
 
-    Agents sent where they cannot go are idle in the answer. A task that is served stays served, though agents may
-    change places along augmenting paths.
+    Agents sent where they cannot go are idle in the answer. A task that is served stays served. Agents change places
+    along augmenting paths alone, each with the fewest moves, at whose end an idle agent is preferred, then the nearest.
     """
     task = allocation.task_of_agent.copy()
     working = np.flatnonzero(task != IDLE)
