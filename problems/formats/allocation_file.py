@@ -5,7 +5,7 @@ from typing import Any
 from alloc.problems.allocation import Allocation
 from alloc.problems.errors import InputError
 from alloc.problems.formats import json_text
-from alloc.problems.formats.columns import check_texts, require_format
+from alloc.problems.formats.columns import check_names, require_format
 from alloc.problems.formats.document import require_known
 from alloc.problems.formats.files import PathLike, named, read_text, write_text_atomically
 from alloc.problems.formats.messages import described, quoted, told
@@ -66,9 +66,7 @@ def write_allocation(allocation: Allocation, instance: Instance, path: PathLike)
 
 def allocation_to_document(allocation: Allocation, instance: Instance) -> dict[str, Any]:
     """Return `allocation` as plain objects; every agent appears, idle ones with None."""
-    check_texts([instance.name], "instance")
-    check_texts(instance.agent_ids, "agents[{}].id")
-    check_texts(instance.task_ids, "tasks[{}].id")
+    check_names(instance, "instance")
     return {"format": ALLOCATION_FORMAT, "instance": instance.name, "assignment": allocation.to_ids(instance)}
 
 

@@ -61,9 +61,7 @@ class Columns:
         InputError
             If a value breaks a rule or a reference leads nowhere; its place is in the terms of the JSON format.
         """
-        check_texts([self.name], "name")
-        check_texts(self.agent_ids, "agents[{}].id")
-        check_texts(self.task_ids, "tasks[{}].id")
+        check_names(self)
         _require_all(self.ability, "agents[{}].ability", "> 0")
         _require_all(self.workload, "tasks[{}].workload", ">= 0")
         index = {name: number for number, name in enumerate(self.task_ids)}
@@ -86,8 +84,14 @@ class Columns:
         )
 
 
-def check_texts(texts: Sequence[str], place: str) -> None:
-    """Raise `InputError` if a text holds what not every format can keep: NUL, or half a surrogate pair."""
+def check_names(named: "Columns | Instance", name_field: str = "name") -> None:
+    """Raise `InputError` if the name or an id holds what not every format can keep: NUL, or half a surrogate pair."""
+    _check_texts([named.name], name_field)
+    _check_texts(named.agent_ids, "agents[{}].id")
+    _check_texts(named.task_ids, "tasks[{}].id")
+
+
+def _check_texts(texts: Sequence[str], place: str) -> None:
     if _is_plain("".join(texts)):
         return
     row = next(row for row, text in enumerate(texts) if not _is_plain(text))

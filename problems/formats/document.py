@@ -15,7 +15,7 @@ from alloc.problems.formats.columns import (
     INSTANCE_FORMAT,
     TASK_FIELDS,
     Columns,
-    check_texts,
+    check_names,
     plain_numbers,
     require_format,
     unknown_field,
@@ -76,12 +76,7 @@ def to_document(instance: Instance) -> dict[str, Any]:
     InputError
         If an id holds what no file can keep.
     """
-    for texts, place in (
-        ([instance.name], "name"),
-        (instance.agent_ids, "agents[{}].id"),
-        (instance.task_ids, "tasks[{}].id"),
-    ):
-        check_texts(texts, place)
+    check_names(instance)
     agents = zip(
         instance.agent_ids,
         plain_numbers(instance.ability),

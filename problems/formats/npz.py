@@ -15,7 +15,7 @@ from alloc.problems.formats.columns import (
     DEFAULT_TAU,
     INSTANCE_FORMAT,
     Columns,
-    check_texts,
+    check_names,
     require_format,
     unknown_field,
 )
@@ -100,9 +100,7 @@ def to_npz(instance: Instance) -> bytes:
     InputError
         If an id holds what the format cannot keep, or ids are so long that the file would be.
     """
-    check_texts([instance.name], "name")
-    check_texts(instance.agent_ids, "agents[{}].id")
-    check_texts(instance.task_ids, "tasks[{}].id")
+    check_names(instance)
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
         for name, array in _arrays(instance).items():
