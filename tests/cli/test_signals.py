@@ -101,7 +101,9 @@ def test_ctrl_c_outside_a_run_is_quiet(tmp_path):
         text=True,
         cwd=tmp_path,
     )
-    time.sleep(1.5)
+    assert process.stdin is not None
+    process.stdin.write(" " * 1_000_000)  # more than a pipe holds: this returns once the command reads
+    process.stdin.flush()
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=20)
     assert (process.returncode, out, err) == (130, "", "")

