@@ -4,7 +4,7 @@ The thresholds were measured on two cores. Makespan: the descent of the exact me
 the first second as long as the solver's model can be built at all, 60,000 pairs a second. Energy: `milp` proves the
 least, or ends within 10 % of it, up to about 500 pairs for each second; beyond, it may not get past its first plan.
 There `ga` always meets the least makespan of the paper's scenarios, which comes first in the objective. `gappo` mostly
-ends up to 1 % above it; its plans fly less, by a third at 500 agents and 50 tasks, but who wants that has to ask for it.
+ends up to 1 % above it; its plans fly less, by a third at 500 agents and 50 tasks, for those who ask for it.
 """
 
 from alloc.allocators.search import Budget
