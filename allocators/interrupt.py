@@ -1,7 +1,9 @@
 """Stopping a run from outside: signals, and solvers in native code that only a second thread can stop."""
 
+import atexit
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
@@ -12,6 +14,11 @@ Answer = TypeVar("Answer")
 POLL_S = 0.02
 GRACE_S = 0.3
 """How long a native solver may take to obey before its thread is left behind."""
+
+EXIT_GRACE_S = 10.0
+"""How long the end of the process waits for those left behind: one that calls back into Python after it, crashes."""
+
+THREAD_NAME = "alloc-native-solver"
 
 
 @contextmanager
@@ -55,7 +62,8 @@ def run_native(work: Callable[[], Answer], should_stop: Callable[[], bool], halt
     Returns
     -------
     object or None
-        The answer of `work`; None if it did not obey within 0.3 s of `halt`, its thread then being left behind.
+        The answer of `work`; None if it did not obey within 0.3 s of `halt`, its thread then being left behind. The
+        end of the process waits for it, for 10 s at most.
     """
     answers: list[Answer] = []
     errors: list[BaseException] = []
@@ -66,13 +74,27 @@ def run_native(work: Callable[[], Answer], should_stop: Callable[[], bool], halt
         except BaseException as error:
             errors.append(error)
 
-    thread = threading.Thread(target=target, daemon=True, name="alloc-native-solver")
+    thread = threading.Thread(target=target, daemon=True, name=THREAD_NAME)
     thread.start()
     while thread.is_alive() and not should_stop():
         thread.join(POLL_S)
     if thread.is_alive():
         halt()
         thread.join(GRACE_S)
+    if thread.is_alive():
+        atexit.unregister(_await_left_behind)
+        atexit.register(_await_left_behind)
     if errors:
         raise errors[0]
     return answers[0] if answers else None
+
+
+def left_behind() -> list[threading.Thread]:
+    """Return the threads of solvers that did not obey, and have not ended since."""
+    return [thread for thread in threading.enumerate() if thread.name == THREAD_NAME]
+
+
+def _await_left_behind() -> None:
+    end = time.monotonic() + EXIT_GRACE_S
+    for thread in left_behind():
+        thread.join(max(0.0, end - time.monotonic()))

@@ -4,10 +4,11 @@ import time
 from collections.abc import Callable
 
 import numpy as np
-from scipy.optimize import linprog
+from scipy.optimize import OptimizeResult, linprog
 from scipy.sparse import csr_array, hstack, vstack
 
 from alloc.allocators.exact.demand import Demand, Model
+from alloc.allocators.interrupt import run_native
 
 MOST_PAIRS = 100_000
 """Pairs of class and task beyond which a linear programme takes too long to be worth it."""
@@ -33,14 +34,14 @@ def relaxed_lower_bound(
     seconds : float
         Time limit.
     should_stop : callable
-        Asked between two linear programmes.
+        Asked all the while.
     """
     end = time.monotonic() + seconds
     if len(model.kind) > MOST_PAIRS:
         return low
     middle = low * (1 + CLOSE)
     while high - low > CLOSE * high and not should_stop():
-        short = _falls_short(model.at(middle), end - time.monotonic())
+        short = _falls_short(model.at(middle), end - time.monotonic(), should_stop)
         if short is None:
             return low
         low, high = (max(middle, model.after(middle)), high) if short else (low, middle)
@@ -48,7 +49,7 @@ def relaxed_lower_bound(
     return low
 
 
-def _falls_short(demand: Demand, seconds: float) -> bool | None:
+def _falls_short(demand: Demand, seconds: float, should_stop: Callable[[], bool]) -> bool | None:
     """Whether some task stays short however agents are split; None where that is not at hand in time."""
     if seconds <= 0:
         return None
@@ -63,5 +64,9 @@ def _falls_short(demand: Demand, seconds: float) -> bool | None:
     limits = np.concatenate([np.zeros(tasks), demand.count])
     bounds = np.column_stack([np.zeros(pairs + 1), np.append(demand.most, 1.0)])
     cost = np.append(np.zeros(pairs), -1.0)
-    answer = linprog(cost, matrix, limits, bounds=bounds, method="highs", options={"time_limit": seconds})
-    return bool(-answer.fun < 1 - SAFETY) if answer.status == 0 else None
+
+    def work() -> OptimizeResult:
+        return linprog(cost, matrix, limits, bounds=bounds, method="highs", options={"time_limit": seconds})
+
+    answer = run_native(work, should_stop, lambda: None)
+    return bool(-answer.fun < 1 - SAFETY) if answer is not None and answer.status == 0 else None

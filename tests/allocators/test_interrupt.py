@@ -2,12 +2,14 @@
 
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
 
 import pytest
 
-from alloc.allocators.interrupt import run_native, signals_set
+from alloc.allocators.interrupt import left_behind, run_native, signals_set
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -76,4 +78,26 @@ def test_native_work_that_does_not_obey_is_left_behind() -> None:
     release, begin = threading.Event(), time.monotonic()
     assert run_native(lambda: release.wait(10), lambda: True, lambda: None) is None
     assert time.monotonic() - begin < 2
+    (thread,) = left_behind()
     release.set()
+    thread.join(5)
+    assert not left_behind()
+
+
+PROGRAM = """
+import time
+from alloc.allocators.interrupt import run_native
+
+def work():
+    time.sleep(1.5)
+    print("calls back", flush=True)
+
+run_native(work, lambda: True, lambda: None)
+print("over", flush=True)
+"""
+
+
+def test_the_end_of_the_process_waits_for_what_is_left_behind() -> None:
+    """A solver that calls back into an interpreter that has ended would crash a program that embeds us."""
+    ran = subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, text=True, timeout=30)
+    assert (ran.returncode, ran.stdout.split("\n"), ran.stderr) == (0, ["over", "calls back", ""], "")
