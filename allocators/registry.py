@@ -107,7 +107,7 @@ def load(name: str, **options: Any) -> Allocator:
     given = {key: value for key, value in options.items() if value is not None}
     for key in given:
         if key not in method.options:
-            raise InputError(f"method {name!r} takes no option {key!r}{nearest(key, method.options)}", key)
+            raise InputError(f"method {name!r} takes no option {key!r}{_hint(key, method)}", key)
     if method.missing:
         modules = " ".join(method.missing)
         raise InputError(f"method {name!r} needs {modules}; install with: pip install {modules}", "method")
@@ -117,6 +117,14 @@ def load(name: str, **options: Any) -> Allocator:
     allocator = getattr(importlib.import_module(module), attribute)(**given)
     assert isinstance(allocator, Allocator)
     return allocator
+
+
+def _hint(option: str, method: Method) -> str:
+    """Say which option may be meant, or which of our methods takes this one."""
+    takers = [other.name for other in BUILT_IN.values() if option in other.options]
+    if takers:
+        return f"; {' and '.join(takers)} does"
+    return nearest(option, method.options) if method.options else ""
 
 
 def _plugins() -> dict[str, EntryPoint]:

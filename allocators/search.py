@@ -1,5 +1,6 @@
 """One run of one method on one instance: budget, clock, best so far, and the will to stop."""
 
+import math
 import threading
 import time
 from collections.abc import Callable
@@ -42,8 +43,9 @@ class Budget:
     def __post_init__(self) -> None:
         for name in ("time_limit_s", "iterations", "target_gap"):
             value = getattr(self, name)
-            if value is not None and not value >= 0:
-                raise InputError(f"must be >= 0, got {value}", name.removesuffix("_s").replace("_", "-"))
+            if value is not None and not 0 <= value < math.inf:
+                option = name.removesuffix("_s").replace("_", "-")
+                raise InputError(f"must be a finite number >= 0, got {value}", option)
 
 
 class StopReason(StrEnum):

@@ -1,7 +1,10 @@
 """The recipe: load the method, run it, serve what it left unserved, score the answer, prove what can be proven."""
 
+import importlib
 import os
+import sys
 import threading
+import time
 from collections.abc import Callable
 from contextlib import nullcontext
 from typing import Any
@@ -10,7 +13,7 @@ import numpy as np
 
 from alloc.allocators.auto import choose
 from alloc.allocators.base import Allocator, Proposal, RefusedError
-from alloc.allocators.interrupt import signals_set
+from alloc.allocators.interrupt import run_native, signals_set
 from alloc.allocators.registry import load
 from alloc.allocators.result import Result
 from alloc.allocators.search import PROVEN, Budget, Improvement, Search, StopReason, relative_gap
@@ -24,6 +27,12 @@ from alloc.problems import (
     lp_makespan_lower_bound,
     serve_all,
 )
+
+UNHURRIED_S = 30.0
+"""Limit of the linear programme before a run that counts iterations: no clock should decide where it ends."""
+
+LARGEST_SEED = 2**63 - 1
+MOST_THREADS = 1024
 
 
 def solve(
@@ -75,19 +84,25 @@ def solve(
     Raises
     ------
     InputError
-        If the method or an option is unknown, or the budget is negative.
+        If the method or an option is unknown, or the budget, the seed or the threads are out of range.
     RefusedError
         If the method cannot handle this instance within this budget; the message says why.
     """
     goal, budget = Objective(objective), Budget(time_limit_s, iterations, target_gap)
+    _check_numbers(seed, threads)
     notes: list[str] = []
     if method == "auto":
+        given = [name for name, value in options.items() if value is not None]
+        if given:
+            raise InputError("is for a method that you name, such as gappo; auto may pick one without it", given[0])
         method, reason = choose(instance, goal, budget)
         notes.append(f"auto picked {method}: {reason}")
     if isinstance(method, Allocator) and options:
         raise InputError(f"an allocator that is loaded already takes no options, got {', '.join(options)}", "method")
     allocator = load(method, **options) if isinstance(method, str) else method
     refuse(allocator, instance, goal, budget)
+    if target_gap is not None:
+        importlib.import_module("scipy.optimize")  # for the bound below; loading counts for no method
     stop = stop or threading.Event()
     with signals_set(stop) if handle_signals else nullcontext():
         search = Search(
@@ -100,6 +115,9 @@ def solve(
             on_improvement=on_improvement,
             stop=stop,
         )
+        if target_gap is not None and not allocator.method.proves:
+            seconds = UNHURRIED_S if time_limit_s is None else _patience_s(search)
+            _raise_by_programme(search, time.monotonic() + seconds)
         proposal = allocator.allocate(search)
         stop_reason = search.stop_reason()
         if proposal.allocation is not None:
@@ -108,6 +126,14 @@ def solve(
             search.submit(serve_all(instance, search.best.allocation))
         runtime_s = search.elapsed_s
         return _conclude(search, allocator.method.name, proposal, stop_reason, runtime_s, notes)
+
+
+def _check_numbers(seed: int, threads: int | None) -> None:
+    """Raise an `InputError` for what some solver or generator of random numbers would not take."""
+    if not 0 <= seed <= LARGEST_SEED:
+        raise InputError(f"must be a whole number from 0 to {LARGEST_SEED}, got {seed}", "seed")
+    if threads is not None and not 1 <= threads <= MOST_THREADS:
+        raise InputError(f"must be a whole number from 1 to {MOST_THREADS}, got {threads}", "threads")
 
 
 def available_threads() -> int:
@@ -167,11 +193,10 @@ def _conclude(
 
 
 def _tighten(search: Search, proposal: Proposal) -> float | None:
-    """Close the gap further by linear programmes, within a twentieth of the budget each; return the energy bound."""
-    instance, limit = search.instance, search.budget.time_limit_s
-    patience_s = 0.2 if search.interrupted else 0.2 + 0.05 * min(10.0, 10.0 if limit is None else limit)
+    """Close the gap further by linear programmes, within a tenth of the time limit in all; return the energy bound."""
+    end = time.monotonic() + _patience_s(search)
     if search.gap > PROVEN:
-        search.raise_bound(lp_makespan_lower_bound(instance, patience_s) or 0.0)
+        _raise_by_programme(search, end)
     if search.objective is Objective.MAKESPAN or search.best is None or search.best.evaluation.makespan is None:
         return None
     if search.best.evaluation.energy == 0:
@@ -179,8 +204,29 @@ def _tighten(search: Search, proposal: Proposal) -> float | None:
     known = proposal.energy_lower_bound
     if known is not None and known >= search.best.evaluation.energy * (1 - PROVEN):
         return known
-    found = energy_lower_bound(instance, search.best.evaluation.makespan, patience_s)
+    makespan, seconds = search.best.evaluation.makespan, max(0.0, end - time.monotonic())
+    found = _unless_interrupted(search, lambda: energy_lower_bound(search.instance, makespan, seconds))
     return max((bound for bound in (known, found) if bound is not None), default=None)
+
+
+def _raise_by_programme(search: Search, end: float) -> None:
+    """Raise the bound on the makespan by a linear programme that ends at `end` on the monotonic clock."""
+    seconds = max(0.0, end - time.monotonic())
+    search.raise_bound(_unless_interrupted(search, lambda: lp_makespan_lower_bound(search.instance, seconds)) or 0.0)
+
+
+def _unless_interrupted(search: Search, work: Callable[[], float | None]) -> float | None:
+    """Run `work`, but let a signal come first: a linear programme ends for its time limit alone."""
+    before = search.interrupted
+    return run_native(work, lambda: search.interrupted and not before, lambda: None)
+
+
+def _patience_s(search: Search) -> float:
+    """Seconds for linear programmes after the run; after an interrupt hardly any, and none to load a solver."""
+    if search.interrupted:
+        return 0.1 if "scipy.optimize" in sys.modules else 0.0
+    limit = search.budget.time_limit_s
+    return 0.2 + 0.1 * min(10.0, 10.0 if limit is None else limit)
 
 
 def _contest(instance: Instance) -> str:

@@ -49,7 +49,7 @@ IterationsOption = Annotated[
 TargetGapOption = Annotated[
     float | None, typer.Option(min=0, help="Stop at this relative gap of the makespan; 0.01 is 1 %.")
 ]
-ThreadsOption = Annotated[int | None, typer.Option(min=1, help="Threads.", show_default="all processors")]
+ThreadsOption = Annotated[int | None, typer.Option(min=1, max=1024, help="Threads.", show_default="all processors")]
 
 
 def time_limit(given: float | None, iterations: int | None) -> float | None:

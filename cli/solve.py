@@ -37,7 +37,7 @@ def solve_command(
     time_limit: options.TimeLimitOption = None,
     iterations: options.IterationsOption = None,
     target_gap: options.TargetGapOption = None,
-    seed: Annotated[int, typer.Option(min=0, help="Source of all randomness.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=2**63 - 1, help="Source of all randomness.")] = 0,
     start: Annotated[
         str | None,
         typer.Option(metavar="FILE", help="An allocation or a result to begin with; the answer is never worse."),

@@ -24,6 +24,14 @@ def test_unknown_names() -> None:
         load("gappo", polcy="x")
 
 
+def test_options_of_other_methods() -> None:
+    """Whoever gives an option to the wrong method hears which one takes it, and no empty list of what is known."""
+    with pytest.raises(InputError, match=r"'greedy' takes no option 'policy'; gappo does$"):
+        load("greedy", policy="x")
+    with pytest.raises(InputError, match=r"'greedy' takes no option 'colour'$"):
+        load("greedy", colour="x")
+
+
 def test_options_that_are_none_are_left_out() -> None:
     """A command line passes on all its options; those not given do not count."""
     assert load("greedy", policy=None).method.name == "greedy"

@@ -21,8 +21,8 @@ def search(instance: Instance, objective: Objective = Objective.MAKESPAN, **limi
 
 @pytest.mark.parametrize("field", ["time_limit_s", "iterations", "target_gap"])
 def test_budgets_are_not_negative(field: str) -> None:
-    """Neither negative nor NaN; nothing at all is allowed, and so is no limit."""
-    for wrong in (-1, float("nan")):
+    """Neither negative nor NaN nor infinite; nothing at all is allowed, and so is no limit."""
+    for wrong in (-1, float("nan"), float("inf")):
         with pytest.raises(InputError):
             Budget(**{field: wrong})
     Budget(**{field: 0})
