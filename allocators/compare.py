@@ -11,7 +11,7 @@ import numpy as np
 from alloc.allocators.base import Allocator, RefusedError
 from alloc.allocators.registry import load
 from alloc.allocators.result import Result
-from alloc.allocators.search import StopReason
+from alloc.allocators.search import StopReason, relative_gap
 from alloc.allocators.solve import solve
 from alloc.problems import InputError, Instance, Objective
 
@@ -37,11 +37,15 @@ class Row:
     lower_bound : float or None
         Best bound on the makespan that a run proved.
     gap_mean, gap_worst : float or None
-        Of the makespan, each run against the bound that it proved itself.
+        Of the makespan, each run against the bound that it proved itself; see `share_bounds`.
     energy_mean, energy_worst : float or None
     runtime_mean_s, runtime_worst_s : float or None
     reason : str
         Why there are no figures: what the method refuses, what is missing, or how it failed.
+    number : int
+        Which of the instances, from 1, as names may repeat.
+    makespans : tuple of float
+        Of each run, where all served all tasks; not in `to_dict`.
     """
 
     instance: str
@@ -62,10 +66,12 @@ class Row:
     runtime_mean_s: float | None = None
     runtime_worst_s: float | None = None
     reason: str = ""
+    number: int = 1
+    makespans: tuple[float, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Return the fields by name."""
-        return asdict(self)
+        return {name: value for name, value in asdict(self).items() if name != "makespans"}
 
 
 def compare(
@@ -111,7 +117,7 @@ def compare(
         handle_signals=False,
     )
     loaded = {name: _load(name) for name in methods}
-    for instance in instances:
+    for number, instance in enumerate(instances, 1):
         for name, method in loaded.items():
             results: list[Result] = []
             reason = ""
@@ -120,7 +126,7 @@ def compare(
             else:
                 results, reason = _run_seeds(partial(run, instance, method), seeds)
             if reason or results:
-                yield summarise(instance, name, results, reason)
+                yield replace(summarise(instance, name, results, reason), number=number)
             if stop.is_set():
                 return
 
@@ -174,7 +180,25 @@ def summarise(instance: Instance, method: str, results: Sequence[Result], reason
         energy_worst=energy_worst,
         runtime_mean_s=runtime_mean_s,
         runtime_worst_s=runtime_worst_s,
+        makespans=tuple(result.makespan for result in results if result.makespan is not None),
     )
+
+
+def share_bounds(rows: Sequence[Row]) -> list[Row]:
+    """Return the rows with all gaps against the best bound that any method proved on the instance.
+
+    A bound holds for every method; against its own, a method that proves little would look worse than it is.
+    """
+    best: dict[int, float] = {}
+    for row in rows:
+        if row.lower_bound is not None:
+            best[row.number] = max(row.lower_bound, best.get(row.number, 0.0))
+    return [row if row.gap_mean is None else _against(row, best[row.number]) for row in rows]
+
+
+def _against(row: Row, bound: float) -> Row:
+    gap_mean, gap_worst = _mean_and_worst([relative_gap(makespan, bound) for makespan in row.makespans])
+    return replace(row, lower_bound=bound, gap_mean=gap_mean, gap_worst=gap_worst)
 
 
 def _load(name: str) -> str | Allocator | Exception:

@@ -49,7 +49,7 @@ def compare_command(
 ) -> None:
     """Run several methods on several instances and seeds, and print a table."""
     from alloc.allocators import Budget, describe
-    from alloc.allocators.compare import compare
+    from alloc.allocators.compare import compare, share_bounds
     from alloc.allocators.interrupt import signals_set
     from alloc.problems.formats import read_instance
 
@@ -76,7 +76,7 @@ def compare_command(
         ):
             rows.append(row)
             _show_done(row, len(rows), len(problems) * len(names))
-    _print(rows, csv, json=json)
+    _print(share_bounds(rows), csv, json=json)
     if stop.is_set():
         note(f"interrupted after {len(rows)} of {len(problems) * len(names)} rows")
     raise typer.Exit(1 if any(row.unserved for row in rows) or not any(row.runs for row in rows) else 0)
@@ -166,7 +166,8 @@ def _csv(rows: "list[Row]") -> str:
     from alloc.allocators.compare import Row
 
     text = io.StringIO()
-    writer = csv.DictWriter(text, [field.name for field in fields(Row)], lineterminator="\n")
+    names = [field.name for field in fields(Row) if field.name != "makespans"]
+    writer = csv.DictWriter(text, names, lineterminator="\n")
     writer.writeheader()
     writer.writerows(row.to_dict() for row in rows)
     return text.getvalue()

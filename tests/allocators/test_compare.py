@@ -3,7 +3,7 @@ import threading
 import pytest
 
 from alloc.allocators import Allocator, Method, Proposal, registry
-from alloc.allocators.compare import compare
+from alloc.allocators.compare import compare, share_bounds
 from alloc.problems import Allocation, Instance
 
 SMALL = Instance(name="small", ability=[5, 2, 1, 8, 3], workload=[3, 13, 4])
@@ -73,3 +73,15 @@ def test_rows_come_as_they_are_done_and_stop_when_asked():
     assert next(rows).instance == "small"
     stop.set()
     assert list(rows) == []
+
+
+def test_gaps_share_the_best_bound():
+    """What one method proves counts for all on that instance, and for no other instance of the same name."""
+    easy = Instance(name="small", ability=[2, 2], workload=[1, 1])
+    rows = list(compare([SMALL, easy], ["greedy", "cpsat"]))
+    greedy, cpsat, *others = share_bounds(rows)
+    assert rows[0].lower_bound < 1.18 < rows[1].lower_bound
+    assert greedy.lower_bound == cpsat.lower_bound == pytest.approx(13 / 11)
+    assert greedy.gap_mean == pytest.approx(1 - 13 / 11 / greedy.makespan_mean)
+    assert cpsat.gap_worst == pytest.approx(0, abs=1e-6)
+    assert [(row.lower_bound, row.number) for row in others] == [(0.5, 2), (0.5, 2)]
