@@ -1,5 +1,6 @@
 """What goes where: JSON and files asked for go to standard output, everything else to standard error."""
 
+import errno
 import json
 import os
 import sys
@@ -11,7 +12,15 @@ STANDARD = "-"
 
 
 def write_out(text: str) -> None:
-    """Write to standard output; a reader that has gone away, as in ``| head``, is no error."""
+    """Write to standard output; a reader that has gone away, as in ``| head``, is no error.
+
+    Raises
+    ------
+    OSError
+        If standard output is closed, or its device is full.
+    """
+    if sys.stdout is None:
+        raise OSError(errno.EBADF, "is closed", "standard output")
     _write(sys.stdout, text)
 
 

@@ -32,6 +32,8 @@ def check_writable(name: str | None) -> None:
         return
     from alloc.problems import InputError
 
+    if not name:
+        raise InputError("is no name of a file; give one", source="''")
     path = Path(name)
     folder = path.parent
     if path.is_dir():

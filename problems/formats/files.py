@@ -19,7 +19,7 @@ def named(path: PathLike, *, output: bool = False) -> str:
     text = os.fspath(path)
     if text == STANDARD_STREAM:
         return "standard output" if output else "standard input"
-    return one_line(text, 4096)
+    return one_line(text, 4096) or "''"
 
 
 def is_stream(path: PathLike) -> bool:

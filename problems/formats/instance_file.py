@@ -79,6 +79,8 @@ def write_instance(instance: Instance, path: PathLike) -> None:
 def _write(instance: Instance, path: PathLike) -> None:
     file = Path(path)
     suffix = file.suffix.lower()
+    if not os.fspath(path):
+        raise InputError("is no name of a file; give one")  # Path("") would be the working folder
     if os.fspath(path) == STANDARD_STREAM or suffix == ".json":
         write_text_atomically(path, json_text.lines(to_document(instance)))
     elif suffix == ".npz":

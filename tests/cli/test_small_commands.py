@@ -39,6 +39,13 @@ def test_convert_keeps_everything(alloc, small, target):
     assert to_document(read_instance(target)) == to_document(small)
 
 
+def test_convert_needs_a_name(alloc, small):
+    """An empty target is an error, not the working folder."""
+    ran = alloc("convert", "small.json", "")
+    assert (ran.code, ran.err) == (2, "alloc: '': is no name of a file; give one\n")
+    assert not Path("agents.csv").exists()
+
+
 def test_convert_to_standard_output(alloc, small):
     """`-` writes JSON to standard output, and nothing else."""
     ran = alloc("convert", "small.json", "-")

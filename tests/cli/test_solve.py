@@ -4,6 +4,7 @@ from xml.etree import ElementTree
 
 import pytest
 
+from alloc.cli.main import main
 from alloc.problems import Allocation, evaluate
 from alloc.problems.formats import read_instance
 
@@ -114,3 +115,17 @@ def test_the_saved_result_is_that_of_stdout(alloc, small):
     ran = alloc("solve", "small.json", "--method", "greedy", "--output", "result.json", "--json")
     assert json.loads(Path("result.json").read_text()) == ran.json
     assert read_instance("small.json").name == "small"
+
+
+@pytest.mark.parametrize("option", ["--output", "--plot"])
+def test_an_empty_name_is_no_file(alloc, small, option):
+    """A variable of the shell that is empty does not mean the working folder."""
+    ran = alloc("solve", "small.json", option, "")
+    assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
+
+
+def test_closed_standard_output_is_told(alloc, small, monkeypatch):
+    """JSON that has nowhere to go is an error, not silence; a file asked for is written all the same."""
+    monkeypatch.setattr("sys.stdout", None)
+    assert main(["solve", "small.json", "--method", "greedy", "-q", "--json", "--output", "best.json"]) == 2
+    assert json.loads(Path("best.json").read_text())["instance"] == "small"
