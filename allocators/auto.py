@@ -3,8 +3,8 @@
 The thresholds were measured on two cores. Makespan: the descent of the exact methods is within 1 % of the optimum in
 the first second as long as the solver's model can be built at all, 60,000 pairs a second. Energy: `milp` proves the
 least, or ends within 10 % of it, up to about 500 pairs for each second; beyond, it may not get past its first plan.
-There `ga` met the least makespan, which comes first in the objective, on all of the paper's scenarios, where `gappo` ends
-up to 1 % above it with about as much energy.
+There `ga` met the least makespan, which comes first in the objective, on all of the paper's scenarios, where `gappo`
+ends up to 1 % above it with about as much energy.
 """
 
 from alloc.allocators.search import Budget
