@@ -107,7 +107,10 @@ def lp_makespan_lower_bound(instance: Instance, time_limit_s: float = 10.0) -> f
 
     scale = makespan_lower_bound(instance)
     kind, task = np.nonzero(classes.mask & (work > 0))
-    share = classes.ability[kind] * scale / work[task]
+    with np.errstate(over="ignore"):
+        share = classes.ability[kind] * scale / work[task]
+    if not np.isfinite(share).all():
+        return None
     cover, limit = _rows(task, -share, instance.m), _rows(kind, np.ones(len(kind)), classes.size)
     ratio = csr_matrix(np.where(work > 0, 1.0, 0.0)[:, None])  # the last variable is scale / T, to be maximised
     constraints = vstack([hstack([cover, ratio]), hstack([limit, csr_matrix((classes.size, 1))])])

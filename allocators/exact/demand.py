@@ -202,7 +202,10 @@ class Model:
     def _rate(self, time: float) -> FloatArray:
         """Mean work per hour until `time` of one agent of each pair."""
         rate = self.classes.ability[self.kind]
-        return rate if self.delay is None else rate * np.maximum(0.0, 1 - self.delay / time)
+        if self.delay is None:
+            return rate
+        with np.errstate(over="ignore"):  # what takes for ever brings nothing
+            return rate * np.maximum(0.0, 1 - self.delay / time)
 
     def _units_needed(self, time: float) -> FloatArray:
         assert self.unit is not None

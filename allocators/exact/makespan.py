@@ -178,7 +178,8 @@ class LeastMakespan:
         for weight in (1.0, 0.5, 0.25):
             if self._closed or self._over:
                 return
-            self._descend(self._high + weight * (self._low - self._high), 0.03, kicks=SHORT)
+            time = self._high + weight * (self._low - self._high)
+            self._descend(max(self._low, time), 0.03, kicks=SHORT)  # below only by rounding
 
     def _descend(self, time: float, part: float, kicks: int) -> bool:
         """Descend from the best plan; whether one with makespan `time` was found."""

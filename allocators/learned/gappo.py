@@ -177,7 +177,9 @@ def ruin(
             back = rng.random(instance.n) < rng.uniform(*RUINED_SHARE)
         else:
             centre = instance.task_position[rng.integers(instance.m)]
-            away = np.nan_to_num(((instance.task_position - centre) ** 2).sum(axis=1)) + 1e-9 * rng.random(instance.m)
+            with np.errstate(over="ignore"):
+                away = np.nan_to_num(((instance.task_position - centre) ** 2).sum(axis=1))
+            away += 1e-9 * rng.random(instance.m)
             near = np.zeros(instance.m + 1, dtype=bool)
             near[np.argsort(away)[: rng.integers(2, max(4, int(RUINED_TASKS * instance.m)))]] = True
             back = near[plan] | near[home]
@@ -187,7 +189,7 @@ def ruin(
 
 def _usable(device: str) -> torch.device:
     try:
-        torch.zeros(1, device=device)
+        torch.zeros(1, device=device).item()
         return torch.device(device)
     except (RuntimeError, AssertionError) as error:
         reason = next(iter(str(error).splitlines()), "unusable")[:100]

@@ -1,6 +1,7 @@
 """Stored policies: weights in safetensors with a description that must match; a policy file never runs code."""
 
 import json
+import os
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -60,8 +61,9 @@ def load_policy(path: Path | str, method: str, device: torch.device | None = Non
         with safe_open(source, framework="pt") as file:
             said = file.metadata() or {}
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
-    except FileNotFoundError:
-        raise InputError("no such policy file", "", source) from None
+    except FileNotFoundError:  # said of files that may not be read as well
+        reason = "may not be read; change its permissions" if os.path.exists(source) else "no such policy file"
+        raise InputError(reason, "", source) from None
     except (OSError, SafetensorError) as error:
         reason = next(iter(str(error).splitlines()), type(error).__name__)
         raise InputError(f"is not a policy file ({reason}); use one by `alloc train`", "", source) from None

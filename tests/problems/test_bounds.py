@@ -122,3 +122,10 @@ def test_any_multipliers_give_a_bound(instance: Instance, seed: int) -> None:
         fractional, energy = lp_makespan_lower_bound(instance), energy_lower_bound(instance, best.makespan)
     assert fractional is None or fractional <= best.makespan * ROUNDING
     assert energy is None or energy <= best.energy * ROUNDING
+
+
+def test_shares_beyond_floats_have_no_linear_programme() -> None:
+    """Where an agent does a task more often than floats can tell, the simple bounds must do."""
+    instance = Instance(ability=[5e-324, 1.0], workload=[1.0, 5e-324])
+    assert lp_makespan_lower_bound(instance) is None
+    assert makespan_lower_bound(instance) <= 1.0

@@ -95,7 +95,7 @@ def test_unknown_policy_file() -> None:
         load("gappo", policy="/nonexistent/policy.safetensors")
 
 
-@pytest.mark.parametrize("device", ["nonsense", "cuda:99", "xpu:7"])
+@pytest.mark.parametrize("device", ["nonsense", "cuda:99", "xpu:7", "meta"])
 def test_devices_that_are_not_there(device: str) -> None:
     """A device that cannot be used is told in one line."""
     with pytest.raises(InputError, match=r"device: .* cannot be used here") as caught:
