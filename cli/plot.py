@@ -1,6 +1,7 @@
 """Drawing an answer into a file."""
 
 import io
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -33,7 +34,9 @@ def save_plot(result: "Result", path: str) -> None:
 
     kind = Path(path).suffix.lower().removeprefix(".")
     picture = io.BytesIO()
-    draw(result).savefig(picture, format=kind, dpi=150, metadata={"Date": None} if kind == "svg" else None)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing")  # it draws a box instead
+        draw(result).savefig(picture, format=kind, dpi=150, metadata={"Date": None} if kind == "svg" else None)
     write_bytes_atomically(path, picture.getvalue())
 
 

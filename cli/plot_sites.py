@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from alloc.cli.console import one_line
 from alloc.cli.plot_colours import MOVE, UNSERVED, colour_range, colours, scale, shades, unserved_tasks
 from alloc.cli.plot_labels import place_labels, visible
 from alloc.cli.plot_moves import flows, two_axes, wedges
@@ -167,7 +168,8 @@ def _write(axes: "Axes", text: str, site: "FloatArray", offset: "FloatArray", si
 
 
 def shortened(name: str, most: int) -> str:
-    """Return `name`, cut off after `most` characters."""
+    """Return `name` on one line, cut off after `most` characters."""
+    name = one_line(name)
     return name if len(name) <= most else name[: most - 1] + "…"
 
 

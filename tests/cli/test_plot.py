@@ -6,6 +6,7 @@ from alloc.cli.plot import draw
 from alloc.cli.plot_labels import place_labels, visible
 from alloc.cli.plot_moves import flows, two_axes, wedges
 from alloc.problems import Allocation, Instance
+from alloc.problems.formats import write_instance
 
 
 def axes_of(instance: Instance):
@@ -93,3 +94,13 @@ def test_labels_keep_clear_of_each_other_and_of_circles():
     assert np.isnan(middle[2]).all()
     assert visible(centre[:2], radius[:2], 3.0).tolist() == [True, True]
     assert visible(np.zeros((2, 2)), radius[:2], 3.0).tolist() == [False, True]
+
+
+def test_names_of_every_script_on_one_line(alloc, tmp_path):
+    """Letters that the font lacks and line breaks in names trouble neither the picture nor the terminal."""
+    instance = Instance(name="two\nlines", task_ids=["日本", "a\nb"], ability=[1, 2], workload=[1, 2])
+    (times,) = axes_of(instance)
+    assert {label.get_text() for label in times.get_yticklabels()} == {"日本", "a b"}
+    write_instance(instance, tmp_path / "names.json")
+    ran = alloc("solve", "names.json", "--method", "greedy", "--plot", "names.png", "-q")
+    assert (ran.code, ran.err) == (0, "")
