@@ -48,7 +48,10 @@ def train_command(
         typer.Option(metavar="FILE", help="A CSV line for each generation.", show_default="OUTPUT with .csv"),
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint.")] = False,
-    threads: options.ThreadsOption = None,
+    threads: Annotated[
+        int,
+        typer.Option(min=1, max=1024, help="Threads of torch; the tensors are small, and more than one rarely pays."),
+    ] = 1,
 ) -> None:
     """Train a learned method, with a checkpoint after each generation."""
     if method != "gappo":
@@ -59,6 +62,10 @@ def train_command(
         check_writable(str(path))
     if len({policy, kept, lines}) < 3:
         raise typer.BadParameter("policy, checkpoint and log must be three files", param_hint="'--output'")
+    from alloc.problems import InputError
+
+    if kept.exists() and not resume:
+        raise InputError("holds a training run; go on with --resume, or name another by --checkpoint", source=str(kept))
     from alloc.allocators.interrupt import signals_set
     from alloc.allocators.learned.train import train
 
@@ -84,13 +91,12 @@ def train_command(
         raise typer.Exit(1)
 
 
-def _trainer(checkpoint: Path, population: int, seed: int, threads: int | None, *, resume: bool) -> "Trainer":
+def _trainer(checkpoint: Path, population: int, seed: int, threads: int, *, resume: bool) -> "Trainer":
     import torch
 
     from alloc.allocators.learned.train import Trainer, TrainingParameters
-    from alloc.allocators.solve import available_threads
 
-    torch.set_num_threads(threads or available_threads())
+    torch.set_num_threads(threads)
     parameters = TrainingParameters(population=population)
     return Trainer.resume(checkpoint, parameters) if resume else Trainer(parameters, seed)
 

@@ -30,3 +30,12 @@ def test_interrupted_before_the_first_generation_writes_no_policy(alloc, monkeyp
     assert ran.code == 1
     assert "interrupted" in ran.err
     assert not Path("p.safetensors").exists()
+
+
+def test_a_run_is_not_overwritten_by_mistake(alloc):
+    """Where a checkpoint stands already, a new training has to be told to go on, or to go elsewhere."""
+    Path("p.checkpoint").write_bytes(b"weeks of training")
+    ran = alloc("train", "gappo", "--output", "p.safetensors")
+    assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
+    assert "--resume" in ran.err
+    assert Path("p.checkpoint").read_bytes() == b"weeks of training"
