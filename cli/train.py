@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from alloc.cli import options
 from alloc.cli.console import note, number, say
 from alloc.cli.files import check_writable
 from alloc.cli.options import examples
