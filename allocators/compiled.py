@@ -1,0 +1,20 @@
+"""Loops that numba compiles to machine code: at their first call, or read from its cache where that may be written."""
+
+from collections.abc import Callable
+from typing import TypeVar, cast
+
+import numba
+
+Function = TypeVar("Function", bound=Callable[..., object])
+
+
+def compiled(function: Function) -> Function:
+    """Compile `function` at its first call, to run without the interpreter's lock.
+
+    The machine code is kept beside the source, else in the user's cache folder; where neither can be written, every
+    process compiles anew.
+    """
+    try:
+        return cast(Function, numba.njit(cache=True, nogil=True)(function))
+    except RuntimeError:  # no folder for the cache
+        return cast(Function, numba.njit(nogil=True)(function))
