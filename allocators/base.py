@@ -25,11 +25,14 @@ class Proposal:
         Hours that every allocation serving all tasks needs, as far as the method proved it.
     energy_lower_bound : float or None
         Energy that every allocation needs whose makespan is at most that of the answer, as far as proved.
+    notes : tuple of str
+        What the user should know of the run, in plain words; `Result.notes` tells it.
     """
 
     allocation: Allocation | None = None
     makespan_lower_bound: float | None = None
     energy_lower_bound: float | None = None
+    notes: tuple[str, ...] = ()
 
 
 class Allocator(ABC):

@@ -44,7 +44,8 @@ class Result:
     trace : tuple of Improvement
         Every improvement, in order.
     notes : tuple of str
-        What the user should know, in plain words: what `auto` picked and why, which tasks too few agents can reach.
+        What the user should know, in plain words: what `auto` picked and why, what the method tells of its run, which
+        tasks too few agents can reach.
     """
 
     instance: Instance

@@ -125,6 +125,7 @@ def solve(
         if search.best is not None and search.best.evaluation.unserved_tasks:
             search.submit(serve_all(instance, search.best.allocation))
         runtime_s = search.elapsed_s
+        notes.extend(proposal.notes)
         return _conclude(search, allocator.method.name, proposal, stop_reason, runtime_s, notes)
 
 

@@ -197,3 +197,8 @@ def test_auto_says_what_it_picked(instance: Instance) -> None:
     result = solve(instance, "auto")
     assert result.method != "auto"
     assert any(f"auto picked {result.method}" in note for note in result.notes)
+
+
+def test_tells_what_the_method_notes(instance: Instance) -> None:
+    """The notes of a proposal stand in the result."""
+    assert solve(instance, Answers(Proposal(Allocation([0, 1, 0]), notes=("12 messages",)))).notes == ("12 messages",)
