@@ -4,12 +4,13 @@ from alloc.allocators.base import Allocator, Proposal, RefusedError
 from alloc.allocators.method import Kind, Method
 from alloc.allocators.registry import describe, load, names
 from alloc.allocators.result import Result, Status
-from alloc.allocators.search import Budget, Improvement, Search, StopReason
+from alloc.allocators.search import Budget, Deadline, Improvement, Search, StopReason
 from alloc.allocators.solve import solve
 
 __all__ = [
     "Allocator",
     "Budget",
+    "Deadline",
     "Improvement",
     "Kind",
     "Method",

@@ -32,6 +32,9 @@ class Method:
         What it optimises; with any other objective `solve` refuses it.
     finite_speeds : bool
         Whether it handles agents that need time to travel; `solve` refuses it where it cannot.
+    makespan_slack : bool
+        Whether it spends the slack that `Deadline` leaves to the makespan on less energy; `solve` refuses it where it
+        does not.
     proves : bool
         Whether it proves bounds of its own.
     warm_start : bool
@@ -50,6 +53,7 @@ class Method:
     requires: tuple[str, ...] = ()
     objectives: tuple[Objective, ...] = (Objective.MAKESPAN, Objective.MAKESPAN_ENERGY)
     finite_speeds: bool = False
+    makespan_slack: bool = False
     proves: bool = False
     warm_start: bool = False
     anytime: bool = False

@@ -4,8 +4,9 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
-from alloc.allocators.search import PROVEN, Improvement, StopReason, relative_gap
+from alloc.allocators.search import PROVEN, STRICT, Deadline, Improvement, StopReason, relative_gap
 from alloc.problems import Allocation, Evaluation, Instance, Objective
+from alloc.problems.evaluation import RELATIVE_TOLERANCE
 
 RESULT_FORMAT = "alloc-result/1"
 
@@ -35,9 +36,12 @@ class Result:
     evaluation : Evaluation or None
         Scores of `allocation`.
     lower_bound, energy_lower_bound : float or None
-        Best proven bounds on the makespan in hours, and on the energy of any allocation with this makespan; None
-        while a task is unserved, and for the energy also where it is no objective or no bound is at hand.
+        Best proven bounds on the makespan in hours, and on the energy of any allocation with this makespan, or within
+        `makespan_limit`; None while a task is unserved, and for the energy also where it is no objective or no bound
+        is at hand.
     status : Status
+    makespan_limit : float or None
+        Hours up to which the energy alone counted, where a slack or a limit was given for the makespan.
     stop_reason : StopReason
     runtime_s : float
         Seconds from the instance in memory to the allocation in memory.
@@ -46,6 +50,8 @@ class Result:
     notes : tuple of str
         What the user should know, in plain words: what `auto` picked and why, what the method tells of its run, which
         tasks too few agents can reach.
+    deadline : Deadline
+        The slack and the limit that were given for the makespan.
     """
 
     instance: Instance
@@ -60,6 +66,8 @@ class Result:
     runtime_s: float
     trace: tuple[Improvement, ...]
     notes: tuple[str, ...] = ()
+    makespan_limit: float | None = None
+    deadline: Deadline = STRICT
 
     @property
     def makespan(self) -> float | None:
@@ -92,13 +100,22 @@ class Result:
             return Status.NO_SOLUTION
         if self.evaluation.unserved_tasks:
             return Status.INFEASIBLE
-        gaps = [self.gap] if self.objective is Objective.MAKESPAN else [self.gap, self.energy_gap]
-        proven = all(gap is not None and gap <= PROVEN for gap in gaps)
+        cheap = self.energy_gap is not None and self.energy_gap <= PROVEN
+        proven = self._is_fast_enough and (cheap or self.objective is Objective.MAKESPAN)
         return Status.OPTIMAL if proven else Status.FEASIBLE
+
+    @property
+    def _is_fast_enough(self) -> bool:
+        """Whether the makespan is proven to be the least, up to the slack or the limit that was given."""
+        if self.makespan is None or self.lower_bound is None:
+            return False
+        excess = relative_gap(self.makespan, self.deadline.hours(self.lower_bound))
+        return excess <= PROVEN + RELATIVE_TOLERANCE
 
     def to_dict(self) -> dict[str, Any]:
         """Return the fields of the format `alloc-result/1`."""
         ids, score = self.instance, self.evaluation
+        limit = {} if self.makespan_limit is None else {"makespan_limit": self.makespan_limit}
         return {
             "format": RESULT_FORMAT,
             "method": self.method,
@@ -111,6 +128,7 @@ class Result:
             "served_makespan": None if score is None else score.served_makespan,
             "lower_bound": self.lower_bound,
             "gap": self.gap,
+            **limit,
             "energy": self.energy,
             "energy_lower_bound": self.energy_lower_bound,
             "energy_gap": self.energy_gap,

@@ -1,10 +1,11 @@
 """One run of one method on one instance: budget, clock, best so far, and the will to stop."""
 
 import math
+import sys
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from alloc.problems import (
@@ -17,6 +18,7 @@ from alloc.problems import (
     makespan_lower_bound,
     serve_all,
 )
+from alloc.problems.evaluation import RELATIVE_TOLERANCE
 
 PROVEN = 1e-6
 """Relative gap at which a stage of the objective counts as proven."""
@@ -46,6 +48,36 @@ class Budget:
             if value is not None and not 0 <= value < math.inf:
                 option = name.removesuffix("_s").replace("_", "-")
                 raise InputError(f"must be a finite number >= 0, got {value}", option)
+
+
+@dataclass(frozen=True)
+class Deadline:
+    """How slow an allocation may be before its makespan counts against it; for the objective with energy.
+
+    Attributes
+    ----------
+    slack : float
+        Relative excess over the fastest allocation found, >= 0; 0.02 takes any that is at most 2 % slower.
+    limit : float or None
+        Hours, > 0; allocations that are no slower are equally fast.
+    """
+
+    slack: float = 0.0
+    limit: float | None = None
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.slack < math.inf:
+            raise InputError(f"must be a finite number >= 0, got {self.slack}", "makespan-slack")
+        if self.limit is not None and not 0 < self.limit < math.inf:
+            raise InputError(f"must be a finite number of hours > 0, got {self.limit}", "makespan-limit")
+
+    def hours(self, fastest: float) -> float:
+        """Return the makespan up to which allocations are equally fast, where the fastest takes `fastest` hours."""
+        return min(max((1 + self.slack) * fastest, self.limit or 0.0), sys.float_info.max)
+
+
+STRICT = Deadline()
+"""No slack: the least makespan, whatever energy it takes."""
 
 
 class StopReason(StrEnum):
@@ -96,6 +128,10 @@ class Search:
         Best lower bound known on the makespan of allocations that serve all tasks, in hours.
     best : Improvement or None
         The best submitted so far.
+    fastest : Improvement or None
+        That with the least makespan, of those with the fewest unserved tasks; the same as `best` but for energy.
+    deadline : Deadline
+        How much slower than the fastest the best may be.
     """
 
     def __init__(
@@ -107,15 +143,19 @@ class Search:
         seed: int = 0,
         start: Allocation | None = None,
         threads: int = 1,
+        deadline: Deadline = STRICT,
         on_improvement: Callable[[Improvement], None] | None = None,
         stop: threading.Event | None = None,
     ) -> None:
         self._begin = time.monotonic()
         self.instance, self.objective, self.budget = instance, objective, budget
+        self.deadline = deadline
         self.seed, self.start, self.threads = seed, start, threads
         self._on_improvement, self._stop = on_improvement, stop or threading.Event()
         self.iteration = 0
         self.best: Improvement | None = None
+        self.fastest: Improvement | None = None
+        self._front: list[Improvement] = []  # candidates for `best` should the fastest become faster
         self.trace: list[Improvement] = []
         self.lower_bound = makespan_lower_bound(instance)
         if start is not None:
@@ -139,15 +179,38 @@ class Search:
         """Whether somebody asked the run to end."""
         return self._stop.is_set()
 
+    @property
+    def makespan_limit(self) -> float:
+        """Hours up to which allocations are equally fast, so that energy alone tells them apart; ``inf`` at first."""
+        return math.inf if self.fastest is None else self.deadline.hours(self.fastest.evaluation.served_makespan)
+
     def submit(self, allocation: Allocation) -> Evaluation:
         """Score `allocation`, keep it if it is the best so far, and report that."""
         evaluation = evaluate(self.instance, allocation)
-        if self.best is None or evaluation.is_better_than(self.best.evaluation, self.objective):
-            self.best = Improvement(self.elapsed_s, allocation, evaluation, self.lower_bound)
+        found = Improvement(self.elapsed_s, allocation, evaluation, self.lower_bound)
+        if self.fastest is None or evaluation.is_better_than(self.fastest.evaluation, Objective.MAKESPAN):
+            self.fastest = found
+        candidates = [found]
+        if self.deadline.slack > 0:
+            candidates = self._front = _undominated([*self._front, found], self.makespan_limit)
+        for candidate in candidates:
+            if self.best is None or self._is_better(candidate.evaluation, self.best.evaluation):
+                self.best = replace(candidate, time_s=found.time_s, lower_bound=found.lower_bound)
+        if self.best is not None and (not self.trace or self.trace[-1] is not self.best):
             self.trace.append(self.best)
             if self._on_improvement is not None:
                 self._on_improvement(self.best)
         return evaluation
+
+    def _is_better(self, one: Evaluation, other: Evaluation) -> bool:
+        """Whether `one` is better, where makespans up to the limit are equal if energy counts."""
+        if self.objective is Objective.MAKESPAN or len(one.unserved_tasks) != len(other.unserved_tasks):
+            return one.is_better_than(other, self.objective)
+        limit = self.makespan_limit * (1 + RELATIVE_TOLERANCE)
+        in_time = [score.served_makespan <= limit for score in (one, other)]
+        if not all(in_time):
+            return in_time[0] or (not any(in_time) and one.is_better_than(other, self.objective))
+        return other.energy - one.energy > RELATIVE_TOLERANCE * other.energy
 
     def raise_bound(self, hours: float) -> None:
         """Tell a proven lower bound on the makespan."""
@@ -155,9 +218,17 @@ class Search:
 
     @property
     def gap(self) -> float:
-        """Relative gap (T - bound) / T of the best so far; 1 if nothing serves all tasks yet."""
-        makespan = None if self.best is None else self.best.evaluation.makespan
+        """Relative gap (T - bound) / T of the fastest so far; 1 if nothing serves all tasks yet."""
+        makespan = None if self.fastest is None else self.fastest.evaluation.makespan
         return 1.0 if makespan is None else relative_gap(makespan, self.lower_bound)
+
+    @property
+    def fast_enough(self) -> bool:
+        """Whether the fastest so far is proven to be that, or keeps to the limit that was given."""
+        if self.fastest is None or self.fastest.evaluation.makespan is None:
+            return False
+        given = self.deadline.limit
+        return self.gap <= PROVEN or (given is not None and self.fastest.evaluation.makespan <= given)
 
     def stop_reason(self) -> StopReason | None:
         """Return why the run should end now, or None if it should go on."""
@@ -169,7 +240,7 @@ class Search:
             return StopReason.ITERATIONS
         if self.budget.target_gap is not None and self.gap <= self.budget.target_gap:
             return StopReason.TARGET_GAP
-        if self.best is not None and self.gap <= PROVEN:
+        if self.best is not None and self.fast_enough:
             energy_counts = self.objective is Objective.MAKESPAN_ENERGY
             if not energy_counts or self.best.evaluation.energy == 0:
                 return StopReason.PROVEN
@@ -183,3 +254,15 @@ class Search:
 def relative_gap(value: float, bound: float) -> float:
     """Return (value - bound) / value, 0 where the two agree or value is 0."""
     return 0.0 if value <= 0 else max(0.0, (value - bound) / value)
+
+
+def _undominated(found: list[Improvement], limit: float) -> list[Improvement]:
+    """Keep those within `limit` hours that have less energy than all faster ones, the fastest first."""
+    kept: list[Improvement] = []
+    fewest = min(len(one.evaluation.unserved_tasks) for one in found)
+    for one in sorted(found, key=lambda one: (one.evaluation.served_makespan, one.evaluation.energy)):
+        score = one.evaluation
+        in_time = score.served_makespan <= limit * (1 + RELATIVE_TOLERANCE)
+        if in_time and len(score.unserved_tasks) == fewest and (not kept or score.energy < kept[-1].evaluation.energy):
+            kept.append(one)
+    return kept

@@ -14,9 +14,9 @@ import numpy as np
 from alloc.allocators.auto import choose
 from alloc.allocators.base import Allocator, Proposal, RefusedError
 from alloc.allocators.interrupt import run_native, signals_set
-from alloc.allocators.registry import load
+from alloc.allocators.registry import BUILT_IN, load
 from alloc.allocators.result import Result
-from alloc.allocators.search import PROVEN, Budget, Improvement, Search, StopReason, relative_gap
+from alloc.allocators.search import PROVEN, STRICT, Budget, Deadline, Improvement, Search, StopReason, relative_gap
 from alloc.problems import (
     Allocation,
     InputError,
@@ -46,6 +46,8 @@ def solve(
     seed: int = 0,
     start: Allocation | None = None,
     threads: int | None = None,
+    makespan_slack: float = 0.0,
+    makespan_limit: float | None = None,
     on_improvement: Callable[[Improvement], None] | None = None,
     stop: threading.Event | None = None,
     handle_signals: bool = True,
@@ -68,6 +70,9 @@ def solve(
         A warm start; the answer is never worse.
     threads : int, optional
         Threads that the method may use; as many as there are processors by default.
+    makespan_slack, makespan_limit : float
+        Relative excess over the fastest allocation found, and hours, up to which makespans are equally good, so that
+        the energy decides; for the objective ``makespan-energy``. See `Deadline`.
     on_improvement : callable, optional
         Called with every new best; what it raises ends the run and is passed on.
     stop : threading.Event, optional
@@ -89,7 +94,11 @@ def solve(
         If the method cannot handle this instance within this budget; the message says why.
     """
     goal, budget = Objective(objective), Budget(time_limit_s, iterations, target_gap)
+    deadline = Deadline(makespan_slack, makespan_limit)
     _check_numbers(seed, threads)
+    if goal is Objective.MAKESPAN and deadline != STRICT:
+        option = "makespan-slack" if makespan_slack else "makespan-limit"
+        raise InputError(f"leaves room for less energy; it is for the objective {Objective.MAKESPAN_ENERGY}", option)
     notes: list[str] = []
     if method == "auto":
         given = [name for name, value in options.items() if value is not None]
@@ -100,7 +109,7 @@ def solve(
     if isinstance(method, Allocator) and options:
         raise InputError(f"an allocator that is loaded already takes no options, got {', '.join(options)}", "method")
     allocator = load(method, **options) if isinstance(method, str) else method
-    refuse(allocator, instance, goal, budget)
+    refuse(allocator, instance, goal, budget, deadline)
     if target_gap is not None:
         importlib.import_module("scipy.optimize")  # for the bound below; loading counts for no method
     stop = stop or threading.Event()
@@ -112,6 +121,7 @@ def solve(
             seed=seed,
             start=start,
             threads=threads or available_threads(),
+            deadline=deadline,
             on_improvement=on_improvement,
             stop=stop,
         )
@@ -142,14 +152,20 @@ def available_threads() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def refuse(allocator: Allocator, instance: Instance, objective: Objective, budget: Budget) -> None:
+def refuse(
+    allocator: Allocator, instance: Instance, objective: Objective, budget: Budget, deadline: Deadline = STRICT
+) -> None:
     """Raise `RefusedError` if `allocator` cannot handle `instance` within `budget`."""
     method = allocator.method
     reason = None
     if instance.has_travel_time and not method.finite_speeds:
-        reason = "finite speeds are beyond it; use greedy, cpsat or milp"
+        able = [name for name, other in BUILT_IN.items() if other.finite_speeds]
+        reason = f"finite speeds are beyond it; use {' or '.join(able)}"
     elif objective not in method.objectives:
         reason = f"it does not optimise {objective}"
+    elif deadline != STRICT and not method.makespan_slack:
+        able = [name for name, other in BUILT_IN.items() if other.makespan_slack]
+        reason = f"it makes no use of slack for the makespan; use {' or '.join(able)}"
     reason = reason or allocator.refusal(instance, objective, budget)
     if reason is not None:
         raise RefusedError(f"method {method.name!r} refuses {instance.name!r}: {reason}")
@@ -169,7 +185,7 @@ def _conclude(
     if infeasible:
         notes.append(_contest(instance))
     energy_bound = None if infeasible or best is None else _tighten(search, proposal)
-    proven = search.gap <= PROVEN and (
+    proven = search.fast_enough and (
         search.objective is Objective.MAKESPAN
         or (
             best is not None
@@ -190,13 +206,15 @@ def _conclude(
         runtime_s=runtime_s,
         trace=tuple(search.trace),
         notes=tuple(notes),
+        makespan_limit=None if infeasible or search.deadline == STRICT else search.makespan_limit,
+        deadline=search.deadline,
     )
 
 
 def _tighten(search: Search, proposal: Proposal) -> float | None:
     """Close the gap further by linear programmes, within a tenth of the time limit in all; return the energy bound."""
     end = time.monotonic() + _patience_s(search)
-    if search.gap > PROVEN:
+    if not search.fast_enough:
         _raise_by_programme(search, end)
     if search.objective is Objective.MAKESPAN or search.best is None or search.best.evaluation.makespan is None:
         return None
@@ -205,7 +223,7 @@ def _tighten(search: Search, proposal: Proposal) -> float | None:
     known = proposal.energy_lower_bound
     if known is not None and known >= search.best.evaluation.energy * (1 - PROVEN):
         return known
-    makespan, seconds = search.best.evaluation.makespan, max(0.0, end - time.monotonic())
+    makespan, seconds = search.makespan_limit, max(0.0, end - time.monotonic())
     found = _unless_interrupted(search, lambda: energy_lower_bound(search.instance, makespan, seconds))
     return max((bound for bound in (known, found) if bound is not None), default=None)
 

@@ -24,7 +24,7 @@ def methods_command(json: options.JsonOption = False) -> None:
     if json:
         write_json(facts)
         return
-    header = ["name", "kind", "objectives", "speeds", "proves", "state", "what it is"]
+    header = ["name", "kind", "objectives", "speeds", "slack", "proves", "state", "what it is"]
     say(table(header, [_row(fact) for fact in facts], left=len(header)))
     say("")
     for fact in facts:
@@ -47,6 +47,7 @@ def _facts(name: str) -> dict[str, Any]:
         "kind": str(method.kind),
         "objectives": [str(objective) for objective in method.objectives],
         "finite_speeds": method.finite_speeds,
+        "makespan_slack": method.makespan_slack,
         "proves": method.proves,
         "warm_start": method.warm_start,
         "anytime": method.anytime,
@@ -59,12 +60,13 @@ def _facts(name: str) -> dict[str, Any]:
 
 def _row(fact: dict[str, Any]) -> list[str]:
     if "error" in fact:
-        return [fact["name"], "-", "-", "-", "-", "broken", fact["error"]]
+        return [fact["name"], *"-----", "broken", fact["error"]]
     return [
         fact["name"],
         fact["kind"],
         ", ".join(fact["objectives"]),
         "finite" if fact["finite_speeds"] else "none",
+        "yes" if fact["makespan_slack"] else "no",
         "yes" if fact["proves"] else "no",
         "installed" if fact["installed"] else f"pip install {' '.join(fact['missing'])}",
         fact["summary"],

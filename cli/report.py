@@ -33,6 +33,8 @@ def _headline(result: Result) -> str:
 def _status(result: Result) -> str:
     unserved = 0 if result.evaluation is None else len(result.evaluation.unserved_tasks)
     if result.status is Status.OPTIMAL:
+        if result.makespan_limit is not None:
+            return f"optimal, no allocation within {number(result.makespan_limit)} h takes less energy"
         better = "is sooner" if result.objective is Objective.MAKESPAN else "is sooner, or as soon with less energy"
         return f"optimal, no allocation {better}"
     if result.status is Status.FEASIBLE:
@@ -55,7 +57,9 @@ def figures(result: Result) -> list[str]:
         lines.append(f"  makespan  {number(result.makespan)} h ({bound})")
     energy = f"  energy    {number(score.energy)}"
     if result.energy_lower_bound is not None:
-        energy += f" (at least {number(result.energy_lower_bound)} at this makespan, gap {percent(result.energy_gap)})"
+        limit = result.makespan_limit
+        when = "at this makespan" if limit is None else f"within {number(limit)} h"
+        energy += f" (at least {number(result.energy_lower_bound)} {when}, gap {percent(result.energy_gap)})"
     lines.append(f"{energy}, distance {number(score.distance)}")
     if score.battery_remaining_percent is not None:
         lines.append(f"  battery   {score.battery_remaining_percent:.1f} % left on average")

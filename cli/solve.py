@@ -16,6 +16,7 @@ EXAMPLES = examples(
     "alloc solve demo.json",
     "alloc solve demo.json --method ga --time-limit 30 --seed 1 --output best.json",
     "alloc solve demo.json --objective makespan-energy --plot demo.png",
+    "alloc solve demo.json --objective makespan-energy --makespan-slack 0.05",
     "alloc solve demo.json --start best.json --target-gap 0.01",
     "alloc generate paper-1 --seed 7 --output - | alloc solve - --method cpsat --json",
     closing="Ctrl-C ends a run as its time limit does: the best so far is printed and saved.",
@@ -37,6 +38,14 @@ def solve_command(
     time_limit: options.TimeLimitOption = None,
     iterations: options.IterationsOption = None,
     target_gap: options.TargetGapOption = None,
+    makespan_slack: Annotated[
+        float,
+        typer.Option(min=0, help="With energy: how much slower than the fastest found is as good; 0.02 is 2 %."),
+    ] = 0.0,
+    makespan_limit: Annotated[
+        float | None,
+        typer.Option(metavar="HOURS", help="With energy: what is no slower than this is as good.", show_default=False),
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, max=2**63 - 1, help="Source of all randomness.")] = 0,
     start: Annotated[
         str | None,
@@ -75,6 +84,8 @@ def solve_command(
             seed=seed,
             start=first,
             threads=threads,
+            makespan_slack=makespan_slack,
+            makespan_limit=makespan_limit,
             on_improvement=progress.update,
             policy=policy,
             device=device,

@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 
 from alloc.problems import Instance
 
+FloatArray = NDArray[np.float64]
+
 CHUNK = 20_000
 """Plans that are scored at once."""
 
@@ -26,16 +28,28 @@ class Optimum:
 
 def brute_force(instance: Instance) -> Optimum:
     """Try all (m + 1)^n allocations; those that send an agent where it cannot go are left out."""
-    distance, able = reachable(instance)
-    options = [[-1, *np.flatnonzero(row).tolist()] for row in able]
-    plans = np.array(np.meshgrid(*options, indexing="ij"), dtype=np.int64).reshape(instance.n, -1).T
-    scores = [_score(instance, distance, plans[row : row + CHUNK]) for row in range(0, len(plans), CHUNK)]
-    unserved, makespan, energy = (np.concatenate(part) for part in zip(*scores, strict=True))
+    plans, unserved, makespan, energy = _scored_plans(instance)
     few = unserved == unserved.min()
     least = makespan[few].min()
     fast = few & (makespan <= least * (1 + 1e-9))
     best = int(np.flatnonzero(fast)[energy[fast].argmin()])
     return Optimum(int(unserved[best]), float(least), float(energy[best]), tuple(plans[best].tolist()))
+
+
+def least_energy_within(instance: Instance, makespan: float) -> float:
+    """Return the least energy of all allocations that serve all tasks within `makespan` hours."""
+    _, unserved, hours, energy = _scored_plans(instance)
+    return float(energy[(unserved == 0) & (hours <= makespan * (1 + 1e-9))].min())
+
+
+def _scored_plans(instance: Instance) -> tuple[NDArray[np.int64], NDArray[np.int64], FloatArray, FloatArray]:
+    """Return all plans that send nobody astray, with their unserved tasks, makespans and energies."""
+    distance, able = reachable(instance)
+    options = [[-1, *np.flatnonzero(row).tolist()] for row in able]
+    plans = np.array(np.meshgrid(*options, indexing="ij"), dtype=np.int64).reshape(instance.n, -1).T
+    scores = [_score(instance, distance, plans[row : row + CHUNK]) for row in range(0, len(plans), CHUNK)]
+    unserved, makespan, energy = (np.concatenate(part) for part in zip(*scores, strict=True))
+    return plans, unserved, makespan, energy
 
 
 def reachable(instance: Instance) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:

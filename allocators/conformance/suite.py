@@ -165,6 +165,25 @@ class AllocatorConformance:
         if result.status is Status.OPTIMAL:
             assert result.makespan <= best.makespan * (1 + 2 * PROVEN)
 
+    @every_case
+    def test_slack_is_spent_on_energy(self, subject: Allocator, case: str) -> None:
+        """With slack for the makespan, nothing beyond it is taken, and the bound on the energy holds within it."""
+        if not subject.method.makespan_slack:
+            pytest.skip("it makes no use of slack for the makespan")
+        result = self.solve(subject, CASES[case], objective=Objective.MAKESPAN_ENERGY, makespan_slack=0.5)
+        score, fastest = result.evaluation, optimum(case, Objective.MAKESPAN).makespan
+        assert score is not None
+        if fastest is None:
+            assert result.makespan_limit is None
+            return
+        limit = result.makespan_limit
+        assert limit is not None
+        assert score.makespan is not None
+        assert score.makespan <= limit * TOLERANCE
+        assert (result.energy_lower_bound or 0.0) <= least_energy(case, limit) * TOLERANCE
+        if result.status is Status.OPTIMAL:
+            assert score.energy == pytest.approx(least_energy(case, 1.5 * fastest), rel=2 * PROVEN)
+
     @every_objective
     def test_same_seed_gives_same_answer(self, subject: Allocator, objective: Objective) -> None:
         """With a budget of iterations, the seed alone decides; the clock does not."""

@@ -33,7 +33,7 @@ def least_energy(search: Search, ask: Callable[[Question, Watch], Answer], serve
         Energy that every plan with at most this makespan needs; None if nothing is known.
     """
     assert search.best is not None
-    time = search.best.evaluation.served_makespan
+    time = search.makespan_limit
     if search.best.evaluation.energy == 0:
         return 0.0
     if is_over(search):

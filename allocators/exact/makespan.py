@@ -79,12 +79,13 @@ class LeastMakespan:
 
     @property
     def _high(self) -> float:
-        assert self._search.best is not None
-        return self._search.best.evaluation.served_makespan
+        assert self._search.fastest is not None
+        return self._search.fastest.evaluation.served_makespan
 
     @property
     def _closed(self) -> bool:
-        return self._high <= self._low * (1 + TIGHT)
+        given = self._search.deadline.limit
+        return self._high <= max(self._low * (1 + TIGHT), given or 0.0)
 
     @property
     def _over(self) -> bool:
@@ -183,8 +184,8 @@ class LeastMakespan:
 
     def _descend(self, time: float, part: float, kicks: int) -> bool:
         """Descend from the best plan; whether one with makespan `time` was found."""
-        assert self._search.best is not None
-        table = self._model.classes.tally(self._search.best.allocation)[:, self._model.tasks]
+        assert self._search.fastest is not None
+        table = self._model.classes.tally(self._search.fastest.allocation)[:, self._model.tasks]
         served = table.any(axis=0)
         until_s = np.inf if self._repeatable else self._search.elapsed_s + self._part(part)
         counts, _ = descend(

@@ -129,3 +129,33 @@ def test_closed_standard_output_is_told(alloc, small, monkeypatch):
     monkeypatch.setattr("sys.stdout", None)
     assert main(["solve", "small.json", "--method", "greedy", "-q", "--json", "--output", "best.json"]) == 2
     assert json.loads(Path("best.json").read_text())["instance"] == "small"
+
+
+def test_slack_buys_energy(alloc, small):
+    """With slack the answer is slower, within the limit that the result names, and takes less energy."""
+    strict = alloc("solve", "small.json", "--objective", "makespan-energy", "--json").json
+    loose = alloc("solve", "small.json", "--objective", "makespan-energy", "--makespan-slack", "1", "--json")
+    assert "makespan_limit" not in strict
+    assert loose.json["makespan_limit"] == pytest.approx(2 * strict["makespan"])
+    assert strict["makespan"] < loose.json["makespan"] <= loose.json["makespan_limit"]
+    assert loose.json["energy"] < strict["energy"]
+    assert loose.json["status"] == "optimal"
+    shown = alloc("solve", "small.json", "--objective", "makespan-energy", "--makespan-limit", "9").err
+    assert "optimal, no allocation within 9 h takes less energy" in shown
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--makespan-slack", "0.1"], "it is for the objective makespan-energy"),
+        (["--makespan-slack", "inf", "--objective", "makespan-energy"], "must be a finite number"),
+        (["--makespan-limit", "0", "--objective", "makespan-energy"], "hours > 0"),
+        (["--makespan-limit", "3", "--objective", "makespan-energy", "--method", "ga"], "use milp or cpsat"),
+    ],
+)
+def test_wrong_slack_is_refused(alloc, small, arguments, words):
+    """Slack without energy, slack that is no number, and a method that has no use for it: one line, exit code 2."""
+    ran = alloc("solve", "small.json", *arguments)
+    assert (ran.code, ran.out) == (2, "")
+    assert words in ran.err
+    assert ran.err.count("\n") == 1

@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
-from oracle import brute_force
+from oracle import brute_force, least_energy_within
 from tiny_instances import tiny_instance
 
 from alloc.allocators import Allocator, Status, StopReason, load, solve
 from alloc.problems import Instance, fewest_unserved
-from alloc.problems.generate import paper
+from alloc.problems.generate import paper, paper_like
 
 
 @pytest.fixture(params=["cpsat", "milp"], scope="module")
@@ -44,6 +44,28 @@ def test_solver_alone_proves_a_paper_scenario(name):
     result = solve(paper(1, 3), exact, time_limit_s=30)
     assert (result.status, result.makespan) == (Status.OPTIMAL, 1.0)
     assert len(result.trace) > 1
+
+
+@pytest.mark.parametrize("slack", [0.1, 0.5, 3.0])
+def test_slack_is_spent_to_the_end(exact, slack):
+    """The least energy of all plans at most so much slower than the fastest, as trying everything finds it."""
+    instance = paper_like(6, 3, 24, 4)
+    able = least_energy_within(instance, brute_force(instance).makespan * (1 + slack))
+    result = solve(instance, exact, objective="makespan-energy", makespan_slack=slack, time_limit_s=60)
+    assert result.status is Status.OPTIMAL
+    assert result.energy == pytest.approx(able, rel=1e-6)
+
+
+def test_limit_is_spent_to_the_end(exact):
+    """A makespan limit that can be kept leaves the energy alone to be minimised; one that cannot changes nothing."""
+    instance = paper_like(6, 3, 24, 4)
+    best = brute_force(instance)
+    result = solve(instance, exact, objective="makespan-energy", makespan_limit=2.5 * best.makespan, time_limit_s=60)
+    assert (result.status, result.makespan_limit) == (Status.OPTIMAL, 2.5 * best.makespan)
+    assert result.energy == pytest.approx(least_energy_within(instance, 2.5 * best.makespan), rel=1e-6)
+    strict = solve(instance, exact, objective="makespan-energy", makespan_limit=0.5 * best.makespan, time_limit_s=60)
+    assert strict.status is Status.OPTIMAL
+    assert (strict.makespan, strict.energy) == pytest.approx((best.makespan, best.energy), rel=1e-6)
 
 
 def test_makespans_a_millionth_apart_are_told_apart(exact):
