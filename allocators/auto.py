@@ -8,7 +8,7 @@ ends up to 1 % above it with about as much energy.
 """
 
 from alloc.allocators.search import Budget
-from alloc.problems import Instance, Objective, agent_classes
+from alloc.problems import Instance, Objective, count_classes
 
 MAKESPAN_PAIRS_PER_SECOND = 30_000
 ENERGY_PAIRS_PER_SECOND = 500
@@ -23,7 +23,7 @@ def choose(instance: Instance, objective: Objective, budget: Budget) -> tuple[st
     """Return the method for this instance, objective and budget, and the reason in plain words."""
     energy = objective is Objective.MAKESPAN_ENERGY
     tasks = int((instance.workload > 0).sum())
-    pairs = agent_classes(instance, by_place=energy).size * tasks
+    pairs = count_classes(instance, by_place=energy) * tasks
     seconds = min(UNHURRIED_S, UNHURRIED_S if budget.time_limit_s is None else budget.time_limit_s)
     searchable = max(15_000, int(MAKESPAN_PAIRS_PER_SECOND * seconds))
     provable = max(500, int(ENERGY_PAIRS_PER_SECOND * seconds)) if energy else searchable

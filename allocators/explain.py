@@ -1,14 +1,13 @@
 """What holds the makespan up: the last task, and what one more agent there would gain."""
 
-from dataclasses import dataclass, replace
-from itertools import count
+import sys
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from alloc.problems import IDLE, Allocation, Evaluation, Instance, evaluate
-from alloc.problems.evaluation import RELATIVE_TOLERANCE
-from alloc.problems.instance import IntArray
+from alloc.problems import Allocation, Evaluation, Instance, evaluate
+from alloc.problems.evaluation import RELATIVE_TOLERANCE, completion_time
+from alloc.problems.instance import FloatArray, IntArray
 
 
 @dataclass(frozen=True)
@@ -81,7 +80,7 @@ def explain(instance: Instance, allocation: Allocation) -> Bottleneck | None:
     last = tuple(np.flatnonzero(is_last).tolist())
     others = np.where(is_last, 0.0, time)
     next_time = float(others.max())
-    agents = np.flatnonzero(_working(instance, allocation, last[0]))
+    agents = _working(instance, allocation, last[0])
     alone = len(last) == 1
     typical = float(np.median(instance.ability))
     return Bottleneck(
@@ -91,54 +90,45 @@ def explain(instance: Instance, allocation: Allocation) -> Bottleneck | None:
         next_task=int(others.argmax()) if next_time > 0 else None,
         next_time=next_time,
         use=float(instance.workload.sum() / (instance.ability.sum() * makespan)),
-        enough=_enough(instance, allocation, last[0], agents, next_time) if alone and next_time > 0 else None,
-        typical=_gain(instance, allocation, last[0], typical) if alone else None,
+        enough=_enough(instance, evaluation, agents, last[0], next_time) if alone and next_time > 0 else None,
+        typical=_gain(instance, evaluation, agents, last[0], typical) if alone else None,
     )
 
 
-def evaluate_with_agent(instance: Instance, allocation: Allocation, task: int, ability: float) -> Evaluation:
-    """Score `allocation` with one more agent of `ability`, which is on `task` from hour 0 on."""
-    return evaluate(_with_agent(instance, ability), Allocation([*allocation.task_of_agent, task]))
+def makespan_with_agent(instance: Instance, found: Evaluation, agents: IntArray, task: int, ability: float) -> float:
+    """Return the makespan in hours with one more agent of `ability`, which is on `task` from hour 0 on.
+
+    Parameters
+    ----------
+    found : Evaluation
+        Scores without that agent.
+    agents : ndarray of int, shape (k,)
+        Who is on `task` already, and can take it.
+    """
+    abilities = np.append(instance.ability[agents], ability)
+    time = found.completion_time.copy()
+    time[task] = completion_time(instance.workload[task], abilities, np.append(_arrival(instance, agents, task), 0.0))
+    return float(np.minimum(time, sys.float_info.max).max())
 
 
-def _working(instance: Instance, allocation: Allocation, task: int) -> NDArray[np.bool_]:
+def _arrival(instance: Instance, agents: IntArray, task: int) -> FloatArray:
+    """Hour at which each agent is at `task`."""
+    with np.errstate(over="ignore"):
+        return instance.reach.distance_of(agents, np.full(len(agents), task)) / instance.speed[agents]
+
+
+def _working(instance: Instance, allocation: Allocation, task: int) -> IntArray:
     """Who is on `task`, and can take it."""
-    there: NDArray[np.bool_] = allocation.task_of_agent == task
-    able: NDArray[np.bool_] = instance.reach.mask[instance.reach.origin, task]
-    return there & able
+    there = np.flatnonzero(allocation.task_of_agent == task)
+    return there[instance.reach.allows(there, np.full(len(there), task))]
 
 
-def _enough(
-    instance: Instance,
-    allocation: Allocation,
-    task: int,
-    agents: IntArray,
-    next_time: float,
-) -> Gain:
+def _enough(instance: Instance, found: Evaluation, agents: IntArray, task: int, next_time: float) -> Gain:
     """What the group leaves undone at `next_time`, over `next_time`."""
-    distance = instance.reach.distance_of(agents, np.full(len(agents), task))
-    hours = np.maximum(0.0, next_time - distance / instance.speed[agents])
+    hours = np.maximum(0.0, next_time - _arrival(instance, agents, task))
     left = instance.workload[task] - float((instance.ability[agents] * hours).sum())
-    return _gain(instance, allocation, task, left / next_time)
+    return _gain(instance, found, agents, task, left / next_time)
 
 
-def _gain(instance: Instance, allocation: Allocation, task: int, ability: float) -> Gain:
-    makespan = evaluate_with_agent(instance, allocation, task, ability).makespan
-    assert makespan is not None, "an agent more left a task unserved"
-    return Gain(ability, makespan)
-
-
-def _with_agent(instance: Instance, ability: float) -> Instance:
-    """Add an agent without a place, which is near everything and can take every task."""
-    allowed, names = instance.allowed_tasks, set(instance.agent_ids)
-    return replace(
-        instance,
-        agent_ids=(*instance.agent_ids, next(name for name in map(str, count()) if name not in names)),
-        ability=np.append(instance.ability, ability),
-        agent_position=np.vstack([instance.agent_position, np.full(3, np.nan)]),
-        start_task=np.append(instance.start_task, IDLE),
-        battery=np.append(instance.battery, np.inf),
-        communication_range=np.append(instance.communication_range, np.inf),
-        speed=np.append(instance.speed, np.inf),
-        allowed_tasks=None if allowed is None else (*allowed, None),
-    )
+def _gain(instance: Instance, found: Evaluation, agents: IntArray, task: int, ability: float) -> Gain:
+    return Gain(ability, makespan_with_agent(instance, found, agents, task, ability))

@@ -252,7 +252,7 @@ def _contest(instance: Instance) -> str:
     """Say which tasks compete for too few agents."""
     tasks = contested_tasks(instance)
     assert tasks is not None, "tasks are left unserved although a matching serves all"
-    able = int(np.any(instance.reach.mask[:, tasks], axis=1, keepdims=True)[instance.reach.origin].sum())
+    able = len(np.unique(np.concatenate([instance.reach.agents_of(task) for task in tasks.tolist()])))
     ids = [repr(instance.task_ids[j]) for j in tasks[:10].tolist()]
     more = f" and {len(tasks) - 10} more" if len(tasks) > 10 else ""
     if len(tasks) == 1:

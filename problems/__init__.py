@@ -2,7 +2,7 @@
 
 from alloc.problems.allocation import Allocation
 from alloc.problems.bounds import energy_lower_bound, lp_makespan_lower_bound, makespan_lower_bound
-from alloc.problems.classes import AgentClasses, agent_classes
+from alloc.problems.classes import AgentClasses, agent_classes, count_classes
 from alloc.problems.errors import InputError
 from alloc.problems.evaluation import Evaluation, Objective, Violation, evaluate
 from alloc.problems.formats import read_allocation, read_instance, write_allocation, write_instance
@@ -25,6 +25,7 @@ __all__ = [
     "Violation",
     "agent_classes",
     "contested_tasks",
+    "count_classes",
     "energy_lower_bound",
     "evaluate",
     "fewest_unserved",

@@ -9,15 +9,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from alloc.problems.classes import agent_classes
+from alloc.problems.classes import agent_classes, count_classes
 from alloc.problems.evaluation import RELATIVE_TOLERANCE, completion_time
 from alloc.problems.instance import FloatArray, Instance, IntArray
+from alloc.problems.neighbours import nearest_distance
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
 ROUNDING = 1e-12
 """Relative amount by which a bound is lowered for what sums of floats may be off."""
+
+SCARCE = 32
+"""Tasks whose agents are counted where the table of who reaches what is too large for all."""
 
 LP_SIZE_LIMIT = 500_000
 """Pairs of agent class and task beyond which no linear programme is built."""
@@ -58,17 +62,35 @@ def _dropping_bound(work: FloatArray, ability: FloatArray) -> float:
 
 def _reach_bound(instance: Instance) -> float:
     """Each task alone with all who can reach it."""
-    per_origin = np.bincount(instance.reach.origin, weights=instance.ability, minlength=len(instance.reach.mask))
-    rate = per_origin @ instance.reach.mask
+    reach = instance.reach
+    if not reach.has_table:
+        return 0.0 if reach.is_complete else _reach_bound_of_scarce(instance)
+    per_origin = np.bincount(reach.origin, weights=instance.ability, minlength=len(reach.place))
+    rate = per_origin @ reach.mask
     needed = (instance.workload > 0) & (rate > 0)
     return float((instance.workload[needed] / rate[needed]).max(initial=0.0))
+
+
+def _reach_bound_of_scarce(instance: Instance) -> float:
+    """The same for `SCARCE` tasks alone: those with the most work for those of a sample who can reach them."""
+    reach, work = instance.reach, instance.workload
+    sample = np.unique(np.linspace(0, instance.n - 1, 10 * SCARCE).astype(np.intp))
+    rate = instance.ability[sample] @ reach.rows(reach.origin[sample])[1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        scarce = np.argsort(-np.where(work > 0, work / rate, 0.0), kind="stable")[:SCARCE]
+    rates = [(work[j], float(instance.ability[reach.agents_of(j)].sum())) for j in scarce.tolist()]
+    return max((load / ability for load, ability in rates if ability > 0), default=0.0)
 
 
 def _arrival_bound(instance: Instance) -> float:
     """All agents at once, each from the hour at which it could reach its nearest task."""
     needed = instance.workload > 0
-    nearest = np.where(instance.reach.mask & needed, instance.reach.distance, np.inf).min(axis=1)
-    nearest = nearest[instance.reach.origin]
+    reach = instance.reach
+    if reach.has_table:
+        nearest = np.where(reach.mask & needed, reach.distance, np.inf).min(axis=1)
+    else:
+        nearest = nearest_distance(reach, needed)
+    nearest = nearest[reach.origin]
     arrival = np.divide(nearest, instance.speed, out=np.full(instance.n, np.inf), where=np.isfinite(nearest))
     able = np.isfinite(arrival)
     if not able.any():
@@ -100,9 +122,9 @@ def lp_makespan_lower_bound(instance: Instance, time_limit_s: float = 10.0) -> f
     instances with travel times, nor where it would take more than `time_limit_s` or `LP_SIZE_LIMIT` pairs.
     """
     work = instance.workload
-    classes = agent_classes(instance, by_place=False)
-    if instance.has_travel_time or not (work > 0).any() or _is_too_large(classes.size * instance.m, time_limit_s):
+    if instance.has_travel_time or not (work > 0).any() or _is_too_large(instance, time_limit_s, by_place=False):
         return None
+    classes = agent_classes(instance, by_place=False)
     from scipy.sparse import csr_matrix, hstack, vstack
 
     scale = makespan_lower_bound(instance)
@@ -137,9 +159,9 @@ def energy_lower_bound(instance: Instance, makespan: float, time_limit_s: float 
         In hours; every task with workload must be done by then.
     """
     work = instance.workload
-    classes = agent_classes(instance, by_place=True)
-    if _is_too_large(classes.size * instance.m, time_limit_s):
+    if _is_too_large(instance, time_limit_s, by_place=True):
         return None
+    classes = agent_classes(instance, by_place=True)
     from scipy.sparse import vstack
 
     kind, task = np.nonzero(classes.mask & (work > 0))
@@ -162,8 +184,9 @@ def energy_lower_bound(instance: Instance, makespan: float, time_limit_s: float 
     return min(least * instance.energy_per_distance, sys.float_info.max)
 
 
-def _is_too_large(pairs: int, time_limit_s: float) -> bool:
-    return pairs > min(LP_SIZE_LIMIT, LP_PAIRS_PER_SECOND * time_limit_s)
+def _is_too_large(instance: Instance, time_limit_s: float, *, by_place: bool) -> bool:
+    most = min(LP_SIZE_LIMIT, LP_PAIRS_PER_SECOND * time_limit_s)
+    return instance.m > most or count_classes(instance, by_place=by_place) * instance.m > most
 
 
 def _largest(row: IntArray, value: FloatArray, count: int) -> FloatArray:

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from alloc.problems.allocation import Allocation
 from alloc.problems.instance import IDLE, FloatArray, Instance, IntArray
+from alloc.problems.origins import group_rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,29 +76,36 @@ def agent_classes(instance: Instance, *, by_place: bool) -> AgentClasses:
     ----------
     by_place : bool
         Whether the place matters, as it does for energy; if not, agents with the same ability that can take the same
-        tasks are alike wherever they are, unless travel takes time.
+        tasks are alike wherever they are, unless travel takes time, or the table of who reaches what is too large to
+        compare its rows (`Reach.has_table`).
     """
-    reach = instance.reach
-    if by_place or instance.has_travel_time:
-        row = np.arange(len(reach.mask))
-    else:
-        packed = np.ascontiguousarray(np.packbits(reach.mask, axis=1))
-        _, row = np.unique(packed.view(np.dtype((np.void, packed.shape[1])))[:, 0], return_inverse=True)
-    keys = (instance.speed, row[reach.origin], instance.ability)
-    order = np.lexsort(keys)
-    new = np.zeros(instance.n, dtype=bool)
-    new[0] = True
-    for key in keys:
-        new[1:] |= key[order][1:] != key[order][:-1]
-    kind = np.cumsum(new) - 1
-    class_of_agent = np.empty(instance.n, dtype=np.intp)
-    class_of_agent[order] = kind
-    example = order[new]
+    example, class_of_agent = _group(instance, by_place=by_place)
+    distance, mask = instance.reach.rows(instance.reach.origin[example])
     return AgentClasses(
         class_of_agent=class_of_agent,
-        count=np.bincount(kind),
+        count=np.bincount(class_of_agent),
         ability=instance.ability[example],
         speed=instance.speed[example],
-        distance=reach.distance[reach.origin[example]],
-        mask=reach.mask[reach.origin[example]],
+        distance=distance,
+        mask=mask,
     )
+
+
+def count_classes(instance: Instance, *, by_place: bool) -> int:
+    """Return how many classes `agent_classes` would make, without the table of what they can take."""
+    return len(_group(instance, by_place=by_place)[0])
+
+
+def _group(instance: Instance, *, by_place: bool) -> tuple[IntArray, IntArray]:
+    """Return one member of each class, and the class of each agent."""
+    reach = instance.reach
+    if by_place or instance.has_travel_time:
+        row = np.arange(len(reach.place))
+    elif reach.is_complete:
+        row = np.zeros(len(reach.place), dtype=np.intp)
+    elif reach.has_table:
+        packed = np.ascontiguousarray(np.packbits(reach.mask, axis=1))
+        _, row = np.unique(packed.view(np.dtype((np.void, packed.shape[1])))[:, 0], return_inverse=True)
+    else:
+        row = np.arange(len(reach.place))
+    return group_rows([instance.ability, row[reach.origin].astype(np.float64), instance.speed])

@@ -210,7 +210,7 @@ def _violations(instance: Instance, agents: IntArray, task: IntArray) -> list[Vi
     found = []
     for agent in agents.tolist():
         goal = int(task[agent])
-        away = float(instance.reach.distance[instance.reach.origin[agent], goal])
+        away = float(instance.reach.distance_of(np.array([agent]), np.array([goal]))[0])
         allowed = None if instance.allowed_tasks is None else instance.allowed_tasks[agent]
         if allowed is not None and goal not in allowed:
             reason = "the agent may not do this task"

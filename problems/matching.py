@@ -7,11 +7,17 @@ import numpy as np
 from alloc.problems.allocation import Allocation
 from alloc.problems.instance import IDLE, Instance, IntArray
 
+SPENT = -1
+"""Mark of agents that a search in vain has met: no later path leads through them."""
+
+MANY = 50_000_000
+"""Pairs of agent, or of origin, and unserved task that are too many to look at one by one."""
+
 
 class _Matching:
     """One agent kept for each served task, grown by augmenting paths (Berge 1957, doi:10.1073/pnas.43.9.842)."""
 
-    def __init__(self, instance: Instance, task_of_agent: IntArray) -> None:
+    def __init__(self, instance: Instance, task_of_agent: IntArray, unserved: int) -> None:
         self.reach, self.m = instance.reach, instance.m
         self.task_of_agent = task_of_agent.copy()
         self.keeper = np.full(instance.m, IDLE, dtype=np.intp)
@@ -20,34 +26,53 @@ class _Matching:
         self.kept_task = np.full(instance.n, IDLE, dtype=np.intp)
         held = np.flatnonzero(self.keeper != IDLE)
         self.kept_task[self.keeper[held]] = held
-        self.spent = np.zeros(instance.n, dtype=bool)  # met by a search that failed: no later path leads through them
+        self.met = np.zeros(instance.n, dtype=np.intp)  # the search that met an agent last
+        self.search = 0
+        reach = self.reach
+        many = not reach.has_table and unserved * len(reach.place) > MANY and not reach.is_complete
+        near = reach.neighbours if many else None
+        self._rows = None if near is None else near.by_task(instance.m)
 
     def serve(self, task: int) -> IntArray | None:
         """Serve `task` along a path with the fewest moves; None if done, else the tasks that compete for its agents."""
         came_from: dict[int, tuple[int, int]] = {}  # task -> (task that wants its keeper, that keeper)
-        seen_agents = self.spent.copy()
+        self.search += 1
         queue, seen = deque([task]), {task}
         while queue:
             wanting = queue.popleft()
-            able = np.flatnonzero(self.reach.mask[self.reach.origin, wanting] & ~seen_agents)
+            able = self._able(wanting)
+            able = able[(self.met[able] != self.search) & (self.met[able] != SPENT)]
             free = able[self.kept_task[able] == IDLE]
             if len(free):
                 self._augment(wanting, self._cheapest(free, wanting), came_from)
                 return None
-            seen_agents[able] = True
+            self.met[able] = self.search
             for agent in able.tolist():
                 held = int(self.kept_task[agent])
                 if held not in seen:
                     seen.add(held)
                     came_from[held] = (wanting, agent)
                     queue.append(held)
-        self.spent = seen_agents
+        self.met[self.met == self.search] = SPENT
         return np.array(sorted(seen), dtype=np.intp)
+
+    def _able(self, task: int) -> IntArray:
+        """Return the agents that can take `task`; looked up where many tasks will be asked for."""
+        if self._rows is None:
+            return self.reach.agents_of(task)
+        (first, origins), (begin, agents) = self._rows, self.reach.agents_by_origin
+        near = origins[first[task] : first[task + 1]]
+        sizes = begin[near + 1] - begin[near]
+        offsets = np.arange(sizes.sum()) - np.repeat(np.cumsum(sizes) - sizes, sizes)
+        able: IntArray = agents[np.repeat(begin[near], sizes) + offsets]
+        return able
 
     def _cheapest(self, agents: IntArray, task: int) -> int:
         """Prefer an idle agent, then the nearest."""
-        busy = self.task_of_agent[agents] != IDLE
-        return int(agents[np.lexsort((self.reach.distance[self.reach.origin[agents], task], busy))[0]])
+        idle = agents[self.task_of_agent[agents] == IDLE]
+        choice = idle if len(idle) else agents
+        distance = self.reach.distance_of(choice, np.full(len(choice), task))
+        return int(choice[np.argmin(distance)])
 
     def _augment(self, task: int, agent: int, came_from: dict[int, tuple[int, int]]) -> None:
         while True:
@@ -75,15 +100,30 @@ def serve_all(instance: Instance, allocation: Allocation) -> Allocation:
     unserved = [j for j in _needs_agent(instance).tolist() if not served[j]]
     if not unserved:
         return Allocation(task)
-    matching = _start(instance, task)
+    if instance.reach.is_complete and instance.n * len(unserved) > MANY:
+        return Allocation(_serve_by_anyone(instance, task, unserved))
+    matching = _start(instance, task, len(unserved))
     for j in unserved:
         matching.serve(j)
     return Allocation(matching.task_of_agent)
 
 
-def _start(instance: Instance, task_of_agent: IntArray) -> _Matching:
-    """Begin a matching in which tasks without workload keep nobody."""
-    matching = _Matching(instance, task_of_agent)
+def _serve_by_anyone(instance: Instance, task_of_agent: IntArray, unserved: list[int]) -> IntArray:
+    """Serve tasks where everyone can go everywhere: by the idle first, but by the nearest of them only by chance."""
+    keeper = np.full(instance.m, IDLE, dtype=np.intp)
+    working = np.flatnonzero(task_of_agent != IDLE)
+    keeper[task_of_agent[working]] = working
+    kept = keeper[(keeper != IDLE) & (instance.workload > 0)]
+    task_of_agent, busy = task_of_agent.copy(), (task_of_agent != IDLE).astype(np.int8)
+    busy[kept] = 2
+    free = np.argsort(busy, kind="stable")[: int((busy < 2).sum())][: len(unserved)]
+    task_of_agent[free] = unserved[: len(free)]
+    return task_of_agent
+
+
+def _start(instance: Instance, task_of_agent: IntArray, unserved: int) -> _Matching:
+    """Begin a matching in which tasks without workload keep nobody; `unserved`: how many tasks are to be served."""
+    matching = _Matching(instance, task_of_agent, unserved)
     for j in np.flatnonzero(instance.workload == 0).tolist():
         if matching.keeper[j] != IDLE:
             matching.kept_task[matching.keeper[j]] = IDLE
@@ -100,11 +140,17 @@ def fewest_unserved(instance: Instance) -> int:
     from scipy.sparse.csgraph import maximum_bipartite_matching
 
     tasks = _needs_agent(instance)
-    if instance.reach.is_complete:
+    reach = instance.reach
+    if reach.is_complete:
         return max(0, len(tasks) - instance.n)
-    copies = np.minimum(np.bincount(instance.reach.origin, minlength=len(instance.reach.mask)), len(tasks))
-    row_of_copy = np.repeat(np.arange(len(copies)), copies)
-    graph = csr_matrix(instance.reach.mask[:, tasks][row_of_copy].T)
+    near = reach.neighbours
+    if near is None:
+        matching = _start(instance, np.full(instance.n, IDLE, dtype=np.intp), len(tasks))
+        return sum(matching.serve(j) is not None for j in tasks.tolist())
+    degree = np.diff(near.first)
+    table = csr_matrix((np.ones(len(near.task), dtype=np.int8), near.task, near.first), (len(degree), instance.m))
+    copies = np.minimum(np.bincount(reach.origin, minlength=len(degree)), degree)
+    graph = table[np.repeat(np.arange(len(degree)), copies)][:, tasks].T.tocsr()
     return int((maximum_bipartite_matching(graph, perm_type="column") == IDLE).sum())
 
 
@@ -114,8 +160,9 @@ def contested_tasks(instance: Instance) -> IntArray | None:
     Such a set has one task more than agents that can take any of them; without any one of its tasks, the rest could
     be served (Hall 1935, doi:10.1112/jlms/s1-10.37.26).
     """
-    matching = _start(instance, np.full(instance.n, IDLE, dtype=np.intp))
-    for j in _needs_agent(instance).tolist():
+    tasks = _needs_agent(instance)
+    matching = _start(instance, np.full(instance.n, IDLE, dtype=np.intp), len(tasks))
+    for j in tasks.tolist():
         rivals = matching.serve(j)
         if rivals is not None:
             return rivals

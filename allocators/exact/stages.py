@@ -13,7 +13,7 @@ from alloc.allocators.exact.makespan import LeastMakespan
 from alloc.allocators.exact.question import Answer, Question, Watch
 from alloc.allocators.heuristic.greedy import greedy
 from alloc.allocators.search import Budget, Search
-from alloc.problems import Instance, Objective, agent_classes, fewest_unserved, serve_all
+from alloc.problems import Instance, Objective, count_classes, fewest_unserved, serve_all
 
 MAKESPAN_SHARE = 0.6
 """Part of the time limit after which the makespan gives way to the energy, proven or not."""
@@ -72,5 +72,5 @@ class ExactAllocator(Allocator):
 
 def count_pairs(instance: Instance, objective: Objective) -> int:
     """Return the number of pairs of agent class and task that the largest model for `objective` has."""
-    classes = agent_classes(instance, by_place=objective is Objective.MAKESPAN_ENERGY)
-    return classes.size * int((instance.workload > 0).sum())
+    classes = count_classes(instance, by_place=objective is Objective.MAKESPAN_ENERGY)
+    return classes * int((instance.workload > 0).sum())

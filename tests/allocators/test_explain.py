@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from alloc.allocators.explain import evaluate_with_agent, explain
-from alloc.problems import Allocation, Instance
+from alloc.allocators.explain import explain, makespan_with_agent
+from alloc.problems import Allocation, Instance, evaluate
 
 
 def test_enough_is_the_least_ability_that_hands_over():
@@ -14,8 +14,9 @@ def test_enough_is_the_least_ability_that_hands_over():
     assert (found.makespan, found.next_time) == (12 / 5, 4 / 5)
     assert found.enough.ability == pytest.approx(12 / 0.8 - 5)
     assert found.enough.makespan == pytest.approx(0.8)
-    more = evaluate_with_agent(instance, allocation, 0, found.enough.ability * 2).makespan
-    less = evaluate_with_agent(instance, allocation, 0, found.enough.ability * 0.99).makespan
+    score, group = evaluate(instance, allocation), np.array([0])
+    more = makespan_with_agent(instance, score, group, 0, found.enough.ability * 2)
+    less = makespan_with_agent(instance, score, group, 0, found.enough.ability * 0.99)
     assert more == pytest.approx(0.8)
     assert less > 0.8 * 1.001
     assert found.typical.ability == 5

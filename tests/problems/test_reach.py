@@ -7,7 +7,7 @@ from oracle import reachable
 from strategies import instances
 
 from alloc.problems import Instance
-from alloc.problems.reach import BLOCK
+from alloc.problems.distances import BLOCK
 
 
 @given(instances())

@@ -1,0 +1,48 @@
+"""Agents that begin alike: the same place, range, battery and list of tasks make one *origin*."""
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+Indices = NDArray[np.intp]
+
+
+def group_rows(columns: Iterable[NDArray[np.float64]]) -> tuple[Indices, Indices]:
+    """Return the first row of each kind, and the kind of each row; NaN equals NaN, and 0.0 equals -0.0.
+
+    Kinds are in the order of the columns, the first column first. Takes O(n log n) time per column, as far as columns
+    are needed to tell the rows apart.
+    """
+    kind, kinds = np.zeros(0, dtype=np.intp), 1
+    for column in columns:
+        if not len(kind):
+            kind = np.zeros(len(column), dtype=np.intp)
+        if kinds == len(column):
+            break
+        if (column == column[0]).all() or np.isnan(column).all():
+            continue
+        values, number = np.unique(column, return_inverse=True)
+        if kinds > 1:
+            values, number = np.unique(kind * len(values) + number, return_inverse=True)
+        kind, kinds = number.astype(np.intp, copy=False), len(values)
+    first = np.empty(kinds, dtype=np.intp)
+    first[kind[::-1]] = np.arange(len(kind) - 1, -1, -1)
+    return first, kind
+
+
+def number_lists(
+    lists: Sequence[NDArray[np.intp] | None] | None, n: int
+) -> tuple[Indices, tuple[NDArray[np.intp], ...]]:
+    """Return the number of each agent's list, -1 where it may do all tasks, and the distinct lists."""
+    if lists is None:
+        return np.full(n, -1, dtype=np.intp), ()
+    numbers: dict[bytes, int] = {}
+    distinct: list[NDArray[np.intp]] = []
+    number = np.full(n, -1, dtype=np.intp)
+    for agent, tasks in enumerate(lists):
+        if tasks is not None:
+            number[agent] = numbers.setdefault(tasks.tobytes(), len(distinct))
+            if number[agent] == len(distinct):
+                distinct.append(tasks)
+    return number, tuple(distinct)
