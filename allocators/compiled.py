@@ -18,3 +18,8 @@ def compiled(function: Function) -> Function:
         return cast(Function, numba.njit(cache=True, nogil=True)(function))
     except RuntimeError:  # no folder for the cache
         return cast(Function, numba.njit(nogil=True)(function))
+
+
+def inlined(function: Function) -> Function:
+    """Put `function` into each compiled loop that calls it, where a call would cost more than its work."""
+    return cast(Function, numba.njit(inline="always", nogil=True)(function))

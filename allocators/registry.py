@@ -13,6 +13,7 @@ ENTRY_POINT_GROUP = "alloc.allocators"
 
 _TARGETS = {
     "greedy": "alloc.allocators.heuristic.greedy:Greedy",
+    "local-search": "alloc.allocators.heuristic.local_search:LocalSearch",
     "milp": "alloc.allocators.exact.milp:Milp",
     "cpsat": "alloc.allocators.exact.cpsat:CpSat",
     "ga": "alloc.allocators.heuristic.ga:GeneticAlgorithm",
@@ -27,6 +28,15 @@ BUILT_IN = {
             summary="largest ability first, to the task that is worst served",
             finite_speeds=True,
             citation="Deuermeyer, Friesen and Langston (1982), doi:10.1137/0603019",
+        ),
+        Method(
+            name="local-search",
+            summary="annealed exchanges between two groups, each shared out anew at the least price",
+            requires=("numba",),
+            finite_speeds=True,
+            warm_start=True,
+            anytime=True,
+            citation="Ahuja, Ergun, Orlin and Punnen (2002), doi:10.1016/S0166-218X(01)00338-9",
         ),
         Method(
             name="milp",

@@ -13,6 +13,10 @@ class TestGreedy(AllocatorConformance):
     name = "greedy"
 
 
+class TestLocalSearch(AllocatorConformance):
+    name = "local-search"
+
+
 class TestMilp(AllocatorConformance):
     name = "milp"
 
