@@ -7,6 +7,7 @@ from alloc.problems.errors import InputError
 from alloc.problems.evaluation import Evaluation, Objective, Violation, evaluate
 from alloc.problems.formats import read_allocation, read_instance, write_allocation, write_instance
 from alloc.problems.generate import paper, paper_like, random_instance
+from alloc.problems.generate_covering import machine_covering
 from alloc.problems.generate_family import Family
 from alloc.problems.instance import IDLE, Instance
 from alloc.problems.matching import contested_tasks, fewest_unserved, serve_all
@@ -30,6 +31,7 @@ __all__ = [
     "evaluate",
     "fewest_unserved",
     "lp_makespan_lower_bound",
+    "machine_covering",
     "makespan_lower_bound",
     "paper",
     "paper_like",

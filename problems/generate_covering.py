@@ -1,0 +1,60 @@
+"""Seeded instances of machine covering, P||Cmin and Q||Cmin: few agents per task, abilities over a wide range."""
+
+import numpy as np
+
+from alloc.problems.errors import InputError
+from alloc.problems.instance import Instance
+
+EQUAL_WORKLOAD = 1000
+"""Workload of every task where all are equal."""
+
+WORKLOADS = (200, 2000)
+"""Smallest and largest workload where they differ."""
+
+
+def machine_covering(
+    agents: int, tasks: int, low: int, high: int, seed: int, *, equal: bool = True, whole: bool = True
+) -> Instance:
+    """Return an instance without places: abilities U[low, high], and workloads all 1000, or U[200, 2000].
+
+    ``numpy.random.default_rng([agents, tasks, low, high, seed])`` draws first the abilities, by ``integers``, ends
+    included, or by ``uniform``, and then the workloads, by ``integers``. So an instance with equal workloads and one
+    with unequal ones have the same abilities.
+
+    Parameters
+    ----------
+    agents, tasks : int
+        Numbers of both, >= 1.
+    low, high : int
+        Range of the abilities, 1 <= low <= high.
+    seed : int
+        Source of all randomness, >= 0.
+    equal : bool
+        Whether all workloads are 1000.
+    whole : bool
+        Whether abilities are whole numbers.
+
+    Raises
+    ------
+    InputError
+        If a number is out of its range.
+
+    References
+    ----------
+    Families of abilities as in Haouari and Jemmali (2008), doi:10.1007/s10288-007-0053-5, and Walter, Wirth and
+    Lawrinenko (2017), doi:10.1007/s10951-016-0477-x, for equal workloads; the unequal ones are ours.
+    """
+    for name, value, least in (("agents", agents, 1), ("tasks", tasks, 1), ("low", low, 1), ("high", high, low)):
+        if value < least:
+            raise InputError(f"must be at least {least}, got {value}", name)
+    if seed < 0:
+        raise InputError(f"must be a whole number >= 0, got {seed}", "seed")
+    rng = np.random.default_rng([agents, tasks, low, high, seed])
+    ability = rng.integers(low, high, agents, endpoint=True) if whole else rng.uniform(low, high, agents)
+    unequal = rng.integers(*WORKLOADS, tasks, endpoint=True)
+    kind = f"{'' if whole else 'real-'}{'equal' if equal else 'unequal'}"
+    return Instance(
+        name=f"covering-{agents}x{tasks}-{low}-{high}-{kind}-seed-{seed}",
+        ability=ability,
+        workload=np.full(tasks, EQUAL_WORKLOAD) if equal else unequal,
+    )

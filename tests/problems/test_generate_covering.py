@@ -1,0 +1,39 @@
+import numpy as np
+import pytest
+
+from alloc.problems import InputError, machine_covering
+
+
+def test_same_seed_same_instance():
+    """The seed alone decides, and another seed gives another instance."""
+    first, again, other = (machine_covering(12, 4, 1, 100, seed) for seed in (3, 3, 4))
+    assert np.array_equal(first.ability, again.ability)
+    assert not np.array_equal(first.ability, other.ability)
+
+
+def test_abilities_and_workloads_lie_in_their_ranges():
+    """Whole abilities in the range asked for; workloads all 1000, or whole from 200 to 2000."""
+    equal, unequal = (machine_covering(400, 100, 20, 50, 0, equal=equal) for equal in (True, False))
+    assert np.array_equal(equal.ability, unequal.ability)
+    assert set(equal.ability) == set(range(20, 51))
+    assert set(equal.workload) == {1000}
+    assert unequal.workload.min() >= 200
+    assert unequal.workload.max() <= 2000
+    assert len(set(unequal.workload)) > 50
+    assert np.array_equal(unequal.workload, np.round(unequal.workload))
+
+
+def test_real_abilities():
+    """Where they need not be whole, hardly one is."""
+    ability = machine_covering(50, 20, 1, 100, 0, whole=False).ability
+    assert (ability != np.round(ability)).all()
+    assert ((ability >= 1) & (ability <= 100)).all()
+
+
+@pytest.mark.parametrize(
+    "arguments", [(0, 1, 1, 9, 0), (1, 0, 1, 9, 0), (1, 1, 0, 9, 0), (1, 1, 5, 4, 0), (1, 1, 1, 9, -1)]
+)
+def test_numbers_out_of_range_are_refused(arguments):
+    """Each number has its least value."""
+    with pytest.raises(InputError, match="must be"):
+        machine_covering(*arguments)
