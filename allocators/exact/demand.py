@@ -176,6 +176,15 @@ class Model:
         share[self.kind, self.goal] = np.minimum(1.0, self._rate(time) * (time / self.work[self.goal]))
         return share
 
+    def uncapped(self, time: float) -> tuple[FloatArray, FloatArray]:
+        """Return what one agent of each class adds to each task, shape (k, t), and what each needs, shape (t,)."""
+        able = np.zeros((self.classes.size, len(self.tasks)))
+        if self.unit is None:
+            able[self.kind, self.goal] = self._rate(time)
+            return able, self.work / time * (1 - ROUNDING)
+        able[self.kind, self.goal] = np.round(self.classes.ability / self.unit)[self.kind]
+        return able, self._units_needed(time)
+
     def after(self, time: float) -> float:
         """Return a lower bound on the makespan of every plan that is slower than `time`.
 

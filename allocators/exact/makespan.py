@@ -9,6 +9,7 @@ from alloc.allocators.exact.demand import Model
 from alloc.allocators.exact.descent import descend
 from alloc.allocators.exact.question import Answer, Question, Watch, is_over
 from alloc.allocators.exact.relaxation import relaxed_lower_bound
+from alloc.allocators.exact.wandering import Wanderer
 from alloc.allocators.search import PROVEN, Search
 from alloc.problems import Evaluation, agent_classes
 
@@ -18,6 +19,12 @@ TIGHT = 1e-8
 UNLIMITED_S = 60.0
 """What the parts of the time that tests get are measured by where there is no time limit."""
 
+
+REPEATABLE_ROUNDS = 20
+"""Times that are wandered for where runs must be repeatable."""
+
+STEPS_PER_TIME = 1000
+"""Splits for one time."""
 
 LONG, SHORT = 300, 20
 """Kicks of a descent: where solvers have failed, and at the start."""
@@ -71,6 +78,7 @@ class LeastMakespan:
         self._search, self._ask, self._until_s, self._descent = search, ask, until_s, descent
         self._model = Model.build(search.instance, agent_classes(search.instance, by_place=False), serve)
         self._rng = np.random.default_rng(search.seed)
+        self._wanderer = Wanderer(self._model, search.seed)
         self._repeatable = search.budget.time_limit_s is None and search.budget.iterations is not None
         self._build_s = 2 * len(self._model.kind) / pairs_per_second
         self._low = self._simple_bound()
@@ -95,6 +103,7 @@ class LeastMakespan:
         """Narrow the gap until it is closed or time is up; plans and bounds go to the search."""
         if self._descent:
             self._quick_plans()
+            self._wander(0.02, 0.05)
         if self._search.instance.has_travel_time or not self._search.instance.reach.is_complete:
             self._raise_by_relaxation()
         test = Test(self._low, self._part(0.25))
@@ -199,6 +208,38 @@ class LeastMakespan:
         full = np.zeros(self._model.classes.mask.shape, dtype=np.intp)
         full[:, self._model.tasks[served]] = counts
         return self._is_met(self._search.submit(self._model.classes.spread(full)), time)
+
+    def _wander(self, calm: float, part: float) -> None:
+        """Wander for times closer to the best plan until nothing gets better for a while.
+
+        Parameters
+        ----------
+        calm : float
+            Part of the time without success after which this ends, at least as long as the last success took.
+        part : float
+            Part of the time after which it ends anyway.
+        """
+        assert self._search.best is not None
+        if not self._wanderer.able:
+            return
+        self._wanderer.settle(self._search.best.allocation)
+        begin_s = last_s = self._search.elapsed_s
+        rounds, weight = 0, 1.0
+        while not (self._closed or self._over):
+            patience_s = max(self._part(calm), last_s - begin_s)
+            now_s = self._search.elapsed_s
+            if self._repeatable and rounds >= REPEATABLE_ROUNDS:
+                return
+            if not self._repeatable and (now_s - begin_s > self._part(part) or now_s - last_s > patience_s):
+                return
+            high, rounds = self._high, rounds + 1
+            time = max(self._low, high + weight * (self._low - high) - TIGHT / 2 * high)
+            _, plan = self._wanderer.walk(time, lambda: self._over, most_steps=STEPS_PER_TIME)
+            self._search.submit(plan)
+            if self._high < high:
+                last_s = self._search.elapsed_s
+            else:
+                weight = weight / 2 if weight > 0.1 else float(self._rng.choice([0.0, 0.5, 1.0]))
 
     def _part(self, part: float) -> float:
         """Seconds that are this part of the time, at least 0.3; no limit where runs must be repeatable."""
