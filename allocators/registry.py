@@ -36,6 +36,7 @@ BUILT_IN = {
             finite_speeds=True,
             warm_start=True,
             anytime=True,
+            makespan_slack=True,
             citation="Ahuja, Ergun, Orlin and Punnen (2002), doi:10.1016/S0166-218X(01)00338-9",
         ),
         Method(

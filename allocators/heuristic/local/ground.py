@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from alloc.problems.instance import FloatArray, Instance
-from alloc.problems.reach import LARGEST, TOLERANCE
+from alloc.problems.reach import TOLERANCE, Reach
 
 Small = NDArray[np.int32]
 
@@ -62,41 +62,37 @@ class Ground(NamedTuple):
 
 def survey(instance: Instance) -> Ground:
     """Gather what is needed of `instance`, without distances yet."""
-    origin = instance.reach.origin
-    _, example = np.unique(origin, return_index=True)
-    place, goal = instance.start_position[example], instance.task_position
-    farthest = max(np.nanmax(np.abs(places), initial=0.0) for places in (place, goal))
-    scale = float(farthest) if farthest > LARGEST else 1.0
-    first, listed = _lists(instance, example)
+    reach = instance.reach
+    first, listed = _lists(reach)
     unit = None if instance.has_travel_time else _unit(instance.ability)
     step = float(np.mean(instance.ability)) if unit is None else unit
     return Ground(
         ability=np.ascontiguousarray(instance.ability / step if unit is None else np.round(instance.ability / step)),
         slow=1.0 / instance.speed,
-        origin=origin.astype(np.int32),
+        origin=reach.origin.astype(np.int32),
         table=np.zeros((0, 0)),
-        place=np.ascontiguousarray(place / scale),
-        goal=np.ascontiguousarray(goal / scale),
-        farthest=instance.communication_range[example] + TOLERANCE,
-        battery=instance.battery[example] + TOLERANCE,
+        place=np.ascontiguousarray(reach.place / reach.unit),
+        goal=np.ascontiguousarray(reach.goal / reach.unit),
+        farthest=reach.communication_range + TOLERANCE,
+        battery=reach.battery + TOLERANCE,
         first=first,
         listed=listed,
-        scale=scale,
-        energy_per_distance=instance.energy_per_distance,
+        scale=reach.unit,
+        energy_per_distance=reach.energy_per_distance,
         unit=step,
         whole=unit is not None,
     )
 
 
-def _lists(instance: Instance, example: NDArray[np.intp]) -> tuple[NDArray[np.int64], Small]:
+def _lists(reach: Reach) -> tuple[NDArray[np.int64], Small]:
     """Lists of tasks by origin, one behind the other; an agent that may do nothing gets a task that there is not."""
-    if instance.allowed_tasks is None:
-        return np.zeros(len(example) + 1, dtype=np.int64), np.zeros(0, dtype=np.int32)
-    nowhere = np.array([instance.m])
-    lists = [instance.allowed_tasks[agent] for agent in example.tolist()]
-    rows = [np.zeros(0, dtype=np.intp) if row is None else row if len(row) else nowhere for row in lists]
+    if not len(reach.lists):
+        return np.zeros(len(reach.place) + 1, dtype=np.int64), np.zeros(0, dtype=np.int32)
+    nowhere, everywhere = np.array([len(reach.goal)]), np.zeros(0, dtype=np.intp)
+    lists = [row if len(row) else nowhere for row in reach.lists]
+    rows = [lists[number] if number >= 0 else everywhere for number in reach.list_of.tolist()]
     first = np.concatenate([[0], np.cumsum([len(row) for row in rows])])
-    return first, np.concatenate([np.sort(row) for row in rows]).astype(np.int32)
+    return first, np.concatenate(rows).astype(np.int32)
 
 
 def _unit(ability: FloatArray) -> float | None:

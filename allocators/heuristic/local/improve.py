@@ -137,14 +137,13 @@ def _improve_endlessly(search: Search, parameters: Parameters, clock: Clock) -> 
 
 def lessen_makespan(search: Search, chain: Chain, parameters: Parameters, clock: Clock) -> None:
     """Aim at makespans between the bound and the best; the nearer to the best, the more often it failed."""
-    best = search.best
-    assert best is not None
-    chain.begin(best.allocation, best.evaluation.served_makespan)
+    assert search.fastest is not None
+    chain.begin(search.fastest.allocation, search.fastest.evaluation.served_makespan)
     patience, fraction = float(parameters.attempt), 0.0
-    while not clock.is_over:
-        assert search.best is not None
-        time_now = search.best.evaluation.served_makespan
-        bound = min(search.lower_bound, time_now) if search.best.evaluation.makespan is not None else 0.5 * time_now
+    while not clock.is_over and not search.fast_enough:
+        fastest = search.fastest.evaluation
+        time_now = fastest.served_makespan
+        bound = min(search.lower_bound, time_now) if fastest.makespan is not None else 0.5 * time_now
         if bound >= time_now * (1 - RELATIVE_TOLERANCE):
             return
         reached = _attempt(search, chain, parameters, clock, bound + fraction * (time_now - bound), int(patience))
@@ -154,7 +153,7 @@ def lessen_makespan(search: Search, chain: Chain, parameters: Parameters, clock:
 
 def _attempt(search: Search, chain: Chain, parameters: Parameters, clock: Clock, hours: float, iterations: int) -> bool:
     """Look for a plan that takes at most so long, the noise falling; whether there is one."""
-    assert search.best is not None
+    assert search.fastest is not None
     chain.aim(hours)
     mean = float(chain.ground.ability.mean())
     for step in range(iterations):
@@ -163,7 +162,7 @@ def _attempt(search: Search, chain: Chain, parameters: Parameters, clock: Clock,
         noise = mean * parameters.shaken * (parameters.calm / parameters.shaken) ** ((step + 1) / iterations)
         chain.run(parameters.exchanges, Weights(0.0, noise, 0.0, 1.0, 2.0, chain.sums), 1.0)
         search.iteration += 1
-    if not chain.short or chain.longest() < search.best.evaluation.served_makespan:
+    if not chain.short or chain.longest() < search.fastest.evaluation.served_makespan:
         search.submit(chain.allocation)
     return not chain.short
 
@@ -174,8 +173,7 @@ def lessen_energy(search: Search, chain: Chain, parameters: Parameters, clock: C
     assert best is not None
     if clock.is_over or best.evaluation.energy == 0:
         return
-    limit = getattr(search, "makespan_limit", best.evaluation.served_makespan)
-    chain.begin(best.allocation, limit)
+    chain.begin(best.allocation, search.makespan_limit)
     clock = Clock(search, clock.until_s, clock.until_iteration)
     ratio = parameters.cold / parameters.hot
     report = Reporter(search, chain)
