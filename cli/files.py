@@ -26,6 +26,22 @@ def read_pair(instance: str, allocation: str | None, *, quiet: bool = False) -> 
     return problem, answer
 
 
+def read_known(instance: str, front: str | None, *, quiet: bool = False) -> "tuple[Instance, list[Allocation]]":
+    """Read an instance, and all allocations of it in a file: one, or those of a front."""
+    from alloc.problems import InputError
+    from alloc.problems.formats import read_allocations, read_instance
+
+    if instance == front == STANDARD:
+        raise InputError("cannot be the instance and the start at once", source="standard input")
+    problem = read_instance(instance)
+    if front is None:
+        return problem, []
+    answers, warning = read_allocations(front, problem)
+    if warning is not None and not quiet:
+        note(warning)
+    return problem, answers
+
+
 def check_writable(name: str | None) -> None:
     """Raise an `InputError` if the file cannot be written as far as that can be told."""
     if name is None or name == STANDARD:

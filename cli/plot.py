@@ -30,13 +30,18 @@ def check_plot(path: str) -> None:
 
 def save_plot(result: "Result", path: str) -> None:
     """Draw `result` into a .png or .svg file, which is written whole or not at all."""
+    save_figure(draw(result), path)
+
+
+def save_figure(figure: "Figure", path: str) -> None:
+    """Write `figure` into a .png or .svg file, whole or not at all."""
     from alloc.problems.formats import write_bytes_atomically
 
     kind = Path(path).suffix.lower().removeprefix(".")
     picture = io.BytesIO()
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Glyph .* missing")  # it draws a box instead
-        draw(result).savefig(picture, format=kind, dpi=150, metadata={"Date": None} if kind == "svg" else None)
+        figure.savefig(picture, format=kind, dpi=150, metadata={"Date": None} if kind == "svg" else None)
     write_bytes_atomically(path, picture.getvalue())
 
 

@@ -4,6 +4,7 @@ from alloc.problems.formats.allocation_file import (
     allocation_from_document,
     allocation_to_document,
     read_allocation,
+    read_allocations,
     write_allocation,
 )
 from alloc.problems.formats.document import from_document, to_document
@@ -15,6 +16,7 @@ __all__ = [
     "allocation_to_document",
     "from_document",
     "read_allocation",
+    "read_allocations",
     "read_bytes",
     "read_instance",
     "read_text",

@@ -14,6 +14,8 @@ from alloc.problems.instance import Instance
 ALLOCATION_FORMAT = "alloc-allocation/1"
 RESULT_FORMAT = "alloc-result/1"
 
+FRONT_FORMAT = "alloc-pareto/1"
+
 ALLOCATION_FIELDS = ("format", "instance", "assignment")
 
 
@@ -45,9 +47,55 @@ def read_allocation(path: PathLike, instance: Instance) -> tuple[Allocation, str
         allocation, name = allocation_from_document(document, instance)
     except InputError as error:
         raise told(error, source) from error.__cause__
+    return allocation, _other_instance(source, name, instance)
+
+
+def read_allocations(path: PathLike, instance: Instance) -> tuple[list[Allocation], str | None]:
+    """Read all allocations of a front (alloc-pareto/1), or the one of a file that `read_allocation` takes.
+
+    Returns
+    -------
+    allocations : list of Allocation
+    warning : str or None
+        One line, where the file names another instance.
+
+    Raises
+    ------
+    InputError
+        As `read_allocation` does.
+    """
+    source = named(path)
+    try:
+        document = json_text.parse(read_text(path))
+        if not isinstance(document, dict) or document.get("format") != FRONT_FORMAT:
+            allocation, name = allocation_from_document(document, instance)
+            allocations = [allocation]
+        else:
+            allocations, name = _front_from_document(document, instance)
+    except InputError as error:
+        raise told(error, source) from error.__cause__
+    return allocations, _other_instance(source, name, instance)
+
+
+def _front_from_document(document: dict[str, Any], instance: Instance) -> tuple[list[Allocation], str | None]:
+    points = document.get("points")
+    if not isinstance(points, list):
+        raise InputError(f"must be a list of points, got {described(points)}", "points")
+    name, found = document.get("instance"), []
+    for number, point in enumerate(points):
+        fields = json_text.require_object(point, f"points[{number}]")
+        inner = {"format": ALLOCATION_FORMAT, "instance": name, "assignment": fields.get("assignment")}
+        try:
+            found.append(allocation_from_document(inner, instance)[0])
+        except InputError as error:
+            raise InputError(error.message, f"points[{number}].{error.place}") from error
+    return found, name
+
+
+def _other_instance(source: str, name: str | None, instance: Instance) -> str | None:
     if name is None or name == instance.name:
-        return allocation, None
-    return allocation, f"{source}: made for instance {quoted(name)}, used for {quoted(instance.name)}"
+        return None
+    return f"{source}: made for instance {quoted(name)}, used for {quoted(instance.name)}"
 
 
 def write_allocation(allocation: Allocation, instance: Instance, path: PathLike) -> None:

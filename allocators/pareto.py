@@ -1,0 +1,214 @@
+"""The front of makespan against energy: how much energy each hour saved costs."""
+
+import math
+import sys
+import threading
+from collections.abc import Callable, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from alloc.allocators.base import Allocator
+from alloc.allocators.interrupt import signals_set
+from alloc.allocators.registry import load
+from alloc.allocators.result import Result
+from alloc.allocators.search import PROVEN, Budget
+from alloc.allocators.solve import solve
+from alloc.problems import Allocation, Evaluation, InputError, Instance, Objective, evaluate
+
+PARETO_FORMAT = "alloc-pareto/1"
+
+CLOSE = 1e-3
+"""Ratio of two makespans below which nothing is looked for between them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Front:
+    """Allocations of which none is both faster and cheaper than another, the fastest first.
+
+    Attributes
+    ----------
+    instance : Instance
+    points : tuple of Result
+        Each the least energy found within its `makespan_limit`, with the bound on it; at least one.
+    complete : bool
+        Whether every run came to its end, none was interrupted.
+    """
+
+    instance: Instance
+    points: tuple[Result, ...]
+    complete: bool
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the fields of the format `alloc-pareto/1`."""
+        return {
+            "format": PARETO_FORMAT,
+            "instance": self.instance.name,
+            "complete": self.complete,
+            "points": [_point(result) for result in self.points],
+        }
+
+
+def _point(result: Result) -> dict[str, Any]:
+    names = (
+        "method", "status", "stop_reason", "makespan", "lower_bound", "makespan_limit", "energy", "energy_lower_bound",
+        "energy_gap", "unserved_tasks", "runtime_s", "assignment",
+    )  # fmt: skip
+    fields = result.to_dict()
+    return {name: fields.get(name) for name in names}
+
+
+def pareto(
+    instance: Instance,
+    method: str | Allocator = "auto",
+    *,
+    points: int = 10,
+    time_limit_s: float | None = 10.0,
+    iterations: int | None = None,
+    seed: int = 0,
+    starts: Sequence[Allocation] = (),
+    threads: int | None = None,
+    on_point: Callable[[Result], None] | None = None,
+    stop: threading.Event | None = None,
+    handle_signals: bool = True,
+) -> Front:
+    """Trace the front of makespan against energy.
+
+    The fastest allocation comes first, then the one with the least energy of all; then, again and again, the least
+    energy at a makespan between the two neighbours that leave the largest area open (the epsilon-constraint method of
+    Haimes, Lasdon and Wismer 1971, doi:10.1109/TSMC.1971.4308298, on an adaptive grid). Every run begins with the
+    best allocation that an earlier one found within its limit.
+
+    Parameters
+    ----------
+    instance : Instance
+    method : str or Allocator
+        One that makes use of slack for the makespan, or ``auto``.
+    points : int
+        Runs, >= 1, and as many as there are `starts` at the least; the front may have fewer points, where several
+        limits have the same best allocation.
+    time_limit_s, iterations, seed, threads
+        Of each single run, as in `solve`.
+    starts : sequence of Allocation
+        Allocations to begin with, such as those of an earlier front: their makespans are the first limits.
+    on_point : callable, optional
+        Called with the result of every run.
+    stop : threading.Event, optional
+        Setting it ends the run in progress and returns the front so far.
+    handle_signals : bool
+        Whether SIGINT and SIGTERM do the same.
+
+    Raises
+    ------
+    InputError, RefusedError
+        As `solve` does.
+    """
+    if points < 1:
+        raise InputError(f"must be at least 1, got {points}", "points")
+    Budget(time_limit_s, iterations)
+    allocator = load(method) if isinstance(method, str) and method != "auto" else method
+    stop = stop or threading.Event()
+    known = [(start, evaluate(instance, start)) for start in starts]
+    wanted = sorted((score.served_makespan, score.energy) for _, score in known if score.makespan)
+    points = max(points, len(wanted))
+    results: list[Result] = []
+    with signals_set(stop) if handle_signals else nullcontext():
+        run = partial(
+            solve,
+            instance,
+            allocator,
+            objective=Objective.MAKESPAN_ENERGY,
+            time_limit_s=time_limit_s,
+            iterations=iterations,
+            seed=seed,
+            threads=threads,
+            stop=stop,
+            handle_signals=False,
+        )
+        while len(results) < points:
+            limit = _next_limit(instance, results, wanted)
+            if limit is None or (results and stop.is_set()):
+                break
+            result = run(start=_best_within(known, limit), makespan_limit=None if limit == 0 else limit)
+            results.append(result)
+            if result.allocation is not None and result.evaluation is not None:
+                known.append((result.allocation, result.evaluation))
+            if on_point is not None:
+                on_point(result)
+    return Front(instance, _undominated(results), complete=not stop.is_set())
+
+
+def _next_limit(instance: Instance, results: Sequence[Result], wanted: Sequence[tuple[float, float]]) -> float | None:
+    """Return the makespan up to which the next run shall save energy; 0 for the fastest, None if all is known.
+
+    After both ends come the makespans of the allocations to begin with, `wanted` with their energies, unless a result
+    is as good already.
+    """
+    if not results:
+        return 0.0
+    fastest = results[0]
+    if not fastest.makespan or not fastest.energy:
+        return None
+    if len(results) == 1:
+        return slowest(instance)
+    for hours, energy in wanted:
+        if not any(_is_as_good(result, hours, energy) for result in results):
+            return hours
+    area, limit = max(_gaps(results), default=(0.0, None))
+    return limit if area > 0 else None
+
+
+def _gaps(results: Sequence[Result]) -> list[tuple[float, float]]:
+    """Return area left open and middle of each pair of neighbours; areas with makespans on a logarithmic scale."""
+    ends = sorted((_limit(result), result.makespan or 0.0, result.energy or 0.0) for result in results)
+    gaps, (left, _, costly) = [], ends[0]
+    for limit, right, cheap in ends[1:]:
+        if right > left * (1 + CLOSE) and costly > cheap * (1 + PROVEN):
+            gaps.append((math.log(right / left) * (costly - cheap), math.sqrt(left * right)))
+        left, costly = limit, min(costly, cheap)
+    return gaps
+
+
+def _is_as_good(result: Result, hours: float, energy: float) -> bool:
+    """Whether `result` is neither slower nor costlier than that, but for trifles."""
+    slow, costly = result.makespan or 0.0, result.energy or 0.0
+    return slow <= hours * (1 + CLOSE) and costly <= energy * (1 + PROVEN)
+
+
+def _limit(result: Result) -> float:
+    """Return the makespan up to which this run minimised the energy."""
+    return max(result.makespan_limit or 0.0, result.makespan or 0.0)
+
+
+def slowest(instance: Instance) -> float:
+    """Return a makespan, in hours, that no allocation exceeds that serves all tasks with any agent each."""
+    hours = float(instance.workload.max()) / float(instance.ability.min())
+    if instance.has_travel_time:
+        places = np.vstack([instance.start_position, instance.task_position])
+        places = places[~np.isnan(places).any(axis=1)]
+        farthest = float(np.linalg.norm(np.ptp(places, axis=0))) if len(places) else 0.0
+        hours += farthest / float(instance.speed.min())
+    return min(hours, sys.float_info.max)
+
+
+def _best_within(known: Sequence[tuple[Allocation, Evaluation]], limit: float) -> Allocation | None:
+    """Return the allocation with the least energy within `limit` hours, else the fastest, None if none is known."""
+    serving = [(plan, score) for plan, score in known if score.makespan is not None and not score.violations]
+    if not serving:
+        return None
+    in_time = [(plan, score) for plan, score in serving if score.served_makespan <= limit]
+    if in_time:
+        return min(in_time, key=lambda pair: (pair[1].energy, pair[1].served_makespan))[0]
+    return min(serving, key=lambda pair: (pair[1].served_makespan, pair[1].energy))[0]
+
+
+def _undominated(results: Sequence[Result]) -> tuple[Result, ...]:
+    """Keep each result that has less energy than all faster ones; if none serves all tasks, the first."""
+    kept: list[Result] = []
+    for result in sorted(results, key=lambda one: (one.makespan or 0.0, one.energy or 0.0)):
+        if result.makespan is not None and (not kept or (result.energy or 0.0) < (kept[-1].energy or 0.0)):
+            kept.append(result)
+    return tuple(kept or results[:1])

@@ -1,0 +1,128 @@
+"""``alloc pareto``."""
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from alloc.cli import options
+from alloc.cli.console import STANDARD, note, number, percent, say, table, to_json, write_out
+from alloc.cli.files import check_writable, read_known
+from alloc.cli.options import examples
+
+if TYPE_CHECKING:
+    from alloc.allocators import Result
+    from alloc.allocators.pareto import Front
+
+EXAMPLES = examples(
+    "alloc pareto demo.json",
+    "alloc pareto demo.json --points 20 --time-limit 5 --plot front.png --output front.json",
+    "alloc pareto demo.json --start front.json --time-limit 60 --output front.json",
+    "alloc pareto demo.json --method milp --json",
+    closing="Ctrl-C ends the run in progress: the front so far is printed and saved.",
+)
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to `app`."""
+    app.command("pareto", epilog=EXAMPLES)(pareto_command)
+
+
+def pareto_command(
+    instance: options.InstanceArgument,
+    method: Annotated[
+        str,
+        typer.Option(autocompletion=options.complete_methods, help="A method that makes use of slack, or auto."),
+    ] = "auto",
+    points: Annotated[int, typer.Option(min=1, max=10_000, help="Runs, one for each point of the front.")] = 10,
+    time_limit: options.TimeLimitOption = None,
+    iterations: options.IterationsOption = None,
+    seed: Annotated[int, typer.Option(min=0, max=2**63 - 1, help="Source of all randomness.")] = 0,
+    start: Annotated[
+        str | None,
+        typer.Option(metavar="FILE", help="An allocation, a result or an earlier front to begin with."),
+    ] = None,
+    threads: options.ThreadsOption = None,
+    output: Annotated[
+        str | None, typer.Option(metavar="FILE", help="Write the front here as JSON; - is standard output.")
+    ] = None,
+    plot: Annotated[str | None, typer.Option(metavar="FILE", help="Draw the front as .png or .svg.")] = None,
+    json: options.JsonOption = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print no table, no notes, no progress.")] = False,
+) -> None:
+    """Trace the front of makespan against energy: what each hour saved costs."""
+    from alloc.allocators.pareto import pareto
+
+    check_writable(output)
+    if plot is not None:
+        from alloc.cli.plot import check_plot
+
+        check_plot(plot)
+    problem, starts = read_known(instance, start, quiet=quiet)
+    front = pareto(
+        problem,
+        method,
+        points=points,
+        time_limit_s=options.time_limit(time_limit, iterations),
+        iterations=iterations,
+        seed=seed,
+        starts=starts,
+        threads=threads,
+        on_point=None if quiet else _show_point,
+    )
+    _save(front, output, json=json)
+    if not quiet:
+        if not json:
+            say(_table(front))
+        for line in dict.fromkeys(line for result in front.points for line in result.notes):
+            note(line)
+    if plot is not None:
+        from alloc.cli.plot_front import save_front
+
+        save_front(front, plot)
+    raise typer.Exit(0 if front.points and front.points[0].makespan is not None else 1)
+
+
+def _save(front: "Front", output: str | None, *, json: bool) -> None:
+    text = to_json(front.to_dict()) if json or output is not None else ""
+    if output is not None and output != STANDARD:
+        from alloc.problems.formats import write_text_atomically
+
+        write_text_atomically(output, text)
+    if json or output == STANDARD:
+        write_out(text)
+
+
+def _show_point(result: "Result") -> None:
+    """On a terminal, tell each point as it comes; the table follows at the end."""
+    import sys
+
+    if sys.stderr is not None and sys.stderr.isatty():
+        say(f"T {number(result.makespan)} h, energy {number(result.energy)}, gap {percent(result.energy_gap)}")
+
+
+def _table(front: "Front") -> str:
+    header = ["T (h)", "slower", "energy", "saved", "at least", "gap", "time (s)", "method", "status"]
+    fastest = front.points[0]
+    rows = [
+        [
+            number(result.makespan, 5),
+            _change(result.makespan, fastest.makespan),
+            number(result.energy, 5),
+            _change(fastest.energy, result.energy, of=fastest.energy),
+            number(result.energy_lower_bound, 5),
+            percent(result.energy_gap),
+            number(result.runtime_s, 3),
+            result.method,
+            str(result.status),
+        ]
+        for result in front.points
+    ]
+    return table(header, rows, left=0)
+
+
+def _change(value: float | None, base: float | None, of: float | None = None) -> str:
+    """Return ``value - base`` as a part of `of`, else of `base`."""
+    whole = base if of is None else of
+    if value is None or base is None or not whole:
+        return "-"
+    return percent((value - base) / whole)
