@@ -17,6 +17,7 @@ _TARGETS = {
     "milp": "alloc.allocators.exact.milp:Milp",
     "cpsat": "alloc.allocators.exact.cpsat:CpSat",
     "ga": "alloc.allocators.heuristic.ga:GeneticAlgorithm",
+    "hedonic": "alloc.allocators.heuristic.hedonic:Hedonic",
     "gappo": "alloc.allocators.learned.gappo:Gappo",
 }
 
@@ -70,6 +71,15 @@ BUILT_IN = {
             warm_start=True,
             anytime=True,
             citation="Fortin et al. (2012), JMLR 13:2171-2175",
+        ),
+        Method(
+            name="hedonic",
+            summary="decentralised coalition-formation game: agents decide on what they hear (GRAPE)",
+            makespan_slack=True,
+            warm_start=True,
+            anytime=True,
+            options=("hearing",),
+            citation="Jang, Shin and Tsourdos (2018), doi:10.1109/TRO.2018.2858292",
         ),
         Method(
             name="gappo",

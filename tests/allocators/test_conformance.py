@@ -2,6 +2,7 @@
 
 import inspect
 import sys
+from typing import ClassVar
 
 import pytest
 
@@ -27,6 +28,17 @@ class TestCpsat(AllocatorConformance):
 
 class TestGa(AllocatorConformance):
     name = "ga"
+
+
+class TestHedonic(AllocatorConformance):
+    name = "hedonic"
+    iterations = 100
+
+
+class TestHedonicWithinHearing(AllocatorConformance):
+    name = "hedonic"
+    options: ClassVar = {"hearing": 0.5}
+    iterations = 100
 
 
 class TestGappo(AllocatorConformance):
