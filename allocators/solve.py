@@ -160,15 +160,19 @@ def refuse(
     reason = None
     if instance.has_travel_time and not method.finite_speeds:
         able = [name for name, other in BUILT_IN.items() if other.finite_speeds]
-        reason = f"finite speeds are beyond it; use {' or '.join(able)}"
+        reason = f"finite speeds are beyond it; use {_either(able)}"
     elif objective not in method.objectives:
         reason = f"it does not optimise {objective}"
     elif deadline != STRICT and not method.makespan_slack:
         able = [name for name, other in BUILT_IN.items() if other.makespan_slack]
-        reason = f"it makes no use of slack for the makespan; use {' or '.join(able)}"
+        reason = f"it makes no use of slack for the makespan; use {_either(able)}"
     reason = reason or allocator.refusal(instance, objective, budget)
     if reason is not None:
         raise RefusedError(f"method {method.name!r} refuses {instance.name!r}: {reason}")
+
+
+def _either(names: list[str]) -> str:
+    return " or ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
 def _conclude(

@@ -24,19 +24,20 @@ def scattered(n: int, m: int, *, speed: float | None = None) -> Instance:
         (20, 5, None, "makespan", 10, "cpsat"),
         (20, 5, None, "makespan-energy", 10, "milp"),
         (500, 50, None, "makespan", 3, "cpsat"),
-        (500, 50, None, "makespan-energy", 3, "ga"),
-        (2000, 200, None, "makespan", 1, "ga"),
-        (2000, 200, None, "makespan-energy", 1, "ga"),
+        (500, 50, None, "makespan-energy", 3, "local-search"),
+        (500, 50, None, "makespan-energy", 30, "milp"),
+        (2000, 200, None, "makespan", 1, "local-search"),
+        (2000, 200, None, "makespan-energy", 1, "local-search"),
         (200, 20, 1.0, "makespan", 10, "cpsat"),
         (200, 20, 1.0, "makespan-energy", 10, "milp"),
-        (2000, 200, 1.0, "makespan", 1, "greedy"),
-        (3000, 1000, None, "makespan", 10, "greedy"),
+        (2000, 200, 1.0, "makespan", 1, "local-search"),
+        (3000, 1000, None, "makespan", 10, "local-search"),
     ],
 )
 def test_choice_follows_size_budget_and_objective(
     n: int, m: int, speed: float | None, objective: str, seconds: float, expected: str
 ) -> None:
-    """Small instances go to a solver, larger ones to `ga`, the rest and slow travellers to greedy."""
+    """Small instances go to a solver, larger ones to the local search, with travel times as well."""
     method, reason = choose(scattered(n, m, speed=speed), Objective(objective), Budget(seconds))
     assert method == expected
     assert " for " in reason
@@ -52,4 +53,4 @@ def test_more_time_turns_the_choice_to_a_proof() -> None:
     """With a minute, a solver is worth trying where in a second it is not; without a limit, all the more."""
     instance = scattered(100, 20)
     picks = [choose(instance, Objective.MAKESPAN_ENERGY, Budget(seconds))[0] for seconds in (1.0, 60.0, None)]
-    assert picks == ["ga", "milp", "milp"]
+    assert picks == ["local-search", "milp", "milp"]
