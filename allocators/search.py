@@ -146,8 +146,9 @@ class Search:
         deadline: Deadline = STRICT,
         on_improvement: Callable[[Improvement], None] | None = None,
         stop: threading.Event | None = None,
+        spent_s: float = 0.0,
     ) -> None:
-        self._begin = time.monotonic()
+        self._begin = time.monotonic() - spent_s  # what was spent on choosing the method is part of the run
         self.instance, self.objective, self.budget = instance, objective, budget
         self.deadline = deadline
         self.seed, self.start, self.threads = seed, start, threads

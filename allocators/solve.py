@@ -100,16 +100,20 @@ def solve(
         option = "makespan-slack" if makespan_slack else "makespan-limit"
         raise InputError(f"leaves room for less energy; it is for the objective {Objective.MAKESPAN_ENERGY}", option)
     notes: list[str] = []
+    begin = time.monotonic()
     if method == "auto":
         given = [name for name, value in options.items() if value is not None]
         if given:
             raise InputError("is for a method that you name, such as gappo; auto may pick one without it", given[0])
         method, reason = choose(instance, goal, budget)
         notes.append(f"auto picked {method}: {reason}")
+    spent_s = time.monotonic() - begin
     if isinstance(method, Allocator) and options:
         raise InputError(f"an allocator that is loaded already takes no options, got {', '.join(options)}", "method")
     allocator = load(method, **options) if isinstance(method, str) else method
+    begin = time.monotonic()
     refuse(allocator, instance, goal, budget, deadline)
+    spent_s += time.monotonic() - begin
     if target_gap is not None:
         importlib.import_module("scipy.optimize")  # for the bound below; loading counts for no method
     stop = stop or threading.Event()
@@ -124,6 +128,7 @@ def solve(
             deadline=deadline,
             on_improvement=on_improvement,
             stop=stop,
+            spent_s=spent_s,
         )
         if target_gap is not None and not allocator.method.proves:
             seconds = UNHURRIED_S if time_limit_s is None else _patience_s(search)

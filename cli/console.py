@@ -46,7 +46,18 @@ def write_json(value: Any) -> None:
 
 def to_json(value: Any) -> str:
     """Return `value` as JSON that any reader takes: no NaN, ASCII alone, a line break at the end."""
+    if isinstance(value, dict) and value:
+        entries = (f"  {json.dumps(str(key))}: {_entry(item)}" for key, item in value.items())
+        return "{\n" + ",\n".join(entries) + "\n}\n"
     return json.dumps(value, indent=2, allow_nan=False) + "\n"
+
+
+def _entry(value: Any) -> str:
+    """One entry of an object; a large flat one by the quick encoder, which does not indent by itself."""
+    if isinstance(value, dict) and value and set(map(type, value.values())) <= {str, type(None)}:
+        flat = json.dumps(value, separators=(",\n    ", ": "))
+        return "{\n    " + flat[1:-1] + "\n  }"
+    return json.dumps(value, indent=2, allow_nan=False).replace("\n", "\n  ")
 
 
 def one_line(text: str) -> str:

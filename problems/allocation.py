@@ -67,4 +67,4 @@ class Allocation:
     def to_ids(self, instance: Instance) -> dict[str, str | None]:
         """Return the task id of each agent id, None for idle, in the order of the agents."""
         ids: list[str | None] = [*instance.task_ids, None]
-        return dict(zip(instance.agent_ids, (ids[task] for task in self.task_of_agent), strict=True))
+        return dict(zip(instance.agent_ids, map(ids.__getitem__, self.task_of_agent.tolist()), strict=True))

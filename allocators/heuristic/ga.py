@@ -10,12 +10,19 @@ from alloc.allocators.heuristic.greedy import greedy
 from alloc.allocators.heuristic.operators import cross_groups, mutate, tournament
 from alloc.allocators.heuristic.population import Genes, Landscape, list_schedules
 from alloc.allocators.registry import BUILT_IN
-from alloc.allocators.search import Search
-from alloc.problems import Allocation, Objective, serve_all
+from alloc.allocators.search import Budget, Search
+from alloc.problems import Allocation, Instance, Objective, serve_all
 from alloc.problems.instance import FloatArray
 
 AIMS = (0.0, 0.5, 0.8, 0.95)
 """Where the makespans that epochs aim at lie, between the lower bound (0) and the best so far (1)."""
+
+
+MOST_AGENTS = 200_000
+"""Agents beyond which a generation takes longer than a run may overrun its time limit."""
+
+MOST_PAIRS = 20_000_000
+"""Pairs of starting place and task beyond which the table of distances takes longer than that."""
 
 
 @dataclass(frozen=True)
@@ -91,6 +98,16 @@ class GeneticAlgorithm(Allocator):
 
     method = BUILT_IN["ga"]
     parameters = Parameters()
+
+    def refusal(self, instance: Instance, objective: Objective, budget: Budget) -> str | None:
+        """Refuse what would take most of a usual time limit only to be looked at once."""
+        if instance.n > MOST_AGENTS:
+            return f"it takes {MOST_AGENTS} agents, this has {instance.n}; use greedy"
+        pairs = instance.reach.pairs
+        by_place = objective is Objective.MAKESPAN_ENERGY or not instance.reach.is_complete
+        if by_place and pairs > MOST_PAIRS:
+            return f"it takes {MOST_PAIRS} pairs of starting place and task, this has {pairs}; use greedy"
+        return None
 
     def allocate(self, search: Search) -> Proposal:
         """Evolve until the search says stop; every improvement has been submitted by then."""

@@ -1,9 +1,10 @@
 import io
+import json
 import sys
 
 import pytest
 
-from alloc.cli.console import one_line, percent, say, table
+from alloc.cli.console import one_line, percent, say, table, to_json
 from alloc.cli.files import check_writable
 from alloc.problems import InputError
 
@@ -39,3 +40,19 @@ def test_write_protected_places_are_told(tmp_path, monkeypatch):
     monkeypatch.setattr("os.access", lambda path, mode: False)
     with pytest.raises(InputError, match="may not be written"):
         check_writable(str(tmp_path / "x.json"))
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        {},
+        [],
+        3,
+        [1, {"a": 2}],
+        {"a": {}, "b": [], "c": {"x": None, "é\n": '"q"'}, "d": [{"x": [1, 2]}], "e": {"q": 1}},
+        {"t": {"k": {"j": "x"}}},
+    ],
+)
+def test_json_is_that_of_the_standard_library(value: object) -> None:
+    """Large objects are encoded another way, which nobody can tell."""
+    assert to_json(value) == json.dumps(value, indent=2) + "\n"

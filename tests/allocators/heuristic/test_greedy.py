@@ -1,13 +1,17 @@
 """Greedy list scheduling."""
 
+from dataclasses import replace
+from unittest.mock import patch
+
 import numpy as np
 import pytest
 from hypothesis import given
+from hypothesis import strategies as st
 from strategies import instances
 
 from alloc.allocators import Budget, Search, solve
-from alloc.allocators.heuristic.greedy import greedy
-from alloc.problems import Allocation, Instance, Objective, evaluate, fewest_unserved
+from alloc.allocators.heuristic.greedy import _by_scan, _by_tree, greedy
+from alloc.problems import Allocation, Instance, Objective, Reach, evaluate, fewest_unserved
 
 
 def test_by_hand() -> None:
@@ -42,6 +46,38 @@ def test_legal_and_complete(instance: Instance) -> None:
     assert result.evaluation is not None
     assert not result.evaluation.violations
     assert len(result.evaluation.unserved_tasks) == fewest_unserved(instance)
+
+
+@given(instances(most_agents=12, most_tasks=30), st.sampled_from([1.0, 1 / 3, 1e200]))
+def test_the_tree_does_what_the_scan_does(instance: Instance, factor: float) -> None:
+    """Compiled or not, each agent gets the same task: ranges, batteries, lists, travel times and unknown places."""
+    instance = replace(
+        instance,
+        agent_position=instance.agent_position * factor,
+        task_position=instance.task_position * factor,
+        communication_range=instance.communication_range * factor,
+        battery=np.minimum(instance.battery * factor, 1e300),
+        speed=instance.speed * factor,
+    )
+    assert _by_tree(instance, None).tolist() == _by_scan(instance, None).tolist()
+
+
+def test_a_hundred_thousand_agents_with_short_ranges() -> None:
+    """No table of all pairs, nobody beyond its range, and every task is served."""
+    rng = np.random.default_rng(0)
+    n, m = 100_000, 2_000
+    instance = Instance(
+        ability=rng.uniform(1, 10, n),
+        workload=rng.uniform(1, 10, m),
+        agent_position=rng.random((n, 3)),
+        task_position=rng.random((m, 3)),
+        communication_range=rng.uniform(0.1, 0.2, n),
+    )
+    with patch.object(Reach, "mask", property()), patch.object(Reach, "distance", property()):
+        result = solve(instance, "greedy", time_limit_s=60)
+    assert result.evaluation is not None
+    assert not result.evaluation.violations
+    assert not result.evaluation.unserved_tasks
 
 
 def test_never_worse_than_four_thirds() -> None:

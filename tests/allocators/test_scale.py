@@ -1,0 +1,80 @@
+"""Instances too large for most methods: who refuses does so at once, and the rest build no table of all pairs."""
+
+import time
+from collections.abc import Iterator
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+import pytest
+
+from alloc.allocators import RefusedError, load, solve
+from alloc.problems import Family, Instance, Objective, Reach, evaluate, random_instance
+from alloc.problems.reach import TABLE_LIMIT
+
+
+@pytest.fixture(autouse=True)
+def no_large_table() -> Iterator[None]:
+    """Make every large table of all pairs an error."""
+
+    def guarded(name: str) -> property:
+        build = Reach.__dict__[name].func
+
+        def table(reach: Reach) -> Any:
+            assert reach.pairs <= TABLE_LIMIT, "a table of all pairs was built"
+            return build(reach)
+
+        return property(table)
+
+    with patch.object(Reach, "distance", guarded("distance")), patch.object(Reach, "mask", guarded("mask")):
+        yield
+
+
+@pytest.fixture(scope="module")
+def far_and_wide() -> Instance:
+    """100,000 agents with places and ranges of their own, 10,000 tasks."""
+    family = Family(agents=100_000, tasks=10_000, starts="own", communication_range=(0.2, 0.4), integer=False)
+    return random_instance(family, 0)
+
+
+@pytest.mark.parametrize("method", ["ga", "gappo", "milp", "cpsat"])
+@pytest.mark.parametrize("objective", list(Objective))
+def test_refusals_are_quick(far_and_wide: Instance, method: str, objective: Objective) -> None:
+    """A method that cannot hold a table of all pairs says so before anybody builds one, and names its limit."""
+    allocator = load(method)
+    instance = far_and_wide
+    instance.reach.is_complete  # noqa: B018 - what any method needs
+    begin = time.perf_counter()
+    with pytest.raises(RefusedError, match=r"\d"):
+        solve(instance, allocator, objective=objective)
+    assert time.perf_counter() - begin < 1.0  # milliseconds on an idle machine
+
+
+@pytest.mark.parametrize("starts", ["tasks", "own"])
+@pytest.mark.parametrize("objective", list(Objective))
+def test_greedy_with_complete_reach(starts: str, objective: Objective) -> None:
+    """200,000 agents and 2,500 tasks: within a tenth of a per cent of the bound, whatever the agents begin at."""
+    instance = random_instance(Family(agents=200_000, tasks=2_500, starts=starts), 0)
+    result = solve(instance, "greedy", objective=objective, time_limit_s=60)
+    assert result.gap is not None
+    assert result.gap < 0.001
+    assert result.allocation is not None
+    assert evaluate(instance, result.allocation).energy == result.energy
+
+
+def test_without_time_tasks_are_served_all_the_same(far_and_wide: Instance) -> None:
+    """The repair after a run that had no time takes seconds at the most, where everyone reaches everything or not."""
+    free = Instance(
+        ability=np.ones(300_000), workload=np.ones(5_000), task_position=np.random.default_rng(0).random((5_000, 3))
+    )
+    for instance in (free, far_and_wide):
+        result = solve(instance, "greedy", time_limit_s=0)
+        assert result.evaluation is not None
+        assert not result.evaluation.unserved_tasks
+
+
+def test_auto_picks_at_once(far_and_wide: Instance) -> None:
+    """What cannot be held is not picked."""
+    result = solve(far_and_wide, "auto", time_limit_s=60)
+    assert result.method in ("greedy", "local-search")
+    assert result.makespan is not None
