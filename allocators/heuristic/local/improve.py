@@ -12,6 +12,12 @@ from alloc.allocators.search import Search
 from alloc.problems import Objective
 from alloc.problems.evaluation import RELATIVE_TOLERANCE
 
+HARD = 100.0
+"""Factor of penalties that no distance outweighs."""
+
+TAIL = 0.95
+"""Part of the budget after which no plan may lack anything any more."""
+
 
 @dataclass(frozen=True)
 class Parameters:
@@ -37,6 +43,8 @@ class Parameters:
         Largest part of the budget that is spent on the makespan where energy counts as well.
     cycle : int
         Iterations of the first cycle of cooling down where no budget is known; each cycle is twice as long.
+    few, many : float
+        Exchanges per agent up to which noise is never more than `cold`, and from which on it begins at `hot`.
     """
 
     exchanges: int = 1000
@@ -51,6 +59,27 @@ class Parameters:
     longer: float = 1.2
     share: float = 0.5
     cycle: int = 100
+    few: float = 10.0
+    many: float = 100.0
+
+    def weights(self, chain: Chain, noise: float, stiffness: float) -> Weights:
+        """Return the weights of exchanges that lessen the distance.
+
+        Parameters
+        ----------
+        noise : float
+            As a part of the distance to a near task.
+        stiffness : float
+            Factor of the penalties.
+        """
+        unit = stiffness * max(chain.step, chain.distance / chain.instance.n)
+        mean = float(chain.ground.ability.mean())
+        return Weights(1.0, noise * chain.step, self.charge * unit, self.lack * unit / mean, 2.0, chain.sums)
+
+    def warmth(self, exchanges: float) -> float:
+        """Return the part of `hot` to begin with, where there is time for so many exchanges per agent."""
+        rise = math.log(max(exchanges, 1e-9) / self.few) / math.log(self.many / self.few)
+        return (self.cold / self.hot) ** (1 - min(1.0, max(0.0, rise)))
 
 
 class Clock:
@@ -86,6 +115,14 @@ class Clock:
         seconds = (search.elapsed_s - self.begin_s) / max(1e-9, self.until_s - self.begin_s)
         iterations = (search.iteration - self.begin_iteration) / max(1, self.until_iteration - self.begin_iteration)
         return min(1.0, max(seconds, iterations))
+
+    @property
+    def left(self) -> float:
+        """Iterations that are left, if they go on as quickly as they did."""
+        search = self.search
+        pace_s = (search.elapsed_s - self.begin_s) / max(1, search.iteration - self.begin_iteration)
+        in_time = (self.until_s - search.elapsed_s) / max(pace_s, 1e-9) if self.until_s < math.inf else math.inf
+        return max(0.0, min(in_time, self.until_iteration - search.iteration))
 
     @property
     def is_over(self) -> bool:
@@ -175,16 +212,16 @@ def lessen_energy(search: Search, chain: Chain, parameters: Parameters, clock: C
         return
     chain.begin(best.allocation, search.makespan_limit)
     clock = Clock(search, clock.until_s, clock.until_iteration)
-    ratio = parameters.cold / parameters.hot
     report = Reporter(search, chain)
-    lack = chain.step * parameters.lack / float(chain.ground.ability.mean())
+    chain.run(parameters.exchanges, parameters.weights(chain, parameters.cold, HARD), 1.0)  # tells the pace
+    search.iteration += 1
+    warmth = parameters.warmth(parameters.exchanges * clock.left / search.instance.n)
+    hot = parameters.hot * warmth
     while not clock.is_over:
-        noise = chain.step * parameters.hot * ratio**clock.progress
-        chain.run(
-            parameters.exchanges,
-            Weights(1.0, noise, parameters.charge * chain.step, lack, 2.0, chain.sums),
-            1.0,
-        )
+        progress = clock.progress
+        noise = hot * (parameters.cold / hot) ** progress
+        stiffness = HARD if hot <= parameters.cold * 1.001 or progress > TAIL else 1.0
+        chain.run(parameters.exchanges, parameters.weights(chain, noise, stiffness), 1.0)
         search.iteration += 1
         report()
     report(at_once=True)

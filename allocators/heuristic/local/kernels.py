@@ -28,7 +28,7 @@ UNREACHED = 1e300
 """Cost of a sum of abilities that no set of agents has."""
 
 
-@inlined
+@compiled
 def draw(state: NDArray[np.uint64], below: int) -> int:
     """Return a random whole number in [0, below), by xorshift (Marsaglia 2003, doi:10.18637/jss.v008.i14)."""
     x = state[0]
@@ -100,7 +100,7 @@ def fill_table(ground: Ground, table: FloatArray) -> None:
             table[row, task] = distance_of(ground, row, task)
 
 
-@inlined
+@compiled
 def share_of(ability: float, slow: float, hours: float, distance: float) -> float:
     """Return the ability that an agent brings to a task done in `hours`, less for the time it takes to get there."""
     return ability if slow == 0.0 else ability * max(0.0, 1.0 - distance * slow / hours)
@@ -112,7 +112,8 @@ def settle(ground: Ground, plan: Plan, hours: float) -> None:
     idle = plan.need.shape[0] - 1
     task_of, load, origin, ability, slow = plan.task, plan.load, ground.origin, ground.ability, ground.slow
     table = ground.table
-    load[:] = 0.0
+    for task in range(idle + 1):
+        load[task] = 0.0
     total = 0.0
     for agent in range(task_of.shape[0]):
         task = task_of[agent]
@@ -123,8 +124,8 @@ def settle(ground: Ground, plan: Plan, hours: float) -> None:
             total += distance
     plan.figure[FLOWN] = total
     plan.counter[SHORTS] = 0
-    plan.short_at[:] = -1
     for task in range(idle):
+        plan.short_at[task] = -1
         note_shortage(plan, task)
 
 
@@ -165,7 +166,8 @@ def move(plan: Plan, agent: int, goal: int) -> None:
 def keep(plan: Plan) -> None:
     """Remember the plan as the best so far, writing only what changed since the last time."""
     if plan.counter[CHANGED] > plan.journal.shape[0]:
-        plan.best[:] = plan.task
+        for agent in range(plan.task.shape[0]):
+            plan.best[agent] = plan.task[agent]
     else:
         for entry in range(plan.counter[CHANGED]):
             agent = plan.journal[entry]
@@ -174,7 +176,7 @@ def keep(plan: Plan) -> None:
     plan.figure[BEST] = plan.figure[FLOWN]
 
 
-@inlined
+@compiled
 def penalty(weights: Weights, lack: float, nobody: bool) -> float:
     """Price of what a task lacks."""
     if lack <= 0.0:
@@ -244,7 +246,7 @@ def exchange(
     most = MOST_FREE // 2 if by_sum else MOST_TRIED // 2
     if plan.size[task] + plan.size[other] <= MOST_TRIED:
         most = MOST_TRIED
-    pool = 0
+    pool = np.int64(0)
     for group in (task, other):
         if plan.size[group] > 0:
             first = draw(plan.random, plan.size[group])
@@ -277,23 +279,18 @@ def apply(plan: Plan, scratch: Scratch, pool: int, chosen: np.uint64, task: int,
     idle = plan.need.shape[0] - 1
     for index in range(pool):
         agent = scratch.agent[index]
-        goes = (chosen >> np.uint64(index)) & np.uint64(1) != np.uint64(0)
-        if goes and plan.task[agent] != task:
-            if plan.begin[task] + plan.size[task] == plan.begin[task + 1]:
-                plan.counter[CROWDED] = 1
-                continue
-            move(plan, agent, task)
-            plan.load[task] += scratch.here[index]
-            plan.load[other] -= scratch.there[index]
-            plan.figure[FLOWN] += scratch.flight[index]
-        elif not goes and plan.task[agent] == task:
-            if plan.begin[other] + plan.size[other] == plan.begin[other + 1]:
-                plan.counter[CROWDED] = 1
-                continue
-            move(plan, agent, other)
-            plan.load[task] -= scratch.here[index]
-            plan.load[other] += scratch.there[index]
-            plan.figure[FLOWN] -= scratch.flight[index]
+        goal, sign = other, -1.0
+        if (chosen >> np.uint64(index)) & np.uint64(1) != np.uint64(0):
+            goal, sign = task, 1.0
+        if plan.task[agent] == goal:
+            continue
+        if plan.begin[goal] + plan.size[goal] == plan.begin[goal + 1]:
+            plan.counter[CROWDED] = 1
+            continue
+        move(plan, agent, goal)
+        plan.load[task] += sign * scratch.here[index]
+        plan.load[other] -= sign * scratch.there[index]
+        plan.figure[FLOWN] += sign * scratch.flight[index]
     note_shortage(plan, task)
     if other != idle:
         note_shortage(plan, other)
