@@ -197,6 +197,12 @@ class Model:
             return time
         return max(time, float((self.work[need > 1] / (need[need > 1] - 1)).min() / self.unit * (1 - ROUNDING)))
 
+    def least_alike(self, time: float) -> float:
+        """Return the least T at which the tasks need the same as at `time`, or `time` where that is not known."""
+        if self.unit is None:
+            return time
+        return min(time, float((self.work / self._units_needed(time)).max() / self.unit))
+
     def allocation(self, demand: Demand, counts: IntArray) -> Allocation:
         """Turn numbers of agents per pair of `demand`, shape (p,), into an allocation."""
         table = np.zeros(self.classes.mask.shape, dtype=np.intp)

@@ -3,13 +3,17 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import highspy
 import numpy as np
 
+from alloc.allocators.exact.configuration import Configurations
 from alloc.allocators.exact.demand import Model
 from alloc.allocators.exact.descent import descend
+from alloc.allocators.exact.enumeration import choose_groups, enumerate_groups
 from alloc.allocators.exact.question import Answer, Question, Watch, is_over
 from alloc.allocators.exact.relaxation import relaxed_lower_bound
 from alloc.allocators.exact.wandering import Wanderer
+from alloc.allocators.interrupt import run_native
 from alloc.allocators.search import PROVEN, Search
 from alloc.problems import Evaluation, agent_classes
 
@@ -25,6 +29,9 @@ REPEATABLE_ROUNDS = 20
 
 STEPS_PER_TIME = 1000
 """Splits for one time."""
+
+STEPS_PER_TEST = 20_000
+"""Splits for a time that is tested."""
 
 LONG, SHORT = 300, 20
 """Kicks of a descent: where solvers have failed, and at the start."""
@@ -84,6 +91,7 @@ class LeastMakespan:
         self._low = self._simple_bound()
         self._wall = 0.0
         self._hard = False
+        self._configurations: Configurations | None = None
 
     @property
     def _high(self) -> float:
@@ -104,7 +112,8 @@ class LeastMakespan:
         if self._descent:
             self._quick_plans()
             self._wander(0.02, 0.05)
-        if self._search.instance.has_travel_time or not self._search.instance.reach.is_complete:
+            self._raise_by_prices()
+        elif self._search.instance.has_travel_time or not self._search.instance.reach.is_complete:
             self._raise_by_relaxation()
         test = Test(self._low, self._part(0.25))
         while not (self._closed or self._over):
@@ -114,8 +123,7 @@ class LeastMakespan:
                     return
                 self._wall = self._wall if test.top else max(self._wall, test.time)
                 if not self._hard:
-                    self._hard = True
-                    self._raise_by_relaxation()
+                    self._raise_by_prices()
             test = self._next(ruled_out=found is False)
 
     def _next(self, *, ruled_out: bool) -> Test:
@@ -136,8 +144,12 @@ class LeastMakespan:
         demand = self._model.at(test.time)
         if demand.hopeless:
             return self._rule_out(test.time)
-        if self._hard and self._descent and self._descend(test.time, 0.05, kicks=LONG):
+        if self._hard and self._descent and self._find_plan(test.time):
             return True
+        if self._hard and self._configurations is not None:
+            known = self._try_groups(test, self._configurations)
+            if known is not None:
+                return known
         until_s = min(self._search.elapsed_s + test.seconds + self._build_s, self._until_s)
         question = Question(
             demand=demand,
@@ -173,6 +185,70 @@ class LeastMakespan:
         if model.serve == len(model.tasks):
             return self._search.lower_bound
         return float(np.sort(model.work)[: model.serve].sum() / (model.classes.ability @ model.classes.count))
+
+    def _raise_by_prices(self) -> None:
+        """Let the configuration linear programme push the lower bound, or a simpler one where that takes too long."""
+        self._hard = True
+        if self._closed or self._over or self._model.serve < len(self._model.tasks):
+            return
+        configurations = Configurations(self._model, self._low)
+        if not configurations.able:
+            self._raise_by_relaxation()
+            return
+        self._configurations = configurations
+        until_s = self._search.elapsed_s + (np.inf if self._repeatable else self._part(0.3))
+        time = possible = self._high
+        time = self._low
+        while not (self._closed or self._over) and possible > self._low * (1 + TIGHT):
+            prices, solved = configurations.best_prices(time, lambda: self._over or self._search.elapsed_s > until_s)
+            if prices is None or not (solved or prices.theta > 1):
+                return
+            if prices.theta > 1:
+                self._rule_out(configurations.reach_of(prices, time, possible))
+            else:
+                possible = max(self._low, self._model.least_alike(time))
+            time = (self._low + min(possible, self._high)) / 2
+
+    def _try_groups(self, test: Test, configurations: Configurations) -> bool | None:
+        """Whether some choice of groups makes a plan, None if that stays open."""
+        until_s = min(self._search.elapsed_s + test.seconds, self._until_s)
+
+        def over() -> bool:
+            return self._over or self._search.elapsed_s >= until_s
+
+        prices, _ = configurations.best_prices(test.time, over, converge=True)
+        if prices is None:
+            return None
+        if prices.theta > 1:
+            return self._rule_out(configurations.reach_of(prices, test.time, self._high))
+        choice = enumerate_groups(configurations, prices, test.time, over)
+        if choice is None or over():
+            return None
+        highs = highspy.Highs()
+        highs.HandleUserInterrupt = True
+        seconds = np.inf if self._repeatable else until_s - self._search.elapsed_s
+        found = run_native(lambda: choose_groups(choice, highs, seconds, self._search.seed), over, highs.cancelSolve)
+        table, impossible = found or (None, False)
+        if impossible:
+            return self._rule_out(test.time)
+        if table is None:
+            return None
+        full = np.zeros(self._model.classes.mask.shape, dtype=np.intp)
+        full[:, self._model.tasks] = table
+        high, score = self._high, self._search.submit(self._model.classes.spread(full))
+        return True if self._is_met(score, test.time) and score.served_makespan < high else None
+
+    def _find_plan(self, time: float) -> bool:
+        """Wander, or descend where that cannot be; whether a plan with makespan `time` was found."""
+        if not self._wanderer.able:
+            return self._descend(time, 0.05, kicks=LONG)
+        assert self._search.best is not None
+        self._wanderer.settle(self._search.best.allocation)
+        until_s = np.inf if self._repeatable else self._search.elapsed_s + self._part(0.01)
+        found, plan = self._wanderer.walk(
+            time, lambda: self._over or self._search.elapsed_s >= until_s, most_steps=STEPS_PER_TEST
+        )
+        return self._is_met(self._search.submit(plan), time) and found
 
     def _raise_by_relaxation(self) -> None:
         """Let linear programmes push the lower bound; they see more than the simple bounds, and less than a test."""

@@ -52,6 +52,7 @@ def split(
     value: FloatArray,
     base: FloatArray,
     need: FloatArray,
+    tasks: int,
     size: int,
     within: float,
     sums: FloatArray,
@@ -62,10 +63,12 @@ def split(
 
     Parameters
     ----------
-    value : ndarray, shape (tasks, POOL)
+    value : ndarray, shape (MOST_TASKS, POOL)
         What each agent adds to each task.
-    base, need : ndarray, shape (tasks,)
+    base, need : ndarray, shape (MOST_TASKS,)
         What each task has already, and needs.
+    tasks : int
+        How many they are.
     size : int
         Agents to split.
     within : float
@@ -74,7 +77,7 @@ def split(
         Space to work in.
     state : ndarray of uint64, shape (1,)
         Of the random numbers.
-    chosen : ndarray of int, shape (tasks,)
+    chosen : ndarray of int, shape (MOST_TASKS,)
         Gets the agents of each task, as bits; of several best splits a random one. Unchanged if there is none.
 
     Returns
@@ -82,17 +85,15 @@ def split(
     float
         ``inf`` if there is no such split.
     """
-    tasks, all_agents = len(need), (1 << size) - 1
+    all_agents, most, slack = (1 << size) - 1, sums[MOST_TASKS], 0.0
     largest = np.zeros(size)
-    for agent in range(size):
-        for task in range(tasks):
-            largest[agent] = max(largest[agent], value[task, agent])
     for task in range(tasks):
+        slack = max(slack, 1e-9 * need[task])
         sum_subsets(value[task], size, sums[task])
-    sum_subsets(largest, size, sums[MOST_TASKS])
-    most = sums[MOST_TASKS]
-    slack = 1e-9 * need.max()
-    later = np.zeros(tasks)  # what the tasks after each one need from the pool
+        for agent in range(size):
+            largest[agent] = max(largest[agent], value[task, agent])
+    sum_subsets(largest, size, most)
+    later = np.zeros(MOST_TASKS)  # what the tasks after each one need from the pool
     for task in range(tasks - 2, -1, -1):
         later[task] = later[task + 1] + need[task + 1] - base[task + 1]
     best, equals, found = within, 0, False
@@ -169,12 +170,15 @@ def wander(
         size[j] += 1
     sums = np.empty((MOST_TASKS + 1, 1 << POOL))
     task, chosen = np.empty(MOST_TASKS, dtype=np.int64), np.zeros(MOST_TASKS, dtype=np.int64)
-    value, base = np.empty((MOST_TASKS, POOL)), np.empty(MOST_TASKS)
+    value, base, needs = np.empty((MOST_TASKS, POOL)), np.empty(MOST_TASKS), np.empty(MOST_TASKS)
     pool, at = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
-    least, best = (has / need).min(), place.copy()
-    total = 0.0
+    best = np.empty_like(place)
+    for i in range(n):
+        best[i] = place[i]
+    total, least = 0.0, np.inf
     for j in range(t):
         total += missing(has[j], need[j])
+        least = min(least, has[j] / need[j])
     for _ in range(steps):
         if total == 0.0:
             break
@@ -199,7 +203,7 @@ def wander(
         before = 0.0
         for q in range(tasks):
             j = task[q]
-            base[q] = has[j]
+            base[q], needs[q] = has[j], need[j]
             before += missing(has[j], need[j])
             for r in range(size[j]):
                 pool[agents], at[agents] = members[j, r], q
@@ -213,7 +217,7 @@ def wander(
             for q in range(tasks):
                 value[q, p] = work[pool[p], task[q]]
             base[at[p]] -= value[at[p], p]
-        after = split(value[:tasks], base[:tasks], need[task[:tasks]], used, before, sums, state, chosen)
+        after = split(value, base, needs, tasks, used, before, sums, state, chosen)
         if after == np.inf:
             continue
         for q in range(tasks):
@@ -240,5 +244,6 @@ def wander(
             lowest = min(lowest, has[j] / need[j])
         if lowest > least:
             least = lowest
-            best[:] = place
+            for i in range(n):
+                best[i] = place[i]
     return total, least, best

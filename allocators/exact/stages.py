@@ -8,10 +8,10 @@ import scipy.optimize
 import scipy.sparse.csgraph  # noqa: F401 - both are loaded with the method, so that no run waits for them
 
 from alloc.allocators.base import Allocator, Proposal
+from alloc.allocators.exact import enumeration, wandering
 from alloc.allocators.exact.energy import least_energy
 from alloc.allocators.exact.makespan import LeastMakespan
 from alloc.allocators.exact.question import Answer, Question, Watch
-from alloc.allocators.exact.wandering import compile_loops
 from alloc.allocators.heuristic.greedy import greedy
 from alloc.allocators.search import Budget, Search
 from alloc.problems import Instance, Objective, count_classes, fewest_unserved, serve_all
@@ -41,7 +41,8 @@ class ExactAllocator(Allocator):
 
     def __init__(self, *, descent: bool = True) -> None:
         self._descent = descent
-        compile_loops()
+        enumeration.compile_loops()
+        wandering.compile_loops()
 
     def refusal(self, instance: Instance, objective: Objective, budget: Budget) -> str | None:
         """Refuse models that would take most of the time only to be built."""

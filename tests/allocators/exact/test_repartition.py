@@ -16,12 +16,12 @@ def lacking(value: np.ndarray, base: np.ndarray, need: np.ndarray, goal: tuple[i
 def test_split_is_the_best_there_is(tasks, seed):
     """Of all ways to split six agents, some barred from some tasks, none misses less; every agent is used once."""
     rng = np.random.default_rng(seed)
-    value = np.zeros((tasks, POOL))
-    value[:, :6] = rng.integers(1, 20, 6) * (rng.random((tasks, 6)) < 0.8)
+    value = np.zeros((MOST_TASKS, POOL))
+    value[:tasks, :6] = rng.integers(1, 20, 6) * (rng.random((tasks, 6)) < 0.8)
     base, need = rng.integers(0, 5, tasks).astype(float), rng.integers(10, 40, tasks).astype(float)
     best = min(lacking(value, base, need, goal) for goal in product(range(tasks), repeat=6))
     chosen, sums = np.zeros(MOST_TASKS, dtype=np.int64), np.empty((MOST_TASKS + 1, 1 << POOL))
-    found = split(value, base, need, 6, need.sum(), sums, np.ones(1, dtype=np.uint64), chosen)
+    found = split(value, base, need, tasks, 6, need.sum(), sums, np.ones(1, dtype=np.uint64), chosen)
     assert found == best
     assert sorted(q for p in range(6) for q in range(tasks) if chosen[q] >> p & 1) == sorted(
         q for q in range(tasks) for _ in range(int(chosen[q]).bit_count())
@@ -32,10 +32,10 @@ def test_split_is_the_best_there_is(tasks, seed):
 
 def test_nothing_within_the_limit():
     """Where every split misses more than is allowed, none is chosen."""
-    value, sums = np.ones((2, POOL)), np.empty((MOST_TASKS + 1, 1 << POOL))
+    value, sums = np.ones((MOST_TASKS, POOL)), np.empty((MOST_TASKS + 1, 1 << POOL))
     chosen = np.full(MOST_TASKS, -1)
     state = np.ones(1, dtype=np.uint64)
-    assert split(value, np.zeros(2), np.full(2, 9.0), 4, 1.0, sums, state, chosen) == np.inf
+    assert split(value, np.zeros(2), np.full(2, 9.0), 2, 4, 1.0, sums, state, chosen) == np.inf
     assert (chosen == -1).all()
 
 
