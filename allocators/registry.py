@@ -18,6 +18,8 @@ _TARGETS = {
     "cpsat": "alloc.allocators.exact.cpsat:CpSat",
     "ga": "alloc.allocators.heuristic.ga:GeneticAlgorithm",
     "hedonic": "alloc.allocators.heuristic.hedonic:Hedonic",
+    "auction": "alloc.allocators.heuristic.auction:Auction",
+    "lp-round": "alloc.allocators.heuristic.lp_round:LpRound",
     "gappo": "alloc.allocators.learned.gappo:Gappo",
 }
 
@@ -80,6 +82,23 @@ BUILT_IN = {
             anytime=True,
             options=("hearing",),
             citation="Jang, Shin and Tsourdos (2018), doi:10.1109/TRO.2018.2858292",
+        ),
+        Method(
+            name="auction",
+            summary="decentralised auction: tasks bid for agents until a deadline is met, then agents exchange places",
+            makespan_slack=True,
+            warm_start=True,
+            anytime=True,
+            citation="Bertsekas (1992), doi:10.1007/BF00247653",
+        ),
+        Method(
+            name="lp-round",
+            summary="linear programme over classes of agents, rounded by a matching, mended by local search",
+            finite_speeds=True,
+            makespan_slack=True,
+            warm_start=True,
+            anytime=True,
+            citation="Shmoys and Tardos (1993), doi:10.1007/BF01585178",
         ),
         Method(
             name="gappo",

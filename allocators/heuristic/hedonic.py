@@ -78,7 +78,7 @@ class Hedonic(Allocator):
 
     def __init__(self, hearing: float | None = None) -> None:
         self.hearing = hearing
-        _compile()
+        compile_game()
 
     def refusal(self, instance: Instance, objective: Objective, budget: Budget) -> str | None:
         """Every agent keeps what it knows of all others."""
@@ -230,8 +230,8 @@ def _sample(count: int, most: int, rng: np.random.Generator) -> IntArray:
     return np.arange(count) if count <= most else rng.choice(count, most, replace=False)
 
 
-def _compile() -> None:
-    """Compile the loop, or read it from its cache, before a clock runs."""
+def compile_game() -> None:
+    """Compile the loops of the game, or read them from their cache, before a clock runs."""
     instance = Instance(ability=[1, 2], workload=[2, 1])
     game = Game(Search(instance, Objective.MAKESPAN, Budget(None, 1)), hearing(instance), Parameters())
     game.begin(Allocation.idle(instance))

@@ -41,6 +41,15 @@ class TestHedonicWithinHearing(AllocatorConformance):
     iterations = 100
 
 
+class TestAuction(AllocatorConformance):
+    name = "auction"
+    iterations = 200
+
+
+class TestLpRound(AllocatorConformance):
+    name = "lp-round"
+
+
 class TestGappo(AllocatorConformance):
     name = "gappo"
     iterations = 4
