@@ -10,6 +10,9 @@ from alloc.problems.instance import IDLE, Instance, IntArray
 SPENT = -1
 """Mark of agents that a search in vain has met: no later path leads through them."""
 
+NEARBY = 64
+"""Origins next to a task that are looked at first where there are many."""
+
 MANY = 50_000_000
 """Pairs of agent, or of origin, and unserved task that are too many to look at one by one."""
 
@@ -102,6 +105,8 @@ def serve_all(instance: Instance, allocation: Allocation) -> Allocation:
         return Allocation(task)
     if instance.reach.is_complete and instance.n * len(unserved) > MANY:
         return Allocation(_serve_by_anyone(instance, task, unserved))
+    if len(instance.reach.place) * len(unserved) > MANY and not instance.reach.has_table:
+        task, unserved = _serve_nearby(instance, task, unserved)
     matching = _start(instance, task, len(unserved))
     for j in unserved:
         matching.serve(j)
@@ -119,6 +124,32 @@ def _serve_by_anyone(instance: Instance, task_of_agent: IntArray, unserved: list
     free = np.argsort(busy, kind="stable")[: int((busy < 2).sum())][: len(unserved)]
     task_of_agent[free] = unserved[: len(free)]
     return task_of_agent
+
+
+def _serve_nearby(instance: Instance, task_of_agent: IntArray, unserved: list[int]) -> tuple[IntArray, list[int]]:
+    """Serve tasks by idle agents from the `NEARBY` nearest origins that have one; return the tasks that are left."""
+    from scipy.spatial import cKDTree
+
+    reach, task_of_agent = instance.reach, task_of_agent.copy()
+    by_origin = reach.agents_by_origin[1]
+    idle = by_origin[task_of_agent[by_origin] == IDLE]
+    bounds = np.searchsorted(reach.origin[idle], np.arange(len(reach.place) + 1))
+    first, end = bounds[:-1].copy(), bounds[1:]
+    origins = np.flatnonzero((first < end) & ~np.isnan(reach.place[:, 0]))
+    goals = np.array(unserved)[~np.isnan(reach.goal[unserved, 0])]
+    if not len(origins) or not len(goals):
+        return task_of_agent, unserved
+    count = min(NEARBY, len(origins))
+    _, near = cKDTree(reach.place[origins] / reach.unit).query(reach.goal[goals] / reach.unit, k=count)
+    served = set()
+    for j, row in zip(goals.tolist(), origins[near.reshape(len(goals), count)], strict=True):
+        same = np.full(count, j)
+        able = row[(first[row] < end[row]) & reach.is_within(row, same, reach.distances_between(row, same))]
+        if len(able):
+            task_of_agent[idle[first[able[0]]]] = j
+            first[able[0]] += 1
+            served.add(j)
+    return task_of_agent, [j for j in unserved if j not in served]
 
 
 def _start(instance: Instance, task_of_agent: IntArray, unserved: int) -> _Matching:
