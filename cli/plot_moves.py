@@ -33,10 +33,11 @@ def two_axes(instance: Instance) -> tuple[int, int]:
     return first, second
 
 
-def flows(instance: Instance, allocation: Allocation) -> Flows:
-    """Gather the agents that change places by where they begin and where they go."""
-    task = allocation.task_of_agent
-    begin = instance.start_position
+def flows(instance: Instance, allocation: Allocation, agents: IntArray | None = None) -> Flows:
+    """Gather the agents (or these of them) that change places by where they begin and where they go."""
+    chosen = slice(None) if agents is None else agents
+    task = allocation.task_of_agent[chosen]
+    begin = instance.start_position[chosen]
     goal = instance.task_position[np.maximum(task, 0)]
     moves = (task != IDLE) & ~np.isnan(begin[:, 0]) & ~np.isnan(goal[:, 0]) & (begin != goal).any(axis=1)
     pairs, count = np.unique(np.hstack([begin[moves], goal[moves]]), axis=0, return_counts=True)

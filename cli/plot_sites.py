@@ -18,7 +18,16 @@ if TYPE_CHECKING:
 MOST_LABELS = 60
 """Tasks beyond which single ones are not named."""
 
+MOST_AGENTS = 20_000
+"""Agents beyond which a sample of them is drawn: dots and wedges would only cover each other."""
+
 Plane = tuple[int, int]
+
+
+def drawn_agents(result: "Result") -> "IntArray":
+    """Return the agents whose starts and moves are drawn: all, or evenly spaced ones of many."""
+    n = result.instance.n
+    return np.unique(np.linspace(0, n - 1, min(n, MOST_AGENTS)).astype(np.intp))
 
 
 def draw_sites(axes: "Axes", result: "Result") -> "tuple[FloatArray, FloatArray]":
@@ -48,11 +57,14 @@ def _areas(result: "Result", sites: "FloatArray") -> "FloatArray":
 
 def _draw_starts(axes: "Axes", result: "Result", plane: Plane) -> None:
     """Agents that do not begin at a task: dots, hollow for the idle ones."""
-    instance = result.instance
-    place = instance.start_position[:, list(plane)]
-    idle = np.ones(instance.n, dtype=bool) if result.allocation is None else result.allocation.task_of_agent < 0
+    instance, agents = result.instance, drawn_agents(result)
+    start = instance.start_position[agents]
+    place = start[:, list(plane)]
+    idle = np.ones(len(agents), dtype=bool)
+    if result.allocation is not None:
+        idle = result.allocation.task_of_agent[agents] < 0
     at_task = {tuple(row) for row in instance.task_position.tolist()}
-    own = np.array([tuple(row) not in at_task for row in instance.start_position.tolist()]) & ~np.isnan(place[:, 0])
+    own = np.array([tuple(row) not in at_task for row in start.tolist()]) & ~np.isnan(place[:, 0])
     size = float(np.clip(3_000 / instance.n, 4, 28))
     busy, free = own & ~idle, own & idle
     axes.scatter(place[busy, 0], place[busy, 1], s=size, color=MOVE, linewidths=0, zorder=2)
@@ -66,7 +78,7 @@ def _draw_moves(axes: "Axes", result: "Result", plane: Plane) -> None:
         return
     places = np.vstack([result.instance.task_position, result.instance.start_position])[:, list(plane)]
     extent = float(np.ptp(places[~np.isnan(places[:, 0])], axis=0).max()) or 1.0
-    shapes = wedges(flows(result.instance, result.allocation), plane, extent)
+    shapes = wedges(flows(result.instance, result.allocation, drawn_agents(result)), plane, extent)
     alpha = float(np.clip(40 / max(len(shapes), 1), 0.12, 0.55))
     axes.add_collection(PolyCollection(shapes, facecolors=MOVE, alpha=alpha, linewidths=0, zorder=1))
 
@@ -112,7 +124,8 @@ def _finish(axes: "Axes", result: "Result", plane: Plane) -> None:
     axes.set_xlabel("xyz"[plane[0]])
     axes.set_ylabel("xyz"[plane[1]])
     counts = ", number = agents" if result.instance.m <= MOST_LABELS else ""
-    axes.set_title(f"circle = task (area = workload{counts}); wedge = move, thin end at the task", fontsize=9)
+    sample = f"; {MOST_AGENTS} of the agents are drawn" if result.instance.n > MOST_AGENTS else ""
+    axes.set_title(f"circle = task (area = workload{counts}); wedge = move, thin end at the task{sample}", fontsize=9)
     axes.grid(color="0.92", linewidth=0.6)
     axes.set_axisbelow(True)
     bar = ScalarMappable(Normalize(*colour_range(result)), scale())

@@ -1,6 +1,6 @@
 """The right half of a drawing: when each task is done."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -16,9 +16,14 @@ if TYPE_CHECKING:
 MOST_ROWS = 40
 """Tasks beyond which bars stand upright, without names."""
 
+MOST_BARS = 1_000
+"""Tasks beyond which a line stands for each."""
+
 
 def draw_times(axes: "Axes", result: "Result") -> None:
     """Draw a bar per task, the unserved first, then the last one first, with makespan and lower bound as lines."""
+    from matplotlib.colors import to_rgba
+
     time, unserved = finite_times(result), unserved_tasks(result)
     order = np.lexsort((-time, ~unserved))
     top = max(float(time.max()), result.makespan or 0.0, result.lower_bound or 0.0) or 1.0
@@ -27,9 +32,13 @@ def draw_times(axes: "Axes", result: "Result") -> None:
     fill[missing] = 1.0
     rows = result.instance.m <= MOST_ROWS
     thick = 0.8 if result.instance.m <= 150 else 1.0
-    bars = (axes.barh if rows else axes.bar)(np.arange(result.instance.m), height, thick, color=fill)
-    for place in np.flatnonzero(missing):
-        bars[place].set(hatch="////", linewidth=0.8, edgecolor=UNSERVED)
+    if result.instance.m > MOST_BARS:
+        fill[missing] = to_rgba(UNSERVED, 0.3)
+        axes.vlines(np.arange(result.instance.m), 0, height, colors=cast(Any, fill), linewidth=0.5)
+    else:
+        bars = (axes.barh if rows else axes.bar)(np.arange(result.instance.m), height, thick, color=fill)
+        for place in np.flatnonzero(missing):
+            bars[place].set(hatch="////", linewidth=0.8, edgecolor=UNSERVED)
     lines = _lines(axes, result, rows)
     if rows:
         _name_rows(axes, result, order, top)

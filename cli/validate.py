@@ -50,7 +50,6 @@ def validate_command(
 def _facts(instance: "Instance") -> dict[str, Any]:
     from alloc.problems import fewest_unserved, makespan_lower_bound
 
-    origins = instance.reach.origin
     unserved = fewest_unserved(instance)
     return {
         "name": instance.name,
@@ -58,7 +57,7 @@ def _facts(instance: "Instance") -> dict[str, Any]:
         "tasks": instance.m,
         "total_ability": float(instance.ability.sum()),
         "total_workload": float(instance.workload.sum()),
-        "reach_density": float(instance.reach.mask.mean(axis=1)[origins].mean()),
+        "reach_density": instance.reach.density,
         "travel_time": instance.has_travel_time,
         "fewest_unserved": unserved,
         "lower_bound": makespan_lower_bound(instance) if unserved == 0 else None,

@@ -123,6 +123,18 @@ class Reach:
         return find_neighbours(self)
 
     @cached_property
+    def density(self) -> float:
+        """Share of the tasks that an agent can take, on average; by a sample where nobody could count them all."""
+        m = len(self.goal)
+        if self.has_table:
+            return float(self.mask.mean(axis=1)[self.origin].mean())
+        if self.is_complete:
+            return 1.0
+        if self.neighbours is None:
+            return estimated_pairs(self) / self.pairs
+        return float(np.diff(self.neighbours.first)[self.origin].mean() / m)
+
+    @cached_property
     def agents_by_origin(self) -> tuple[Indices, Indices]:
         """Where each origin's agents begin in the second array, shape (origins + 1,); and all agents by origin."""
         order = np.argsort(self.origin, kind="stable")

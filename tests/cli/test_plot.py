@@ -5,7 +5,7 @@ from alloc.allocators import solve
 from alloc.cli.plot import draw
 from alloc.cli.plot_labels import place_labels, visible
 from alloc.cli.plot_moves import flows, two_axes, wedges
-from alloc.problems import Allocation, Instance
+from alloc.problems import Allocation, Family, Instance, random_instance
 from alloc.problems.formats import write_instance
 
 
@@ -104,3 +104,13 @@ def test_names_of_every_script_on_one_line(alloc, tmp_path):
     write_instance(instance, tmp_path / "names.json")
     ran = alloc("solve", "names.json", "--method", "greedy", "--plot", "names.png", "-q")
     assert (ran.code, ran.err) == (0, "")
+
+
+def test_very_many_agents_and_tasks_are_drawn_by_a_sample():
+    """Beyond what can be told apart on paper, dots and wedges are of some agents, and lines stand for the tasks."""
+    instance = random_instance(Family(agents=30_000, tasks=1_200, starts="own"), 0)
+    figure = draw(solve(instance, "greedy"))
+    sites, times = figure.axes[:2]
+    assert "20000 of the agents" in sites.get_title()
+    assert len(sites.collections[0].get_offsets()) <= 20_000
+    assert not times.patches

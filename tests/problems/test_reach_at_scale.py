@@ -67,6 +67,7 @@ def test_pairs_agree_with_the_table(instance: Instance, factor: float) -> None:
         assert (lazy.distance_of(agents, tasks) == distance[origin[agents], tasks]).all()
         assert (lazy.allows(agents, tasks) == mask[origin[agents], tasks]).all()
         assert lazy.is_complete == mask.all()
+        assert lazy.density == pytest.approx(mask[origin].mean())
         rows = lazy.rows(np.arange(len(lazy.place)))
         assert (rows[0] == distance).all()
         assert (rows[1] == mask).all()
