@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from alloc.allocators.base import Allocator, Proposal
+from alloc.allocators.heuristic.exchange import fly_less
 from alloc.allocators.registry import BUILT_IN
 from alloc.allocators.search import Search
-from alloc.problems import IDLE, Allocation, Instance, makespan_lower_bound
+from alloc.problems import IDLE, Allocation, Instance, Objective, makespan_lower_bound
 
 CHECK_EVERY = 256
 """Agents between two looks at the clock."""
@@ -39,9 +40,15 @@ class Greedy(Allocator):
 
 
 def greedy(instance: Instance, search: Search | None = None) -> Allocation:
-    """Build the greedy allocation; ends early when `search` says so."""
+    """Build the greedy allocation; ends early when `search` says so.
+
+    Where energy counts, and everyone reaches everything at once, agents of equal ability then exchange tasks.
+    """
     if instance.reach.is_complete and not instance.has_travel_time:
-        return Allocation(_by_heap(instance, search))
+        task = _by_heap(instance, search)
+        if search is not None and search.objective is Objective.MAKESPAN_ENERGY:
+            task = fly_less(instance, task, search.should_stop)
+        return Allocation(task)
     if instance.reach.has_table and instance.n <= MOST_SCANNED:
         return Allocation(_by_scan(instance, search))
     return Allocation(_by_tree(instance, search))
