@@ -2,11 +2,14 @@
 
 import sys
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from alloc.allocators.exact.demand import ROUNDING, Model
+from alloc.allocators.exact.demand import ROUNDING, Demand, Model
+from alloc.allocators.exact.narrowing import MOST_TASKS, REPEATABLE_SLICES, Narrowing
 from alloc.allocators.exact.question import Answer, Question, Watch, is_over
 from alloc.allocators.search import Search
 from alloc.problems import IDLE, Allocation, Instance, agent_classes
@@ -14,6 +17,15 @@ from alloc.problems.instance import IntArray
 
 MOST_MATCHED = 400
 """Agents alike that are matched with their places at once, some 10 ms; larger classes are cut into parts."""
+
+FEW_PAIRS = 200
+"""Pairs of class and task that a solver does away with at once."""
+
+UNHURRIED_S = 60.0
+"""What the parts of the time are measured by where there is no time limit, or a longer one."""
+
+PART_ALONE = 0.3
+"""Part of the time before which the solver is not asked."""
 
 
 def least_energy(search: Search, ask: Callable[[Question, Watch], Answer], serve: int) -> float | None:
@@ -41,23 +53,96 @@ def least_energy(search: Search, ask: Callable[[Question, Watch], Answer], serve
     model = Model.build(search.instance, agent_classes(search.instance, by_place=True), serve)
     search.submit(nearest_places(search.instance, search.best.allocation, lambda: is_over(search)))
     search.submit(without_idlers(model, search.best.allocation, time))
-    demand, budget = model.at(time), search.budget
-    pairs = model.pairs_at(demand)
-    until_s = np.inf if budget.time_limit_s is None else budget.time_limit_s
-    question = Question(
-        demand=demand,
-        cost=model.distance[pairs],
-        hint=model.counts(demand, search.best.allocation),
-        seconds=search.remaining_s,
-        threads=search.threads,
-        seed=search.seed,
-        repeatable=budget.time_limit_s is None and budget.iterations is not None,
-    )
-    answer = ask(question, Watch(search, model, demand, until_s))
-    search.iteration += 1
-    if answer.counts is not None:
-        search.submit(model.allocation(demand, answer.counts))
-    return min(max(0.0, answer.bound * search.instance.energy_per_distance), sys.float_info.max)
+    bound = _Energy(search, ask, model, model.at(time)).run()
+    return min(max(0.0, bound * search.instance.energy_per_distance), sys.float_info.max)
+
+
+class _Energy:
+    """Plans and bounds by `Narrowing`, then by the solver, which gets only what a better plan may have."""
+
+    def __init__(self, search: Search, ask: Callable[[Question, Watch], Answer], model: Model, demand: Demand) -> None:
+        assert search.best is not None
+        self._search, self._ask, self._model, self._demand = search, ask, model, demand
+        self._begin_s, budget = search.elapsed_s, search.budget
+        self._repeatable = budget.time_limit_s is None and budget.iterations is not None
+        self._until_s = np.inf if budget.time_limit_s is None else budget.time_limit_s
+        self._hurry_s = min(UNHURRIED_S, self._until_s - self._begin_s)
+        self._sides: Narrowing | None = None
+        if len(demand.kind) > FEW_PAIRS and len(demand.need) <= MOST_TASKS:
+            sides = Narrowing(search.instance, model, demand, search.best.allocation, search.seed)
+            self._sides = None if sides.idle else sides
+
+    def run(self) -> float:
+        """Return the distance that is proven to be needed."""
+        sides = self._sides
+        if sides is not None:
+            self._narrow(sides)
+            if sides.closed or is_over(self._search):
+                return sides.bound
+        answer = self._put(sides)
+        return answer.bound if sides is None else max(sides.bound, min(answer.bound, self._cost))
+
+    @property
+    def _cost(self) -> float:
+        assert self._search.best is not None
+        return self._search.best.evaluation.distance
+
+    def _narrow(self, sides: Narrowing) -> None:
+        """Narrow until bounds hardly rise any more, and half of the time has passed."""
+        if self._repeatable:
+            for number in range(REPEATABLE_SLICES):
+                if sides.closed or self._search.interrupted:
+                    return
+                self._submit(sides.repeat(number))
+            return
+        with ThreadPoolExecutor(1) as pool:
+            while not (is_over(self._search) or sides.closed):
+                share = (self._search.elapsed_s - self._begin_s) / self._hurry_s if self._hurry_s > 0 else 1.0
+                if share >= 1 or (sides.settled and share >= PART_ALONE):
+                    return
+                self._submit(sides.run(min(1.0, share), pool if self._search.threads > 1 else None))
+
+    def _submit(self, plan: Allocation | None) -> None:
+        if plan is not None:
+            self._search.submit(plan)
+        if self._sides is not None:
+            self._sides.meet(self._cost)
+
+    def _put(self, sides: Narrowing | None) -> Answer:
+        """Put the rest to the solver; the calling thread goes on meanwhile if there are processors for both."""
+        search, demand = self._search, self._demand
+        assert search.best is not None
+        if sides is not None:
+            keep = sides.keep
+            demand = replace(
+                demand,
+                kind=demand.kind[keep],
+                goal=demand.goal[keep],
+                weight=demand.weight[keep],
+                most=demand.most[keep],
+            )
+        question = Question(
+            demand=demand,
+            cost=self._model.distance[self._model.pairs_at(demand)],
+            hint=self._model.counts(demand, search.best.allocation),
+            seconds=search.remaining_s,
+            threads=max(1, search.threads - 1) if sides is not None else search.threads,
+            seed=search.seed,
+            repeatable=self._repeatable,
+        )
+
+        def meanwhile() -> bool:
+            if sides is None or self._repeatable or search.threads == 1:
+                return False
+            share = (search.elapsed_s - self._begin_s) / self._hurry_s if self._hurry_s > 0 else 1.0
+            self._submit(sides.run(min(1.0, share), None))
+            return sides.closed
+
+        answer = self._ask(question, Watch(search, self._model, demand, self._until_s, meanwhile))
+        search.iteration += 1
+        if answer.counts is not None:
+            search.submit(self._model.allocation(demand, answer.counts))
+        return answer
 
 
 def nearest_places(

@@ -72,10 +72,21 @@ class Watch:
         What the counts given to `tell` are about.
     until_s : float
         Seconds since the run began at which the solver must end.
+    meanwhile : callable, optional
+        What the calling thread does each time that it looks at the solver, for 50 ms at most; returns whether the
+        solver is no longer needed.
     """
 
-    def __init__(self, search: Search, model: Model, demand: Demand, until_s: float) -> None:
+    def __init__(
+        self,
+        search: Search,
+        model: Model,
+        demand: Demand,
+        until_s: float,
+        meanwhile: Callable[[], bool] = lambda: False,
+    ) -> None:
         self._search, self._model, self._demand, self._until_s = search, model, demand, until_s
+        self._meanwhile = meanwhile
         self._finds: deque[IntArray] = deque(maxlen=1)
         self._error: BaseException | None = None
         self.halted = threading.Event()
@@ -99,7 +110,8 @@ class Watch:
 
     def _should_stop(self) -> bool:
         self._submit()
-        return self._error is not None or is_over(self._search) or self._search.elapsed_s >= self._until_s
+        over = self._error is not None or is_over(self._search) or self._search.elapsed_s >= self._until_s
+        return over or self._meanwhile()
 
     def _submit(self) -> None:
         """Submit the last find; what a callback of the user raises waits until the solver has ended."""

@@ -8,7 +8,7 @@ import scipy.optimize
 import scipy.sparse.csgraph  # noqa: F401 - both are loaded with the method, so that no run waits for them
 
 from alloc.allocators.base import Allocator, Proposal
-from alloc.allocators.exact import enumeration, wandering
+from alloc.allocators.exact import enumeration, narrowing, wandering
 from alloc.allocators.exact.energy import least_energy
 from alloc.allocators.exact.makespan import LeastMakespan
 from alloc.allocators.exact.question import Answer, Question, Watch
@@ -43,6 +43,7 @@ class ExactAllocator(Allocator):
         self._descent = descent
         enumeration.compile_loops()
         wandering.compile_loops()
+        narrowing.compile_loops()
 
     def refusal(self, instance: Instance, objective: Objective, budget: Budget) -> str | None:
         """Refuse models that would take most of the time only to be built."""
