@@ -4,7 +4,8 @@
 
 Each command is a process of its own. Its seconds are parted into start (interpreter and imports), reading, solving
 (`runtime_s` of the result) and the rest (bounds by linear programme, summary, writing); memory is its largest resident
-set. The exponent is that of the power law through the seconds beyond the start, by least squares on logarithms.
+set. Exponents are those of the power law from 10,000 agents on, by least squares on logarithms: of solving, and of the
+whole command without its start. Runs that go on until their time limit have none.
 """
 
 import argparse
@@ -124,10 +125,11 @@ def _run(command: list[str]) -> tuple[str, float, int]:
     return output, float(seconds), int(memory) * (1 if sys.platform == "darwin" else 1024)
 
 
-def exponent(rows: list[Row]) -> float:
-    """Return b of seconds = a agents^b through `rows`, without the start of the program."""
-    seconds = [row.wall_s - row.start_s for row in rows]
-    return float(np.polyfit(np.log([row.agents for row in rows]), np.log(np.maximum(seconds, 1e-3)), 1)[0])
+def exponent(rows: list[Row], seconds: list[float]) -> float:
+    """Return b of seconds = a agents^b through `rows` of at least 10,000 agents."""
+    large = [(row.agents, time) for row, time in zip(rows, seconds, strict=True) if row.agents >= 10_000]
+    agents, times = np.array(large).T
+    return float(np.polyfit(np.log(agents), np.log(np.maximum(times, 1e-3)), 1)[0])
 
 
 def series(rows: list[Row]) -> dict[tuple[str, str], list[Row]]:
@@ -147,8 +149,11 @@ def markdown(rows: list[Row]) -> str:
             times = f"{row.start_s:.2f} | {row.read_s:.2f} | {row.solve_s:.2f} | {row.rest_s:.2f} | {row.wall_s:.2f}"
             gap = f"{row.unserved} unserved" if row.unserved else f"{100 * row.gap:.3f} %"
             lines.append(f"| {case} | {method} | {row.agents:,} | {times} | {row.memory / 2**20:.0f} | {gap} |")
-        if len(group) > 1:
-            lines.append(f"| {case} | {method} | exponent | | | | | {exponent(group):.2f} | | |")
+        ends_by_itself = group[0].solve_s < group[-1].solve_s / 2
+        if ends_by_itself and sum(row.agents >= 10_000 for row in group) > 1:
+            solve = exponent(group, [row.solve_s for row in group])
+            whole = exponent(group, [row.wall_s - row.start_s for row in group])
+            lines.append(f"| {case} | {method} | exponent | | | {solve:.2f} | | {whole:.2f} | | |")
     return "\n".join(lines)
 
 
@@ -164,7 +169,7 @@ def draw(rows: list[Row], path: str) -> None:
     styles = dict(zip(dict.fromkeys(row.method for row in rows), ("-", "--", ":"), strict=False))
     for (case, method), group in series(rows).items():
         x, y = [row.agents for row in group], [row.wall_s - row.start_s for row in group]
-        label = f"{method}, {case} (exponent {exponent(group):.2f})"
+        label = f"{method}, {case}"
         axes.loglog(x, y, styles[method], marker="o", markersize=4, color=colours[case], label=label)
     ends = np.array([min(row.agents for row in rows), max(row.agents for row in rows)])
     axes.loglog(ends, ends * 8e-6, color="0.6", linewidth=1, label="linear")
