@@ -10,6 +10,9 @@ from alloc.allocators.heuristic.local.ground import Ground, Small
 from alloc.allocators.heuristic.local.kernels import draw, exchange, keep
 from alloc.allocators.heuristic.local.plan import BEST, CROWDED, FLOWN, SHORTS, Plan, Scratch, Weights
 
+TRIES = 30
+"""Agents that are drawn to find one that reaches a task."""
+
 WILD = 8
 """One in so many exchanges is with any task, not with a near one."""
 
@@ -45,6 +48,18 @@ def any_of(state: NDArray[np.uint64], tasks: int, row: Small) -> int:
 
 
 @compiled
+def helper(ground: Ground, plan: Plan, task: int) -> int:
+    """Return a random agent that may be able to come to a task: one of a few drawn that reaches it, if there is one."""
+    agent = 0
+    table, origin, state, agents = ground.table, ground.origin, plan.random, plan.task.shape[0]
+    for _ in range(TRIES):
+        agent = draw(state, agents)
+        if table.shape[0] == 0 or table[origin[agent], task] < np.inf:
+            break
+    return agent
+
+
+@compiled
 def anneal(
     ground: Ground, plan: Plan, scratch: Scratch, near: Near, hours: float, steps: int, weights: Weights, cooling: float
 ) -> float:
@@ -63,10 +78,9 @@ def anneal(
             task = plan.short[draw(plan.random, plan.counter[SHORTS])]
             if plan.size[tasks] > 0 and draw(plan.random, 2) == 0:
                 other = tasks
-            elif draw(plan.random, 2) == 0:
-                other = draw(plan.random, tasks)
             else:
-                other = any_of(plan.random, tasks, near.of_task[task])
+                agent = helper(ground, plan, task)
+                other = plan.task[agent]
         else:
             agent = draw(plan.random, agents)
             other = plan.task[agent]

@@ -11,6 +11,7 @@ from alloc.allocators.heuristic.local.plan import Weights
 from alloc.allocators.search import Search
 from alloc.problems import Objective
 from alloc.problems.evaluation import RELATIVE_TOLERANCE
+from alloc.problems.instance import FloatArray
 
 HARD = 100.0
 """Factor of penalties that no distance outweighs."""
@@ -33,8 +34,10 @@ class Parameters:
         First and last noise on distances, as a part of the distance to a near task.
     charge, lack : float
         Penalty of a task that lacks ability, and of each mean ability that it lacks, in the same unit.
-    shaken, calm : float
-        First and last noise while the makespan is lessened, as a part of the mean ability.
+    shaken : tuple of float
+        First noise of one attempt at a makespan after the other, as a part of the mean ability.
+    calm : float
+        Their last noise.
     attempt : int
         Iterations of the first attempt at a makespan; each that fails makes the next longer.
     longer : float
@@ -53,8 +56,8 @@ class Parameters:
     cold: float = 0.007
     charge: float = 1.2
     lack: float = 5.0
-    shaken: float = 0.1
-    calm: float = 0.001
+    shaken: tuple[float, ...] = (0.1, 0.01, 0.001)
+    calm: float = 1e-6
     attempt: int = 4
     longer: float = 1.2
     share: float = 0.5
@@ -79,7 +82,8 @@ class Parameters:
     def warmth(self, exchanges: float) -> float:
         """Return the part of `hot` to begin with, where there is time for so many exchanges per agent."""
         rise = math.log(max(exchanges, 1e-9) / self.few) / math.log(self.many / self.few)
-        return (self.cold / self.hot) ** (1 - min(1.0, max(0.0, rise)))
+        part: float = (self.cold / self.hot) ** (1 - min(1.0, max(0.0, rise)))
+        return part
 
 
 class Clock:
@@ -176,28 +180,30 @@ def lessen_makespan(search: Search, chain: Chain, parameters: Parameters, clock:
     """Aim at makespans between the bound and the best; the nearer to the best, the more often it failed."""
     assert search.fastest is not None
     chain.begin(search.fastest.allocation, search.fastest.evaluation.served_makespan)
-    patience, fraction = float(parameters.attempt), 0.0
+    patience, fraction, attempts = float(parameters.attempt), 0.0, 0
+    mean = float(chain.ground.ability.mean())
     while not clock.is_over and not search.fast_enough:
         fastest = search.fastest.evaluation
         time_now = fastest.served_makespan
         bound = min(search.lower_bound, time_now) if fastest.makespan is not None else 0.5 * time_now
         if bound >= time_now * (1 - RELATIVE_TOLERANCE):
             return
-        reached = _attempt(search, chain, parameters, clock, bound + fraction * (time_now - bound), int(patience))
+        shaken = parameters.shaken[attempts % len(parameters.shaken)]
+        noises = mean * np.geomspace(shaken, parameters.calm, int(patience) + 1)[1:]
+        reached = _attempt(search, chain, clock, bound + fraction * (time_now - bound), noises, parameters.exchanges)
         fraction = 0.5 * fraction if reached else min(0.5 * (1 + fraction), 0.999)
         patience *= 1.0 if reached else parameters.longer
+        attempts += 1
 
 
-def _attempt(search: Search, chain: Chain, parameters: Parameters, clock: Clock, hours: float, iterations: int) -> bool:
-    """Look for a plan that takes at most so long, the noise falling; whether there is one."""
+def _attempt(search: Search, chain: Chain, clock: Clock, hours: float, noises: FloatArray, exchanges: int) -> bool:
+    """Look for a plan that takes at most so long, with one noise per iteration; whether there is one."""
     assert search.fastest is not None
     chain.aim(hours)
-    mean = float(chain.ground.ability.mean())
-    for step in range(iterations):
+    for noise in noises.tolist():
         if clock.is_over or not chain.short:
             break
-        noise = mean * parameters.shaken * (parameters.calm / parameters.shaken) ** ((step + 1) / iterations)
-        chain.run(parameters.exchanges, Weights(0.0, noise, 0.0, 1.0, 2.0, chain.sums), 1.0)
+        chain.run(exchanges, Weights(0.0, noise, 0.0, 1.0, 2.0, chain.sums), 1.0)
         search.iteration += 1
     if not chain.short or chain.longest() < search.fastest.evaluation.served_makespan:
         search.submit(chain.allocation)

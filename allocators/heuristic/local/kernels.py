@@ -11,6 +11,7 @@ from alloc.allocators.heuristic.local.plan import (
     CROWDED,
     FLOWN,
     MOST_FREE,
+    MOST_HALVED,
     MOST_SUMS,
     MOST_TRIED,
     SHORTS,
@@ -23,6 +24,9 @@ from alloc.problems.instance import FloatArray
 
 EMPTY = 1e12
 """Penalty of a task without anybody, beyond all others."""
+
+LOOK = 8
+"""Sums of the second half that are looked at for each of the first, from the least that is enough on."""
 
 UNREACHED = 1e300
 """Cost of a sum of abilities that no set of agents has."""
@@ -207,7 +211,10 @@ def gather(
     agents, bring_here, bring_there = scratch.agent, scratch.here, scratch.there
     flights, prices, logistic = scratch.flight, scratch.price, scratch.logistic
     noise = draw(plan.random, TABLE_SIZE)
-    for step in range(min(size, most)):
+    room = pool + most
+    for step in range(size):
+        if pool == room:
+            break
         position = first + step
         agent = slot[begin + (position if position < size else position - size)]
         row = origin[agent]
@@ -243,10 +250,10 @@ def exchange(
     if plan.need[other] < plan.need[task] and other != plan.need.shape[0] - 1:
         task, other = other, task
     by_sum = weights.sums * MOST_FREE < MOST_SUMS
-    most = MOST_FREE // 2 if by_sum else MOST_TRIED // 2
+    most = MOST_FREE // 2 if by_sum else MOST_HALVED // 2
     if plan.size[task] + plan.size[other] <= MOST_TRIED:
         most = MOST_TRIED
-    pool = np.int64(0)
+    pool: int = np.int64(0)  # type: ignore[assignment]
     for group in (task, other):
         if plan.size[group] > 0:
             first = draw(plan.random, plan.size[group])
@@ -268,6 +275,8 @@ def exchange(
     span = int(max(0.0, min(total, most_here + weights.spare)))
     if by_sum and (pool > MOST_TRIED or pool * span < 2 << pool):
         chosen = by_sums(scratch, weights, pool, span, total, left, right, alone, lonely)
+    elif pool > MOST_TRIED:
+        chosen = by_halves(scratch, weights, pool, left, right)
     else:
         chosen = by_trial(scratch, weights, pool, left, right, alone, lonely)
     apply(plan, scratch, pool, chosen, task, other)
@@ -368,4 +377,56 @@ def by_trial(
             value += penalty(weights, other_lack, lonely and entry == count - 1)
         if value < best:
             best, chosen = value, entry
+    return np.uint64(chosen)
+
+
+@compiled
+def sorted_subsets(scratch: Scratch, begin: int, count: int, base: int) -> int:
+    """Write all sets of `count` agents of the pool, in the order of their sums, from `base` on; return how many."""
+    here, there, cost, sets = scratch.trial_here, scratch.trial_there, scratch.trial_cost, scratch.trial_set
+    spare = 2 << (MOST_HALVED // 2)
+    here[base], there[base], cost[base], sets[base] = 0.0, 0.0, 0.0, 0
+    size = 1
+    for index in range(begin, begin + count):
+        more, less, price, bit = scratch.here[index], scratch.there[index], scratch.price[index], 1 << index
+        without, with_it = base, base
+        for entry in range(spare, spare + 2 * size):
+            if with_it == base + size or (without < base + size and here[without] <= here[with_it] + more):
+                here[entry], there[entry] = here[without], there[without]
+                cost[entry], sets[entry] = cost[without], sets[without]
+                without += 1
+            else:
+                here[entry], there[entry] = here[with_it] + more, there[with_it] + less
+                cost[entry], sets[entry] = cost[with_it] + price, sets[with_it] | bit
+                with_it += 1
+        size *= 2
+        for entry in range(size):
+            here[base + entry], there[base + entry] = here[spare + entry], there[spare + entry]
+            cost[base + entry], sets[base + entry] = cost[spare + entry], sets[spare + entry]
+    return size
+
+
+@compiled
+def by_halves(scratch: Scratch, weights: Weights, pool: int, left: float, right: float) -> np.uint64:
+    """Choose among sets of the pool that are just enough, each of one half and one of the other; return it as bits.
+
+    By Horowitz and Sahni (1974), doi:10.1145/321812.321823: with both halves in order, for each set of the first one
+    finds the sets of the second that make up for what is left.
+    """
+    here, there, cost, sets = scratch.trial_here, scratch.trial_there, scratch.trial_cost, scratch.trial_set
+    middle = 1 << (MOST_HALVED // 2)
+    size = sorted_subsets(scratch, 0, pool // 2, 0)
+    other_size = sorted_subsets(scratch, pool // 2, pool - pool // 2, middle)
+    total = 0.0
+    for index in range(pool):
+        total += scratch.there[index]
+    best, chosen, enough = np.inf, 0, other_size
+    for entry in range(size):
+        while enough > 0 and here[entry] + here[middle + enough - 1] >= left:
+            enough -= 1
+        for fit in range(middle + max(0, enough - 1), middle + min(other_size, enough + LOOK)):
+            value = cost[entry] + cost[fit] + penalty(weights, left - here[entry] - here[fit], False)
+            value += penalty(weights, right - (total - there[entry] - there[fit]), False)
+            if value < best:
+                best, chosen = value, sets[entry] | sets[fit]
     return np.uint64(chosen)

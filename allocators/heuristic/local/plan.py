@@ -14,6 +14,9 @@ MOST_FREE = 32
 MOST_TRIED = 12
 """The same where every set of them is tried."""
 
+MOST_HALVED = 20
+"""The same where there are more, and only sets that are just enough are tried; halves and space must fit."""
+
 TABLE_SIZE = 4096
 """Random numbers that are drawn beforehand."""
 
@@ -81,6 +84,7 @@ class Scratch(NamedTuple):
     trial_here: FloatArray
     trial_there: FloatArray
     trial_cost: FloatArray
+    trial_set: NDArray[np.int64]
     logistic: FloatArray
 
 
@@ -127,5 +131,8 @@ def room_to_work(seed: int) -> Scratch:
     cost, sets = np.empty(2 * MOST_SUMS), np.empty(2 * MOST_SUMS, dtype=np.uint64)
     here, there, flight, price = (np.empty(2 * MOST_FREE) for _ in range(4))
     trial_here, trial_there, trial_cost = (np.empty(1 << MOST_TRIED) for _ in range(3))
+    trial_set = np.empty(1 << MOST_TRIED, dtype=np.int64)
     agent, logistic = np.empty(2 * MOST_FREE, dtype=np.int32), np.log(uniform / (1 - uniform))
-    return Scratch(agent, here, there, flight, price, cost, sets, trial_here, trial_there, trial_cost, logistic)
+    return Scratch(
+        agent, here, there, flight, price, cost, sets, trial_here, trial_there, trial_cost, trial_set, logistic
+    )
