@@ -85,10 +85,12 @@ def anneal(
             agent = draw(plan.random, agents)
             other = plan.task[agent]
             task = any_of(plan.random, tasks, near.of_origin[near.row[ground.origin[agent]]])
-            if task == other and plan.size[tasks] > 0:
-                other = tasks
-            elif task == other:
-                task = any_of(plan.random, tasks, near.of_task[other])
+            spare = other < tasks and plan.load[other] > plan.need[other]
+            if other < tasks and (task == other or (spare and draw(plan.random, 4) == 0)):
+                if spare or plan.size[tasks] > 0:
+                    task, other = other, tasks
+                else:
+                    task = any_of(plan.random, tasks, near.of_task[other])
         if (
             task < 0
             or other < 0
