@@ -3,9 +3,9 @@
     python tests/benchmarks/local_search_paper_scenarios.py --scenarios 1 2 3 4 --seeds 100
     python tests/benchmarks/local_search_paper_scenarios.py --energy-limit 3 --keep    # better energies are kept
 
-The first row of each scenario is for the makespan alone, the second for the energy at it. Energies are compared with the
-least ever met at T = 1, which are kept in `local_search_best_known.json` beside this file, by scenario and seed; what a
-run meets counts as well.
+The first row of each scenario is for the makespan alone, the second for the energy at it. Energies are compared with
+the least ever met at T = 1, which are kept in `local_search_best_known.json` beside this file, by scenario and seed;
+what a run meets counts as well. They were made by the second command with limits of 1 and 2.5 s.
 """
 
 import argparse

@@ -14,7 +14,7 @@ MOST_FREE = 32
 MOST_TRIED = 12
 """The same where every set of them is tried."""
 
-MOST_HALVED = 20
+MOST_HALVED = 16
 """The same where there are more, and only sets that are just enough are tried; halves and space must fit."""
 
 TABLE_SIZE = 4096
