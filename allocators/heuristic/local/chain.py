@@ -59,9 +59,11 @@ class Chain:
 
     def begin(self, allocation: Allocation, hours: float) -> None:
         """Go on from an allocation, and aim at a makespan."""
-        task = allocation.task_of_agent
-        self._served = np.isin(np.arange(self.instance.m), task)
-        self._place(np.where(task == IDLE, self.instance.m, task).astype(np.int32))
+        idle = self.instance.m
+        task = np.where(allocation.task_of_agent == IDLE, idle, allocation.task_of_agent).astype(np.int32)
+        task[np.append(self.instance.workload == 0, False)[task]] = idle
+        self._served = np.isin(np.arange(idle), task)
+        self._place(task)
         self.aim(hours)
 
     def aim(self, hours: float) -> None:

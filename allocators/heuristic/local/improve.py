@@ -10,7 +10,7 @@ from alloc.allocators.heuristic.local.chain import Chain
 from alloc.allocators.heuristic.local.clock import Clock
 from alloc.allocators.heuristic.local.plan import Weights
 from alloc.allocators.search import Search
-from alloc.problems import Objective
+from alloc.problems import Allocation, Objective
 from alloc.problems.evaluation import RELATIVE_TOLERANCE
 from alloc.problems.instance import FloatArray
 
@@ -109,7 +109,10 @@ def improve(
     """
     assert search.best is not None
     clock = Clock(search, until_s, search.iteration + iterations)
-    if clock.is_over or not (search.instance.workload > 0).any():
+    if search.best.evaluation.served_makespan == 0:  # no task that takes time can be served
+        search.submit(Allocation.idle(search.instance))
+        return
+    if clock.is_over:
         return
     parameters = parameters or Parameters()
     economical = search.objective is Objective.MAKESPAN_ENERGY

@@ -11,7 +11,7 @@ from alloc.allocators import load, solve
 from alloc.allocators.heuristic.greedy import greedy
 from alloc.allocators.heuristic.local.improve import Parameters, improve
 from alloc.allocators.search import Budget, Search
-from alloc.problems import Instance, Objective, evaluate, serve_all
+from alloc.problems import Allocation, Instance, Objective, evaluate, serve_all
 from alloc.problems.generate import paper, random_instance
 from alloc.problems.generate_family import Family
 
@@ -79,6 +79,25 @@ def test_travel_times_and_real_abilities(allocator):
         result = solve(instance, allocator, **settings)
         assert result.lower_bound <= result.makespan <= first.makespan * 1.01
         assert result.energy < 0.8 * first.energy
+
+
+def test_nothing_to_do(allocator):
+    """Where no task with work can be served, or none has any, everybody rests."""
+    places = {"agent_position": [[0, 0], [0, 1]], "task_position": [[1, 0], [2, 0]]}
+    for work, lists in (([0, 0], None), ([0, 1], [[0], [0]])):
+        instance = Instance(ability=[1, 1], workload=work, allowed_tasks=lists, **places)
+        start = Allocation([0, 0])
+        result = solve(instance, allocator, objective="makespan-energy", start=start, iterations=3, time_limit_s=None)
+        assert result.energy == 0
+
+
+def test_work_that_there_is_not(allocator):
+    """Agents that a start sends to a task without work come to rest."""
+    places = {"agent_position": [[0, 0], [0, 1]], "task_position": [[0, 0], [2, 0]]}
+    instance = Instance(ability=[1, 1], workload=[1, 0], **places)
+    start = Allocation([0, 1])
+    result = solve(instance, allocator, objective="makespan-energy", start=start, iterations=3, time_limit_s=None)
+    assert result.allocation == Allocation([0, 0])
 
 
 def test_few_agents_per_task(allocator):
