@@ -151,6 +151,8 @@ def _set_parameters(solver: cp_model.CpSolver, question: Question) -> None:
     parameters.catch_sigint_signal = False
     parameters.random_seed = question.seed % 2**31
     parameters.num_workers = 1 if question.repeatable else question.threads
+    if question.cost is None and question.demand.spare == 0:  # all equations: presolve finds nothing and takes long
+        parameters.cp_model_presolve = False
     if np.isfinite(question.seconds):
         parameters.max_time_in_seconds = question.seconds
     if question.repeatable:

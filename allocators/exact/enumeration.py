@@ -20,6 +20,7 @@ from scipy.sparse import csc_array
 from alloc.allocators.compiled import compiled
 from alloc.allocators.exact.configuration import Configurations, Prices
 from alloc.allocators.exact.patterns import WholeArray, fill_table, read_group
+from alloc.allocators.interrupt import run_native
 from alloc.problems.instance import FloatArray, IntArray
 
 MOST_GROUPS = 60_000
@@ -173,7 +174,7 @@ def enumerate_groups(
     return Choice(np.concatenate(found), np.array(rows, dtype=np.intp), tasks, count)
 
 
-def choose_groups(choice: Choice, highs: highspy.Highs, seconds: float, seed: int) -> tuple[WholeArray | None, bool]:
+def choose_groups(choice: Choice, seed: int, should_stop: Callable[[], bool]) -> tuple[WholeArray | None, bool]:
     """Choose a group for each task by HiGHS.
 
     Returns
@@ -183,35 +184,41 @@ def choose_groups(choice: Choice, highs: highspy.Highs, seconds: float, seed: in
     bool
         Whether there is proven to be no such choice.
     """
+    highs = highspy.Highs()
+    highs.HandleUserInterrupt = True
+    for option, value in (("output_flag", False), ("parallel", "off"), ("random_seed", seed % 2**31)):
+        highs.setOptionValue(option, value)
+
+    def work() -> highspy.HighsModelStatus:
+        highs.passModel(_programme(choice))
+        highs.solve()
+        return highs.getModelStatus()
+
+    status = run_native(work, should_stop, highs.cancelSolve)
+    if status is None or status == highspy.HighsModelStatus.kInfeasible:
+        return None, status is not None
+    if highs.getInfo().primal_solution_status != highspy.SolutionStatus.kSolutionStatusFeasible:
+        return None, False
+    return _table(choice, np.round(np.asarray(highs.getSolution().col_value)).astype(np.int64)), False
+
+
+def _programme(choice: Choice) -> highspy.HighsLp:
+    """State that each task takes a group, and no class more agents than it has."""
     p, rows = len(choice.row), len(choice.tasks)
     alike = np.array([len(tasks) for tasks in choice.tasks], dtype=float)
     line, kind = np.nonzero(choice.groups)
-    matrix = csc_array(
-        (
-            np.concatenate([np.ones(p), choice.groups[line, kind].astype(float)]),
-            (np.concatenate([choice.row, rows + kind]), np.concatenate([np.arange(p), line])),
-        ),
-        shape=(rows + len(choice.count), p),
-    )
+    row = np.concatenate([choice.row, rows + kind])
+    value = np.concatenate([np.ones(p), choice.groups[line, kind].astype(float)])
+    matrix = csc_array((value, (row, np.concatenate([np.arange(p), line]))), shape=(rows + len(choice.count), p))
     lp = highspy.HighsLp()
-    lp.num_col_, lp.num_row_ = p, matrix.shape[0]
+    lp.num_row_, lp.num_col_ = matrix.shape
     lp.col_cost_, lp.col_lower_, lp.col_upper_ = np.zeros(p), np.zeros(p), alike[choice.row]
     lp.row_lower_ = np.concatenate([alike, np.full(len(choice.count), -np.inf)])
     lp.row_upper_ = np.concatenate([alike, choice.count.astype(float)])
     lp.a_matrix_.format_ = highspy.MatrixFormat.kColwise
     lp.a_matrix_.start_, lp.a_matrix_.index_, lp.a_matrix_.value_ = matrix.indptr, matrix.indices, matrix.data
     lp.integrality_ = [highspy.HighsVarType.kInteger] * p
-    for option, value in (("output_flag", False), ("parallel", "off"), ("random_seed", seed % 2**31)):
-        highs.setOptionValue(option, value)
-    if np.isfinite(seconds):
-        highs.setOptionValue("time_limit", max(0.0, seconds))
-    highs.passModel(lp)
-    highs.run()
-    if highs.getModelStatus() == highspy.HighsModelStatus.kInfeasible:
-        return None, True
-    if highs.getInfo().primal_solution_status != highspy.SolutionStatus.kSolutionStatusFeasible:
-        return None, False
-    return _table(choice, np.round(np.asarray(highs.getSolution().col_value)).astype(np.int64)), False
+    return lp
 
 
 def _table(choice: Choice, times: WholeArray) -> WholeArray:

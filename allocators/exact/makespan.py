@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import highspy
 import numpy as np
 
 from alloc.allocators.exact.configuration import Configurations
@@ -13,7 +12,6 @@ from alloc.allocators.exact.enumeration import choose_groups, enumerate_groups
 from alloc.allocators.exact.question import Answer, Question, Watch, is_over
 from alloc.allocators.exact.relaxation import relaxed_lower_bound
 from alloc.allocators.exact.wandering import Wanderer
-from alloc.allocators.interrupt import run_native
 from alloc.allocators.search import PROVEN, Search
 from alloc.problems import Evaluation, agent_classes
 
@@ -26,6 +24,9 @@ UNLIMITED_S = 60.0
 
 REPEATABLE_ROUNDS = 20
 """Times that are wandered for where runs must be repeatable."""
+
+CALM_S = 0.05
+"""Seconds without success after which wandering may end."""
 
 STEPS_PER_TIME = 1000
 """Splits for one time."""
@@ -111,8 +112,9 @@ class LeastMakespan:
         """Narrow the gap until it is closed or time is up; plans and bounds go to the search."""
         if self._descent:
             self._quick_plans()
-            self._wander(0.02, 0.05)
-            self._raise_by_prices()
+            for part in (0.005, 0.2):  # plans and bounds by turns, as either alone often closes the gap
+                self._wander(part)
+                self._raise_by_prices(part)
         elif self._search.instance.has_travel_time or not self._search.instance.reach.is_complete:
             self._raise_by_relaxation()
         test = Test(self._low, self._part(0.25))
@@ -123,7 +125,7 @@ class LeastMakespan:
                     return
                 self._wall = self._wall if test.top else max(self._wall, test.time)
                 if not self._hard:
-                    self._raise_by_prices()
+                    self._raise_by_prices(0.2)
             test = self._next(ruled_out=found is False)
 
     def _next(self, *, ruled_out: bool) -> Test:
@@ -150,11 +152,12 @@ class LeastMakespan:
             known = self._try_groups(test, self._configurations)
             if known is not None:
                 return known
+        assert self._search.fastest is not None
         until_s = min(self._search.elapsed_s + test.seconds + self._build_s, self._until_s)
         question = Question(
             demand=demand,
             cost=None,
-            hint=None,
+            hint=self._model.counts(demand, self._search.fastest.allocation),
             seconds=until_s - self._search.elapsed_s,
             threads=self._search.threads,
             seed=self._search.seed,
@@ -186,19 +189,20 @@ class LeastMakespan:
             return self._search.lower_bound
         return float(np.sort(model.work)[: model.serve].sum() / (model.classes.ability @ model.classes.count))
 
-    def _raise_by_prices(self) -> None:
+    def _raise_by_prices(self, part: float) -> None:
         """Let the configuration linear programme push the lower bound, or a simpler one where that takes too long."""
-        self._hard = True
+        first, self._hard = not self._hard, True
         if self._closed or self._over or self._model.serve < len(self._model.tasks):
             return
-        configurations = Configurations(self._model, self._low)
-        if not configurations.able:
-            self._raise_by_relaxation()
+        if first:
+            configurations = Configurations(self._model, self._low)
+            self._configurations = configurations if configurations.able else None
+        if self._configurations is None:
+            if first:
+                self._raise_by_relaxation()
             return
-        self._configurations = configurations
-        until_s = self._search.elapsed_s + (np.inf if self._repeatable else self._part(0.3))
-        time = possible = self._high
-        time = self._low
+        configurations, until_s = self._configurations, self._search.elapsed_s + self._part(part)
+        time, possible = self._low, self._high
         while not (self._closed or self._over) and possible > self._low * (1 + TIGHT):
             prices, solved = configurations.best_prices(time, lambda: self._over or self._search.elapsed_s > until_s)
             if prices is None or not (solved or prices.theta > 1):
@@ -224,11 +228,7 @@ class LeastMakespan:
         choice = enumerate_groups(configurations, prices, test.time, over)
         if choice is None or over():
             return None
-        highs = highspy.Highs()
-        highs.HandleUserInterrupt = True
-        seconds = np.inf if self._repeatable else until_s - self._search.elapsed_s
-        found = run_native(lambda: choose_groups(choice, highs, seconds, self._search.seed), over, highs.cancelSolve)
-        table, impossible = found or (None, False)
+        table, impossible = choose_groups(choice, self._search.seed, over)
         if impossible:
             return self._rule_out(test.time)
         if table is None:
@@ -242,8 +242,7 @@ class LeastMakespan:
         """Wander, or descend where that cannot be; whether a plan with makespan `time` was found."""
         if not self._wanderer.able:
             return self._descend(time, 0.05, kicks=LONG)
-        assert self._search.best is not None
-        self._wanderer.settle(self._search.best.allocation)
+        self._settle()
         until_s = np.inf if self._repeatable else self._search.elapsed_s + self._part(0.01)
         found, plan = self._wanderer.walk(
             time, lambda: self._over or self._search.elapsed_s >= until_s, most_steps=STEPS_PER_TEST
@@ -285,30 +284,19 @@ class LeastMakespan:
         full[:, self._model.tasks[served]] = counts
         return self._is_met(self._search.submit(self._model.classes.spread(full)), time)
 
-    def _wander(self, calm: float, part: float) -> None:
-        """Wander for times closer to the best plan until nothing gets better for a while.
-
-        Parameters
-        ----------
-        calm : float
-            Part of the time without success after which this ends, at least as long as the last success took.
-        part : float
-            Part of the time after which it ends anyway.
-        """
-        assert self._search.best is not None
-        if not self._wanderer.able:
+    def _wander(self, part: float) -> None:
+        """Wander for times closer to the best plan for this part of the time, less where nothing gets better."""
+        if not self._wanderer.able or self._closed or self._over:
             return
-        self._wanderer.settle(self._search.best.allocation)
+        self._settle()
         begin_s = last_s = self._search.elapsed_s
         rounds, weight = 0, 1.0
         while not (self._closed or self._over):
-            patience_s = max(self._part(calm), last_s - begin_s)
-            now_s = self._search.elapsed_s
-            if self._repeatable and rounds >= REPEATABLE_ROUNDS:
+            high, now_s, rounds = self._high, self._search.elapsed_s, rounds + 1
+            patience_s = max(self._part(part / 10, CALM_S), last_s - begin_s)
+            late = now_s - begin_s > self._part(part) or now_s - last_s > patience_s
+            if rounds > REPEATABLE_ROUNDS if self._repeatable else late:
                 return
-            if not self._repeatable and (now_s - begin_s > self._part(part) or now_s - last_s > patience_s):
-                return
-            high, rounds = self._high, rounds + 1
             time = max(self._low, high + weight * (self._low - high) - TIGHT / 2 * high)
             _, plan = self._wanderer.walk(time, lambda: self._over, most_steps=STEPS_PER_TIME)
             self._search.submit(plan)
@@ -317,8 +305,12 @@ class LeastMakespan:
             else:
                 weight = weight / 2 if weight > 0.1 else float(self._rng.choice([0.0, 0.5, 1.0]))
 
-    def _part(self, part: float) -> float:
-        """Seconds that are this part of the time, at least 0.3; no limit where runs must be repeatable."""
+    def _settle(self) -> None:
+        assert self._search.fastest is not None
+        self._wanderer.settle(self._search.fastest.allocation)
+
+    def _part(self, part: float, least_s: float = 0.3) -> float:
+        """Seconds that are this part of the time, at least `least_s`; no limit where runs must be repeatable."""
         if self._repeatable:
             return float("inf")
-        return max(0.3, part * (self._until_s if np.isfinite(self._until_s) else UNLIMITED_S))
+        return max(least_s, part * (self._until_s if np.isfinite(self._until_s) else UNLIMITED_S))

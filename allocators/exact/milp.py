@@ -128,7 +128,7 @@ def _load(highs: highspy.Highs, programme: Programme, question: Question) -> Non
     for option, value in _options(question).items():
         highs.setOptionValue(option, value)
     highs.passModel(lp)
-    if question.hint is not None and not question.demand.partial:
+    if question.hint is not None and question.cost is not None and not question.demand.partial:
         highs.setSolution(len(programme.pair_at), programme.pair_at.astype(np.int32), question.hint.astype(float))
 
 
