@@ -6,6 +6,7 @@ python tests/benchmarks/exact_vs_brute_force.py --count 300
 import argparse
 import sys
 import time
+from itertools import count, islice
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -40,12 +41,13 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=300, help="number of instances")
     parser.add_argument("--first", type=int, default=0, help="number of the first instance")
+    parser.add_argument("--speeds", action="store_true", help="only instances with finite speeds, --count of them")
     options = parser.parse_args()
     loaded = {method: load(method) for method in METHODS}
     seconds = {(method, goal): [0.0, 0.0] for method in METHODS for goal in OBJECTIVES}
     wrong = infeasible = speeds = 0
-    for seed in range(options.first, options.first + options.count):
-        instance = tiny_instance(seed)
+    drawn = (tiny_instance(seed) for seed in count(options.first))
+    for instance in islice((each for each in drawn if each.has_travel_time or not options.speeds), options.count):
         best = brute_force(instance)
         infeasible += best.unserved > 0
         speeds += instance.has_travel_time
