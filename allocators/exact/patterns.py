@@ -23,6 +23,9 @@ from alloc.allocators.compiled import compiled
 from alloc.problems.instance import FloatArray
 
 WholeArray = NDArray[np.int64]
+CORE = 24
+"""Classes left open at first in `cheapest_by_core`."""
+
 Table = tuple[FloatArray, WholeArray, WholeArray, WholeArray, NDArray[np.uint8]]
 """Costs, shape (most + 1,); class, agents and weight of each item, shape (i,); items taken, shape (i, most + 1)."""
 
@@ -146,3 +149,55 @@ def cheapest_group(
     if not np.isfinite(cost[best]):
         return np.inf, np.zeros(len(weight), dtype=np.int64)
     return cost[best], read_group(table, len(weight), best)
+
+
+@compiled
+def cheapest_by_core(
+    weight: WholeArray, price: FloatArray, copies: WholeArray, need: int, enough: int
+) -> tuple[float, WholeArray]:
+    """Return what `cheapest_group` does, faster where there are many classes and `enough` sets a limit.
+
+    At the price of weight at which the linear relaxation breaks, each agent saves or costs something against it. Only
+    those for whom that is little, the core, are left open; the rest are settled by its sign. The core grows until what
+    its best group lacks of the relaxation is less than what changing any of the others would cost.
+
+    References
+    ----------
+    Balas and Zemel (1980), An algorithm for large zero-one knapsack problems, doi:10.1287/opre.28.5.1130.
+    """
+    classes, total, rate = len(weight), 0, 0.0
+    for k in np.argsort(price / weight):
+        rate = price[k] / weight[k]
+        total += weight[k] * copies[k]
+        if total >= need:
+            break
+    against = price - rate * weight
+    relaxed = rate * (need if rate >= 0 else enough)
+    for k in range(classes):
+        relaxed += min(0.0, against[k]) * copies[k]
+    order = np.argsort(np.abs(against))
+    size = min(CORE, classes)
+    while True:
+        core, settled, paid = order[:size], 0, 0.0
+        for k in order[size:]:
+            if against[k] < 0:
+                settled += weight[k] * copies[k]
+                paid += price[k] * copies[k]
+        movable = (weight[core] * copies[core]).sum()
+        least, most = max(0, need - settled), min(enough - settled, movable)
+        if least <= most:
+            cost, group = cheapest_group(weight[core], price[core], copies[core], least, most)
+            lacking = paid + cost - relaxed
+            if size == classes or lacking <= np.abs(against[order[size]]):
+                if not np.isfinite(cost):
+                    break
+                full = np.zeros(classes, dtype=np.int64)
+                full[core] = group
+                for k in order[size:]:
+                    if against[k] < 0:
+                        full[k] = copies[k]
+                return paid + cost, full
+        elif size == classes:
+            break
+        size = min(2 * size, classes)
+    return np.inf, np.zeros(classes, dtype=np.int64)

@@ -23,7 +23,7 @@ from scipy.sparse import csr_array
 from scipy.spatial.distance import squareform
 
 from alloc.allocators.compiled import compiled
-from alloc.allocators.exact.patterns import WholeArray, fill_table, read_group
+from alloc.allocators.exact.patterns import WholeArray, cheapest_by_core, fill_table, read_group
 from alloc.problems.instance import FloatArray
 
 Mask = NDArray[np.bool_]
@@ -86,12 +86,16 @@ def hire(
     group : ndarray of int
         Filled with the agents hired.
     excess : ndarray
-        Filled with how much dearer the best group with an agent of the pair is, or less than that.
+        Filled with how much dearer the best group with an agent of the pair is, or less than that; may be empty.
     """
     total = 0.0
     for j in range(len(need)):
         a, b = first[j], first[j + 1]
         exact, top = enough[j] >= 0, max(need[j], enough[j])
+        if exact and len(excess) == 0:
+            paid, group[a:b] = cheapest_by_core(weight[a:b], price[a:b], copies[a:b], need[j], enough[j])
+            total += paid
+            continue
         table = fill_table(weight[a:b], price[a:b], copies[a:b], top, exact)
         cost, best = table[0], need[j]
         for s in range(need[j], enough[j] + 1):
@@ -101,7 +105,7 @@ def hire(
         if not np.isfinite(cost[best]):
             return np.inf
         group[a:b] = read_group(table, b - a, best)
-        for p in range(a, b):
+        for p in range(a, b if len(excess) > 0 else a):
             with_it = np.inf
             if exact:
                 for s in range(max(need[j], weight[p]), enough[j] + 1):
@@ -260,7 +264,7 @@ class Prices:
         value = -float(np.where(self._price >= 0, offer.count, offer.least) @ self._price)
         if clusters is not None:
             price += clusters.link @ self._paid
-            bought, _, extra = _hire(clusters.hired, -self._paid)
+            bought, _, extra = _hire(clusters.hired, -self._paid, compare=False)
             value += extra
         group, excess, total = _hire(offer, price)
         value += total
@@ -320,8 +324,8 @@ def _excess_demand(used: WholeArray, offer: Offer, price: FloatArray) -> FloatAr
     return np.where(price > 0, many, np.where(price < 0, few, unpriced))
 
 
-def _hire(offer: Offer, price: FloatArray) -> tuple[WholeArray, FloatArray, float]:
-    group, excess = np.zeros(len(price), dtype=np.int64), np.zeros(len(price))
+def _hire(offer: Offer, price: FloatArray, *, compare: bool = True) -> tuple[WholeArray, FloatArray, float]:
+    group, excess = np.zeros(len(price), dtype=np.int64), np.zeros(len(price) if compare else 0)
     total = hire(offer.first, offer.kind, offer.weight, offer.copies, price, offer.need, offer.enough, group, excess)
     return group, excess, total
 

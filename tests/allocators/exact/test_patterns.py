@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from alloc.allocators.exact.patterns import cheapest_group, fill_table, read_group
+from alloc.allocators.exact.patterns import cheapest_by_core, cheapest_group, fill_table, read_group
 
 classes = st.lists(st.tuples(st.integers(1, 7), st.integers(-2, 9), st.integers(0, 3)), min_size=1, max_size=4)
 
@@ -67,3 +67,18 @@ def test_no_group_costs_infinity():
         cost, group = cheapest_group(weight, price, copies, need, enough)
         assert cost == np.inf
         assert not group.any()
+
+
+@given(st.integers(0, 2**32), st.integers(0, 3), st.integers(1, 90))
+def test_core_has_the_cheapest_group(seed, spare, classes):
+    """Settling all but the core costs nothing, for prices of either sign."""
+    rng = np.random.default_rng(seed)
+    weight, copies = rng.integers(1, 11, classes), rng.integers(1, 4, classes)
+    price = rng.normal(0, 1, classes)
+    need = int(rng.integers(0, 1 + weight @ copies))
+    cost, group = cheapest_by_core(weight, price, copies, need, need + spare)
+    assert cost == pytest.approx(cheapest_group(weight, price, copies, need, need + spare)[0])
+    if np.isfinite(cost):
+        assert group @ price == pytest.approx(cost)
+        assert need <= group @ weight <= need + spare
+        assert (group <= copies).all()
