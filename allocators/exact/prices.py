@@ -337,5 +337,5 @@ def _clusters(apart: FloatArray) -> Mask:
     for row, (one, other, _, _) in enumerate(linkage(squareform(apart, checks=False), "average"), start=tasks):
         member[row] = member[int(one)] | member[int(other)]
     member = member[tasks:]
-    small: Mask = member.sum(axis=1) <= max(4, tasks / 8)
+    small: Mask = member.sum(axis=1) <= max(4, tasks / 4)
     return np.asarray(member[small])
