@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from alloc.allocators.heuristic.population import BoolArray, Genes, Landscape
+from alloc.allocators.heuristic.population import ROUNDING, BoolArray, Genes, Landscape
 from alloc.problems.instance import FloatArray, IntArray
 
 
@@ -59,6 +59,9 @@ class Mutation:
         Spread of the random term in the choice of the agents, in units of mean ability per mean demand.
     economy : float
         Weight, at most, of a mean distance saved, against a task's whole demand missed.
+    homeward : float
+        Probability, where energy counts and no task lacks anything, that the agent is drawn by the length of its flight
+        and the task by what the agent would save there.
     pairs : float
         Probability that up to two agents of each group, not one, change places.
     group_cap, pair_cap : int
@@ -70,6 +73,7 @@ class Mutation:
     stray: float = 0.1
     temperature: float = 0.1
     economy: float = 0.7
+    homeward: float = 0.8
     pairs: float = 0.1
     group_cap: int = 16
     pair_cap: int = 6
@@ -109,6 +113,11 @@ def mutate(
         excess = group[row] - demand
         to = _draw(np.maximum(0.0, -excess[:, :-1]), rng, settings.stray)
         giver = _draw_giver(genes[row], np.maximum(0.0, excess), to, landscape, rng, settings.stray)
+        if economical:
+            home = np.flatnonzero(
+                (excess >= -ROUNDING * demand).all(axis=1) & (rng.random(len(row)) < settings.homeward)
+            )
+            giver[home], to[home] = _draw_homeward(genes[row[home]], landscape, rng)
         out = genes[row, giver].astype(np.intp)
         differ = np.flatnonzero(out != to)
         if len(differ):
@@ -233,6 +242,17 @@ def _draw_giver(
     if not landscape.is_complete:
         weight = weight * landscape.allows(np.arange(landscape.n)[None, :], to[:, None])
     return _roulette(weight, rng)
+
+
+def _draw_homeward(some: Genes, landscape: Landscape, rng: np.random.Generator) -> tuple[IntArray, IntArray]:
+    """Draw an agent of each row in proportion to its flight, and a task in proportion to what it would save there."""
+    agents = np.arange(landscape.n)[None, :]
+    flown = landscape.distance(agents, some.astype(np.intp))
+    giver = _roulette(flown, rng)
+    columns = np.arange(landscape.bench)[None, :]
+    saved = np.take_along_axis(flown, giver[:, None], axis=1) - landscape.distance(giver[:, None], columns)
+    saved = np.maximum(0.0, saved) ** 2 * landscape.allows(giver[:, None], columns)
+    return giver, _roulette(saved, rng)
 
 
 def _roulette(weight: FloatArray, rng: np.random.Generator) -> IntArray:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from alloc.allocators.heuristic.operators import Mutation, cross_groups, mutate, tournament
+from alloc.allocators.heuristic.operators import Mutation, _draw_homeward, cross_groups, mutate, tournament
 from alloc.allocators.heuristic.population import Landscape, list_schedules
 from alloc.problems import Allocation, Instance, evaluate
 
@@ -133,3 +133,25 @@ def test_list_schedule_without_noise_is_greedy(instance: Instance, rng: np.rando
     noisy = list_schedules(Landscape(instance), np.full(20, 0.5), np.full(20, 1.0), rng, lambda: False)
     assert Landscape(instance).allows(np.arange(12), noisy).all()
     assert len(np.unique(noisy, axis=0)) > 10
+
+
+def test_homeward_draws_shorten_the_flight() -> None:
+    """Where energy counts, the agent drawn would fly less to the task drawn beside it, and can go there."""
+    rng = np.random.default_rng(4)
+    instance = Instance(
+        ability=np.ones(30),
+        workload=np.ones(6),
+        agent_position=rng.random((30, 2)),
+        task_position=rng.random((6, 2)),
+        communication_range=np.full(30, 0.9),
+    )
+    landscape = Landscape(instance)
+    task = np.array([rng.choice(np.flatnonzero(row)) for row in instance.reach.mask[instance.reach.origin]])
+    genes = np.tile(task.astype(np.int32), (50, 1))
+    giver, to = _draw_homeward(genes, landscape, rng)
+    away, new = landscape.distance(giver, task[giver]), landscape.distance(giver, to)
+    nearest = np.where(instance.reach.mask, instance.reach.distance, np.inf).min(axis=1)[instance.reach.origin]
+    could = nearest[giver] < away
+    assert could.any()
+    assert (new[could] < away[could]).all()
+    assert landscape.allows(giver, to)[could].all()
