@@ -286,7 +286,8 @@ class LeastMakespan:
 
     def _wander(self, part: float) -> None:
         """Wander for times closer to the best plan for this part of the time, less where nothing gets better."""
-        if not self._wanderer.able or self._closed or self._over:
+        partial = self._model.serve < len(self._model.tasks)  # which tasks to serve is the question there
+        if not self._wanderer.able or partial or self._closed or self._over:
             return
         self._settle()
         begin_s = last_s = self._search.elapsed_s
