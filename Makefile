@@ -38,6 +38,7 @@ $(VENV)/bin/python:
 
 $(VENV)/.installed: $(VENV)/bin/python $(CODE)
 	$(PIP) install --editable .
+	$(BIN)/alloc methods --prepare
 	@touch $@
 
 $(VENV)/.tested: $(VENV)/.installed

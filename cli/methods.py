@@ -1,14 +1,19 @@
 """``alloc methods``."""
 
-from typing import Any
+from typing import Annotated, Any
 
 import typer
 
 from alloc.cli import options
-from alloc.cli.console import say, table, write_json
+from alloc.cli.console import note, say, table, write_json
 from alloc.cli.options import examples
 
-EXAMPLES = examples("alloc methods", "alloc methods --json")
+EXAMPLES = examples(
+    "alloc methods",
+    "alloc methods --json",
+    "alloc methods --prepare",
+    closing="Some methods compile their loops when they are first used: --prepare does it for all of them at once.",
+)
 
 
 def register(app: typer.Typer) -> None:
@@ -16,10 +21,18 @@ def register(app: typer.Typer) -> None:
     app.command("methods", epilog=EXAMPLES)(methods_command)
 
 
-def methods_command(json: options.JsonOption = False) -> None:
+def methods_command(
+    json: options.JsonOption = False,
+    prepare: Annotated[
+        bool, typer.Option("--prepare", help="Compile what the methods need, so that no first run waits for it.")
+    ] = False,
+) -> None:
     """List the methods, what each can do, and what is missing for it."""
     from alloc.allocators import names
 
+    if prepare:
+        _prepare()
+        return
     facts = [_facts(name) for name in names()]
     if json:
         write_json(facts)
@@ -30,6 +43,19 @@ def methods_command(json: options.JsonOption = False) -> None:
     for fact in facts:
         if fact["citation"]:
             say(f"{fact['name']}: {fact['citation']}")
+
+
+def _prepare() -> None:
+    """Load each method that is installed; a broken plugin keeps nobody waiting."""
+    from alloc.allocators import describe, load, names
+    from alloc.problems import InputError
+
+    for name in names():
+        try:
+            if not describe(name).missing:
+                load(name)
+        except InputError as error:
+            note(str(error))
 
 
 def _facts(name: str) -> dict[str, Any]:

@@ -63,7 +63,7 @@ class Progress:
 def progress_line(elapsed_s: float, best: "Improvement | None") -> str:
     """Return the line at this moment."""
     if best is None:
-        return f"{elapsed_s:6.1f} s  no allocation yet"
+        return f"{elapsed_s:6.1f} s  no allocation yet; the first run of some methods compiles them"
     score = best.evaluation
     if score.makespan is None:
         return f"{elapsed_s:6.1f} s  {len(score.unserved_tasks)} tasks unserved  energy {number(score.energy)}"

@@ -82,3 +82,17 @@ def test_methods_survives_a_broken_plugin(alloc, monkeypatch):
     facts = {fact["name"]: fact for fact in alloc("methods", "--json").json}
     assert "cannot be imported" in facts["broken"]["error"]
     assert alloc("methods").code == 0
+
+
+def test_methods_are_prepared_once_for_all(alloc, monkeypatch):
+    """Every method that is installed is loaded, and nothing is printed; a broken plugin is a note."""
+    from importlib.metadata import EntryPoint
+
+    broken = EntryPoint("broken", "no_such_module:Thing", "alloc.allocators")
+    monkeypatch.setattr("alloc.allocators.registry.entry_points", lambda group: [broken])
+    loaded = []
+    monkeypatch.setattr("alloc.allocators.load", loaded.append)
+    ran = alloc("methods", "--prepare")
+    assert (ran.code, ran.out) == (0, "")
+    assert {"greedy", "cpsat", "local-search"} <= set(loaded)
+    assert "plugin 'broken'" in ran.err
