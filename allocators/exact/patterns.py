@@ -23,11 +23,30 @@ from alloc.allocators.compiled import compiled
 from alloc.problems.instance import FloatArray
 
 WholeArray = NDArray[np.int64]
+
 CORE = 24
 """Classes left open at first in `cheapest_by_core`."""
 
 Table = tuple[FloatArray, WholeArray, WholeArray, WholeArray, NDArray[np.uint8]]
 """Costs, shape (most + 1,); class, agents and weight of each item, shape (i,); items taken, shape (i, most + 1)."""
+
+
+@compiled
+def order_of(value: FloatArray) -> WholeArray:
+    """Return what sorts `value`, by Shell's method: numpy's, in a loop like these, takes over a second to compile."""
+    order = np.empty(len(value), dtype=np.int64)
+    for k in range(len(value)):
+        order[k] = k
+    gap = len(value) // 2
+    while gap > 0:
+        for q in range(gap, len(value)):
+            k, place = order[q], q
+            while place >= gap and value[order[place - gap]] > value[k]:
+                order[place] = order[place - gap]
+                place -= gap
+            order[place] = k
+        gap = 1 if gap == 2 else gap * 5 // 11
+    return order
 
 
 @compiled
@@ -48,7 +67,9 @@ def pack_items(
             rest //= 2
             bits += 1
     kind, size, items = np.empty(bits, dtype=np.int64), np.empty(bits, dtype=np.int64), 0
-    for k in np.argsort(price):
+    order = order_of(price)
+    for q in range(len(order)):
+        k = order[q]
         w = weight[k]
         if w < 1 or (exact and w > most):
             continue
@@ -166,36 +187,45 @@ def cheapest_by_core(
     Balas and Zemel (1980), An algorithm for large zero-one knapsack problems, doi:10.1287/opre.28.5.1130.
     """
     classes, total, rate = len(weight), 0, 0.0
-    for k in np.argsort(price / weight):
-        rate = price[k] / weight[k]
-        total += weight[k] * copies[k]
+    against, changed, core_price = np.empty(classes), np.empty(classes), np.empty(classes)
+    core_weight, core_copies = np.empty(classes, dtype=np.int64), np.empty(classes, dtype=np.int64)
+    for k in range(classes):
+        against[k] = price[k] / weight[k]
+    order = order_of(against)
+    for q in range(classes):
+        rate = against[order[q]]
+        total += weight[order[q]] * copies[order[q]]
         if total >= need:
             break
-    against = price - rate * weight
     relaxed = rate * (need if rate >= 0 else enough)
+    full = np.zeros(classes, dtype=np.int64)
     for k in range(classes):
-        relaxed += min(0.0, against[k]) * copies[k]
-    order = np.argsort(np.abs(against))
+        against[k] = price[k] - rate * weight[k]
+        changed[k] = abs(against[k])
+        if against[k] < 0:
+            relaxed += against[k] * copies[k]
+            full[k] = copies[k]
+    order = order_of(changed)
     size = min(CORE, classes)
     while True:
-        core, settled, paid = order[:size], 0, 0.0
-        for k in order[size:]:
-            if against[k] < 0:
-                settled += weight[k] * copies[k]
-                paid += price[k] * copies[k]
-        movable = (weight[core] * copies[core]).sum()
+        settled, movable, paid = 0, 0, 0.0
+        for q in range(size):
+            movable += weight[order[q]] * copies[order[q]]
+        for q in range(size, classes):
+            settled += weight[order[q]] * full[order[q]]
+            paid += price[order[q]] * full[order[q]]
         least, most = max(0, need - settled), min(enough - settled, movable)
         if least <= most:
-            cost, group = cheapest_group(weight[core], price[core], copies[core], least, most)
+            for q in range(size):
+                k = order[q]
+                core_weight[q], core_price[q], core_copies[q] = weight[k], price[k], copies[k]
+            cost, group = cheapest_group(core_weight[:size], core_price[:size], core_copies[:size], least, most)
             lacking = paid + cost - relaxed
-            if size == classes or lacking <= np.abs(against[order[size]]):
+            if size == classes or lacking <= changed[order[size]]:
                 if not np.isfinite(cost):
                     break
-                full = np.zeros(classes, dtype=np.int64)
-                full[core] = group
-                for k in order[size:]:
-                    if against[k] < 0:
-                        full[k] = copies[k]
+                for q in range(size):
+                    full[order[q]] = group[q]
                 return paid + cost, full
         elif size == classes:
             break

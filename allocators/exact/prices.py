@@ -93,7 +93,9 @@ def hire(
         a, b = first[j], first[j + 1]
         exact, top = enough[j] >= 0, max(need[j], enough[j])
         if exact and len(excess) == 0:
-            paid, group[a:b] = cheapest_by_core(weight[a:b], price[a:b], copies[a:b], need[j], enough[j])
+            paid, hired = cheapest_by_core(weight[a:b], price[a:b], copies[a:b], need[j], enough[j])
+            for p in range(a, b):
+                group[p] = hired[p - a]
             total += paid
             continue
         table = fill_table(weight[a:b], price[a:b], copies[a:b], top, exact)
@@ -104,7 +106,9 @@ def hire(
         total += cost[best]
         if not np.isfinite(cost[best]):
             return np.inf
-        group[a:b] = read_group(table, b - a, best)
+        hired = read_group(table, b - a, best)
+        for p in range(a, b):
+            group[p] = hired[p - a]
         for p in range(a, b if len(excess) > 0 else a):
             with_it = np.inf
             if exact:
