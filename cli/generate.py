@@ -17,11 +17,13 @@ EXAMPLES = examples(
     "alloc generate random --agents 50 --tasks 12 --sites clustered --range 0.5 --seed 1 --output demo.json",
     "alloc generate random --speed 20:60 --battery 10:30 --real --seed 3 --output demo.npz",
     "alloc generate paper-4 --seed 100 --count 20 --output instances",
+    "alloc generate covering --agents 40 --tasks 16 --ability-max 100 --workload uniform --seed 3 --output demo.json",
     closing="SPREAD is one value for all, LOW:HIGH for a uniform draw, or none for no limit.",
 )
 
 SEED = Annotated[int, typer.Option(min=0, help="Source of all randomness; with --count the first of several.")]
 SPREADS = ("communication_range", "battery", "speed", "priority")
+COVERING = ("agents", "tasks", "ability_min", "ability_max", "workload", "integer")
 
 
 class Family(StrEnum):
@@ -32,6 +34,7 @@ class Family(StrEnum):
     PAPER_3 = "paper-3"
     PAPER_4 = "paper-4"
     RANDOM = "random"
+    COVERING = "covering"
 
 
 class Sites(StrEnum):
@@ -73,7 +76,9 @@ def generate_command(
     family: Annotated[
         Family,
         typer.Argument(
-            metavar="FAMILY", help="paper-1 to paper-4, a scenario of the paper, or random, with the options below."
+            metavar="FAMILY",
+            help="paper-1 to paper-4, a scenario of the paper; random, with the options below; or covering, machine "
+            "covering without places: 100 agents with abilities from 1 to 1000, 25 tasks, workloads equal or uniform.",
         ),
     ],
     seed: SEED = 0,
@@ -110,10 +115,11 @@ def generate_command(
     energy_per_distance: Annotated[float | None, _option("Energy per unit of distance.", "6")] = None,
     tau: Annotated[float | None, _option("Base of the reward (3).", "0.5")] = None,
 ) -> None:
-    """Write instances like the paper's, or random ones."""
+    """Write instances like the paper's, random ones, or those of machine covering."""
     wanted = {name: value for name, value in locals().items() if value is not None and name not in FIXED}
-    if family is not Family.RANDOM and wanted:
-        raise typer.BadParameter(f"is for random alone, not for {family}", param_hint=f"'{_flag(next(iter(wanted)))}'")
+    for name in wanted:
+        if family is not Family.RANDOM and not (family is Family.COVERING and name in COVERING):
+            raise typer.BadParameter(f"is for random, not for {family}", param_hint=f"'{_flag(name)}'")
     if count > 1 and output == STANDARD:
         raise typer.BadParameter("must name a folder for several instances", param_hint="'--output'")
     for number in range(seed, seed + count):
@@ -130,6 +136,8 @@ def _instance(family: Family, wanted: dict[str, Any], seed: int) -> "Instance":
     from alloc.problems import Family as Parameters
     from alloc.problems import InputError, paper, random_instance
 
+    if family is Family.COVERING:
+        return _covering(seed=seed, **wanted)
     if family is not Family.RANDOM:
         return paper(int(family.removeprefix("paper-")), seed)
     try:
@@ -139,6 +147,30 @@ def _instance(family: Family, wanted: dict[str, Any], seed: int) -> "Instance":
         return random_instance(Parameters(**values), seed)
     except InputError as error:
         raise InputError(error.message, _flag(error.place) if error.place in wanted else error.place) from None
+
+
+def _covering(
+    seed: int,
+    agents: int = 100,
+    tasks: int = 25,
+    ability_min: float = 1,
+    ability_max: float = 1000,
+    workload: Distribution = Distribution.EQUAL,
+    integer: bool = True,
+) -> "Instance":
+    from alloc.problems import InputError, machine_covering
+
+    if workload not in (Distribution.EQUAL, Distribution.UNIFORM):
+        raise InputError("must be equal or uniform here", "--workload")
+    for flag, value in (("--ability-min", ability_min), ("--ability-max", ability_max)):
+        if value != int(value):
+            raise InputError(f"must be a whole number here, got {value}", flag)
+    flags = {"agents": "--agents", "tasks": "--tasks", "low": "--ability-min", "high": "--ability-max"}
+    equal, ends = workload is Distribution.EQUAL, (int(ability_min), int(ability_max))
+    try:
+        return machine_covering(agents, tasks, *ends, seed, equal=equal, whole=integer)
+    except InputError as error:
+        raise InputError(error.message, flags.get(error.place, error.place)) from None
 
 
 def _write(instance: "Instance", output: str, *, into_folder: bool) -> None:

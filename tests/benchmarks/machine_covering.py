@@ -7,6 +7,10 @@ figures for; the others are of the kinds in the literature: `small` with n = 2m,
 5m + 2; `large` with U[1, 1000]; `tight` with n / m = 2.5 and U[n/5, n/2]. `plain` is one maximisation by CP-SAT over
 classes of agents, as it would be stated without further thought. A gap is (T - bound) / T of the method's own bound;
 T / bound is against the best bound of all methods in the same run. Exits with 1 if a target family misses its figure.
+
+    python tests/benchmarks/machine_covering.py --families target,large --seeds 10 --publish docs/machine-covering.csv
+
+writes plans and proven bounds of `cpsat` instead, one row for each instance, beside those that the file has already.
 """
 
 import argparse
@@ -14,8 +18,10 @@ import sys
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
+from machine_covering_table import Entry, entry, write_table
 from ortools.sat.python import cp_model
 
 from alloc.allocators import load, solve
@@ -136,6 +142,22 @@ def table(family: Family, rows: dict[str, list[Row]]) -> bool:
     return good
 
 
+def publish(options: argparse.Namespace, equalities: tuple[bool, ...], seeds: range) -> None:
+    """Write rows of the published table; an instance of several families belongs to the first of them."""
+    done: dict[tuple[str, ...], Entry] = {}
+    for name in FAMILIES:
+        for shape in FAMILIES[name]() if name in options.families.split(",") else ():
+            for equal in equalities:
+                owner = next(family for family in FAMILIES if shape in FAMILIES[family]())
+                if owner != name or options.only not in Family(*shape, equal).name:
+                    continue
+                for seed in seeds:
+                    line = entry(name, shape, seed, equal=equal, time_limit_s=options.time_limit)
+                    done[line.key] = line
+                    print(name, *line.key, line.status, line.seconds, line.proof, flush=True)
+                    write_table(list(done.values()), options.publish)
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--families", default="target", help=f"of {', '.join(FAMILIES)}, comma between")
@@ -146,8 +168,13 @@ def main() -> int:
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--first-seed", type=int, default=0)
     parser.add_argument("--threads", type=int, default=1)
+    parser.add_argument("--publish", type=Path, metavar="FILE", help="write rows of the published table there")
     options = parser.parse_args()
     equalities = {"equal": (True,), "unequal": (False,), "both": (True, False)}[options.workloads]
+    seeds = range(options.first_seed, options.first_seed + options.seeds)
+    if options.publish is not None:
+        publish(options, equalities, seeds)
+        return 0
     good = True
     print("| family | method | mean gap | proven | mean T / bound | mean s |\n|---|---|---|---|---|---|")
     for name in options.families.split(","):
@@ -156,7 +183,6 @@ def main() -> int:
                 family = Family(*shape, equal)
                 if options.only not in family.name:
                     continue
-                seeds = range(options.first_seed, options.first_seed + options.seeds)
                 instances = [machine_covering(*shape, seed, equal=equal) for seed in seeds]
                 rows = {
                     method: [measure(method, each, options.time_limit, options.threads) for each in instances]

@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from alloc.cli import generate
-from alloc.problems import Family, paper, random_instance
+from alloc.problems import Family, machine_covering, paper, random_instance
 from alloc.problems.formats import read_instance, to_document
 from alloc.problems.generate import Distribution, Sites, Starts
 
@@ -31,6 +31,31 @@ def test_every_parameter_of_the_family_is_an_option(alloc):
         energy_per_distance=2, tau=0.4,
     )  # fmt: skip
     assert to_document(read_instance("r.npz")) == to_document(random_instance(family, 5))
+
+
+def test_machine_covering_is_the_generator_s(alloc):
+    """Families of the published table have a name, and options of their own."""
+    assert alloc("generate", "covering", "--seed", "7", "--output", "c.json").code == 0
+    assert to_document(read_instance("c.json")) == to_document(machine_covering(100, 25, 1, 1000, 7))
+    options = ("--agents", "9", "--tasks", "4", "--ability-min", "20", "--ability-max", "50", "--workload", "uniform")
+    assert alloc("generate", "covering", *options, "--seed", "1", "--output", "u.json").code == 0
+    assert to_document(read_instance("u.json")) == to_document(machine_covering(9, 4, 20, 50, 1, equal=False))
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "told"),
+    [
+        ("--workload", "pareto", "alloc: --workload: must be equal or uniform"),
+        ("--ability-min", "1.5", "alloc: --ability-min: must be a whole number"),
+        ("--ability-max", "0", "alloc: --ability-max: must be at least"),
+        ("--tau", "0.5", "--tau': is for random, not for covering"),
+    ],
+)
+def test_machine_covering_refuses(alloc, option, value, told):
+    """What these families do not have is told under the name of the option."""
+    ran = alloc("generate", "covering", option, value)
+    assert (ran.code, ran.out) == (2, "")
+    assert told in ran.err
 
 
 def test_count_gives_a_file_per_seed(alloc):

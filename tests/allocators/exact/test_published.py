@@ -1,0 +1,42 @@
+"""The published table of machine covering says what its plans are worth, and bounds that they meet."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from alloc.problems import Allocation, evaluate, machine_covering, makespan_lower_bound
+
+TABLE = Path(__file__).parents[3] / "docs" / "machine-covering.csv"
+
+pytestmark = pytest.mark.skipif(not TABLE.exists(), reason="the tests run without the documentation")
+
+
+def rows() -> list[dict[str, str]]:
+    with TABLE.open(newline="") as text:
+        return list(csv.DictReader(text))
+
+
+def test_every_plan_has_the_published_makespan_and_no_bound_is_above_it() -> None:
+    """Scored anew, every plan serves all tasks in the published time, at or above the published and simple bounds."""
+    for row in rows():
+        shape = (int(row[name]) for name in ("agents", "tasks", "low", "high", "seed"))
+        instance = machine_covering(*shape, equal=row["workloads"] == "equal")
+        plan = Allocation(np.array([-1 if task == "-" else int(task) for task in row["plan"].split()]))
+        score, bound = evaluate(instance, plan), float(row["lower_bound"])
+        assert len(score.unserved_tasks) == 0
+        assert score.makespan == pytest.approx(float(row["makespan"]), rel=1e-12)
+        assert makespan_lower_bound(instance) * (1 - 1e-9) <= bound <= score.makespan * (1 + 1e-12)
+        assert (row["status"] == "optimal") == (score.makespan - bound <= 1e-6 * score.makespan)
+
+
+def test_least_loads_are_those_of_the_makespans() -> None:
+    """With equal workloads the optimum's least load is a whole number, and the bound on it is the same number."""
+    for row in rows():
+        if row["workloads"] == "equal":
+            load = 1000 / float(row["makespan"])
+            assert int(row["min_load"]) == pytest.approx(load, rel=1e-9)
+            assert int(row["min_load"]) <= int(row["min_load_bound"]) == int(1000 / float(row["lower_bound"]) + 1e-6)
+        else:
+            assert row["min_load"] == row["min_load_bound"] == ""
