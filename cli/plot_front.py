@@ -33,13 +33,14 @@ def draw_front(front: "Front") -> "Figure":
     hours = [result.makespan or 0.0 for result in front.points]
     energy = [result.energy or 0.0 for result in front.points]
     wide = hours[0] > 0 and hours[-1] > WIDE * hours[0]
-    end = hours[-1] * (1.25 if wide else 1.0) + 0.05 * (hours[-1] - hours[0]) or 1.0
+    span = hours[-1] - hours[0] or hours[0] or 1.0  # of a front that is one point too
+    end = hours[-1] * (1.25 if wide else 1.0) + 0.05 * span
     axes.step([*hours, end], [*energy, energy[-1]], where="post", color=MAKESPAN, linewidth=1.6, zorder=3)
     axes.plot(hours, energy, "o", color=MAKESPAN, markersize=6, clip_on=False, zorder=4, label="best found")
     _draw_bounds(axes, front)
     if wide:
         _logarithmic(axes)
-    axes.set_xlim(hours[0] / 1.1 if wide else hours[0] - 0.08 * (end - hours[0]), end)
+    axes.set_xlim(hours[0] / 1.1 if wide else hours[0] - 0.08 * span, end)
     axes.set_ylim(0, max(energy) * 1.08 or 1.0)
     axes.set_xlabel("makespan (h)")
     axes.set_ylabel("energy")

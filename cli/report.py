@@ -19,6 +19,9 @@ STOPS = {
 MOST_NAMES = 8
 """Ids in a list before it is cut."""
 
+SETTLED = 1e-6 + 1e-9
+"""Relative gap up to which no allocation is sooner, as for the status `optimal`; with slack that may be far."""
+
 
 def summary(result: Result) -> str:
     """Return the whole answer for people: how good it is, its figures, and what holds it up."""
@@ -120,7 +123,7 @@ def _gain(instance: Instance, found: Bottleneck) -> str:
 
 def _room(result: Result, found: Bottleneck) -> str:
     used = f"{percent(found.use)} of all ability is at work until then"
-    if result.gap is None or result.status is Status.OPTIMAL or result.gap <= 1e-6:
+    if result.gap is None or result.gap <= SETTLED:
         return f"{used}; the same agents cannot be done sooner."
     return f"{used}; the same agents, allocated otherwise, gain {percent(result.gap)} at most."
 

@@ -39,6 +39,14 @@ def test_one_point_is_drawn(alloc, unservable):
     assert Path("front.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_one_point_with_energy_is_drawn(alloc, small):
+    """A front that ends after its first point has a width too: nothing but the table is printed."""
+    ran = alloc("pareto", "small.json", "--method", "milp", "--points", "1", "--plot", "front.png")
+    assert ran.code == 0
+    assert "Warning" not in ran.err
+    assert Path("front.png").read_bytes().startswith(b"\x89PNG")
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [

@@ -43,3 +43,18 @@ def test_no_work_is_no_bottleneck():
     result = solve(Instance(ability=[3], workload=[0]), "greedy", handle_signals=False)
     assert "There is no work to do." in summary(result)
     assert "optimal" in summary(result)
+
+
+def test_what_slack_leaves_open_is_not_called_settled():
+    """With slack the cheapest allocation is proven, but the same agents may well be done sooner."""
+    instance = Instance(
+        ability=[1, 1, 1], workload=[3, 1], task_position=[[0, 0], [9, 0]], agent_position=[[0, 0], [9, 0], [9, 0]]
+    )
+    result = solve(
+        instance, "milp", objective="makespan-energy", makespan_slack=9, handle_signals=False, time_limit_s=30
+    )
+    assert result.energy == 0
+    lines = summary(result)
+    assert "optimal, no allocation within" in lines
+    assert "cannot be done sooner" not in lines
+    assert "the same agents, allocated otherwise, gain" in lines
