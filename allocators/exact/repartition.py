@@ -6,9 +6,9 @@ at random; of several best splits one is drawn, so that the search wanders where
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from alloc.allocators.compiled import compiled
+from alloc.allocators.xorshift import RandomState, draw
 from alloc.problems.instance import FloatArray, IntArray
 
 MOST_TASKS = 4
@@ -16,20 +16,6 @@ MOST_TASKS = 4
 
 POOL = 12
 """Agents that are split together at the most; of larger pools some stay where they are."""
-
-RandomState = NDArray[np.uint64]
-
-
-@compiled
-def draw(state: RandomState, bound: int) -> int:
-    """Return a random whole number from 0 to bound - 1, by xorshift; `state`, shape (1,), is never 0."""
-    x = state[0]
-    x ^= x << np.uint64(13)
-    x ^= x >> np.uint64(7)
-    x ^= x << np.uint64(17)
-    state[0] = x
-    number: int = np.int64((x >> np.uint64(11)) % np.uint64(bound))  # type: ignore[assignment]
-    return number
 
 
 @compiled

@@ -4,6 +4,10 @@ Which of their agents two tasks get each is a knapsack: exact by dynamic program
 small whole numbers. So are a task and those who stay idle. A state that no such step improves is shaken: around one
 task, distances get noise for one descent; the result is kept if it is better, or by the rule of annealing.
 
+The exchanges of the local search (`heuristic.local`) are much the same neighbourhood. As the plan side of the exact
+methods they were no better: of the paper's scenario 1, in 3 s on two threads of a busy machine, three of ten seeds took
+1.0, 1.4 and 2.4 % more energy, none markedly less; on scenarios 2 to 4 either came out ahead, by 1.1 % at most.
+
 References
 ----------
 Ahuja, Ergun, Orlin and Punnen (2002), A survey of very large-scale neighborhood search techniques,

@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from alloc.allocators.compiled import compiled
 from alloc.allocators.heuristic.local.ground import Ground, Small
-from alloc.allocators.heuristic.local.kernels import draw, exchange, keep
+from alloc.allocators.heuristic.local.kernels import exchange, keep
 from alloc.allocators.heuristic.local.plan import BEST, CROWDED, FLOWN, SHORTS, Plan, Scratch, Weights
+from alloc.allocators.xorshift import draw
 
 TRIES = 30
 """Agents that are drawn to find one that reaches a task."""

@@ -20,6 +20,7 @@ from alloc.allocators.heuristic.local.plan import (
     Scratch,
     Weights,
 )
+from alloc.allocators.xorshift import draw
 from alloc.problems.instance import FloatArray
 
 EMPTY = 1e12
@@ -30,17 +31,6 @@ LOOK = 8
 
 UNREACHED = 1e300
 """Cost of a sum of abilities that no set of agents has."""
-
-
-@compiled
-def draw(state: NDArray[np.uint64], below: int) -> int:
-    """Return a random whole number in [0, below), by xorshift (Marsaglia 2003, doi:10.18637/jss.v008.i14)."""
-    x = state[0]
-    x ^= x << np.uint64(13)
-    x ^= x >> np.uint64(7)
-    x ^= x << np.uint64(17)
-    state[0] = x
-    return np.int64(((x >> np.uint64(32)) * np.uint64(below)) >> np.uint64(32))  # type: ignore[return-value]
 
 
 @compiled

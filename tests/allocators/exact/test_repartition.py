@@ -3,7 +3,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from alloc.allocators.exact.repartition import MOST_TASKS, POOL, draw, split, wander
+from alloc.allocators.exact.repartition import MOST_TASKS, POOL, split, wander
 
 
 def lacking(value: np.ndarray, base: np.ndarray, need: np.ndarray, goal: tuple[int, ...]) -> float:
@@ -63,11 +63,3 @@ def test_perfect_split_is_found():
     work = np.repeat(rng.permutation(ability[ability > 0])[:, None], 20, axis=1)
     place, need = rng.integers(0, 20, len(work)), np.full(20, 1000.0 - 2)
     assert wander(work, need, place, 20_000, np.ones(1, dtype=np.uint64))[0] == 0.0
-
-
-def test_draws_are_even():
-    """Each number comes up about as often as the others."""
-    state = np.ones(1, dtype=np.uint64)
-    count = np.bincount([draw(state, 7) for _ in range(7000)], minlength=7)
-    assert len(count) == 7
-    assert (abs(count - 1000) < 150).all()

@@ -9,7 +9,7 @@ from alloc.allocators.heuristic.local import chain as chain_module
 from alloc.allocators.heuristic.local.anneal import helper
 from alloc.allocators.heuristic.local.chain import Chain, measure
 from alloc.allocators.heuristic.local.ground import survey
-from alloc.allocators.heuristic.local.kernels import by_halves, by_sums, by_trial, distance_of, draw, sorted_subsets
+from alloc.allocators.heuristic.local.kernels import by_halves, by_sums, by_trial, distance_of, sorted_subsets
 from alloc.allocators.heuristic.local.plan import Weights, room_to_work
 from alloc.problems import IDLE, Allocation, Instance, evaluate, serve_all
 
@@ -91,16 +91,6 @@ def test_subsets_come_in_order():
         assert scratch.trial_here[entry] == pytest.approx(scratch.here[goes].sum())
         assert scratch.trial_cost[entry] == pytest.approx(scratch.price[goes].sum())
     assert len(set(scratch.trial_set[:size].tolist())) == size
-
-
-def test_draws_are_even():
-    """Random numbers cover their range evenly, and the same state gives the same ones."""
-    state = np.array([12345], dtype=np.uint64)
-    drawn = [draw(state, 7) for _ in range(7000)]
-    assert np.bincount(drawn, minlength=7).min() > 850
-    assert max(drawn) == 6
-    state[0] = 12345
-    assert [draw(state, 7) for _ in range(20)] == drawn[:20]
 
 
 @settings(max_examples=60, deadline=None)
