@@ -1,7 +1,6 @@
 """The least makespan: bisection on T, each test a question of feasibility."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -9,7 +8,7 @@ from alloc.allocators.exact.configuration import Configurations
 from alloc.allocators.exact.demand import Model
 from alloc.allocators.exact.descent import descend
 from alloc.allocators.exact.enumeration import choose_groups, enumerate_groups
-from alloc.allocators.exact.question import Answer, Question, Watch, is_over
+from alloc.allocators.exact.question import Answer, Question, Test, Watch, is_over
 from alloc.allocators.exact.relaxation import relaxed_lower_bound
 from alloc.allocators.exact.wandering import Wanderer
 from alloc.allocators.search import PROVEN, Search
@@ -20,7 +19,6 @@ TIGHT = 1e-8
 
 UNLIMITED_S = 60.0
 """What the parts of the time that tests get are measured by where there is no time limit."""
-
 
 REPEATABLE_ROUNDS = 20
 """Times that are wandered for where runs must be repeatable."""
@@ -36,20 +34,6 @@ STEPS_PER_TEST = 20_000
 
 LONG, SHORT = 300, 20
 """Kicks of a descent: where solvers have failed, and at the start."""
-
-
-@dataclass(frozen=True)
-class Test:
-    """A makespan to be tried, the seconds that it may take, and whether nothing is lost or left if they pass in vain.
-
-    A test at the `top`, just below the best plan, comes early, to see whether the plan is the optimum already; the
-    `last` one comes when bisection has met nothing but open tests.
-    """
-
-    time: float
-    seconds: float
-    top: bool = False
-    last: bool = False
 
 
 class LeastMakespan:

@@ -11,6 +11,20 @@ from alloc.allocators.search import Search, StopReason
 from alloc.problems.instance import FloatArray, IntArray
 
 
+@dataclass(frozen=True)
+class Test:
+    """A makespan to be tried, the seconds that it may take, and whether nothing is lost or left if they pass in vain.
+
+    A test at the `top`, just below the best plan, comes early, to see whether the plan is the optimum already; the
+    `last` one comes when bisection has met nothing but open tests.
+    """
+
+    time: float
+    seconds: float
+    top: bool = False
+    last: bool = False
+
+
 @dataclass(frozen=True, eq=False)
 class Question:
     """Whether there is a plan with this demand, and which costs least.
