@@ -27,6 +27,9 @@ UNHURRIED_S = 60.0
 PART_ALONE = 0.3
 """Part of the time before which the solver is not asked."""
 
+PART_TRAVELLING, MOST_TRAVELLING_S = 0.4, 20.0
+"""Part of the time, and seconds, that local search gets where travel takes time."""
+
 
 def least_energy(search: Search, ask: Callable[[Question, Watch], Answer], serve: int) -> float | None:
     """Look for the least energy at the makespan of the best plan so far; return what is proven to be needed.
@@ -53,8 +56,25 @@ def least_energy(search: Search, ask: Callable[[Question, Watch], Answer], serve
     model = Model.build(search.instance, agent_classes(search.instance, by_place=True), serve)
     search.submit(nearest_places(search.instance, search.best.allocation, lambda: is_over(search)))
     search.submit(without_idlers(model, search.best.allocation, time))
+    if model.delay is not None and (search.budget.time_limit_s is not None or search.budget.iterations is None):
+        _search_travelling(search)
     bound = _Energy(search, ask, model, model.at(time)).run()
     return min(max(0.0, bound * search.instance.energy_per_distance), sys.float_info.max)
+
+
+def _search_travelling(search: Search) -> None:
+    """Save energy by local search first, as no walk of `Narrowing` knows of travel times.
+
+    Loaded when it is needed, as most runs do without.
+    """
+    from alloc.allocators.heuristic.local.chain import Chain
+    from alloc.allocators.heuristic.local.clock import Clock
+    from alloc.allocators.heuristic.local.improve import Parameters, lessen_energy
+
+    parameters = Parameters()
+    seconds = min(PART_TRAVELLING * search.remaining_s, MOST_TRAVELLING_S)
+    chain = Chain(search.instance, search.seed, parameters.near)
+    lessen_energy(search, chain, parameters, Clock(search, search.elapsed_s + seconds))
 
 
 class _Energy:
