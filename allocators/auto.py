@@ -10,6 +10,9 @@ from alloc.problems import Instance, Objective, count_classes
 
 MAKESPAN_PAIRS_PER_SECOND = 30_000
 ENERGY_PAIRS_PER_SECOND = 1_000
+MOST_PLACES = 4_000_000
+"""Agents times tasks beyond which the exact methods no longer search for plans by themselves."""
+
 UNHURRIED_S = 60.0
 """What counts as the time limit where there is none, or a longer one."""
 
@@ -24,6 +27,11 @@ def choose(instance: Instance, objective: Objective, budget: Budget) -> tuple[st
     few = max(1_000, int(ENERGY_PAIRS_PER_SECOND * seconds)) if energy else searchable
     size = f"{pairs} pairs of agent class and task"
     time = "without a time limit" if budget.time_limit_s is None else f"in {budget.time_limit_s:g} s"
-    if pairs <= few:
+    if pairs <= few and instance.n * instance.m <= MOST_PLACES:
         return "milp" if energy else "cpsat", f"{size} are few enough for a proof, or a small gap, {time} (up to {few})"
+    if pairs <= few:
+        return (
+            "local-search",
+            f"{instance.n} agents and {instance.m} tasks are too many for the search of exact methods",
+        )
     return "local-search", f"{size} are too many for a proof {time} (more than {few})"

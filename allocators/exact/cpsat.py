@@ -149,6 +149,7 @@ def _by(group: IntArray, groups: int) -> list[IntArray]:
 def _set_parameters(solver: cp_model.CpSolver, question: Question) -> None:
     parameters = solver.parameters
     parameters.catch_sigint_signal = False
+    parameters.presolve_inclusion_work_limit = 0  # with wide coefficients it cuts off solutions (OR-Tools 9.15)
     parameters.random_seed = question.seed % 2**31
     parameters.num_workers = 1 if question.repeatable else question.threads
     if question.cost is None and question.demand.spare == 0:  # all equations: presolve finds nothing and takes long

@@ -130,8 +130,7 @@ class Narrowing:
     def _descend(self) -> Allocation | None:
         """Come first, as prices aim at the cost of the plan at hand."""
         assert self._walk is not None
-        self._descended = True
-        self._walk.descend()
+        self._descended = self._walk.descend()
         return self._better()
 
     def _rise(self) -> None:

@@ -97,7 +97,8 @@ def descend_pairs(
     """Share out pair after pair, in random order, until no pair with a `stale` task improves."""
     for _ in range(rounds):
         now, again = stale.copy(), False
-        stale[:] = False
+        for j in range(len(stale)):
+            stale[j] = False
         first = int(rng.random() * len(pairs))
         for z in range(len(pairs)):
             a, b = pairs[(first + z) % len(pairs)]
@@ -114,6 +115,13 @@ def flown(task: WholeArray, distance: FloatArray) -> float:
     for i in range(len(task)):
         total += distance[i, task[i]]
     return total
+
+
+@compiled
+def overwrite(target: WholeArray, source: WholeArray) -> None:
+    """Copy `source`; a loop compiles faster than an assignment to a slice."""
+    for i in range(len(source)):
+        target[i] = source[i]
 
 
 @compiled
@@ -155,16 +163,21 @@ def shake(
         for a, b in pairs:
             if inside[a] and (inside[b] or b == len(need) - 1):
                 share_out(a, b, task, weight, distance, need, noise)
-        noise[:, around] = 0.0
-        stale[:] = inside
+        for j in around:
+            for i in range(len(task)):
+                noise[i, j] = 0.0
+        for j in range(len(stale)):
+            stale[j] = inside[j]
         descend_pairs(task, weight, distance, need, noise, pairs, stale, rng, 100)
         now = flown(task, distance)
         if now <= here or rng.random() < np.exp((here - now) / heat):
-            before[:], here = task, now
+            here = now
+            overwrite(before, task)
             if now < least * (1 - 1e-12):
-                best[:], least = task, now
+                least = now
+                overwrite(best, task)
         else:
-            task[:] = before
+            overwrite(task, before)
 
 
 @dataclass(frozen=True)
@@ -225,6 +238,7 @@ class Sharing:
         self._near = np.ascontiguousarray(order[:, : shaking.around])
         self._pairs = _pairs(order[:, : shaking.partners], tasks)
         self._noise = np.zeros_like(self._distance)
+        self._stale = np.ones(len(self._need), dtype=np.bool_)
         self.best = self._task.copy()
 
     @property
@@ -232,13 +246,13 @@ class Sharing:
         """Sum of distances of the best plan."""
         return float(flown(self.best, self._distance))
 
-    def descend(self) -> None:
-        """Go down to where no pair of tasks can be shared out better."""
-        stale = np.ones(len(self._need), dtype=np.bool_)
+    def descend(self) -> bool:
+        """Go through all pairs of tasks once; whether none can be shared out better any more."""
         descend_pairs(
-            self._task, self._weight, self._distance, self._need, self._noise, self._pairs, stale, self._rng, 100
+            self._task, self._weight, self._distance, self._need, self._noise, self._pairs, self._stale, self._rng, 1
         )
         self.best = self._task.copy()
+        return not self._stale.any()
 
     def walk(self, rounds: int, cooled: float) -> None:
         """Shake and descend `rounds` times, `cooled` being how far annealing is, from 0 to 1."""

@@ -11,7 +11,7 @@ from alloc.allocators.base import Allocator, Proposal
 from alloc.allocators.exact import enumeration, narrowing, wandering
 from alloc.allocators.exact.energy import least_energy
 from alloc.allocators.exact.makespan import LeastMakespan
-from alloc.allocators.exact.question import Answer, Question, Watch
+from alloc.allocators.exact.question import Answer, Question, Watch, is_over
 from alloc.allocators.heuristic.greedy import greedy
 from alloc.allocators.search import Budget, Search
 from alloc.problems import Instance, Objective, count_classes, fewest_unserved, serve_all
@@ -63,11 +63,24 @@ class ExactAllocator(Allocator):
         serve = int((instance.workload > 0).sum()) - fewest_unserved(instance)
         if serve == 0:
             return Proposal(energy_lower_bound=0.0)
-        energy_counts = search.objective is Objective.MAKESPAN_ENERGY
-        limit = search.budget.time_limit_s
-        until_s = np.inf if limit is None else limit * (MAKESPAN_SHARE if energy_counts else 1.0)
+        if search.objective is Objective.MAKESPAN:
+            self._lessen_makespan(search, serve, 1.0)
+            return Proposal()
+        bound: float | None = None
+        while True:  # again where the energy was settled early, and the makespan had not had all its time
+            in_vain = self._lessen_makespan(search, serve, MAKESPAN_SHARE)
+            found = least_energy(search, self.ask, serve)
+            bound = max((known for known in (bound, found) if known is not None), default=None)
+            if in_vain or search.fast_enough or is_over(search):
+                return Proposal(energy_lower_bound=bound)  # what holds within a makespan holds within a lesser one
+
+    def _lessen_makespan(self, search: Search, serve: int, share: float) -> bool:
+        """Look for the least makespan within a share of the time left; whether more time would be of no use."""
+        until_s = np.inf
+        if search.budget.time_limit_s is not None:
+            until_s = search.elapsed_s + share * search.remaining_s
         LeastMakespan(search, self.ask, serve, until_s, self.pairs_per_second, descent=self._descent).run()
-        return Proposal(energy_lower_bound=least_energy(search, self.ask, serve) if energy_counts else None)
+        return search.elapsed_s < until_s
 
     @abstractmethod
     def ask(self, question: Question, watch: Watch) -> Answer:

@@ -228,7 +228,7 @@ def _members(some: Genes, column: IntArray, cap: int, nobody: int, rng: np.rando
 
 def _draw(weight: FloatArray, rng: np.random.Generator, stray: float) -> IntArray:
     """Draw a column of each row with probability in proportion to its weight, or, now and then, any column."""
-    plain = (rng.random(len(weight)) < stray) | ~(weight.sum(axis=1) > 0)
+    plain = (rng.random(len(weight)) < stray) | ~(weight.max(axis=1) > 0)
     return _roulette(np.where(plain[:, None], 1.0, weight), rng)
 
 
@@ -236,7 +236,7 @@ def _draw_giver(
     some: Genes, surplus: FloatArray, to: IntArray, landscape: Landscape, rng: np.random.Generator, stray: float
 ) -> IntArray:
     """Draw an agent of each row in proportion to the surplus of its group, from those that can go to column `to`."""
-    plain = (rng.random(len(some)) < stray) | ~(surplus.sum(axis=1) > 0)
+    plain = (rng.random(len(some)) < stray) | ~(surplus.max(axis=1) > 0)
     weight = np.take_along_axis(np.where(plain[:, None], 1.0, surplus), some.astype(np.intp), axis=1)
     weight[some == to[:, None]] = 0.0
     if not landscape.is_complete:
@@ -257,7 +257,8 @@ def _draw_homeward(some: Genes, landscape: Landscape, rng: np.random.Generator) 
 
 def _roulette(weight: FloatArray, rng: np.random.Generator) -> IntArray:
     """Draw one column of each row in proportion to its weight; any where all weights are 0."""
-    total = np.cumsum(weight, axis=1)
+    largest = weight.max(axis=1, keepdims=True)
+    total = np.cumsum(weight / np.where(largest > 0, largest, 1.0), axis=1)  # so that no sum overflows
     mark = rng.random((len(weight), 1)) * total[:, -1:]
     drawn: NDArray[np.intp] = (total <= mark).sum(axis=1).clip(max=weight.shape[1] - 1)
     return drawn
