@@ -19,6 +19,9 @@ import numpy as np
 from alloc.problems import AgentClasses, Allocation, Instance
 from alloc.problems.instance import FloatArray, IntArray
 
+FEW_PAIRS = 200
+"""Pairs of class and task that a solver does away with at once, so that nothing need be tried before."""
+
 ROUNDING = 1e-12
 """Relative slack on needs, so that rounding in the last digits never makes a plan look too slow."""
 

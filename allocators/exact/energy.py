@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from alloc.allocators.exact.demand import ROUNDING, Demand, Model
+from alloc.allocators.exact.demand import FEW_PAIRS, ROUNDING, Demand, Model
 from alloc.allocators.exact.narrowing import MOST_TASKS, REPEATABLE_SLICES, Narrowing
 from alloc.allocators.exact.question import Answer, Question, Watch, is_over
 from alloc.allocators.search import Search
@@ -17,9 +17,6 @@ from alloc.problems.instance import IntArray
 
 MOST_MATCHED = 400
 """Agents alike that are matched with their places at once, some 10 ms; larger classes are cut into parts."""
-
-FEW_PAIRS = 200
-"""Pairs of class and task that a solver does away with at once."""
 
 UNHURRIED_S = 60.0
 """What the parts of the time are measured by where there is no time limit, or a longer one."""
@@ -56,9 +53,11 @@ def least_energy(search: Search, ask: Callable[[Question, Watch], Answer], serve
     model = Model.build(search.instance, agent_classes(search.instance, by_place=True), serve)
     search.submit(nearest_places(search.instance, search.best.allocation, lambda: is_over(search)))
     search.submit(without_idlers(model, search.best.allocation, time))
-    if model.delay is not None and (search.budget.time_limit_s is not None or search.budget.iterations is None):
+    demand = model.at(time)
+    counted = search.budget.time_limit_s is None and search.budget.iterations is not None
+    if model.delay is not None and len(demand.kind) > FEW_PAIRS and not counted:
         _search_travelling(search)
-    bound = _Energy(search, ask, model, model.at(time)).run()
+    bound = _Energy(search, ask, model, demand).run()
     return min(max(0.0, bound * search.instance.energy_per_distance), sys.float_info.max)
 
 

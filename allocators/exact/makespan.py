@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from alloc.allocators.exact.configuration import Configurations
-from alloc.allocators.exact.demand import Model
+from alloc.allocators.exact.demand import FEW_PAIRS, Model
 from alloc.allocators.exact.descent import descend
 from alloc.allocators.exact.enumeration import choose_groups, enumerate_groups
 from alloc.allocators.exact.question import Answer, Question, Test, Watch, is_over
@@ -96,7 +96,8 @@ class LeastMakespan:
         """Narrow the gap until it is closed or time is up; plans and bounds go to the search."""
         if self._descent:
             self._quick_plans()
-            for part in (0.005, 0.2):  # plans and bounds by turns, as either alone often closes the gap
+            turns = (0.005, 0.2) if len(self._model.kind) > FEW_PAIRS else ()
+            for part in turns:  # plans and bounds by turns, as either alone often closes the gap
                 self._wander(part)
                 self._raise_by_prices(part)
         elif self._search.instance.has_travel_time or not self._search.instance.reach.is_complete:

@@ -12,7 +12,7 @@ from alloc.problems.instance import IDLE, FloatArray, IntArray
 MOST_PLACES = 4_000_000
 """Pairs of agent and task beyond which this is none of its business."""
 
-STEPS = 10
+STEPS = 20
 """Splits in one go: less than a millisecond as a rule, a tenth of a second at worst."""
 
 
