@@ -115,6 +115,9 @@ class GeneticAlgorithm(Allocator):
         if not (instance.workload > 0).any():
             return Proposal(Allocation.idle(instance))
         search.submit(serve_all(instance, greedy(instance, search)))
+        assert search.best is not None
+        if search.best.evaluation.served_makespan == 0:  # no task that takes time can be served
+            return Proposal(Allocation.idle(instance))
         landscape, epoch = Landscape(instance), 0
         rng = np.random.default_rng(search.seed)
         while not search.should_stop():

@@ -161,3 +161,14 @@ def test_holds_its_time_limit_on_many_agents() -> None:
     result = solve(instance, "ga", time_limit_s=0.5)
     assert result.makespan is not None
     assert result.runtime_s < 0.5 * 1.1 + 0.5
+
+
+def test_nobody_flies_where_nothing_can_be_served():
+    """Where no task that takes time is within reach, everybody is idle, at once and without warnings."""
+    instance = Instance(
+        ability=[1, 2], workload=[3, 4], agent_position=[[0, 0], [1, 1]], task_position=[[9, 9], [8, 8]],
+        communication_range=[1, 1],
+    )  # fmt: skip
+    result = solve(instance, "ga", objective="makespan-energy", time_limit_s=5)
+    assert result.allocation == Allocation.idle(instance)
+    assert result.runtime_s < 1
