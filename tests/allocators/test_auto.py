@@ -51,6 +51,6 @@ def test_agents_alike_count_once() -> None:
 
 def test_more_time_turns_the_choice_to_a_proof() -> None:
     """With a minute, a solver is worth trying where in a second it is not; without a limit, all the more."""
-    instance = scattered(100, 20)
+    instance = scattered(500, 50)
     picks = [choose(instance, Objective.MAKESPAN_ENERGY, Budget(seconds))[0] for seconds in (1.0, 60.0, None)]
     assert picks == ["local-search", "milp", "milp"]
