@@ -1,10 +1,11 @@
 """Files that commands read, and those that they are to write, looked at before a long run."""
 
 import os
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from alloc.cli.console import STANDARD, note
+from alloc.cli.console import STANDARD, note, to_json, write_out
 
 if TYPE_CHECKING:
     from alloc.problems import Allocation, Instance
@@ -40,6 +41,17 @@ def read_known(instance: str, front: str | None, *, quiet: bool = False) -> "tup
     if warning is not None and not quiet:
         note(warning)
     return problem, answers
+
+
+def save(document: Callable[[], dict[str, Any]], output: str | None, *, json: bool) -> None:
+    """Write what `document` returns as JSON to the file asked for, whole or not at all, and to standard output."""
+    text = to_json(document()) if json or output is not None else ""
+    if output is not None and output != STANDARD:
+        from alloc.problems.formats import write_text_atomically
+
+        write_text_atomically(output, text)
+    if json or output == STANDARD:
+        write_out(text)
 
 
 def check_writable(name: str | None) -> None:

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from alloc.cli import options
-from alloc.cli.console import STANDARD, note, number, percent, say, table, to_json, write_out
-from alloc.cli.files import check_writable, read_known
+from alloc.cli.console import note, number, percent, say, table
+from alloc.cli.files import check_writable, read_known, save
 from alloc.cli.options import examples
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ def pareto_command(
         threads=threads,
         on_point=None if quiet else _show_point,
     )
-    _save(front, output, json=json)
+    save(front.to_dict, output, json=json)
     if not quiet:
         if not json:
             say(_table(front))
@@ -80,16 +80,6 @@ def pareto_command(
 
         save_front(front, plot)
     raise typer.Exit(0 if front.points and front.points[0].makespan is not None else 1)
-
-
-def _save(front: "Front", output: str | None, *, json: bool) -> None:
-    text = to_json(front.to_dict()) if json or output is not None else ""
-    if output is not None and output != STANDARD:
-        from alloc.problems.formats import write_text_atomically
-
-        write_text_atomically(output, text)
-    if json or output == STANDARD:
-        write_out(text)
 
 
 def _show_point(result: "Result") -> None:

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from alloc.cli import options
-from alloc.cli.console import STANDARD, note, say, to_json, write_out
-from alloc.cli.files import check_writable, read_pair
+from alloc.cli.console import note, say
+from alloc.cli.files import check_writable, read_pair, save
 from alloc.cli.options import Objective, examples
 
 if TYPE_CHECKING:
@@ -90,7 +90,7 @@ def solve_command(
             policy=policy,
             device=device,
         )
-    _save(result, output, json=json)
+    save(result.to_dict, output, json=json)
     if not quiet:
         _tell(result, summary=not json)
     if plot is not None:
@@ -98,16 +98,6 @@ def solve_command(
 
         save_plot(result, plot)
     raise typer.Exit(0 if result.evaluation is not None and not result.evaluation.unserved_tasks else 1)
-
-
-def _save(result: "Result", output: str | None, *, json: bool) -> None:
-    text = to_json(result.to_dict()) if json or output is not None else ""
-    if output is not None and output != STANDARD:
-        from alloc.problems.formats import write_text_atomically
-
-        write_text_atomically(output, text)
-    if json or output == STANDARD:
-        write_out(text)
 
 
 def _tell(result: "Result", *, summary: bool) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 from alloc.allocators.base import Allocator, Proposal
 from alloc.allocators.heuristic.auction_rounds import Market, bid
 from alloc.allocators.heuristic.hearing import hearing
-from alloc.allocators.heuristic.hedonic import CHANCE, MOST_CELLS, Game, compile_game
+from alloc.allocators.heuristic.hedonic import CHANCE, Game, compile_game, too_many_minds
 from alloc.allocators.heuristic.hedonic import Parameters as GameParameters
 from alloc.allocators.registry import BUILT_IN
 from alloc.allocators.search import Budget, Search
@@ -69,9 +69,7 @@ class Auction(Allocator):
 
     def refusal(self, instance: Instance, objective: Objective, budget: Budget) -> str | None:
         """The exchanges keep a plan of all for every agent."""
-        if instance.n * (instance.n + instance.m) > MOST_CELLS:
-            return f"each of {instance.n} agents would keep a plan of all; some {int(MOST_CELLS**0.5)} are the most"
-        return None
+        return too_many_minds(instance)
 
     def allocate(self, search: Search) -> Proposal:
         """Hold auctions until the search says stop; every improvement has been submitted by then."""

@@ -82,9 +82,7 @@ class Hedonic(Allocator):
 
     def refusal(self, instance: Instance, objective: Objective, budget: Budget) -> str | None:
         """Every agent keeps what it knows of all others."""
-        if instance.n * (instance.n + instance.m) > MOST_CELLS:
-            return f"each of {instance.n} agents would keep a plan of all; some {int(MOST_CELLS**0.5)} are the most"
-        return None
+        return too_many_minds(instance)
 
     def allocate(self, search: Search) -> Proposal:
         """Play until the search says stop; every improvement has been submitted by then."""
@@ -103,6 +101,13 @@ class Hedonic(Allocator):
         if game.games > 1:
             notes.append(_report(game.minds.tally, f"{game.games} games in all"))
         return Proposal(notes=tuple(notes))
+
+
+def too_many_minds(instance: Instance) -> str | None:
+    """Say why so many agents cannot each keep a plan of all, None if they can."""
+    if instance.n * (instance.n + instance.m) > MOST_CELLS:
+        return f"each of {instance.n} agents would keep a plan of all; some {int(MOST_CELLS**0.5)} are the most"
+    return None
 
 
 def _report(tally: IntArray, what: str) -> str:
