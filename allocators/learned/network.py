@@ -1,39 +1,66 @@
-"""The actor-critic: attention over tasks, and a small network that scores each agent's bid for each task."""
+"""The body that all five methods share: attention over groups and tasks, and a small network that scores each bid."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import torch
 from torch import Tensor, nn
 
 from alloc.problems.game import (
+    AGENT_FEATURES,
     PAIR_FEATURES,
     TASK_FEATURES,
     Board,
     State,
-    illegal_actions,
+    observe_agents,
     observe_pairs,
     observe_tasks,
+    tasks_of,
 )
-
-BARRED = -1e9
-"""Logit of an action that may not be chosen."""
 
 
 @dataclass(frozen=True)
 class NetworkSize:
-    """Sizes of an `ActorCritic`; part of every stored policy."""
+    """Sizes of an `ActorCritic`; part of every stored policy.
+
+    Attributes
+    ----------
+    pair_width, task_width, heads : int
+    attention : bool
+        Whether groups and tasks attend; without, each is seen alone.
+    """
 
     pair_width: int = 32
     task_width: int = 32
     heads: int = 4
+    attention: bool = True
+
+
+class Scores(NamedTuple):
+    """What a network says of a state.
+
+    Attributes
+    ----------
+    bids : Tensor, shape (B, n, c)
+        Score of every bid, legal or not.
+    reserve : Tensor, shape (B,)
+        Score of granting no bid.
+    value : Tensor, shape (B,)
+        Value of the state (8).
+    """
+
+    bids: Tensor
+    reserve: Tensor
+    value: Tensor
 
 
 class ActorCritic(nn.Module):
     """Scores bids (the actor, (7)) and states (the critic, (8)) for any number of agents and tasks.
 
-    The logit of a bid is the sum of two parts. The local part sees the pair of agent and task alone, so that after a
-    move only the pairs that it touched are scored anew. The other part, a pointer, compares the agent's group with
-    the task after the tasks attended to each other; it is cheap enough to be computed anew at each step.
+    Each group attends to its members, and the places to each other, the nearer the more: so an agent knows of its
+    neighbours within two steps, whatever their number, at a cost that grows with n, not with n^2. The score of a bid
+    is the sum of two parts. The local part sees the pair of agent and task alone, so that after a move only the pairs
+    that it touched are scored anew. The other part, a pointer, compares the agent's group with the task.
 
     References
     ----------
@@ -44,40 +71,74 @@ class ActorCritic(nn.Module):
     def __init__(self, size: NetworkSize | None = None) -> None:
         super().__init__()
         self.size = size or NetworkSize()
-        wide, width = self.size.pair_width, self.size.task_width
+        wide, width, heads = self.size.pair_width, self.size.task_width, self.size.heads
         self.local = nn.Sequential(
             nn.Linear(PAIR_FEATURES, wide), nn.ReLU(), nn.Linear(wide, wide), nn.ReLU(), nn.Linear(wide, 1)
         )
         self.embed = nn.Linear(TASK_FEATURES, width)
-        self.attend = nn.MultiheadAttention(width, self.size.heads, batch_first=True)
+        if self.size.attention:
+            self.member = nn.Linear(AGENT_FEATURES, width + heads)
+            self.gather = nn.Linear(width, width)
+            self.attend = nn.Linear(width, 3 * width)
+            self.spread = nn.Linear(width, width)
+            self.nearness = nn.Parameter(torch.linspace(-2.0, 1.0, heads))
         self.mix = nn.Sequential(nn.Linear(width, 2 * width), nn.ReLU(), nn.Linear(2 * width, width))
         self.query, self.key = nn.Linear(width + 1, width), nn.Linear(width, width)
-        self.stop = nn.Sequential(nn.Linear(2 * width, width), nn.ReLU(), nn.Linear(width, 1))
+        self.reserve = nn.Sequential(nn.Linear(2 * width, width), nn.ReLU(), nn.Linear(width, 1))
         self.critic = nn.Sequential(nn.Linear(2 * width, width), nn.ReLU(), nn.Linear(width, 1))
 
-    def tasks(self, features: Tensor) -> Tensor:
-        """Let the tasks attend to each other: (B, m + 1, TASK_FEATURES) to (B, m + 1, width)."""
-        token = torch.relu(self.embed(features))
-        token = token + self.attend(token, token, token, need_weights=False)[0]
+    def forward(self, board: Board, state: State) -> Scores:
+        """Score all bids and the state."""
+        token = self.places(board, state)
+        return Scores(self.pairs(observe_pairs(board, state)) + self.pointer(board, state, token), *self.heads(token))
+
+    def pairs(self, features: Tensor) -> Tensor:
+        """Local part of the scores: (..., PAIR_FEATURES) to (...)."""
+        score: Tensor = self.local(features)[..., 0]
+        return score
+
+    def places(self, board: Board, state: State) -> Tensor:
+        """Return what each place knows of its group and of the others, shape (B, m + 1, width)."""
+        token = torch.relu(self.embed(observe_tasks(board, state)))
+        if self.size.attention:
+            token = token + self.gather(self._members(board, state))
+            token = token + self.spread(self._neighbours(board, token))
         token = token + self.mix(token)
         return nn.functional.layer_norm(token, list(token.shape[-1:]))
 
-    def pointer(self, token: Tensor, task: Tensor, ability: Tensor) -> Tensor:
-        """Compare each agent's group with each task: shape (B, n, m + 1)."""
-        group = token.gather(1, task[..., None].expand(-1, -1, token.shape[2]))
-        query = self.query(torch.cat([group, ability[..., None] - 1], -1))
-        likeness: Tensor = query @ self.key(token).transpose(1, 2)
-        return likeness.div(token.shape[2] ** 0.5)
+    def _members(self, board: Board, state: State) -> Tensor:
+        """Each group attends to its members: softmax over those at each place, shape (B, m + 1, width)."""
+        heads, width = self.size.heads, self.size.task_width
+        seen = self.member(observe_agents(board, state))
+        weight = (8 * torch.tanh(seen[..., :heads] / 8)).exp() * (board.ability > 0)[..., None]
+        task = tasks_of(board, state)[..., None]
+        heard = torch.relu(seen[..., heads:]).unflatten(-1, (heads, width // heads)) * weight[..., None]
+        empty = seen.new_zeros(len(task), board.places, heads + width)
+        both = torch.cat([weight, heard.flatten(2)], -1)
+        total = empty.scatter_add(1, task.expand(-1, -1, heads + width), both)
+        shares = total[..., heads:].unflatten(-1, (heads, width // heads)) / (total[..., :heads, None] + 1e-6)
+        return shares.flatten(2)
+
+    def _neighbours(self, board: Board, token: Tensor) -> Tensor:
+        """Places attend to each other, those near by more, by a learned slope per head, shape (B, m + 1, width)."""
+        heads, width = self.size.heads, self.size.task_width
+        query, key, value = (
+            part.unflatten(-1, (heads, width // heads)).transpose(1, 2) for part in self.attend(token).chunk(3, -1)
+        )
+        slope = nn.functional.softplus(self.nearness)[:, None, None]
+        likeness = query @ key.transpose(2, 3) / (width // heads) ** 0.5 - slope * board.apart[:, None]
+        heard: Tensor = likeness.softmax(-1) @ value
+        return heard.transpose(1, 2).flatten(2)
+
+    def pointer(self, board: Board, state: State, token: Tensor) -> Tensor:
+        """Compare each agent's group with its candidates: shape (B, n, c)."""
+        width = token.shape[2]
+        group = token.gather(1, tasks_of(board, state)[..., None].expand(-1, -1, width))
+        query = self.query(torch.cat([group, board.ability[..., None] - 1], -1))
+        likeness = query @ self.key(token).transpose(1, 2) / width**0.5
+        return likeness if board.goal.shape[2] == board.places else likeness.gather(2, board.goal)
 
     def heads(self, token: Tensor) -> tuple[Tensor, Tensor]:
-        """Return the logit of stopping and the value of the state, both of shape (B,)."""
+        """Return the score of granting nothing and the value of the state, both of shape (B,)."""
         pooled = torch.cat([token.mean(1), token.amax(1)], -1)
-        return self.stop(pooled)[:, 0], self.critic(pooled)[:, 0]
-
-    def forward(self, board: Board, state: State) -> tuple[Tensor, Tensor]:
-        """Return the logits of all actions, shape (B, n * (m + 1) + 1), and the values, shape (B,)."""
-        token = self.tasks(observe_tasks(board, state))
-        bid = self.local(observe_pairs(board, state))[..., 0] + self.pointer(token, state.task, board.ability)
-        stop, value = self.heads(token)
-        logits = torch.cat([bid.flatten(1), stop[:, None]], 1)
-        return logits.masked_fill(illegal_actions(board, state), BARRED), value
+        return self.reserve(pooled)[:, 0], self.critic(pooled)[:, 0]

@@ -1,0 +1,230 @@
+"""How the game goes: states, turns, and what an episode costs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from enum import StrEnum
+
+import torch
+from torch import Tensor
+
+from alloc.problems.game.board import Board
+
+TOLERANCE = 1e-5
+"""Distance that a battery may be overdrawn by: single precision."""
+
+
+class Turn(StrEnum):
+    """Who moves in a step."""
+
+    BIDDING = "bidding"
+    SIMULTANEOUS = "simultaneous"
+
+
+class Reward(StrEnum):
+    """What the agents are rewarded for."""
+
+    MAKESPAN = "makespan"
+    COVERAGE = "coverage"
+
+
+@dataclass(frozen=True)
+class Rules:
+    """Rules of a game.
+
+    Attributes
+    ----------
+    turn : Turn or str
+        ``bidding``: all agents bid for all their candidates, and the best bid of each neighbourhood moves: bids are
+        granted in their order, but for those that share a task with one granted before. ``simultaneous``, the
+        paper's: all agents choose at once.
+    reward : Reward or str
+        ``makespan``: see `potential`; ``coverage``: (3).
+    flying : bool
+        Whether agents fly at once where they decide to go, so that energy adds up over the hops (19) and the battery
+        left limits the reach. If not, they decide first and fly to the last place only: energy is that of the plan.
+    returning : bool
+        Whether an agent may return to a place that it left in the same episode.
+    most_moves : int or None
+        Bids granted at most in a step; 1 is one move at a time.
+    """
+
+    turn: Turn | str = Turn.BIDDING
+    reward: Reward | str = Reward.MAKESPAN
+    flying: bool = False
+    returning: bool = False
+    most_moves: int | None = None
+
+
+PLANNING = Rules()
+"""The game that the shipped policies play: agents bid, and fly when all is decided."""
+
+PAPER = Rules(Turn.SIMULTANEOUS, Reward.COVERAGE, flying=True, returning=True)
+"""The game of the paper, section 2.2."""
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Where everybody is.
+
+    Attributes
+    ----------
+    slot : Tensor of int, shape (B, n)
+        Candidate that each agent has chosen.
+    group : Tensor, shape (B, m + 1)
+        Ability at each place.
+    left : Tensor of bool, shape (B, n, c)
+        Candidates that each agent has left in this episode.
+    done : Tensor of bool, shape (B,)
+        Whether the game has ended.
+    at : Tensor of int, shape (B, n)
+        Task that each agent has flown to, m for its start; it stays there while it is idle.
+    hopped : Tensor, shape (B, n)
+        Distance that each agent has flown hop by hop.
+    """
+
+    slot: Tensor
+    group: Tensor
+    left: Tensor
+    done: Tensor
+    at: Tensor
+    hopped: Tensor
+
+    def __getitem__(self, rows: Tensor) -> State:
+        """Return the states with these numbers."""
+        return State(*(getattr(self, field.name)[rows] for field in fields(self)))
+
+
+def begin(board: Board) -> State:
+    """Return the state in which a game starts."""
+    batch, n, _ = board.shape
+    return State(
+        slot=board.start,
+        group=group_ability(board, board.start),
+        left=torch.zeros_like(board.legal),
+        done=board.price.new_zeros(batch, dtype=torch.bool),
+        at=board.start.new_full((batch, n), board.places - 1),
+        hopped=torch.zeros_like(board.ability),
+    )
+
+
+def pick(values: Tensor, slot: Tensor) -> Tensor:
+    """Return each agent's value at its slot: (B, n, c) and (B, n) to (B, n)."""
+    return values.gather(2, slot[..., None])[..., 0]
+
+
+def tasks_of(board: Board, state: State) -> Tensor:
+    """Return the task of each agent, m for idle, shape (B, n)."""
+    return pick(board.goal, state.slot)
+
+
+def group_ability(board: Board, slot: Tensor) -> Tensor:
+    """Return the ability at each place, shape (B, m + 1)."""
+    empty = torch.zeros_like(board.need)
+    return empty.scatter_add_(1, pick(board.goal, slot), pick(board.contribution, slot))
+
+
+def open_bids(board: Board, state: State, rules: Rules = PLANNING) -> Tensor:
+    """Return which candidates each agent may move to now, shape (B, n, c): all in C(i) but where it is."""
+    allowed = board.legal & ~state.done[:, None, None]
+    if not rules.returning:
+        allowed = allowed & ~state.left
+    if rules.flying:
+        allowed = allowed & (state.hopped[..., None] + hop(board, state) <= board.endurance[..., None] + TOLERANCE)
+    return allowed.scatter(2, state.slot[..., None], False)
+
+
+def hop(board: Board, state: State) -> Tensor:
+    """Return how far it is from where each agent is to its candidates, shape (B, n, c); being idle takes no flight."""
+    rows = board.apart.gather(1, state.at[..., None].expand(-1, -1, board.places)).gather(2, board.goal)
+    from_start = (state.at == board.places - 1)[..., None]
+    return torch.where(from_start, board.distance, rows).masked_fill(board.goal == board.places - 1, 0.0)
+
+
+def grant(board: Board, state: State, bids: Tensor, reserve: Tensor, most_moves: int | None = None) -> Tensor:
+    """Grant the best bid of each neighbourhood: bids above the reserve that share no task with a better one.
+
+    Parameters
+    ----------
+    bids : Tensor, shape (B, n, c)
+        ``-inf`` where an agent may not bid.
+    reserve : Tensor, shape (B,)
+        Bids below it are not granted; a game without a granted bid ends.
+    most_moves : int, optional
+        Bids granted at most.
+
+    Returns
+    -------
+    Tensor of int, shape (B, k)
+        The granted bids, ``agent * c + slot``, in their order; then once ``n * c`` where the reserve came next, or
+        nobody else could bid; then -1. Where `most_moves` were granted, no reserve follows.
+    """
+    batch, n, c = board.shape
+    task, idle = tasks_of(board, state), board.places - 1
+    flat = torch.cat([bids.flatten(1), reserve[:, None]], 1)
+    open_, passed = flat[:, :-1].view(batch, n, c), state.done.clone()
+    granted: list[Tensor] = []
+    flat[state.done, :-1] = -torch.inf
+    rows = torch.arange(batch, device=flat.device)
+    while not bool(passed.all()) and (most_moves is None or len(granted) < most_moves):
+        choice = flat.argmax(1)
+        granted.append(choice.masked_fill(passed, -1))
+        passed = passed | (choice == n * c)
+        agent = torch.div(choice, c, rounding_mode="floor").clamp(max=n - 1)
+        source = task[rows, agent]
+        target = board.goal[rows, agent, choice % c]
+        source = source.masked_fill(passed | (source == idle), -1)[:, None]
+        target = target.masked_fill(passed | (target == idle), -1)[:, None]
+        open_.masked_fill_(((task == source) | (task == target))[..., None], -torch.inf)
+        open_.masked_fill_((board.goal == source[..., None]) | (board.goal == target[..., None]), -torch.inf)
+        open_[rows, agent] = open_[rows, agent].masked_fill(~passed[:, None], -torch.inf)
+    return torch.stack(granted, 1) if granted else task.new_full((batch, 1), -1)
+
+
+def moved(board: Board, state: State, granted: Tensor) -> Tensor:
+    """Return the slots of all agents after the granted bids, shape (B, n)."""
+    batch, n, c = board.shape
+    slot = torch.cat([state.slot, state.slot.new_zeros(batch, 1)], 1)  # a last column for what is no bid
+    real = (granted >= 0) & (granted < n * c)
+    agent = torch.where(real, torch.div(granted, c, rounding_mode="floor"), n)
+    return slot.scatter(1, agent, granted.clamp(min=0) % c)[:, :-1]
+
+
+def step(board: Board, state: State, slot: Tensor) -> State:
+    """Have every agent go to a candidate; a game in which nobody moves ends.
+
+    Parameters
+    ----------
+    slot : Tensor of int, shape (B, n)
+        The same as in the state for staying; ignored in games that are done.
+    """
+    slot = torch.where(state.done[:, None], state.slot, slot)
+    goes = slot != state.slot
+    left = state.left | (goes[..., None] & torch.zeros_like(state.left).scatter_(2, state.slot[..., None], True))
+    goal = pick(board.goal, slot)
+    flies = goes & (goal != board.places - 1)
+    return State(
+        slot=slot,
+        group=group_ability(board, slot),
+        left=left,
+        done=state.done | ~goes.any(1),
+        at=torch.where(flies, goal, state.at),
+        hopped=state.hopped + _flight(board, state, slot, goal) * flies,
+    )
+
+
+def _flight(board: Board, state: State, slot: Tensor, goal: Tensor) -> Tensor:
+    """Return `hop` to one candidate of each agent, shape (B, n)."""
+    games = torch.arange(len(goal), device=goal.device)[:, None]
+    return torch.where(state.at == board.places - 1, pick(board.distance, slot), board.apart[games, state.at, goal])
+
+
+def flown(board: Board, state: State, rules: Rules = PLANNING) -> Tensor:
+    """Return the mean distance per agent, shape (B,): directly to the last place (19), or hop by hop."""
+    return (state.hopped if rules.flying else pick(board.distance, state.slot)).mean(1)
+
+
+def battery_left(board: Board, state: State) -> Tensor:
+    """Return the mean share of the battery left after the hops of the episode, shape (B,); 1 without batteries."""
+    spent = state.hopped / board.endurance.clamp(min=TOLERANCE)
+    return 1 - spent.clamp(max=1.0).mean(1)
