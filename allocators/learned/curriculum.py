@@ -47,7 +47,7 @@ class Curriculum:
     games: int = 20
     steps_per_agent: float = 0.6
 
-    def draw(self, rng: np.random.Generator) -> Board:
+    def draw(self, rng: np.random.Generator, progress: float = 1.0) -> Board:
         """Draw a board of games for one update."""
         m = int(rng.integers(self.tasks[0], self.tasks[1] + 1))
         n = min(self.most_agents, round(m * rng.uniform(*self.agents_per_task)))
@@ -58,7 +58,7 @@ class Curriculum:
 
     def steps(self, board: Board) -> int:
         """How long games on `board` last."""
-        return max(4, int(self.steps_per_agent * board.shape[1]))
+        return 20
 
     def _instance(self, n: int, m: int, seed: int, rng: np.random.Generator) -> Instance:
         if rng.random() < self.paper_share:
