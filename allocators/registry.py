@@ -20,7 +20,12 @@ _TARGETS = {
     "hedonic": "alloc.allocators.heuristic.hedonic:Hedonic",
     "auction": "alloc.allocators.heuristic.auction:Auction",
     "lp-round": "alloc.allocators.heuristic.lp_round:LpRound",
-    "gappo": "alloc.allocators.learned.gappo:Gappo",
+    "gappo": "alloc.allocators.learned.policy:Gappo",
+    "gappo-ls": "alloc.allocators.learned.policy:GappoLs",
+    "ppo": "alloc.allocators.learned.policy:Ppo",
+    "a2c": "alloc.allocators.learned.policy:A2c",
+    "dqn": "alloc.allocators.learned.policy:Dqn",
+    "ddpg": "alloc.allocators.learned.policy:Ddpg",
 }
 
 BUILT_IN = {
@@ -100,15 +105,57 @@ BUILT_IN = {
             anytime=True,
             citation="Shmoys and Tardos (1993), doi:10.1007/BF01585178",
         ),
-        Method(
-            name="gappo",
-            summary="learned policy: a population of actor-critics, trained by PPO and bred by a GA",
-            kind=Kind.LEARNED,
-            requires=("torch", "safetensors"),
-            warm_start=True,
-            anytime=True,
-            options=("policy", "device"),
-            citation="Fang et al. (2025), doi:10.20944/preprints202502.0192.v1",
+        *(
+            Method(
+                name=name,
+                summary=summary,
+                kind=Kind.LEARNED,
+                requires=("torch", "safetensors", *more),
+                finite_speeds=True,
+                makespan_slack=True,
+                warm_start=True,
+                anytime=True,
+                options=("policy", "device"),
+                citation=citation,
+            )
+            for name, summary, more, citation in (
+                (
+                    "gappo",
+                    "learned policies: a population of actor-critics, trained by PPO and bred by a GA",
+                    ("deap",),
+                    "Fang et al. (2025), doi:10.20944/preprints202502.0192.v1",
+                ),
+                (
+                    "gappo-ls",
+                    "hybrid: the first plan of gappo, improved by local-search",
+                    ("deap", "numba"),
+                    "Fang et al. (2025), doi:10.20944/preprints202502.0192.v1",
+                ),
+                (
+                    "ppo",
+                    "learned policy: proximal policy optimisation",
+                    (),
+                    "Schulman et al. (2017), arXiv:1707.06347",
+                ),
+                (
+                    "a2c",
+                    "learned policy: advantage actor-critic",
+                    (),
+                    "Mnih et al. (2016), arXiv:1602.01783",
+                ),
+                (
+                    "dqn",
+                    "learned policy: deep Q-network",
+                    (),
+                    "Mnih et al. (2015), doi:10.1038/nature14236",
+                ),
+                (
+                    "ddpg",
+                    "learned policy: deep deterministic policy gradient, over relaxed choices",
+                    (),
+                    "Lillicrap et al. (2016), arXiv:1509.02971",
+                ),
+            )
         ),
     )
 }

@@ -3,9 +3,20 @@
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from alloc.allocators.learned.curriculum import Curriculum
+import numpy as np
+
 from alloc.allocators.learned.network import ActorCritic
-from alloc.problems.game import PLANNING, Rules
+from alloc.problems.game import PLANNING, Board, Rules
+
+
+class Games(Protocol):
+    """A source of games, such as a `Curriculum`."""
+
+    def draw(self, rng: np.random.Generator, progress: float) -> Board:
+        """Draw the games of an update, where `progress` of the training, 0 to 1, is behind."""
+
+    def steps(self, board: Board) -> int:
+        """Most steps of a game on `board`."""
 
 
 @dataclass(frozen=True)
@@ -18,17 +29,17 @@ class Lesson:
         Source of all randomness of this lesson.
     decisions : int
         Decisions of agents after which the lesson ends, with the update that reaches them.
+    curriculum : Games
+        Which games are played.
     progress : float
         Share of the whole training that is behind, 0 to 1: for schedules.
-    curriculum : Curriculum
-        Which games are played.
     rules : Rules
     """
 
     seed: int
     decisions: int
+    curriculum: Games
     progress: float = 0.0
-    curriculum: Curriculum = Curriculum()
     rules: Rules = PLANNING
 
 

@@ -1,88 +1,85 @@
-"""Playing many games at once on one instance, scoring anew after a move only what it touched."""
+"""Playing many games at once, scoring anew after a step only the pairs that its moves touched."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
 
-from alloc.allocators.learned.network import BARRED, ActorCritic
+from alloc.allocators.learned.network import ActorCritic, Scores
+from alloc.allocators.learned.turns import choose
 from alloc.problems.game import (
+    PLANNING,
     Board,
+    Rules,
     State,
     begin,
-    deficit,
     flown,
-    group_ability,
     observe_pairs,
-    observe_tasks,
-    pair_features,
-    value_of,
+    step,
+    tasks_of,
+    time_over_reference,
 )
+from alloc.problems.game.board import LEAST
+from alloc.problems.game.observation import lacks, pair_features
 
 SCORE_CHUNK = 250_000
 """Pairs scored at once, to bound the memory."""
 
-TIE = 1e-5
-"""Relative difference below which two makespans in single precision are taken for equal."""
+ANEW = 0.5
+"""Share of the pairs touched from which on all are scored anew: gathering them costs more than it saves."""
 
-PROGRESS = 1e-6
-"""Rise of the value that counts as one."""
+TIE = 1e-5
+"""Relative difference below which two figures in single precision are taken for equal."""
 
 
 @dataclass(frozen=True, eq=False)
 class Best:
-    """The best position that each game passed through.
+    """The best position that each game passed through: fewer unserved, then less shortfall, then nearer.
 
     Attributes
     ----------
-    task : Tensor of int, shape (B, n)
+    slot : Tensor of int, shape (B, n)
     unserved : Tensor, shape (B,)
-    time : Tensor, shape (B,)
-        Makespan of the served tasks over the reference makespan.
+    shortfall : Tensor, shape (B,)
+        Of the worst task where games are compared by makespan, of all together where by the total.
     distance : Tensor, shape (B,)
     """
 
-    task: Tensor
+    slot: Tensor
     unserved: Tensor
-    time: Tensor
+    shortfall: Tensor
     distance: Tensor
 
-    def cpu(self) -> "Best":
-        """Return the same positions in main memory."""
-        return Best(self.task.cpu(), self.unserved.cpu(), self.time.cpu(), self.distance.cpu())
+    def better_than(self, other: "Best") -> Tensor:
+        """Whether each position is better than the other one, shape (B,)."""
+        same = (self.shortfall - other.shortfall).abs() <= TIE
+        less = (self.shortfall < other.shortfall) & ~same
+        nearer = self.distance < other.distance * (1 - TIE)
+        return (self.unserved < other.unserved) | ((self.unserved == other.unserved) & (less | (same & nearer)))
 
-    def improved_by(self, other: "Best") -> "Best":
-        """Return the better of two positions for each game: fewer unserved, then sooner, then nearer."""
-        same = (other.time - self.time).abs() <= TIE * self.time
-        sooner = (other.time < self.time) & ~same
-        better = (other.unserved < self.unserved) | (
-            (other.unserved == self.unserved) & (sooner | (same & (other.distance < self.distance)))
-        )
-        return Best(
-            torch.where(better[:, None], other.task, self.task),
-            torch.where(better, other.unserved, self.unserved),
-            torch.where(better, other.time, self.time),
-            torch.where(better, other.distance, self.distance),
-        )
+    def improved_by(self, other: "Best", rows: Tensor) -> "Best":
+        """Put the positions of `other` in place of those in `rows` where they are better."""
+        here = Best(self.slot[rows], self.unserved[rows], self.shortfall[rows], self.distance[rows])
+        better = other.better_than(here)
+        rows = rows[better]
+        columns = []
+        for name in ("slot", "unserved", "shortfall", "distance"):
+            column = getattr(self, name).clone()
+            column[rows] = getattr(other, name)[better]
+            columns.append(column)
+        return Best(*columns)
 
 
-def repeat(board: Board, price: Tensor) -> Board:
-    """Return as many copies of a board with one game as there are prices; the copies share their memory."""
-
-    def copies(tensor: Tensor) -> Tensor:
-        return tensor.expand(len(price), *tensor.shape[1:])
-
-    return Board(
-        copies(board.ability),
-        copies(board.target),
-        copies(board.distance),
-        copies(board.legal),
-        copies(board.start),
-        price,
-        copies(board.supply),
-        copies(board.choice),
-    )
+def position(board: Board, state: State, total: bool = False) -> Best:
+    """Return where each game stands; see `Best`."""
+    need, group = board.need[:, :-1], state.group[:, :-1]
+    time, unserved = time_over_reference(board, state.group)
+    if total:
+        shortfall = (need - group).clamp(min=0).sum(1) / need.sum(1).clamp(min=LEAST)
+    else:
+        shortfall = (1 - 1 / time.clamp(min=LEAST)).clamp(min=0)
+    return Best(state.slot, unserved, shortfall, flown(board, state))
 
 
 @torch.no_grad()
@@ -91,10 +88,10 @@ def play(
     board: Board,
     *,
     steps: int,
-    patience: int | None = None,
-    haste: float = 0.0,
+    rules: Rules = PLANNING,
     temperature: float = 0.0,
     generator: torch.Generator | None = None,
+    total: bool = False,
     should_stop: Callable[[], bool] = lambda: False,
 ) -> Best:
     """Play the games on `board` and return the best positions on the way.
@@ -103,171 +100,102 @@ def play(
     ----------
     network : ActorCritic
     board : Board
-        Any games, such as copies of one; see `repeat`.
+        Any games, such as copies of one; see `Board.repeat`.
     steps : int
         Most steps.
-    patience : int, optional
-        Steps without a new highest value, potential less energy, after which a game ends.
-    haste : float
-        Share of the outstanding moves, the total deficit over the mean ability, that is granted at once, one at the
-        least; bids granted together share no task and no agent.
     temperature : float
-        0 grants the best bid; above 0 bids are drawn with their logits divided by it.
+        0 grants the best bids; above 0 they are drawn with their scores divided by it.
     generator : torch.Generator
         Source of the draws.
+    total : bool
+        Whether positions are compared by the shortfall in total, instead of that of the worst task.
     should_stop : callable
         Asked before each step, and between chunks of the first scoring.
     """
     state = begin(board)
-    best = _position(board, state)
-    game = _Game(network, board, state, should_stop)
-    highest, stale = value_of(board, state), torch.zeros_like(board.price)
+    best = position(board, state, total)
+    rows = torch.arange(len(board.price), device=board.price.device)
+    scores = _Local(network, board, state, should_stop)
     for _ in range(steps):
         if should_stop() or bool(state.done.all()):
             break
-        logits = game.logits(state)
-        if temperature > 0:
-            noise = torch.empty_like(logits).exponential_(generator=generator).log_()
-            logits = logits / temperature - noise
-        state = game.move(state, logits, haste)
-        best = best.improved_by(_position(board, state))
-        if patience is not None:
-            value = value_of(board, state)
-            stale = (stale + 1).masked_fill(value > highest + PROGRESS, 0)
-            highest = torch.maximum(highest, value)
-            state = State(state.task, state.group, state.done | (stale >= patience))
+        if 2 * int((~state.done).sum()) <= len(rows):
+            going = torch.nonzero(~state.done)[:, 0]
+            rows, board, state = rows[going], board[going], state[going]
+            scores.keep(board, going)
+        _, slot = choose(board, state, scores.all(state), rules, temperature, generator)
+        state = step_and_score(board, state, slot, scores)
+        best = best.improved_by(position(board, state, total), rows)
     return best
 
 
-class _Game:
-    """Local scores of all pairs, kept up to date move by move; nobody returns to a task that it left.
+def step_and_score(board: Board, state: State, slot: Tensor, scores: "_Local") -> State:
+    """Make a step, and score anew what it touched."""
+    after = step(board, state, slot)
+    scores.refresh(state, after)
+    return after
 
-    Without that rule, which training does not know, greedy games end in two agents going back and forth.
-    """
+
+class _Local:
+    """Local scores of all pairs, kept up to date."""
 
     def __init__(self, network: ActorCritic, board: Board, state: State, should_stop: Callable[[], bool]) -> None:
         self.network, self.board = network, board
-        self.target = board.target.clamp(min=1e-3)
-        self.barred = board.price.new_zeros(board.shape).masked_fill_(~board.legal, BARRED)
-        self.score = board.price.new_full(board.shape, BARRED)
-        for agents in _chunks(board, SCORE_CHUNK):
+        self.local = board.price.new_full(board.shape, -1e9)
+        self._score_all(state, should_stop)
+
+    def _score_all(self, state: State, should_stop: Callable[[], bool] = lambda: False) -> None:
+        batch, n, c = self.board.shape
+        width = max(1, SCORE_CHUNK // (batch * c))
+        if width >= n:
+            self.local = self.network.pairs(observe_pairs(self.board, state))
+            return
+        for first in range(0, n, width):
             if should_stop():
                 break
-            part = replace(
-                board,
-                ability=board.ability[:, agents],
-                distance=board.distance[:, agents],
-                legal=board.legal[:, agents],
-                choice=board.choice[:, agents],
-            )
-            there = State(state.task[:, agents], state.group, state.done)
-            self.score[:, agents] = network.local(observe_pairs(part, there))[..., 0]
+            part, there = _agents(self.board, state, slice(first, first + width))
+            self.local[:, first : first + width] = self.network.pairs(observe_pairs(part, there))
 
-    def logits(self, state: State) -> Tensor:
-        """Return the logits of all bids and of stopping, shape (B, n * (m + 1) + 1)."""
-        token = self.network.tasks(observe_tasks(self.board, state))
-        bid = self.network.pointer(token, state.task, self.board.ability)
-        bid += self.score
-        bid += self.barred
-        bid.scatter_(2, state.task[..., None], BARRED)
-        return torch.cat([bid.flatten(1), self.network.heads(token)[0][:, None]], 1)
+    def all(self, state: State) -> Scores:
+        """Return the scores of all bids."""
+        token = self.network.places(self.board, state)
+        return Scores(self.local + self.network.pointer(self.board, state, token), *self.network.heads(token))
 
-    def move(self, state: State, logits: Tensor, haste: float = 0.0) -> State:
-        """Grant bids in every game that is not done, and score anew what they touched."""
-        _, n, places = self.board.shape
-        choice = logits.argmax(1)
-        done = state.done | (choice == n * places)
-        moves = self._outstanding(state).mul(haste).long().clamp(min=1)
-        if int(moves.max()) == 1:
-            rows, agents, goals = _granted(choice, done, places)
-        else:
-            rows, agents, goals = _disjoint(logits, state, done, moves)
-        task = state.task.clone()
-        sources = task[rows, agents]
-        task[rows, agents] = goals
-        self.barred[rows, agents, sources] = BARRED
-        after = State(task, group_ability(self.board, task), done)
-        if len(rows):
-            self._score(after, *self._touched(after, rows, agents, sources, goals))
-        return after
+    def keep(self, board: Board, rows: Tensor) -> None:
+        """Drop the other games."""
+        self.board, self.local = board, self.local[rows]
 
-    def _outstanding(self, state: State) -> Tensor:
-        """Total deficit in units of the mean ability, shape (B,)."""
-        return (self.board.target - state.group)[:, :-1].clamp(min=0).sum(1)
-
-    def _touched(
-        self, state: State, rows: Tensor, agents: Tensor, sources: Tensor, goals: Tensor
-    ) -> tuple[Tensor, Tensor, Tensor]:
-        """Game, agent and task of every pair that moves touched, each of shape (k,).
-
-        These are all pairs with the tasks that changed, and all pairs of the agents there; those who are idle see no
-        change in their own place.
-        """
-        _, n, places = self.board.shape
-        changed = torch.zeros_like(self.board.target, dtype=torch.bool)
-        changed[rows, sources] = True
-        changed[rows, goals] = True
+    def refresh(self, before: State, after: State) -> None:
+        """Score the pairs whose agent or goal is at a place that changed."""
+        board = self.board
+        changed = before.group != after.group
         changed[:, -1] = False
-        concerned = changed.gather(1, state.task)
-        concerned[rows, agents] = True
-        game, agent = torch.nonzero(concerned, as_tuple=True)
-        where, column = torch.nonzero(changed, as_tuple=True)
-        everyone, everywhere = (torch.arange(count, device=rows.device) for count in (n, places))
-        return (
-            torch.cat([where.repeat_interleave(n), game.repeat_interleave(places)]),
-            torch.cat([everyone.repeat(len(where)), agent.repeat_interleave(places)]),
-            torch.cat([column.repeat_interleave(n), everywhere.repeat(len(game))]),
+        concerned = changed.gather(1, tasks_of(board, after)) | (before.slot != after.slot)
+        touched = (concerned[..., None] | changed.gather(1, board.goal.flatten(1)).view(board.shape)) & board.legal
+        game, agent, slot = torch.nonzero(touched, as_tuple=True)
+        if len(game) > ANEW * touched.numel():
+            self._score_all(after)
+        elif len(game):
+            self.local[game, agent, slot] = self.network.pairs(_observe(board, after, game, agent, slot))
+
+
+def _observe(board: Board, state: State, game: Tensor, agent: Tensor, slot: Tensor) -> Tensor:
+    """Return `pair_features` of some pairs, shape (k, PAIR_FEATURES)."""
+    lack, need = lacks(board, state), board.need.clamp(min=LEAST)
+    now = state.slot[game, agent]
+    own, other = (
+        (
+            *(values[game, board.goal[game, agent, place]] for values in (lack, need, board.supply)),
+            board.contribution[game, agent, place],
+            board.distance[game, agent, place],
         )
-
-    def _score(self, state: State, game: Tensor, agent: Tensor, task: Tensor) -> None:
-        board, lack = self.board, deficit(self.board, state)
-        own_task = state.task[game, agent]
-        own, other = (
-            (lack[game, place], self.target[game, place], board.supply[game, place], board.distance[game, agent, place])
-            for place in (own_task, task)
-        )
-        seen = pair_features(board.price[game], board.ability[game, agent], board.choice[game, agent], own, other)
-        self.score[game, agent, task] = self.network.local(seen)[..., 0]
+        for place in (now, slot)
+    )
+    return pair_features(board.price[game], board.ability[game, agent], board.choice[game, agent], own, other)
 
 
-def _chunks(board: Board, size: int) -> Iterator[slice]:
-    batch, n, places = board.shape
-    width = max(1, size // (batch * places))
-    return (slice(first, first + width) for first in range(0, n, width))
-
-
-def _granted(choice: Tensor, done: Tensor, places: int) -> tuple[Tensor, Tensor, Tensor]:
-    rows = torch.nonzero(~done)[:, 0]
-    return rows, choice[rows] // places, choice[rows] % places
-
-
-def _disjoint(logits: Tensor, state: State, done: Tensor, moves: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-    """The best bids that share no task (but the place of the idle) and no agent, up to `moves`, shape (B,), a game."""
-    places, stop = state.group.shape[1], logits.shape[1] - 1
-    top = logits.topk(min(8 * int(moves.max()), stop), dim=1)
-    granted: list[tuple[int, int, int]] = []
-    for game, (values, actions) in enumerate(zip(top.values.tolist(), top.indices.tolist(), strict=True)):
-        used: set[int] = set()
-        moved: set[int] = set()
-        left = 0 if bool(done[game]) else int(moves[game])
-        for value, action in zip(values, actions, strict=True):
-            if left == 0 or action == stop or value < BARRED / 2:
-                break
-            agent, goal = divmod(action, places)
-            source = int(state.task[game, agent])
-            if agent in moved or source in used or goal in used:
-                continue
-            left -= 1
-            moved.add(agent)
-            used |= {source, goal} - {places - 1}
-            granted.append((game, agent, goal))
-    rows, agents, goals = torch.tensor(granted, dtype=torch.long, device=logits.device).reshape(-1, 3).unbind(1)
-    return rows, agents, goals
-
-
-def _position(board: Board, state: State) -> Best:
-    target, group = board.target[:, :-1], state.group[:, :-1]
-    needed = target > 0
-    empty = needed & (group <= 0)
-    time = (target / group.clamp(min=1e-9)).masked_fill(~needed | empty, 0.0).amax(1)
-    return Best(state.task, empty.sum(1), time, flown(board, state))
+def _agents(board: Board, state: State, some: slice) -> tuple[Board, State]:
+    """Return the same games with some of the agents, for their features alone."""
+    per_agent = ("ability", "goal", "legal", "distance", "contribution", "start", "choice", "endurance")
+    part = replace(board, **{name: getattr(board, name)[:, some] for name in per_agent})
+    return part, replace(state, slot=state.slot[:, some], at=state.at[:, some], hopped=state.hopped[:, some])

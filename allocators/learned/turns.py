@@ -89,9 +89,7 @@ def log_probabilities(
     return _of_bids(board, state, scores, actions, rules)
 
 
-def _of_bids(
-    board: Board, state: State, scores: Scores, actions: Tensor, rules: Rules
-) -> tuple[Tensor, Tensor]:
+def _of_bids(board: Board, state: State, scores: Scores, actions: Tensor, rules: Rules) -> tuple[Tensor, Tensor]:
     batch, n, c = board.shape
     rows, idle = torch.arange(batch, device=actions.device), board.places - 1
     task = tasks_of(board, state)

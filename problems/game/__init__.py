@@ -18,7 +18,14 @@ from alloc.problems.game.observation import (
     observe_pairs,
     observe_tasks,
 )
-from alloc.problems.game.reward import coverage, difference_rewards, marginal_contributions, potential, time_over_reference, worth
+from alloc.problems.game.reward import (
+    coverage,
+    difference_rewards,
+    marginal_contributions,
+    potential,
+    time_over_reference,
+    worth,
+)
 from alloc.problems.game.rules import (
     PAPER,
     PLANNING,

@@ -46,7 +46,7 @@ class Board:
     price : Tensor, shape (B,)
         Weight of energy in the reward.
     supply : Tensor, shape (B, m + 1)
-        log of the ability that can reach each task over its need, halved, less 1: low where few can help.
+        log of the ability that can reach each task over its need, halved, less 1: low where few can help; 0 for idle.
     choice : Tensor, shape (B, n)
         Share of the tasks that each agent can take.
     apart : Tensor, shape (B, m + 1, m + 1)
@@ -129,12 +129,13 @@ def make_board(
     pairs = zip(instances, reference_makespan, strict=True)
     layouts = [_layout(instance, hours, rng, near, plan) for instance, hours in pairs]
     columns = [np.stack(column) for column in zip(*layouts, strict=True)]
-    tensors = [torch.from_numpy(_single(column)) for column in columns]
+    tensors = [torch.from_numpy(single(column)) for column in columns]
     names = [field.name for field in fields(Board) if field.name != "price"]
     return Board(price=torch.tensor(price, dtype=torch.float32), **dict(zip(names, tensors, strict=True)))
 
 
-def _single(array: NDArray[np.generic]) -> NDArray[np.generic]:
+def single(array: NDArray[np.generic]) -> NDArray[np.generic]:
+    """Return real numbers in single precision, and others as they are."""
     return array.astype(np.float32) if array.dtype == np.float64 else array
 
 
@@ -142,18 +143,20 @@ def _layout(
     instance: Instance, hours: float, rng: np.random.Generator, near: int | None, plan: NDArray[np.int64] | None
 ) -> tuple[NDArray[np.generic], ...]:
     """Return the fields of `Board` for one instance, in their order and without the price."""
-    n, m = instance.n, instance.m
+    m = instance.m
     hours = max(hours, 1e-300)
     useful = np.append(instance.workload > 0, True)
     unit = float(instance.ability.mean())
     goal, distance, legal = near_tasks(instance, near, plan)
-    contribution = instance.ability[:, None] / unit * _working_share(instance, distance, hours)
+    contribution = instance.ability[:, None] / unit * working_share(instance.speed[:, None], distance, hours)
     legal &= useful[goal] & (contribution > 0)
     legal[:, -1] = True
     mean = distance[:, :-1][legal[:, :-1]].mean() if legal[:, :-1].any() else 0.0
     scale = MEAN_DISTANCE / mean if mean > 0 else 1.0
     need = np.append(instance.workload / hours / unit, 0.0)
     reachable = np.bincount(goal.ravel(), (contribution * legal).ravel(), m + 1)
+    supply = np.log(np.maximum(reachable, LEAST) / np.maximum(need, LEAST)) / 2 - 1
+    supply[-1] = 0.0
     weight = np.append(np.where(useful[:-1], instance.priority, 0.0), 0.0)
     served = weight[:-1][useful[:-1]]
     weight = weight / served.mean() if len(served) and served.mean() > 0 else useful.astype(float)
@@ -167,7 +170,7 @@ def _layout(
         distance * scale,
         contribution,
         _start(instance, goal, distance, legal, rng, plan),
-        np.log(np.maximum(reachable, LEAST) / np.maximum(need, LEAST)) / 2 - 1,
+        supply,
         legal.mean(axis=1),
         _apart(instance) * scale,
         _endurance(instance) * scale,
@@ -175,12 +178,11 @@ def _layout(
     )
 
 
-def _working_share(instance: Instance, distance: NDArray[np.float64], hours: float) -> NDArray[np.float64]:
-    """Share of the reference makespan that is left to work after the flight, shape (n, c)."""
-    speed = instance.speed
+def working_share(speed: NDArray[np.float64], distance: NDArray[np.float64], hours: float) -> NDArray[np.float64]:
+    """Return the share of the reference makespan that is left to work after the flight, in the common shape."""
     if not np.isfinite(speed).any():
         return np.ones_like(distance)
-    return np.clip(1 - distance / speed[:, None] / hours, 0.0, 1.0)
+    return np.clip(1 - distance / speed / hours, 0.0, 1.0)
 
 
 def _start(

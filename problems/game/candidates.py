@@ -61,7 +61,9 @@ def _nearest(instance: Instance, near: int) -> NDArray[np.int64]:
         distance, legal = reach.rows(rows)
         away = np.where(legal & useful, distance, np.inf)
         order = np.argpartition(away, near - 1, axis=1)[:, :near]
-        order = np.take_along_axis(order, np.take_along_axis(away, order, axis=1).argsort(axis=1, kind="stable"), axis=1)
+        order = np.take_along_axis(
+            order, np.take_along_axis(away, order, axis=1).argsort(axis=1, kind="stable"), axis=1
+        )
         nearest[rows] = np.where(np.isinf(np.take_along_axis(away, order, axis=1)), -1, order)
     chosen = nearest[reach.origin]
     _add_scarce(instance, chosen, own)

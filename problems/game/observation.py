@@ -1,4 +1,4 @@
-"""What agents see: local figures without units, so that one policy serves any scale and any number of agents and tasks."""
+"""What agents see: local figures without units, so that one policy serves any scale and any number of agents."""
 
 import torch
 from torch import Tensor
@@ -80,7 +80,11 @@ def observe_pairs(board: Board, state: State) -> Tensor:
         return values.gather(1, board.goal.flatten(1)).view(board.shape)
 
     given, near = pick(board.contribution, state.slot), pick(board.distance, state.slot)
-    own = (*(values.gather(1, task)[..., None] for values in (lack, need, board.supply)), given[..., None], near[..., None])
+    own = (
+        *(values.gather(1, task)[..., None] for values in (lack, need, board.supply)),
+        given[..., None],
+        near[..., None],
+    )
     other = (*(of_candidates(values) for values in (lack, need, board.supply)), board.contribution, board.distance)
     return pair_features(board.price[:, None, None], board.ability[..., None], board.choice[..., None], own, other)
 

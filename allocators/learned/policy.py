@@ -1,0 +1,137 @@
+"""Trained policies as allocators: the networks of a policy file, put to use by the planner."""
+
+from importlib.resources import as_file, files
+from pathlib import Path
+
+import torch
+
+from alloc.allocators.base import Allocator, Proposal
+from alloc.allocators.learned.fine_tuning import FineTuning
+from alloc.allocators.learned.limits import too_large
+from alloc.allocators.learned.planner import Planner, PlannerParameters
+from alloc.allocators.learned.policy_file import load_policy
+from alloc.allocators.registry import BUILT_IN
+from alloc.allocators.search import Budget, Search
+from alloc.problems import Allocation, InputError, Instance, Objective
+
+
+class PolicyAllocator(Allocator):
+    """A learned policy, as shipped or from a file that `alloc train` wrote; subclasses say which.
+
+    Parameters
+    ----------
+    policy : Path or str, optional
+        Policy file; the one that ships with the package by default.
+    device : str
+        Where the networks run, such as ``cpu`` or ``cuda``.
+
+    Raises
+    ------
+    InputError
+        If the policy file is not one, does not fit this version, or there is no such device.
+    """
+
+    trained_by: str
+    parameters = PlannerParameters()
+
+    def __init__(self, policy: Path | str | None = None, device: str = "cpu") -> None:
+        self.device = usable(device)
+        if policy is not None:
+            self.networks = load_policy(policy, self.trained_by, self.device)
+        else:
+            with as_file(files("alloc.allocators.learned") / "policies" / f"{self.trained_by}.safetensors") as shipped:
+                self.networks = load_policy(shipped, self.trained_by, self.device)
+
+    def refusal(self, instance: Instance, objective: Objective, budget: Budget) -> str | None:
+        """Refuse where not even one game would end in time."""
+        return too_large(instance, budget)
+
+    def allocate(self, search: Search) -> Proposal:
+        """Play game after game and submit what is better."""
+        if not (search.instance.workload > 0).any():
+            return Proposal(Allocation.idle(search.instance))
+        threads = torch.get_num_threads()
+        torch.set_num_threads(1)  # the tensors are small: a second thread costs more than it brings
+        try:
+            self.plan(search)
+        finally:
+            torch.set_num_threads(threads)
+        return Proposal()
+
+    def plan(self, search: Search) -> None:
+        """Use the budget up."""
+        Planner(search, self.networks, self.parameters).run()
+
+
+class Ppo(PolicyAllocator):
+    """One actor-critic, trained by proximal policy optimisation."""
+
+    method, trained_by = BUILT_IN["ppo"], "ppo"
+
+
+class A2c(PolicyAllocator):
+    """One actor-critic, trained by advantage actor-critic."""
+
+    method, trained_by = BUILT_IN["a2c"], "a2c"
+
+
+class Dqn(PolicyAllocator):
+    """A network that estimates what each bid is worth."""
+
+    method, trained_by = BUILT_IN["dqn"], "dqn"
+
+
+class Ddpg(PolicyAllocator):
+    """An actor that follows the gradient of a critic."""
+
+    method, trained_by = BUILT_IN["ddpg"], "ddpg"
+
+
+class Gappo(PolicyAllocator):
+    """A population of actor-critics; where time allows, it learns on, on the instance itself.
+
+    References
+    ----------
+    Fang et al. (2025), doi:10.20944/preprints202502.0192.v1.
+    """
+
+    method, trained_by = BUILT_IN["gappo"], "gappo"
+
+    def plan(self, search: Search) -> None:
+        """Play, and learn on in between."""
+        Planner(search, self.networks, self.parameters, FineTuning(search, self.networks)).run()
+
+
+class GappoLs(Gappo):
+    """A first plan by the policies, improved by local search: a hybrid."""
+
+    method = BUILT_IN["gappo-ls"]
+
+    def __init__(self, policy: Path | str | None = None, device: str = "cpu") -> None:
+        from alloc.allocators.heuristic.local.warm_up import warm_up
+
+        super().__init__(policy, device)
+        warm_up()
+
+    def plan(self, search: Search) -> None:
+        """Play one game on the whole instance, then improve its plan by local search."""
+        from alloc.allocators.heuristic.local.improve import improve
+
+        Planner(search, self.networks, self.parameters).play_whole()
+        improve(search)
+
+
+def usable(device: str) -> torch.device:
+    """Return the device of that name.
+
+    Raises
+    ------
+    InputError
+        If it cannot be used here.
+    """
+    try:
+        torch.zeros(1, device=device).item()
+        return torch.device(device)
+    except (RuntimeError, AssertionError) as error:
+        reason = next(iter(str(error).splitlines()), "unusable")[:100]
+        raise InputError(f"{device!r} cannot be used here ({reason}); use cpu", "device") from None
