@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
@@ -10,6 +11,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from alloc.problems.distances import distance_table
 from alloc.problems.game.candidates import near_tasks
 from alloc.problems.instance import IDLE, Instance
 
@@ -18,6 +20,9 @@ MEAN_DISTANCE = 0.66
 
 LEAST = 1e-3
 """Least ability, need or supply that is divided by or taken the logarithm of, in mean abilities."""
+
+LARGEST = 1e9
+"""Needs, distances and the like beyond it are taken for it, so that nothing overflows in single precision."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,13 +53,15 @@ class Board:
     supply : Tensor, shape (B, m + 1)
         log of the ability that can reach each task over its need, halved, less 1: low where few can help; 0 for idle.
     choice : Tensor, shape (B, n)
-        Share of the tasks that each agent can take.
+        Share of its candidates that each agent can take.
     apart : Tensor, shape (B, m + 1, m + 1)
         Distance between tasks; 0 to and from the place of the idle.
     endurance : Tensor, shape (B, n)
         Distance for which each battery lasts; ``inf`` without one.
-    tau : Tensor, shape (B,)
-        Discount factor of (3), raised to the power of one mean ability.
+    log_tau : Tensor, shape (B,)
+        Logarithm of the discount factor of (3) times the mean ability: tau itself may be too small for a float.
+    scale : Tensor of double, shape (B,)
+        What the distances of the instance were multiplied by.
     """
 
     ability: Tensor
@@ -70,7 +77,8 @@ class Board:
     choice: Tensor
     apart: Tensor
     endurance: Tensor
-    tau: Tensor
+    log_tau: Tensor
+    scale: Tensor
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -129,60 +137,84 @@ def make_board(
     pairs = zip(instances, reference_makespan, strict=True)
     layouts = [_layout(instance, hours, rng, near, plan) for instance, hours in pairs]
     columns = [np.stack(column) for column in zip(*layouts, strict=True)]
-    tensors = [torch.from_numpy(single(column)) for column in columns]
+    tensors = [torch.from_numpy(column) for column in columns]
     names = [field.name for field in fields(Board) if field.name != "price"]
     return Board(price=torch.tensor(price, dtype=torch.float32), **dict(zip(names, tensors, strict=True)))
-
-
-def single(array: NDArray[np.generic]) -> NDArray[np.generic]:
-    """Return real numbers in single precision, and others as they are."""
-    return array.astype(np.float32) if array.dtype == np.float64 else array
 
 
 def _layout(
     instance: Instance, hours: float, rng: np.random.Generator, near: int | None, plan: NDArray[np.int64] | None
 ) -> tuple[NDArray[np.generic], ...]:
     """Return the fields of `Board` for one instance, in their order and without the price."""
-    m = instance.m
-    hours = max(hours, 1e-300)
+    m, hours = instance.m, max(hours, 1e-300)
     useful = np.append(instance.workload > 0, True)
-    unit = float(instance.ability.mean())
+    unit = float(np.mean(instance.ability))
     goal, distance, legal = near_tasks(instance, near, plan)
     contribution = instance.ability[:, None] / unit * working_share(instance.speed[:, None], distance, hours)
     legal &= useful[goal] & (contribution > 0)
     legal[:, -1] = True
-    mean = distance[:, :-1][legal[:, :-1]].mean() if legal[:, :-1].any() else 0.0
-    scale = MEAN_DISTANCE / mean if mean > 0 else 1.0
-    need = np.append(instance.workload / hours / unit, 0.0)
+    scale = _scale(distance[:, :-1][legal[:, :-1]])
+    with np.errstate(over="ignore"):
+        need = np.append(np.minimum(instance.workload / hours / unit, LARGEST), 0.0)
     reachable = np.bincount(goal.ravel(), (contribution * legal).ravel(), m + 1)
     supply = np.log(np.maximum(reachable, LEAST) / np.maximum(need, LEAST)) / 2 - 1
     supply[-1] = 0.0
-    weight = np.append(np.where(useful[:-1], instance.priority, 0.0), 0.0)
-    served = weight[:-1][useful[:-1]]
-    weight = weight / served.mean() if len(served) and served.mean() > 0 else useful.astype(float)
-    weight[-1] = 0.0
     return (
-        instance.ability / unit,
-        need,
-        weight,
+        single(instance.ability / unit),
+        single(need),
+        single(_weight(instance)),
         goal,
         legal,
-        distance * scale,
-        contribution,
+        scaled(distance, scale),
+        single(contribution),
         _start(instance, goal, distance, legal, rng, plan),
-        supply,
-        legal.mean(axis=1),
-        _apart(instance) * scale,
-        _endurance(instance) * scale,
-        np.float64(instance.tau**unit),
+        single(supply),
+        single(legal.mean(axis=1)),
+        scaled(_apart(instance), scale),
+        _endurance(instance, scale),
+        single(np.array(max(math.log(instance.tau) * unit, -LARGEST))),
+        np.array(scale),
     )
+
+
+def single(array: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Return numbers in single precision."""
+    return array.astype(np.float32)
+
+
+def _scale(distance: NDArray[np.float64]) -> float:
+    """Return what these distances are multiplied by, so that their mean is `MEAN_DISTANCE`."""
+    farthest = float(distance.max(initial=0.0))
+    if farthest == 0:
+        return 1.0
+    with np.errstate(over="ignore", under="ignore"):
+        scale = MEAN_DISTANCE / float((distance / farthest).mean()) / farthest
+    return float(np.clip(scale, 1e-300, 1e300))
+
+
+def scaled(distance: NDArray[np.float64], scale: float | NDArray[np.float64]) -> NDArray[np.float32]:
+    """Return distances in the units of a game."""
+    with np.errstate(over="ignore"):
+        return single(np.minimum(distance * scale, LARGEST))
+
+
+def _weight(instance: Instance) -> NDArray[np.float64]:
+    """Priority over its mean among the tasks with workload, shape (m + 1,); 1 where no task has any."""
+    useful = instance.workload > 0
+    priority = np.where(useful, instance.priority, 0.0)
+    highest = priority.max()
+    if highest == 0:
+        return np.append(useful.astype(float), 0.0)
+    priority /= highest
+    return np.append(priority / priority[useful].mean(), 0.0)
 
 
 def working_share(speed: NDArray[np.float64], distance: NDArray[np.float64], hours: float) -> NDArray[np.float64]:
     """Return the share of the reference makespan that is left to work after the flight, in the common shape."""
     if not np.isfinite(speed).any():
         return np.ones_like(distance)
-    return np.clip(1 - distance / speed / hours, 0.0, 1.0)
+    with np.errstate(over="ignore"):
+        return np.clip(1 - distance / speed / hours, 0.0, 1.0)
 
 
 def _start(
@@ -198,19 +230,18 @@ def _start(
     start = np.where(legal[:, :-1].any(axis=1), away.argmin(axis=1), idle)
     wanted = instance.start_task if plan is None else np.where(plan == IDLE, instance.m, plan)
     found = (goal == wanted[:, None]) & legal
-    return np.where(found.any(axis=1), found.argmax(axis=1), start)
+    begins: NDArray[np.int64] = np.where(found.any(axis=1), found.argmax(axis=1), start)
+    return begins
 
 
 def _apart(instance: Instance) -> NDArray[np.float64]:
     m = instance.m
     apart = np.zeros((m + 1, m + 1))
-    with np.errstate(over="ignore", invalid="ignore"):
-        step = instance.task_position[:, None] - instance.task_position[None]
-        apart[:m, :m] = np.nan_to_num(np.sqrt((step * step).sum(axis=2)), nan=0.0, posinf=0.0)
+    apart[:m, :m] = distance_table(instance.task_position, instance.task_position, instance.reach.unit)
     return apart
 
 
-def _endurance(instance: Instance) -> NDArray[np.float64]:
-    with np.errstate(divide="ignore", invalid="ignore"):
-        lasts = instance.battery / instance.energy_per_distance
-    return np.where(np.isnan(lasts), np.inf, lasts)
+def _endurance(instance: Instance, scale: float) -> NDArray[np.float32]:
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        lasts = instance.battery / instance.energy_per_distance * scale
+        return single(np.where(np.isnan(lasts) | (lasts > LARGEST), np.inf, lasts))

@@ -23,7 +23,7 @@ def near_tasks(instance: Instance, near: int | None, plan: NDArray[np.int64] | N
     Parameters
     ----------
     near : int or None
-        Candidates besides idleness; None, or as many as there are tasks, for all tasks.
+        Candidates besides idleness, at least 1; None, or as many as there are tasks, for all tasks.
     plan : ndarray of int, shape (n,), or None
         Places that must be among the candidates.
     """
@@ -33,9 +33,10 @@ def near_tasks(instance: Instance, near: int | None, plan: NDArray[np.int64] | N
         goal = np.broadcast_to(np.arange(m + 1), (n, m + 1)).copy()
         return goal, np.column_stack([distance, np.zeros(n)]), np.column_stack([legal, np.ones(n, dtype=bool)])
     chosen = _nearest(instance, near)
-    for wanted in (instance.start_task, plan):
-        if wanted is not None:
-            _include(chosen, wanted)
+    _include(chosen, instance.start_task, np.full(n, -1))
+    if plan is not None:
+        begins = (chosen[:, -1] == instance.start_task) & (near > 1)
+        _include(chosen, plan, np.where(begins, -2, -1))
     agent = np.repeat(np.arange(n), near)
     known = chosen.ravel() >= 0
     task = np.where(known, chosen.ravel(), 0)
@@ -75,7 +76,7 @@ def _add_scarce(instance: Instance, chosen: NDArray[np.int64], own: int) -> None
     n, m = instance.n, instance.m
     kept = chosen[:, :own]
     supply = np.bincount(kept[kept >= 0], np.repeat(instance.ability[:, None], own, axis=1)[kept >= 0], minlength=m)
-    fair = instance.workload * (instance.ability.sum() / max(instance.workload.sum(), 1e-300))
+    fair = instance.workload / max(instance.workload.sum(), 1e-300) * instance.ability.sum()
     used = np.full(n, own)
     for task in np.flatnonzero(supply < AMPLE * fair).tolist():
         able = instance.reach.agents_of(task)
@@ -91,7 +92,7 @@ def _add_scarce(instance: Instance, chosen: NDArray[np.int64], own: int) -> None
         chosen[twice, column] = -1
 
 
-def _include(chosen: NDArray[np.int64], wanted: NDArray[np.int64]) -> None:
-    """Put the wanted task in the last column where it is not among the candidates."""
-    missing = (wanted != IDLE) & ~(chosen == wanted[:, None]).any(axis=1)
-    chosen[missing, -1] = wanted[missing]
+def _include(chosen: NDArray[np.int64], wanted: NDArray[np.int64], column: NDArray[np.int64]) -> None:
+    """Put each agent's wanted task in its column where it is not among the candidates."""
+    missing = np.flatnonzero((wanted != IDLE) & ~(chosen == wanted[:, None]).any(axis=1))
+    chosen[missing, column[missing]] = wanted[missing]

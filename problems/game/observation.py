@@ -76,16 +76,15 @@ def observe_pairs(board: Board, state: State) -> Tensor:
     lack, need = lacks(board, state), board.need.clamp(min=LEAST)
     task = tasks_of(board, state)
 
-    def of_candidates(values: Tensor) -> Tensor:
+    def here(values: Tensor) -> Tensor:
+        return values.gather(1, task)[..., None]
+
+    def there(values: Tensor) -> Tensor:
         return values.gather(1, board.goal.flatten(1)).view(board.shape)
 
-    given, near = pick(board.contribution, state.slot), pick(board.distance, state.slot)
-    own = (
-        *(values.gather(1, task)[..., None] for values in (lack, need, board.supply)),
-        given[..., None],
-        near[..., None],
-    )
-    other = (*(of_candidates(values) for values in (lack, need, board.supply)), board.contribution, board.distance)
+    given, near = pick(board.contribution, state.slot)[..., None], pick(board.distance, state.slot)[..., None]
+    own = (here(lack), here(need), here(board.supply), given, near)
+    other = (there(lack), there(need), there(board.supply), board.contribution, board.distance)
     return pair_features(board.price[:, None, None], board.ability[..., None], board.choice[..., None], own, other)
 
 

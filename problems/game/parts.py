@@ -7,7 +7,8 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from alloc.problems.game.board import LEAST, MEAN_DISTANCE, Board, single, working_share
+from alloc.problems.distances import distances
+from alloc.problems.game.board import LARGEST, LEAST, MEAN_DISTANCE, Board, scaled, single, working_share
 from alloc.problems.instance import Instance
 
 Ints = NDArray[np.int64]
@@ -85,7 +86,8 @@ def lay_out_parts(
     mean = (distance * legal).sum((1, 2)) / np.maximum(reached, 1)
     scale = np.where(mean > 0, MEAN_DISTANCE / np.where(mean > 0, mean, 1.0), 1.0)
     contribution = ability[..., None] * share
-    need = instance.workload[tasks] / max(hours, 1e-300) / unit[:, None]
+    with np.errstate(over="ignore"):
+        need = np.minimum(instance.workload[tasks] / max(hours, 1e-300) / unit[:, None], LARGEST)
     supply = np.log(np.maximum((contribution * legal).sum(1), LEAST) / np.maximum(need, LEAST)) / 2 - 1
     priority = instance.priority[tasks]
     weight = priority / np.where(priority.mean(1) > 0, priority.mean(1), 1.0)[:, None]
@@ -94,19 +96,19 @@ def lay_out_parts(
     slot = (plan[someone][..., None] == tasks[:, None]) & legal
     start = np.where(slot.any(2), slot.argmax(2), j)
     last = ((0, 0), (0, 0), (0, 1))
-    position = np.nan_to_num(instance.task_position[tasks])
-    apart = np.sqrt(((position[:, :, None] - position[:, None]) ** 2).sum(3)) * scale[:, None, None]
+    position = instance.task_position[tasks]
+    apart = scaled(distances(position[:, :, None], position[:, None], instance.reach.unit), scale[:, None, None])
     legal = np.concatenate([legal, real[..., None] | True], axis=2)
     board = Board(
         **{
-            name: torch.from_numpy(single(np.ascontiguousarray(value)))
+            name: torch.from_numpy(np.ascontiguousarray(value if value.dtype.kind in "ib" else single(value)))
             for name, value in {
                 "ability": ability,
                 "need": np.pad(need, ((0, 0), (0, 1))),
                 "weight": np.pad(weight, ((0, 0), (0, 1))),
                 "goal": np.broadcast_to(np.arange(j + 1), (count, width, j + 1)),
                 "legal": legal,
-                "distance": np.pad(distance * scale[:, None, None], last),
+                "distance": np.pad(scaled(distance, scale[:, None, None]), last),
                 "contribution": np.concatenate([contribution, ability[..., None]], axis=2),
                 "start": start,
                 "price": np.full(count, price),
@@ -114,8 +116,9 @@ def lay_out_parts(
                 "choice": legal.mean(2),
                 "apart": np.pad(apart, ((0, 0), (0, 1), (0, 1))),
                 "endurance": np.full((count, width), np.inf),
-                "tau": instance.tau**unit,
+                "log_tau": np.maximum(np.log(instance.tau) * unit, -LARGEST),
             }.items()
-        }
+        },
+        scale=torch.from_numpy(scale),
     )
     return Parts(board, who, tasks, torch.from_numpy(home))

@@ -42,7 +42,7 @@ def coverage(board: Board, group: Tensor) -> Tensor:
     falling with the deficit.
     """
     need, weight = board.need[:, :-1], board.weight[:, :-1]
-    exponent = (group[..., :-1] - need) * board.tau.log()[:, None]
+    exponent = (group[..., :-1] - need) * board.log_tau[:, None]
     beyond = (exponent - LARGEST_EXPONENT).clamp(min=0)
     reward = -exponent.clamp(max=LARGEST_EXPONENT).exp() * (1 + beyond)
     return (reward * weight * (need > 0)).sum(-1) / (need > 0).sum(-1).clamp(min=1)

@@ -78,7 +78,7 @@ class State:
     done : Tensor of bool, shape (B,)
         Whether the game has ended.
     at : Tensor of int, shape (B, n)
-        Task that each agent has flown to, m for its start; it stays there while it is idle.
+        Task that each agent has flown to, first to where it begins; it stays there while it is idle. m for its start.
     hopped : Tensor, shape (B, n)
         Distance that each agent has flown hop by hop.
     """
@@ -96,15 +96,14 @@ class State:
 
 
 def begin(board: Board) -> State:
-    """Return the state in which a game starts."""
-    batch, n, _ = board.shape
+    """Return the state in which a game starts: agents have flown to where they begin."""
     return State(
         slot=board.start,
         group=group_ability(board, board.start),
         left=torch.zeros_like(board.legal),
-        done=board.price.new_zeros(batch, dtype=torch.bool),
-        at=board.start.new_full((batch, n), board.places - 1),
-        hopped=torch.zeros_like(board.ability),
+        done=torch.zeros_like(board.price, dtype=torch.bool),
+        at=pick(board.goal, board.start),
+        hopped=pick(board.distance, board.start),
     )
 
 
@@ -167,7 +166,8 @@ def grant(board: Board, state: State, bids: Tensor, reserve: Tensor, most_moves:
     flat[state.done, :-1] = -torch.inf
     rows = torch.arange(batch, device=flat.device)
     while not bool(passed.all()) and (most_moves is None or len(granted) < most_moves):
-        choice = flat.argmax(1)
+        best, choice = flat.max(1)
+        choice = choice.masked_fill(best == -torch.inf, n * c)
         granted.append(choice.masked_fill(passed, -1))
         passed = passed | (choice == n * c)
         agent = torch.div(choice, c, rounding_mode="floor").clamp(max=n - 1)
@@ -225,6 +225,10 @@ def flown(board: Board, state: State, rules: Rules = PLANNING) -> Tensor:
 
 
 def battery_left(board: Board, state: State) -> Tensor:
-    """Return the mean share of the battery left after the hops of the episode, shape (B,); 1 without batteries."""
-    spent = state.hopped / board.endurance.clamp(min=TOLERANCE)
-    return 1 - spent.clamp(max=1.0).mean(1)
+    """Return the share of the battery left after the hops of the episode, shape (B,).
+
+    The mean over the agents that have a battery; 1 where nobody has one.
+    """
+    limited = board.endurance < torch.inf
+    spent = (state.hopped / board.endurance.clamp(min=TOLERANCE)).clamp(max=1.0) * limited
+    return 1 - spent.sum(1) / limited.sum(1).clamp(min=1)

@@ -1,0 +1,53 @@
+"""Games laid out for tests, at one reference makespan and one price of energy."""
+
+import numpy as np
+
+from alloc.problems import Allocation, Instance
+from alloc.problems.game import Board, State, begin, make_board, step, tasks_of
+
+EXTREMES = {
+    "huge": Instance(
+        ability=[1e300, 1e307],
+        workload=[1e300, 1e-300],
+        task_position=[[1e300, 0], [-1e300, 0]],
+        agent_position=[[0, 0], [1e300, 0]],
+        battery=[1e300, 1e-300],
+        speed=[1e-300, 1e300],
+        priority=[1e308, 1e308],
+        energy_per_distance=1e300,
+    ),
+    "tiny": Instance(
+        ability=[1e-300, 1e-310],
+        workload=[1e-300, 1e300],
+        task_position=[[1e-300, 0], [-1e-300, 0]],
+        agent_position=[[0, 0], [1, 0]],
+        priority=[1e-308, 0],
+        energy_per_distance=0.0,
+        battery=[0, 1],
+        tau=1 - 1e-16,
+    ),
+    "one of each": Instance(ability=[3], workload=[2]),
+    "nothing to do": Instance(ability=[1, 2], workload=[0, 0], task_position=[[0, 0], [1, 0]]),
+    "nobody can go": Instance(ability=[1, 2], workload=[1, 2], allowed_tasks=[[], []]),
+    "no positions": Instance(ability=[1, 2, 3], workload=[1, 2], battery=[0, 1, 2], communication_range=[0, 0, 1]),
+}
+"""Instances at the ends of what is valid."""
+
+
+def layout(*instances: Instance, hours: float = 1.0, price: float = 0.5, seed: int = 0, **options) -> Board:
+    """Lay out games on `instances`; further options are those of `make_board`."""
+    size = len(instances)
+    return make_board(instances, [hours] * size, [price] * size, np.random.default_rng(seed), **options)
+
+
+def state_of(board: Board, plan: np.ndarray) -> State:
+    """Return the state after all agents have gone where `plan`, shape (n,), sends them; they must be able to."""
+    places = np.where(plan < 0, board.places - 1, plan)
+    slot = ((board.goal == board.goal.new_tensor(places)[None, :, None]) & board.legal).int().argmax(2)
+    return step(board, begin(board), slot)
+
+
+def plan_of(board: Board, state: State, game: int = 0) -> Allocation:
+    """Return where everybody is in one game."""
+    task = tasks_of(board, state)[game].numpy()
+    return Allocation(np.where(task == board.places - 1, -1, task))

@@ -1,0 +1,179 @@
+"""How instances are laid out as games."""
+
+import warnings
+
+import numpy as np
+import pytest
+import torch
+from boards import EXTREMES, layout, state_of
+from hypothesis import given
+from hypothesis import strategies as st
+from oracle import reachable
+from strategies import instances
+
+from alloc.problems import IDLE, Allocation, Family, Instance, evaluate, paper_like, random_instance
+from alloc.problems.game import Board, begin, group_ability, make_board, tasks_of
+
+
+def fields(board: Board) -> dict[str, torch.Tensor]:
+    return {name: getattr(board, name) for name in Board.__dataclass_fields__}
+
+
+def test_units_by_hand(board: Board) -> None:
+    """Abilities and needs are in units of the mean ability, 2 here; distances have a mean of 0.66 where legal."""
+    assert board.ability.tolist() == [[0.5, 1.0, 1.5]]
+    assert board.need.tolist() == [[2.0, 1.0, 0.0]]
+    # legal: 0; 0.9 and 0.1; 0.2 and 0.8: a mean of 0.4, which becomes 0.66
+    assert board.scale.item() == pytest.approx(1.65)
+    torch.testing.assert_close(board.distance[0], 1.65 * torch.tensor([[0, 1, 0], [0.9, 0.1, 0], [0.2, 0.8, 0]]))
+    torch.testing.assert_close(board.apart[0], 1.65 * torch.tensor([[0.0, 1, 0], [1, 0, 0], [0, 0, 0]]))
+    assert board.log_tau.item() == pytest.approx(2 * np.log(0.5))
+
+
+def test_the_reference_makespan_sets_the_needs(pair: Instance) -> None:
+    """Twice the hours, half the ability needed."""
+    assert layout(pair, hours=2.0).need.tolist() == [[1.0, 0.5, 0.0]]
+
+
+def test_supply_and_choice_by_hand(board: Board) -> None:
+    """All 3 mean abilities reach the first task, which needs 2; 2.5 reach the second, which needs 1."""
+    assert board.supply[0, :2].tolist() == pytest.approx([np.log(1.5) / 2 - 1, np.log(2.5) / 2 - 1])
+    assert board.choice[0].tolist() == pytest.approx([2 / 3, 1, 1])
+
+
+def test_weights_are_priorities_over_their_mean() -> None:
+    """Tasks without workload do not count; where nobody has a priority, all weigh the same."""
+    tasks = {"ability": [1], "workload": [1, 1, 0]}
+    assert layout(Instance(**tasks, priority=[1, 3, 7])).weight.tolist() == [[0.5, 1.5, 0.0, 0.0]]
+    assert layout(Instance(**tasks, priority=[0, 0, 7])).weight.tolist() == [[1.0, 1.0, 0.0, 0.0]]
+    assert layout(Instance(**tasks, priority=[1e308, 1e308, 1e308])).weight.tolist() == [[1.0, 1.0, 0.0, 0.0]]
+
+
+def test_agents_begin_at_the_nearest_task_in_reach(board: Board) -> None:
+    """Without a start task, an agent begins where it has least to fly."""
+    assert board.start.tolist() == [[0, 1, 0]]
+
+
+def test_a_start_task_is_where_an_agent_begins() -> None:
+    """A start task counts, unless the agent cannot take it; who can take nothing is idle."""
+    instance = Instance(
+        ability=[1, 1, 1],
+        workload=[1, 1],
+        task_position=[[0, 0], [1, 0]],
+        start_task=[1, 1, 0],
+        allowed_tasks=[None, [0], []],
+    )
+    assert layout(instance).start.tolist() == [[1, 0, 2]]
+
+
+def test_a_plan_is_where_agents_begin(pair: Instance) -> None:
+    """A plan goes before the start; whom it sends astray begins as without it."""
+    assert layout(pair, plan=np.array([1, 0, IDLE])).start.tolist() == [[0, 0, 2]]
+
+
+def test_ties_are_broken_by_the_generator() -> None:
+    """Agents between equally near tasks spread over them, by the seed."""
+    instance = Instance(ability=np.ones(40), workload=np.ones(4))
+    starts = [layout(instance, seed=seed).start for seed in (0, 0, 1)]
+    assert torch.equal(starts[0], starts[1])
+    assert not torch.equal(starts[0], starts[2])
+    assert set(starts[0].flatten().tolist()) == {0, 1, 2, 3}
+
+
+def test_late_arrivals_bring_less() -> None:
+    """An agent that flies for half of the reference makespan brings half its ability, and nothing after all of it."""
+    instance = Instance(
+        ability=[2, 2],
+        workload=[1, 1, 1],
+        task_position=[[1, 0], [2, 0], [5, 0]],
+        agent_position=[[0, 0], [0, 0]],
+        speed=[0.5, np.inf],
+    )
+    board = layout(instance, hours=4.0)
+    assert board.contribution[0].tolist() == [[0.5, 0, 0, 1], [1, 1, 1, 1]]
+    assert board.legal[0].tolist() == [[True, False, False, True], [True, True, True, True]]
+
+
+@given(instances(speeds=False))
+def test_legal_is_reach(instance: Instance) -> None:
+    """Without travel times an agent may go where it can reach something to do, and be idle."""
+    board = layout(instance)
+    expected = reachable(instance)[1] & (instance.workload > 0)
+    assert np.array_equal(board.legal[0, :, :-1].numpy(), expected)
+    assert bool(board.legal[..., -1].all())
+    assert bool(board.legal.gather(2, board.start[..., None]).all())
+
+
+@given(instances(speeds=False), st.randoms(use_true_random=False))
+def test_group_ability_is_that_of_the_evaluator(instance: Instance, random) -> None:
+    """Groups of a board, times the mean ability, are the W_j of `evaluate`."""
+    board = layout(instance)
+    options = [[-1, *np.flatnonzero(row).tolist()] for row in board.legal[0, :, :-1].numpy()]
+    plan = np.array([random.choice(row) for row in options])
+    state = state_of(board, plan)
+    expected = evaluate(instance, Allocation(plan)).group_ability
+    np.testing.assert_allclose(state.group[0, :-1].numpy() * instance.ability.mean(), expected, rtol=1e-5)
+    assert torch.equal(group_ability(board, state.slot), state.group)
+
+
+def test_repeat_and_choose_games(pair: Instance) -> None:
+    """Copies differ in their price alone, and games are chosen by number."""
+    board = layout(pair)
+    copies = board.repeat(torch.tensor([0.1, 0.2, 0.3]))
+    assert copies.shape == (3, 3, 3)
+    assert copies.price.tolist() == pytest.approx([0.1, 0.2, 0.3])
+    one = copies[torch.tensor([2])]
+    assert one.price.item() == pytest.approx(0.3)
+    for name, value in fields(one).items():
+        assert name == "price" or torch.equal(value, getattr(board, name)), name
+
+
+def test_boards_of_several_instances_are_those_of_each() -> None:
+    """Games side by side are laid out as each by itself."""
+    games = [paper_like(8, 3, 30, seed) for seed in range(3)]
+    together = layout(*games)
+    for number, game in enumerate(games):
+        for name, value in fields(layout(game)).items():
+            assert torch.equal(getattr(together, name)[number : number + 1], value), name
+
+
+def test_units_do_not_matter() -> None:
+    """Other units of work, time and distance lay out the same game, but for tau and the scale themselves."""
+    one = random_instance(Family(agents=9, tasks=4, starts="own", communication_range=(0.5, 1.0), battery=(2, 5)), 3)
+    other = Instance(
+        ability=one.ability * 10,
+        workload=one.workload * 30,
+        task_position=one.task_position * 7,
+        agent_position=one.agent_position * 7,
+        communication_range=one.communication_range * 7,
+        battery=one.battery * 7,
+        energy_per_distance=one.energy_per_distance,
+    )
+    for name, value in fields(layout(other, hours=3.0)).items():
+        if name not in ("log_tau", "scale"):
+            torch.testing.assert_close(value, getattr(layout(one), name), msg=name)
+
+
+@pytest.mark.parametrize("name", EXTREMES)
+@pytest.mark.parametrize("hours", [0.0, 1e-300, 1.0, 1e300])
+@pytest.mark.parametrize("near", [None, 1])
+def test_layout_is_always_finite(name: str, hours: float, near: int | None) -> None:
+    """Whatever the numbers, no field of a board is NaN, and none but the endurance is infinite; nothing warns."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        board = layout(EXTREMES[name], hours=hours, near=near)
+    for field, value in fields(board).items():
+        assert not value.is_floating_point() or bool(torch.isfinite(value).all() | (field == "endurance")), field
+    assert not bool(board.endurance.isnan().any())
+    assert bool((tasks_of(board, begin(board)) < board.places).all())
+
+
+def test_a_large_mean_ability_keeps_the_discount() -> None:
+    """0.5^500 is 0 in single precision; its logarithm is not."""
+    assert layout(Instance(ability=[500], workload=[1])).log_tau.item() == pytest.approx(500 * np.log(0.5))
+
+
+def test_instances_must_match_their_figures(pair: Instance) -> None:
+    """A reference makespan per instance, not fewer."""
+    with pytest.raises(ValueError, match="shorter"):
+        make_board([pair, pair], [1.0], [0.5, 0.5], np.random.default_rng(0))

@@ -1,0 +1,260 @@
+"""Rewards, with numbers worked by hand and against brute force."""
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from boards import layout, plan_of, state_of
+from hypothesis import given
+from hypothesis import strategies as st
+from strategies import instances
+from tiny_instances import tiny_instance
+
+from alloc.problems import Allocation, Instance, evaluate
+from alloc.problems.game import (
+    PAPER,
+    PLANNING,
+    Board,
+    Reward,
+    Rules,
+    State,
+    begin,
+    coverage,
+    difference_rewards,
+    flown,
+    grant,
+    group_ability,
+    marginal_contributions,
+    moved,
+    open_bids,
+    potential,
+    step,
+    time_over_reference,
+    worth,
+)
+from alloc.problems.game.reward import LARGEST_EXPONENT
+
+RULES = (
+    PLANNING,
+    PAPER,
+    Rules(reward=Reward.COVERAGE),
+    Rules(flying=True, returning=True),
+    Rules(most_moves=1),
+)
+
+
+def somewhere(board: Board, state: State, rules: Rules, seed: int) -> torch.Tensor:
+    """Return open slots, or those where agents are, at random."""
+    can = open_bids(board, state, rules).scatter(2, state.slot[..., None], True)
+    draws = torch.rand(board.shape, generator=torch.Generator().manual_seed(seed))
+    return draws.masked_fill(~can, -1.0).argmax(2)
+
+
+def test_potential_by_hand(board: Board) -> None:
+    """With shortfalls of 1.5 of 2 and 0 of 1 mean abilities, the potential is -4 * 1.5/3 - 2 * 0.75/2 - 0.75."""
+    group = torch.tensor([[0.5, 2.5, 0.0]])
+    assert potential(board, group).item() == pytest.approx(-2 - 0.75 - 0.75)
+    assert potential(board, torch.tensor([[2.0, 1.0, 0.0]])).item() == 0
+
+
+def test_coverage_by_hand(board: Board) -> None:
+    """(3) in the instance's units: -(0.5^(1 - 4) + 0.5^(5 - 2)) / 2 for groups of 1 and 5."""
+    assert coverage(board, torch.tensor([[0.5, 2.5, 0.0]])).item() == pytest.approx(-(8 + 1 / 8) / 2)
+
+
+def test_rewards_take_many_groups_at_once(board: Board) -> None:
+    """Further axes in front are further states of the same games."""
+    group = torch.tensor([[[0.5, 2.5, 0.0]], [[2.0, 1.0, 0.0]]])
+    for reward in (potential, coverage):
+        each = torch.stack([reward(board, one) for one in group])
+        assert torch.equal(reward(board, group), each)
+
+
+def test_worth_by_hand(board: Board) -> None:
+    """The price of energy is 0.5 per mean distance of an agent, (0 + 0.1 + 0.8) * 1.65 / 3 here."""
+    state = state_of(board, np.array([0, 1, 1]))
+    assert worth(board, state).item() == pytest.approx(-3.5 - 0.5 * 0.9 * 1.65 / 3)
+
+
+def test_coverage_is_that_of_the_evaluator() -> None:
+    """With equal priorities and workloads > 0, (3) over the number of tasks is the evaluator's reward over it."""
+    for seed in range(30):
+        instance = tiny_instance(seed)
+        if instance.has_travel_time or (instance.workload == 0).any():
+            continue
+        board = layout(instance)
+        state = begin(board)
+        expected = evaluate(instance, plan_of(board, state)).reward / instance.m
+        assert coverage(board, state.group).item() == pytest.approx(expected, rel=1e-4)
+
+
+def test_coverage_goes_on_along_its_tangent() -> None:
+    """Beyond `LARGEST_EXPONENT` (3) is continued without a jump or a bend, keeps falling, and never overflows."""
+    board = layout(Instance(ability=[1], workload=[1], tau=0.5))
+    limit = LARGEST_EXPONENT / np.log(2)  # mean abilities short at which the exponent is reached
+
+    def short_of(lack: float) -> float:
+        return coverage(board, board.need - torch.tensor([[lack, 0.0]])).item()
+
+    top = np.exp(LARGEST_EXPONENT)
+    assert short_of(limit) == pytest.approx(-top, rel=1e-4)
+    assert short_of(limit - 1) == pytest.approx(-top / 2, rel=1e-4)
+    assert short_of(limit + 1) == pytest.approx(-top * (1 + np.log(2)), rel=1e-4)
+    lacks = [short_of(limit * factor) for factor in (0.99, 1.0, 1.01, 2, 10, 1e3, 1e6)]
+    assert lacks == sorted(lacks, reverse=True)
+    assert len(set(lacks)) == len(lacks)
+    assert np.isfinite(short_of(1e9))
+
+
+@given(instances(), st.integers(0, 99), st.sampled_from(RULES))
+def test_marginal_contributions_add_up(instance: Instance, seed: int, rules: Rules) -> None:
+    """What granted bids bring is the rise of the worth, and what each brings is that of granting it by itself."""
+    board = layout(instance)
+    state, generator = begin(board), torch.Generator().manual_seed(seed)
+    bids = torch.randn(board.shape, generator=generator).masked_fill(~open_bids(board, state, rules), -torch.inf)
+    granted = grant(board, state, bids, torch.tensor([-1.0]), rules.most_moves)
+    brought = marginal_contributions(board, state, granted, rules)
+    after = step(board, state, moved(board, state, granted))
+    rise = worth(board, after, rules) - worth(board, state, rules)
+    size = 1e-5 * (1 + abs(worth(board, state, rules).item()) + abs(worth(board, after, rules).item()))
+    assert brought.sum().item() == pytest.approx(rise.item(), abs=size)
+    so_far = worth(board, state, rules)
+    for number in range(granted.shape[1]):
+        part = step(board, state, moved(board, state, granted[:, : number + 1]))
+        now = worth(board, part, rules)
+        assert brought[0, number].item() == pytest.approx((now - so_far).item(), abs=size)
+        so_far = now
+
+
+def test_what_is_no_bid_brings_nothing(board: Board) -> None:
+    """The reserve and what fills up bring 0, wherever they stand."""
+    state = begin(board)
+    brought = marginal_contributions(board, state, torch.tensor([[9, -1]]))
+    assert brought.tolist() == [[0, 0]]
+
+
+@given(instances(), st.integers(0, 99), st.sampled_from(RULES))
+def test_difference_rewards_by_brute_force(instance: Instance, seed: int, rules: Rules) -> None:
+    """The reward of an agent is the worth of what all did, less that had it alone stayed."""
+    board = layout(instance)
+    state = step(board, begin(board), somewhere(board, begin(board), rules, seed))
+    slot = somewhere(board, state, rules, seed + 1)
+    slot = torch.where(state.done[:, None], state.slot, slot)
+    rewards = difference_rewards(board, state, slot, rules)
+    after = worth(board, step(board, state, slot), rules)
+    for agent in range(instance.n):
+        stayed = slot.clone()
+        stayed[0, agent] = state.slot[0, agent]
+        expected = after - worth(board, step(board, state, stayed), rules)
+        size = 1e-5 * (1 + 2 * abs(after.item()) + abs(expected.item()))
+        assert rewards[0, agent].item() == pytest.approx(expected.item(), abs=size)
+
+
+@given(instances(speeds=False), st.floats(0.1, 10), st.integers(0, 99))
+def test_time_is_that_of_the_evaluator(instance: Instance, hours: float, seed: int) -> None:
+    """Times the reference, it is the makespan of the served tasks; and as many tasks are unserved."""
+    board = layout(instance, hours=hours)
+    state = step(board, begin(board), somewhere(board, begin(board), PLANNING, seed))
+    time, unserved = time_over_reference(board, state.group)
+    expected = evaluate(instance, plan_of(board, state))
+    assert time.item() * hours == pytest.approx(expected.served_makespan, rel=1e-5)
+    assert unserved.item() == len(expected.unserved_tasks)
+
+
+@given(instances(), st.floats(0.1, 10), st.integers(0, 99))
+def test_needs_are_met_when_all_is_done_in_time(instance: Instance, hours: float, seed: int) -> None:
+    """With travel times too, all needs are met if and only if the makespan is within the reference."""
+    board = layout(instance, hours=hours)
+    state = step(board, begin(board), somewhere(board, begin(board), PLANNING, seed))
+    score = evaluate(instance, plan_of(board, state))
+    makespan = np.inf if score.makespan is None else score.makespan
+    if abs(makespan - hours) > 1e-4 * hours:  # single precision
+        assert (potential(board, state.group).item() > -1e-5) == (makespan <= hours)
+
+
+def test_the_last_term_of_the_potential_is_the_makespan() -> None:
+    """1 - T_ref / T of a plan by hand: groups of 3 and 1 for 2 and 2 at T_ref = 1 take 2 h."""
+    board = layout(Instance(ability=[2, 1, 1], workload=[2, 2], start_task=[0, 0, 1]))
+    assert time_over_reference(board, begin(board).group)[0].item() == 2
+    # short: 0 of 2 and 1 of 2, in mean abilities of 4/3; total 1 of 4, on average 1/4, at worst 1/2
+    assert potential(board, begin(board).group).item() == pytest.approx(-4 / 4 - 2 / 4 - 1 / 2)
+
+
+def best_groups(instance: Instance) -> tuple[set[tuple[float, ...]], set[tuple[float, ...]]]:
+    """Return the group abilities of the best of all plans: by (3), and by the makespan with all tasks served."""
+    plans = itertools.product(range(instance.m), repeat=instance.n)
+    plan_of_group = {tuple(np.bincount(plan, instance.ability, instance.m).tolist()): plan for plan in plans}
+    scores = {group: evaluate(instance, Allocation(plan)) for group, plan in plan_of_group.items()}
+    reward = max(score.reward for score in scores.values())
+    makespan = min(score.makespan for score in scores.values() if score.makespan is not None)
+    return (
+        {group for group, score in scores.items() if score.reward == pytest.approx(reward)},
+        {group for group, score in scores.items() if score.makespan == pytest.approx(makespan)},
+    )
+
+
+def test_coverage_and_makespan_agree_at_balanced_load() -> None:
+    """Where total ability equals total load and can be split without rest, both have one best plan, the same."""
+    by_coverage, by_makespan = best_groups(Instance(ability=[2] * 5, workload=[8, 2]))
+    assert by_coverage == by_makespan == {(8.0, 2.0)}
+
+
+def test_coverage_and_makespan_differ_at_other_loads() -> None:
+    """Loads of 8 and 2: (3) equalises the slack W - h, the makespan the ratio h / W, with too little and with too much.
+
+    Of 20, (3) gives 13 and 7, or as near as agents of 2 come; the makespan gives 16 and 4. Of 5, the makespan serves
+    both with 4 and 1; (3) leaves the small task alone.
+    """
+    ample = best_groups(Instance(ability=[2] * 10, workload=[8, 2]))
+    assert ample == ({(12.0, 8.0), (14.0, 6.0)}, {(16.0, 4.0)})
+    scarce = best_groups(Instance(ability=[1] * 5, workload=[8, 2]))
+    assert scarce == ({(5.0, 0.0)}, {(4.0, 1.0)})
+
+
+@pytest.mark.parametrize("reward", list(Reward))
+def test_the_reward_ranks_plans_as_its_objective(reward: Reward) -> None:
+    """At balanced load the worth of the game is highest at the same plan for both rewards."""
+    board = layout(Instance(ability=[3, 1, 1, 1], workload=[4, 2]), price=0.0)
+    slots = torch.tensor(list(itertools.product(range(2), repeat=4)))
+    boards = board.repeat(torch.zeros(len(slots)))
+    gain = potential if reward == Reward.MAKESPAN else coverage
+    value = gain(boards, group_ability(boards, slots))
+    group = group_ability(boards, slots)[value == value.max()] * 1.5
+    assert {tuple(row) for row in group[:, :2].tolist()} == {(4.0, 2.0)}
+
+
+@pytest.mark.parametrize("reward", list(Reward))
+def test_priorities_say_who_is_served_first(reward: Reward) -> None:
+    """Of two equal tasks without anybody, the agent is worth more at the one of higher priority."""
+    for priority in ([1, 3], [3, 1]):
+        instance = Instance(ability=[1, 1], workload=[2, 2], priority=priority)
+        board = layout(instance, plan=np.array([-1, -1]))
+        rules = Rules(reward=reward)
+        bids = torch.tensor([[0 * 3 + 0], [0 * 3 + 1]])
+        brought = [marginal_contributions(board, begin(board), bid[None], rules).item() for bid in bids]
+        assert (brought[0] > brought[1]) == (priority[0] > priority[1])
+        assert min(brought) > 0
+
+
+@pytest.mark.parametrize("reward", list(Reward))
+def test_equal_priorities_are_none(pair: Instance, reward: Reward) -> None:
+    """Priorities that are all the same, whatever they are, change no reward."""
+    rules = Rules(reward=reward)
+    one, other = (layout(instance) for instance in (pair, replace(pair, priority=[5, 5])))
+    assert worth(one, begin(one), rules).item() == worth(other, begin(other), rules).item()
+
+
+def test_energy_costs_its_price(route: Instance) -> None:
+    """A flight of 3 lowers the worth by the price times its share of the mean distance, 3 of two agents' here."""
+    board = layout(route, price=0.25)
+    unit = board.scale.item()
+    bid = torch.tensor([[1]])
+    free = layout(route, price=0.0)
+    for rules in (PLANNING, Rules(flying=True)):
+        paid = marginal_contributions(board, begin(board), bid, rules) - marginal_contributions(
+            free, begin(free), bid, rules
+        )
+        assert paid.item() == pytest.approx(-0.25 * 3 * unit / 2, rel=1e-4)
+    assert flown(board, begin(board)).item() == 0
