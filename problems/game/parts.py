@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from alloc.problems.distances import distances
 from alloc.problems.game.board import LARGEST, LEAST, MEAN_DISTANCE, Board, scaled, single, working_share
-from alloc.problems.instance import Instance
+from alloc.problems.instance import IDLE, Instance
 
 Ints = NDArray[np.int64]
 
@@ -36,13 +36,13 @@ class Parts:
     home: torch.Tensor
 
     def merge(self, plan: Ints, slots: NDArray[np.int64], accepted: NDArray[np.bool_]) -> Ints:
-        """Return a plan, tasks by agent and m for idle, with what was decided in the accepted games."""
+        """Return a plan, tasks by agent and `IDLE`, with what was decided in the accepted games."""
         result = plan.copy()
         idle = len(self.tasks[0])
         for part in np.flatnonzero(accepted).tolist():
             real = self.agents[part] >= 0
             slot = slots[part][real]
-            place = np.where(slot == idle, -1, self.tasks[part][np.minimum(slot, idle - 1)])
+            place = np.where(slot == idle, IDLE, self.tasks[part][np.minimum(slot, idle - 1)])
             result[self.agents[part][real]] = place
         return result
 

@@ -1,0 +1,64 @@
+"""Parts of an instance as games."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from boards import layout
+from strategies import rebuilt
+
+from alloc.problems import IDLE, Family, random_instance
+from alloc.problems.game import Board, begin, observe_pairs
+from alloc.problems.game.parts import lay_out_parts
+
+
+@pytest.mark.parametrize("speed", [None, (0.5, 2.0)])
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_a_part_is_laid_out_as_an_instance_of_its_own(speed, dimensions: int) -> None:
+    """Each game on a part is that of the instance with these agents and tasks alone, but for the battery."""
+    family = Family(
+        agents=14, tasks=6, starts="own", communication_range=(0.4, 1.5), speed=speed, priority=(1, 3),
+        dimensions=dimensions, battery=None,
+    )  # fmt: skip
+    instance = random_instance(family, 5)
+    plan = np.where(instance.reach.mask[instance.reach.origin, np.arange(14) % 6], np.arange(14) % 6, IDLE)
+    tasks = np.array([[0, 1, 2], [3, 5, 4]])
+    agents = [np.flatnonzero(np.isin(plan, some)) for some in tasks]
+    parts = lay_out_parts(instance, 4.0, plan, tasks, agents, price=0.5)
+    for number in range(2):
+        size, place = len(agents[number]), np.full(instance.m + 1, -1)
+        place[tasks[number]] = np.arange(3)
+        game = rebuilt(instance, agents[number], tasks[number])
+        game = replace(game, priority=instance.priority[tasks[number]])
+        alone = layout(game, hours=4.0, plan=place[plan[agents[number]]])
+        part = parts.board[torch.tensor([number])]
+        for name in Board.__dataclass_fields__:
+            value, expected = getattr(part, name), getattr(alone, name)
+            if expected.ndim > 1 and expected.shape[1] == size and name not in ("apart", "need", "weight", "supply"):
+                value = value[:, :size]
+            torch.testing.assert_close(value, expected, msg=lambda text, name=name: f"{name}: {text}")
+        torch.testing.assert_close(observe_pairs(part, begin(part))[:, :size], observe_pairs(alone, begin(alone)))
+
+
+def test_who_fills_up_can_only_be_idle() -> None:
+    """Parts of fewer agents are filled up with agents without ability that go nowhere."""
+    instance = random_instance(Family(agents=5, tasks=4), 1)
+    plan = np.array([0, 0, 0, 2, IDLE])
+    parts = lay_out_parts(instance, 1.0, plan, np.array([[0, 1], [2, 3]]), [np.array([0, 1, 2]), np.array([3])])
+    assert parts.agents.tolist() == [[0, 1, 2], [3, -1, -1]]
+    assert parts.board.ability[1, 1:].tolist() == [0, 0]
+    assert parts.board.legal[1, 1:].tolist() == [[False, False, True]] * 2
+    assert bool(torch.isfinite(observe_pairs(parts.board, begin(parts.board))).all())
+
+
+def test_merge_takes_what_was_accepted() -> None:
+    """Agents of accepted parts go where their slots say; the others stay."""
+    instance = random_instance(Family(agents=5, tasks=4), 1)
+    plan = np.array([0, 0, 1, 2, IDLE])
+    parts = lay_out_parts(instance, 1.0, plan, np.array([[0, 1], [2, 3]]), [np.array([0, 1, 2]), np.array([3])])
+    slots = np.array([[1, 0, 0], [1, 2, 2]])
+    assert parts.merge(plan, slots, np.array([True, False])).tolist() == [1, 0, 0, 2, IDLE]
+    assert parts.merge(plan, slots, np.array([False, True])).tolist() == [0, 0, 1, 3, IDLE]
+    both = parts.merge(plan, np.array([[2, 0, 1], [0, 2, 2]]), np.array([True, True]))
+    assert both.tolist() == [IDLE, 0, 1, 2, IDLE]
