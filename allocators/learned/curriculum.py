@@ -1,7 +1,7 @@
 """Games to train on: small instances of many kinds, drawn anew for every update.
 
-All sizes are far below those of the paper's scenarios, which are never trained on. Seeds start where nobody else's
-do: 10^9 for training, 2 * 10^9 for validation.
+Sizes are far below those of the paper's scenarios, which are never trained on. Seeds start where nobody else's do:
+10^9 for training, 2 * 10^9 for validation.
 """
 
 from collections.abc import Sequence
@@ -9,13 +9,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from alloc.allocators.learned.families import draw_instance
 from alloc.problems import Instance, lp_makespan_lower_bound, makespan_lower_bound
 from alloc.problems.game import Board, make_board
-from alloc.problems.generate import paper_like, random_instance
-from alloc.problems.generate_family import Family
 
 TRAINING_SEED = 10**9
-VALIDATION_SEED = 2 * 10**9
+
+
+@dataclass(frozen=True)
+class Aimed:
+    """An instance, and the makespan in hours at which it is aimed: a lower bound."""
+
+    instance: Instance
+    hours: float
 
 
 @dataclass(frozen=True)
@@ -24,82 +30,83 @@ class Curriculum:
 
     Attributes
     ----------
-    tasks : (int, int)
-        Least and most tasks.
+    families : tuple of str
+        Of `families.FAMILIES`; each game draws one of them.
+    first_tasks, tasks : (int, int)
+        Least and most tasks, when training begins and when all of it is `grown`.
+    grown : float
+        Share of the training after which sizes are at their full range.
     agents_per_task : (float, float)
         Least and most agents per task.
     most_agents : int
-    paper_share : float
-        Share of instances like the paper's; the others are drawn from families with reach, clusters or real values.
     price : (float, float)
-        Least and most weight of energy.
-    games : int
-        Games per board.
-    steps_per_agent : float
-        Length of a game.
+        Least and most weight of energy, drawn in proportion.
+    eased_share, easing : float
+        Share of games that aim at a longer makespan than the bound, and how much longer at most: there is ability to
+        spare, and some agents may stay idle.
+    pairs : int
+        Pairs of agent and place on a board, about, whatever the size of its games: an update always takes as long.
+    games : (int, int)
+        Least and most games on a board.
+    own : tuple of Aimed
+        Instances to play instead of drawn ones.
     """
 
-    tasks: tuple[int, int] = (6, 13)
-    agents_per_task: tuple[float, float] = (3.5, 9.0)
-    most_agents: int = 72
-    paper_share: float = 0.5
-    price: tuple[float, float] = (0.2, 2.4)
-    games: int = 20
-    steps_per_agent: float = 0.6
+    families: tuple[str, ...] = ("mixed",)
+    first_tasks: tuple[int, int] = (4, 8)
+    tasks: tuple[int, int] = (6, 16)
+    grown: float = 0.4
+    agents_per_task: tuple[float, float] = (3.5, 12.0)
+    most_agents: int = 80
+    price: tuple[float, float] = (0.2, 3.0)
+    eased_share: float = 0.3
+    easing: float = 1.3
+    pairs: int = 12_000
+    games: tuple[int, int] = (8, 48)
+    own: tuple[Aimed, ...] = ()
 
     def draw(self, rng: np.random.Generator, progress: float = 1.0) -> Board:
-        """Draw a board of games for one update."""
-        m = int(rng.integers(self.tasks[0], self.tasks[1] + 1))
-        n = min(self.most_agents, round(m * rng.uniform(*self.agents_per_task)))
-        seeds = TRAINING_SEED + rng.integers(0, 10**8, self.games)
-        instances = [self._instance(n, m, int(seed), rng) for seed in seeds]
-        prices = [float(price) for price in rng.uniform(*self.price, self.games)]
-        return reference_board(instances, prices, rng)
+        """Draw a board of games for one update.
+
+        Parameters
+        ----------
+        progress : float
+            Share of the training that is behind.
+        """
+        aimed = self._own(rng) if self.own else self._new(rng, progress)
+        eased = np.where(rng.random(len(aimed)) < self.eased_share, rng.uniform(1.0, self.easing, len(aimed)), 1.0)
+        hours = [one.hours * float(ease) for one, ease in zip(aimed, eased, strict=True)]
+        cheap, dear = self.price
+        prices = (cheap * (dear / cheap) ** rng.random(len(aimed))).tolist()
+        n, m = aimed[0].instance.n, aimed[0].instance.m
+        near = max(8, self.pairs // n) if n * m > self.pairs else None
+        return make_board([one.instance for one in aimed], hours, prices, rng, near=near)
 
     def steps(self, board: Board) -> int:
-        """How long games on `board` last."""
-        return 20
+        """Return how many rounds games on `board` last at most."""
+        return 8 + board.shape[1] // 6
 
-    def _instance(self, n: int, m: int, seed: int, rng: np.random.Generator) -> Instance:
-        if rng.random() < self.paper_share:
-            return paper_like(n, m, int(rng.integers(4 * n, 5 * n + 1)), seed)
-        return random_instance(_FAMILIES[int(rng.integers(len(_FAMILIES)))](n, m, rng), seed)
+    def _new(self, rng: np.random.Generator, progress: float) -> list[Aimed]:
+        along = min(1.0, progress / self.grown) if self.grown > 0 else 1.0
+        low, high = (round(a + along * (b - a)) for a, b in zip(self.first_tasks, self.tasks, strict=True))
+        m = int(rng.integers(low, high + 1))
+        n = max(1, min(self.most_agents, round(m * rng.uniform(*self.agents_per_task))))
+        instances = []
+        for seed in TRAINING_SEED + rng.integers(0, 10**8, self._count(n, m)):
+            family = self.families[int(rng.integers(len(self.families)))]
+            instances.append(draw_instance(family, n, m, int(seed), rng))
+        return aim(instances)
 
+    def _own(self, rng: np.random.Generator) -> list[Aimed]:
+        """Draw from those instances that are as large as one drawn before."""
+        first = self.own[int(rng.integers(len(self.own)))].instance
+        alike = [one for one in self.own if (one.instance.n, one.instance.m) == (first.n, first.m)]
+        return [alike[int(number)] for number in rng.integers(0, len(alike), self._count(first.n, first.m))]
 
-def _reach_limited(n: int, m: int, rng: np.random.Generator) -> Family:
-    reach = rng.uniform(0.3, 0.7)
-    return Family(agents=n, tasks=m, starts="own", communication_range=(reach, 1.5 * reach), battery=None)
-
-
-def _scattered(n: int, m: int, rng: np.random.Generator) -> Family:
-    """Few can reach what is far off, loads differ widely, and agents crowd elsewhere."""
-    reach = rng.uniform(0.25, 0.6)
-    return Family(
-        agents=n,
-        tasks=m,
-        workload=str(rng.choice(["lognormal", "pareto"])),
-        integer=False,
-        starts="own",
-        sites=str(rng.choice(["uniform", "clustered"])),
-        dimensions=2,
-        communication_range=(reach, 3 * reach),
-        battery=None,
-    )
-
-
-def _clustered(n: int, m: int, rng: np.random.Generator) -> Family:
-    return Family(agents=n, tasks=m, starts="own", sites="clustered", dimensions=2, integer=False, battery=None)
-
-
-def _heavy_tailed(n: int, m: int, rng: np.random.Generator) -> Family:
-    return Family(agents=n, tasks=m, ability="lognormal", workload="lognormal", integer=False, battery=None)
-
-
-def _depots(n: int, m: int, rng: np.random.Generator) -> Family:
-    return Family(agents=n, tasks=m, starts="depots", depots=3, dimensions=2, battery=(3.0, 8.0))
-
-
-_FAMILIES = (_reach_limited, _scattered, _scattered, _clustered, _heavy_tailed, _depots)
+    def _count(self, n: int, m: int) -> int:
+        """Games of this size on a board."""
+        least = self.games[0] if n * (m + 1) <= self.pairs else 1
+        return int(np.clip(self.pairs // (n * (m + 1)), least, self.games[1]))
 
 
 def reference_makespan(instance: Instance, patience_s: float = 1.0) -> float:
@@ -110,18 +117,11 @@ def reference_makespan(instance: Instance, patience_s: float = 1.0) -> float:
     return bound
 
 
+def aim(instances: Sequence[Instance]) -> list[Aimed]:
+    """Aim each instance at its lower bound."""
+    return [Aimed(instance, reference_makespan(instance)) for instance in instances]
+
+
 def reference_board(instances: Sequence[Instance], price: Sequence[float], rng: np.random.Generator) -> Board:
     """Lay out games with demands at the lower bound of each instance."""
     return make_board(instances, [reference_makespan(instance) for instance in instances], price, rng)
-
-
-def validation_boards() -> list[Board]:
-    """Return the games on which generations are compared: always the same, none of them trained on."""
-    rng = np.random.default_rng(VALIDATION_SEED)
-    seeds = iter(range(VALIDATION_SEED, VALIDATION_SEED + 1000))
-    kinds = (
-        [paper_like(100, 20, 400, next(seeds)) for _ in range(8)],
-        [paper_like(60, 6, 300, next(seeds)) for _ in range(8)],
-        [random_instance(make(60, 10, rng), next(seeds)) for make in _FAMILIES for _ in range(2)],
-    )
-    return [reference_board(kind, [0.6] * len(kind), rng) for kind in kinds]

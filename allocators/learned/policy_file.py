@@ -2,8 +2,9 @@
 
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from importlib.metadata import version
 from pathlib import Path
 
 import torch
@@ -13,12 +14,14 @@ from safetensors.torch import save
 from alloc.allocators.learned.network import ActorCritic, NetworkSize
 from alloc.problems import InputError
 from alloc.problems.formats import write_bytes_atomically
-from alloc.problems.game import FEATURE_SET, PAIR_FEATURES, TASK_FEATURES
+from alloc.problems.game import AGENT_FEATURES, FEATURE_SET, PAIR_FEATURES, TASK_FEATURES
 
 POLICY_FORMAT = "alloc-policy/1"
 
 
-def save_policy(path: Path | str, networks: Sequence[ActorCritic], method: str) -> None:
+def save_policy(
+    path: Path | str, networks: Sequence[ActorCritic], method: str, figures: Mapping[str, str | float] | None = None
+) -> None:
     """Store networks, the best first.
 
     Parameters
@@ -28,13 +31,20 @@ def save_policy(path: Path | str, networks: Sequence[ActorCritic], method: str) 
         All of one size.
     method : str
         The method that trained them.
+    figures : mapping, optional
+        Figures of the training, for whoever looks at the file.
     """
     tensors = {
         f"{number}.{name}": weight.contiguous()
         for number, network in enumerate(networks)
         for name, weight in network.state_dict().items()
     }
-    write_bytes_atomically(path, save(tensors, metadata=_description(networks[0].size, len(networks), method)))
+    said = {
+        **_description(networks[0].size, len(networks), method),
+        "version": version("alloc-mrta"),
+        "training": json.dumps(dict(figures or {})),
+    }
+    write_bytes_atomically(path, save(tensors, metadata=said))
 
 
 def _description(size: NetworkSize, count: int, method: str) -> dict[str, str]:
@@ -42,14 +52,21 @@ def _description(size: NetworkSize, count: int, method: str) -> dict[str, str]:
         "format": POLICY_FORMAT,
         "method": method,
         "features": FEATURE_SET,
-        "feature_counts": json.dumps([PAIR_FEATURES, TASK_FEATURES]),
+        "feature_counts": json.dumps([PAIR_FEATURES, TASK_FEATURES, AGENT_FEATURES]),
         "networks": str(count),
         "size": json.dumps(asdict(size)),
     }
 
 
-def load_policy(path: Path | str, method: str, device: torch.device | None = None) -> list[ActorCritic]:
+def load_policy(path: Path | str, method: str | None, device: torch.device | None = None) -> list[ActorCritic]:
     """Read networks, the best first, ready to be used.
+
+    Parameters
+    ----------
+    path : Path or str
+    method : str or None
+        The method that trained them; None for any.
+    device : torch.device, optional
 
     Raises
     ------
@@ -71,7 +88,7 @@ def load_policy(path: Path | str, method: str, device: torch.device | None = Non
         size, count = NetworkSize(**json.loads(said["size"])), int(said["networks"])
     except (KeyError, TypeError, ValueError):
         raise InputError("does not describe its networks; use a file by `alloc train`", "metadata", source) from None
-    expected = _description(size, count, method)
+    expected = _description(size, count, said.get("method", "") if method is None else method)
     for key in ("format", "method", "features", "feature_counts"):
         if said.get(key) != expected[key]:
             raise InputError(f"is {said.get(key)!r}, this version needs {expected[key]!r}; train anew", key, source)

@@ -12,13 +12,15 @@ import random
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import torch
 from deap import base, tools
-from torch.nn.utils import parameters_to_vector, vector_to_parameters
 
-from alloc.allocators.learned.network import ActorCritic
+Member = dict[str, Any]
+"""State of a learner by PPO, as `Learner.state` returns it: of its parts, breeding changes `network`, the weights by
+name, and the step size in `optimiser`."""
 
 
 @dataclass(frozen=True)
@@ -54,19 +56,6 @@ class BreedingParameters:
     cost_weight: float = 0.005
 
 
-@dataclass(eq=False)
-class Member:
-    """One actor-critic with its optimiser; training changes it in place."""
-
-    network: ActorCritic
-    optimiser: torch.optim.Optimizer
-
-    @property
-    def learning_rate(self) -> float:
-        """Step size of the optimiser, adapted by PPO and disturbed by mutation."""
-        return float(self.optimiser.param_groups[0]["lr"])
-
-
 class _Fitness(base.Fitness):  # type: ignore[misc]
     weights = (1.0,)
 
@@ -78,11 +67,6 @@ class _Genome(list):  # type: ignore[type-arg]
         super().__init__(weights)
         self.number = number
         self.fitness = _Fitness((fitness,))
-
-
-def new_member(network: ActorCritic, learning_rate: float) -> Member:
-    """Give `network` a fresh Adam optimiser."""
-    return Member(network, torch.optim.Adam(network.parameters(), learning_rate))
 
 
 def fitness(
@@ -116,7 +100,7 @@ def breed(
 ) -> list[Member]:
     """Return the next generation: the elite, and children of tournament winners by crossover and mutation."""
     genomes = [
-        _Genome(parameters_to_vector(member.network.parameters()).tolist(), number, score)
+        _Genome(_weights(member["network"]).tolist(), number, score)
         for number, (member, score) in enumerate(zip(members, scores, strict=True))
     ]
     elite = tools.selBest(genomes, parameters.elite)
@@ -129,6 +113,7 @@ def breed(
 
 
 def _child(parent: Member, mother: _Genome, father: _Genome, parameters: BreedingParameters) -> Member:
+    """Return a child with the optimiser and the replay buffer of its mother, the parent."""
     genome = copy.deepcopy(mother)
     if random.random() < parameters.crossover_probability:
         genome, _ = tools.cxBlend(genome, copy.deepcopy(father), alpha=0.0)
@@ -136,11 +121,22 @@ def _child(parent: Member, mother: _Genome, father: _Genome, parameters: Breedin
     if random.random() < parameters.mutation_probability:
         (genome,) = tools.mutGaussian(genome, 0.0, parameters.mutation_size, parameters.mutated_share)
         factor = random.choice((0.8, 1.25))
-    child = new_member(copy.deepcopy(parent.network), parent.learning_rate)
-    child.optimiser.load_state_dict(copy.deepcopy(parent.optimiser.state_dict()))
-    child.optimiser.param_groups[0]["lr"] = parent.learning_rate * factor
-    vector_to_parameters(torch.tensor(list(genome)), child.network.parameters())
+    child = copy.deepcopy(parent)
+    for group in child["optimiser"]["param_groups"]:
+        group["lr"] *= factor
+    child["network"] = _named(torch.tensor(list(genome)), child["network"])
     return child
+
+
+def _weights(network: dict[str, torch.Tensor]) -> torch.Tensor:
+    """All weights of a network in one row."""
+    return torch.cat([weight.detach().flatten() for weight in network.values()])
+
+
+def _named(weights: torch.Tensor, like: dict[str, torch.Tensor]) -> dict[str, torch.Tensor]:
+    """Undo `_weights`, with the names and shapes of `like`; each tensor has memory of its own."""
+    rows = weights.split([weight.numel() for weight in like.values()])
+    return {name: row.view_as(old).clone() for (name, old), row in zip(like.items(), rows, strict=True)}
 
 
 @contextmanager

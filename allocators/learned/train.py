@@ -1,234 +1,357 @@
-"""Training of GAPPO: PPO on every member, fitness on validation games, the next generation; again and again.
+"""Training: lessons for every member, validation, and the next generation; again and again.
 
 References
 ----------
 Fang et al. (2025), Algorithm 1, doi:10.20944/preprints202502.0192.v1.
 """
 
-import copy
-import csv
-import json
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
 
-from alloc.allocators.learned.curriculum import Curriculum, validation_boards
+from alloc.allocators.learned.checkpoint import described, read_checkpoint, write_checkpoint
+from alloc.allocators.learned.curriculum import Curriculum
+from alloc.allocators.learned.engine import Engine, SerialEngine
+from alloc.allocators.learned.learner import Lesson, LessonReport
+from alloc.allocators.learned.methods import new_learner
 from alloc.allocators.learned.network import ActorCritic, NetworkSize
 from alloc.allocators.learned.policy_file import save_policy
-from alloc.allocators.learned.population import BreedingParameters, Member, breed, fitness, new_member
-from alloc.allocators.learned.ppo import PpoParameters, UpdateStatistics, collect, update
-from alloc.allocators.learned.rollout import play
-from alloc.problems import InputError
-from alloc.problems.game import Board, State, begin, group_ability, value_of
+from alloc.allocators.learned.population import BreedingParameters, breed, fitness
+from alloc.allocators.learned.ppo import PpoParameters
+from alloc.allocators.learned.training_log import TrainingLog
+from alloc.allocators.learned.validation import Validation, validate, validation_boards
+from alloc.problems.game import PLANNING, Board, Rules
 
-CHECKPOINT_FORMAT = "alloc-checkpoint/1"
+Weights = dict[str, torch.Tensor]
 
 
 @dataclass(frozen=True)
 class TrainingParameters:
-    """Shape of a training run.
+    """Shape of a training run; together with the seed it decides the whole curve.
 
     Attributes
     ----------
+    method : str
+        Of `methods.METHODS`.
     population : int
-        Members.
-    updates_per_generation : int
-        PPO updates of each member between two generations.
-    learning_rate : float
-        First step size; adapted by the divergence, and by mutation.
-    decay : float
-        Factor per generation on three times that, the most that a step size may grow to.
+        Members that learn; where there are several, they are bred between generations.
+    decisions : int
+        Decisions of agents in a lesson: one member's share of a generation.
     network : NetworkSize
-    ppo : PpoParameters
+    learner : parameters of the method
+        Such as `PpoParameters`.
     breeding : BreedingParameters
     curriculum : Curriculum
+    rules : Rules
     """
 
+    method: str = "gappo"
     population: int = 4
-    updates_per_generation: int = 10
-    learning_rate: float = 1e-3
-    decay: float = 0.96
+    decisions: int = 20_000
     network: NetworkSize = field(default_factory=NetworkSize)
-    ppo: PpoParameters = field(default_factory=PpoParameters)
+    learner: Any = field(default_factory=PpoParameters)
     breeding: BreedingParameters = field(default_factory=BreedingParameters)
     curriculum: Curriculum = field(default_factory=Curriculum)
+    rules: Rules = PLANNING
 
 
 @dataclass(frozen=True)
-class Validation:
-    """How one network plays the validation games, at the best position of each.
+class Limits:
+    """When training ends, whatever comes first; all count from the beginning of the run.
 
     Attributes
     ----------
-    reward : float
-        Rise of potential less energy.
-    shortfall : float
-        Mean over games of 1 - T_ref / T.
-    distance : float
-        Mean distance per agent, in the board's scale.
+    steps : int or None
+        Decisions of agents, those of all members together.
+    iterations : int or None
+        Generations.
+    minutes : float or None
+    patience : int or None
+        Generations in a row without better networks.
     """
 
-    reward: float
-    shortfall: float
-    distance: float
+    steps: int | None = None
+    iterations: int | None = None
+    minutes: float | None = None
+    patience: int | None = None
 
 
 @dataclass(frozen=True)
 class Report:
-    """What a generation brought; one line of the log."""
+    """What a generation brought; one line of the log.
+
+    Attributes
+    ----------
+    generation : int
+        From 1.
+    decisions, evaluations : int
+        Decisions of agents and states evaluated by networks up to now, by all members together.
+    cost, time, distance, others_time : float
+        Of the best member; see `Validation`.
+    best_cost : float
+        The least cost up to now.
+    fitness : float
+        (12) of the fittest member.
+    reward, entropy, divergence, learning_rate : float
+        Of the best member's lesson; see `LessonReport`.
+    seconds : float
+        Time of training up to now.
+    decisions_per_second : float
+        In this generation.
+    """
 
     generation: int
-    seconds: float
+    decisions: int
+    evaluations: int
+    cost: float
+    time: float
+    distance: float
+    others_time: float
+    best_cost: float
     fitness: float
     reward: float
-    shortfall: float
-    distance: float
     entropy: float
     divergence: float
     learning_rate: float
-    evaluations: int
+    seconds: float
+    decisions_per_second: float
+
+
+class _Assignment(NamedTuple):
+    """A lesson for a learner, as it travels to wherever it is taken."""
+
+    parameters: TrainingParameters
+    state: dict[str, Any]
+    lesson: Lesson
+    boards: Sequence[Board]
+
+
+class _Taught(NamedTuple):
+    """What came of it."""
+
+    state: dict[str, Any]
+    policy: Weights
+    report: LessonReport
+    validation: Validation
+
+
+def teach(assignment: _Assignment) -> _Taught:
+    """Take a lesson and play the validation games: a pure function, the same wherever it runs."""
+    parameters = assignment.parameters
+    learner = new_learner(parameters.method, parameters.network, parameters.learner, 0)
+    learner.load(assignment.state)
+    report = learner.take(assignment.lesson)
+    validation = validate(learner.policy, assignment.boards, parameters.rules, parameters.curriculum)
+    policy = {name: weight.clone() for name, weight in learner.policy.state_dict().items()}
+    return _Taught(learner.state(), policy, report, validation)
 
 
 class Trainer:
-    """A training run that can be stopped after any generation and taken up again to the same curve."""
+    """A training run that can be stopped at any moment and taken up again to the same curve.
 
-    def __init__(self, parameters: TrainingParameters | None = None, seed: int = 0) -> None:
-        self.parameters = parameters or TrainingParameters()
-        self.seed, self.generation, self.seconds, self.evaluations = seed, 0, 0.0, 0
-        self.rng = np.random.default_rng(seed)
-        self.generator = torch.Generator().manual_seed(seed)
-        with torch.random.fork_rng():
-            torch.manual_seed(seed)
-            first = ActorCritic(self.parameters.network)
-        self.members = [
-            new_member(copy.deepcopy(first), self.parameters.learning_rate) for _ in range(self.parameters.population)
-        ]
-        self.scores = [0.0] * len(self.members)
-        self._validation = validation_boards()
+    Parameters
+    ----------
+    parameters : TrainingParameters, optional
+    seed : int
+        Source of all randomness.
+    boards : sequence of Board, optional
+        Validation games; those of the curriculum by default.
+    init : sequence of weights, optional
+        What the policies of the members begin with, in turn; by default all begin with the same random weights, so
+        that those of two members can be blended.
 
-    def advance(self, should_stop: Callable[[], bool] = lambda: False) -> Report | None:
+    Attributes
+    ----------
+    history : list of Report
+    best : list of weights
+        The networks of the generation with the least cost up to now, the best first.
+    """
+
+    def __init__(
+        self,
+        parameters: TrainingParameters | None = None,
+        seed: int = 0,
+        boards: Sequence[Board] | None = None,
+        init: Sequence[Weights] = (),
+    ) -> None:
+        self.parameters, self.seed = parameters or TrainingParameters(), seed
+        self.boards = validation_boards(self.parameters.curriculum) if boards is None else boards
+        self.members = [self._new_member(init[number % len(init)] if init else None) for number in range(self._count)]
+        self.history: list[Report] = []
+        self.best: list[Weights] = []
+
+    @property
+    def _count(self) -> int:
+        return self.parameters.population
+
+    def _new_member(self, weights: Weights | None) -> dict[str, Any]:
+        learner = new_learner(self.parameters.method, self.parameters.network, self.parameters.learner, self.seed)
+        if weights is not None:
+            learner.policy.load_state_dict(weights)
+        return learner.state()
+
+    @property
+    def generation(self) -> int:
+        """Number of generations that are complete."""
+        return len(self.history)
+
+    @property
+    def best_generation(self) -> int:
+        """The generation that brought the best networks, 0 before the first."""
+        costs = [report.cost for report in self.history]
+        return 1 + int(np.argmin(costs)) if costs else 0
+
+    def progress(self, limits: Limits) -> float:
+        """Return the share of the training that is behind: of the steps, else of the generations, else of the time."""
+        last = self.history[-1] if self.history else None
+        for limit, done in (
+            (limits.steps, last.decisions if last else 0),
+            (limits.iterations, self.generation),
+            (limits.minutes and 60 * limits.minutes, last.seconds if last else 0.0),
+        ):
+            if limit is not None:
+                return min(1.0, done / limit) if limit > 0 else 1.0
+        return 0.0
+
+    def is_over(self, limits: Limits) -> bool:
+        """Whether a limit is met."""
+        last = self.history[-1] if self.history else None
+        return (
+            (limits.steps is not None and (last.decisions if last else 0) >= limits.steps)
+            or (limits.iterations is not None and self.generation >= limits.iterations)
+            or (limits.minutes is not None and (last.seconds if last else 0.0) >= 60 * limits.minutes)
+            or (limits.patience is not None and self.generation - self.best_generation >= max(1, limits.patience))
+        )
+
+    def advance(
+        self,
+        limits: Limits | None = None,
+        engine: Engine | None = None,
+        should_stop: Callable[[], bool] = lambda: False,
+    ) -> Report | None:
         """Train, judge and breed one generation.
+
+        Parameters
+        ----------
+        limits : Limits, optional
+            How far training goes, for its schedules.
+        engine : Engine, optional
+            Where the lessons are taken; one after the other by default.
 
         Returns
         -------
         Report or None
-            None if `should_stop`, asked between updates, said so: the generation then is unfinished, and the run can
-            only be taken up from its last checkpoint.
+            None if `should_stop` said so before the generation was complete; nothing is changed then.
         """
         began = time.monotonic()
-        statistics, costs = [], []
-        boards = [self.parameters.curriculum.draw(self.rng) for _ in range(self.parameters.updates_per_generation)]
-        for member in self.members:
-            member_statistics, cost = self._train(member, boards, should_stop)
-            if should_stop():
-                return None
-            statistics.append(member_statistics)
-            costs.append(cost)
-        self.evaluations += sum(costs)
-        results = [self.validate(member.network) for member in self.members]
-        entropies = [member_statistics.entropy for member_statistics in statistics]
-        self.scores = fitness([r.reward for r in results], entropies, costs, self.parameters.breeding)
-        best = int(np.argmax(self.scores))
-        self.seconds += time.monotonic() - began
-        report = Report(
-            self.generation,
-            self.seconds,
-            self.scores[best],
-            **asdict(results[best]),
-            entropy=entropies[best],
-            divergence=statistics[best].divergence,
-            learning_rate=self.members[best].learning_rate,
-            evaluations=self.evaluations,
+        assignments = [
+            _Assignment(self.parameters, member, self._lesson(number, limits or Limits()), self.boards)
+            for number, member in enumerate(self.members)
+        ]
+        taught = (engine or SerialEngine()).map(teach, assignments, should_stop)
+        if taught is None:
+            return None
+        scores = fitness(
+            [one.validation.reward for one in taught],
+            [one.report.entropy for one in taught],
+            [one.report.evaluations for one in taught],
+            self.parameters.breeding,
         )
-        self.generation += 1
-        self.members = breed(
-            self.members, self.scores, self.parameters.breeding, self.seed * 1_000_003 + self.generation
-        )
+        order = sorted(range(len(taught)), key=lambda number: taught[number].validation.cost)
+        report = self._report(taught, order[0], max(scores), time.monotonic() - began)
+        if not self.history or report.cost < self.history[-1].best_cost:
+            self.best = [taught[number].policy for number in order]
+        self.history.append(report)
+        self.members = [one.state for one in taught]
+        if self._count > 1:
+            self.members = breed(
+                self.members, scores, self.parameters.breeding, _seed(self.seed, self.generation, self._count)
+            )
         return report
 
-    def _train(
-        self, member: Member, boards: Sequence[Board], should_stop: Callable[[], bool]
-    ) -> tuple[UpdateStatistics, int]:
-        """Update one member on every board, the same for all members; also return the network evaluations it took."""
-        curriculum, ppo = self.parameters.curriculum, self.parameters.ppo
-        cost, result = 0, UpdateStatistics(0.0, 0.0, 0)
-        highest = 3 * self.parameters.learning_rate * self.parameters.decay**self.generation
-        for board in boards:
-            if should_stop():
-                break
-            played = collect(member.network, board, curriculum.steps(board), ppo, self.generator)
-            result = update(member.network, member.optimiser, board, played, ppo, self.generator, highest)
-            cost += int(played.alive.sum()) * (1 + ppo.epochs)
-        return result, cost
+    def _lesson(self, member: int, limits: Limits) -> Lesson:
+        parameters, decisions = self.parameters, self.parameters.decisions
+        if limits.steps is not None:
+            left = limits.steps - (self.history[-1].decisions if self.history else 0)
+            decisions = max(1, min(decisions, -(-left // self._count)))
+        seed = _seed(self.seed, self.generation, member)
+        return Lesson(seed, decisions, parameters.curriculum, self.progress(limits), parameters.rules)
 
-    def validate(self, network: ActorCritic) -> Validation:
-        """Play the validation games, greedily and by the rules of `play`."""
-        outcomes = [_outcome(network, board, self.parameters.curriculum.steps(board)) for board in self._validation]
-        reward, shortfall, distance = (torch.cat(part).mean().item() for part in zip(*outcomes, strict=True))
-        return Validation(reward, shortfall, distance)
+    def _report(self, taught: Sequence[_Taught], best: int, fittest: float, seconds: float) -> Report:
+        decisions = sum(one.report.decisions for one in taught)
+        last = self.history[-1] if self.history else None
+        validation, report = taught[best].validation, taught[best].report
+        return Report(
+            generation=self.generation + 1,
+            decisions=decisions + (last.decisions if last else 0),
+            evaluations=sum(one.report.evaluations for one in taught) + (last.evaluations if last else 0),
+            cost=validation.cost,
+            time=validation.time,
+            distance=validation.distance,
+            others_time=validation.others_time,
+            best_cost=min(validation.cost, last.best_cost if last else np.inf),
+            fitness=fittest,
+            reward=report.reward,
+            entropy=report.entropy,
+            divergence=report.divergence,
+            learning_rate=report.learning_rate,
+            seconds=seconds + (last.seconds if last else 0.0),
+            decisions_per_second=decisions / max(seconds, 1e-9),
+        )
 
     def save(self, path: Path) -> None:
         """Store the whole run, so that `resume` goes on as if nothing had happened."""
-        beside = path.with_name(path.name + ".part")
-        torch.save(self._state(), beside)
-        beside.replace(path)
-
-    def _state(self) -> dict[str, Any]:
-        return {
-            "format": CHECKPOINT_FORMAT,
-            "seed": self.seed,
-            "generation": self.generation,
-            "seconds": self.seconds,
-            "evaluations": self.evaluations,
-            "network": asdict(self.parameters.network),
-            "numpy": json.dumps(self.rng.bit_generator.state),
-            "torch": self.generator.get_state(),
-            "members": [(m.network.state_dict(), m.optimiser.state_dict()) for m in self.members],
+        state = {
+            "members": self.members,
+            "history": [asdict(report) for report in self.history],
+            "best": self.best,
         }
+        write_checkpoint(path, described(self.parameters, self.seed), state)
 
-    @classmethod
-    def resume(cls, path: Path, parameters: TrainingParameters | None = None) -> "Trainer":
+    def resume(self, path: Path) -> None:
         """Take up the run stored at `path`.
 
         Raises
         ------
         InputError
-            If there is no checkpoint of this version and population at `path`.
+            If there is no checkpoint of this version at `path`, or it is one of another method, seed or parameters.
         """
-        try:
-            state = torch.load(path, weights_only=True)
-            if state["format"] != CHECKPOINT_FORMAT:
-                raise KeyError(state["format"])
-        except FileNotFoundError:
-            raise InputError("no such checkpoint", "", str(path)) from None
-        except Exception as error:
-            reason = next(iter(str(error).splitlines()), type(error).__name__)[:100]
-            raise InputError(f"is not a checkpoint of this version ({reason})", "", str(path)) from None
-        trainer = cls(parameters, seed=state["seed"])
-        if len(state["members"]) != len(trainer.members) or state["network"] != asdict(trainer.parameters.network):
-            raise InputError("was made with another population or network size; use the same", "", str(path))
-        trainer.generation, trainer.seconds = state["generation"], state["seconds"]
-        trainer.evaluations = state["evaluations"]
-        trainer.rng.bit_generator.state = json.loads(state["numpy"])
-        trainer.generator.set_state(state["torch"])
-        for member, (network, optimiser) in zip(trainer.members, state["members"], strict=True):
-            member.network.load_state_dict(network)
-            member.optimiser.load_state_dict(optimiser)
-        return trainer
+        state = read_checkpoint(path, described(self.parameters, self.seed))
+        self.members, self.best = state["members"], state["best"]
+        self.history = [Report(**report) for report in state["history"]]
+
+    def write_policy(self, path: Path) -> None:
+        """Write the best networks up to now."""
+        networks = []
+        for weights in self.best:
+            network = ActorCritic(self.parameters.network)
+            network.load_state_dict(weights)
+            networks.append(network)
+        figures = self.history[self.best_generation - 1]
+        save_policy(
+            path,
+            networks,
+            self.parameters.method,
+            {
+                "seed": self.seed,
+                "generation": figures.generation,
+                "decisions": figures.decisions,
+                "validation_time": round(figures.time, 6),
+                "validation_distance": round(figures.distance, 6),
+                "turn": str(self.parameters.rules.turn),
+                "reward": str(self.parameters.rules.reward),
+            },
+        )
 
 
-def _outcome(network: ActorCritic, board: Board, steps: int) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-    """Return rise of value, shortfall and distance at the best position of each game, each of shape (B,)."""
-    best = play(network, board, steps=steps)
-    start = begin(board)
-    end = State(best.task, group_ability(board, best.task), start.done)
-    rise = value_of(board, end) - value_of(board, start)
-    return rise, 1 - 1 / best.time.clamp(min=1), best.distance
+def _seed(*numbers: int) -> int:
+    """Mix numbers to the seed of a generator."""
+    return int(np.random.SeedSequence(numbers).generate_state(1, np.uint64)[0] >> np.uint64(1))
 
 
 def train(
@@ -237,46 +360,43 @@ def train(
     *,
     checkpoint: Path,
     log: Path,
-    generations: int | None = None,
-    minutes: float | None = None,
+    limits: Limits,
+    tensorboard: Path | None = None,
+    engine: Engine | None = None,
     should_stop: Callable[[], bool] = lambda: False,
     on_report: Callable[[Report], None] = lambda report: None,
 ) -> None:
-    """Train until a limit is met, storing policy, checkpoint and log after every generation.
+    """Train until a limit is met, storing checkpoint, policy and log after every generation.
+
+    The checkpoint is written first and holds what the others say, so that a run that is killed between two of the
+    files puts them right when it is taken up.
 
     Parameters
     ----------
     output : Path
-        Policy file: all members, the fittest first.
+        Policy file: the best networks up to now, those of all members, the best first.
     checkpoint, log : Path
         Whole run, and one CSV line per generation.
-    generations : int, optional
-        Generation after which to stop, counted from the beginning of the run.
-    minutes : float, optional
-        Training time after which to stop, counted from the beginning of the run.
+    limits : Limits
+    tensorboard : Path, optional
+        Folder for event files.
+    engine : Engine, optional
+        Where lessons are taken; one after the other by default.
     should_stop : callable
-        Asked between updates; what the unfinished generation brought is dropped.
+        As `Engine.map` has it; what the unfinished generation brought is dropped.
     on_report : callable
         Called with every `Report`.
     """
-    while not should_stop():
-        if generations is not None and trainer.generation >= generations:
-            return
-        if minutes is not None and trainer.seconds >= 60 * minutes:
-            return
-        report = trainer.advance(should_stop)
-        if report is None:
-            return
-        save_policy(output, [member.network for member in trainer.members], "gappo")
-        trainer.save(checkpoint)
-        _append(log, report)
-        on_report(report)
-
-
-def _append(log: Path, report: Report) -> None:
-    new = not log.exists()
-    with log.open("a", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        if new:
-            writer.writerow(column.name for column in fields(Report))
-        writer.writerow(asdict(report).values())
+    trainer.save(checkpoint)
+    if trainer.best:
+        trainer.write_policy(output)
+    with TrainingLog(Report, log, tensorboard, trainer.history) as lines:
+        while not trainer.is_over(limits) and not should_stop():
+            report = trainer.advance(limits, engine, should_stop)
+            if report is None:
+                return
+            trainer.save(checkpoint)
+            if report.generation == trainer.best_generation:
+                trainer.write_policy(output)
+            lines.append(report)
+            on_report(report)

@@ -1,0 +1,82 @@
+"""Checkpoints: a whole training run in one file, which says what it is a run of; reading it never runs code."""
+
+import hashlib
+import io
+from dataclasses import asdict, fields, is_dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import torch
+
+from alloc.problems import Instance
+from alloc.problems.errors import InputError
+from alloc.problems.formats import write_bytes_atomically
+from alloc.problems.game import FEATURE_SET
+
+if TYPE_CHECKING:
+    from alloc.allocators.learned.train import TrainingParameters
+
+CHECKPOINT_FORMAT = "alloc-checkpoint/2"
+
+
+def described(parameters: "TrainingParameters", seed: int) -> dict[str, str]:
+    """Return all that decides a training curve, flat, as text."""
+    own = parameters.curriculum.own
+    plain = replace(parameters, curriculum=replace(parameters.curriculum, own=()))
+    text = {"seed": str(seed), "features": FEATURE_SET, **_flat("", asdict(plain))}
+    text["instances"] = ", ".join(_digest(aimed.instance) for aimed in own) or "none"
+    return text
+
+
+def _flat(prefix: str, values: dict[str, Any]) -> dict[str, str]:
+    flat = {}
+    for name, value in values.items():
+        if isinstance(value, dict):
+            flat.update(_flat(f"{prefix}{name}.", value))
+        else:
+            flat[prefix + name] = ", ".join(map(str, value)) if isinstance(value, tuple) else str(value)
+    return flat
+
+
+def _digest(instance: Instance) -> str:
+    """Short name of an instance that no other one has."""
+    assert is_dataclass(instance)
+    digest = hashlib.sha256()
+    for column in fields(instance):
+        value = getattr(instance, column.name)
+        digest.update(value.tobytes() if hasattr(value, "tobytes") else repr(value).encode())
+    return f"{instance.name} ({digest.hexdigest()[:8]})"
+
+
+def write_checkpoint(path: Path, description: dict[str, str], state: dict[str, Any]) -> None:
+    """Write a checkpoint whole or not at all."""
+    buffer = io.BytesIO()
+    torch.save({"format": CHECKPOINT_FORMAT, "description": description, **state}, buffer)
+    write_bytes_atomically(path, buffer.getvalue())
+
+
+def read_checkpoint(path: Path, description: dict[str, str]) -> dict[str, Any]:
+    """Return the state that was stored in a checkpoint of a run like this.
+
+    Raises
+    ------
+    InputError
+        If there is no checkpoint of this version at `path`, or it is one of a run with another description.
+    """
+    source = str(path)
+    try:
+        state: dict[str, Any] = torch.load(path, weights_only=True)
+        if state["format"] != CHECKPOINT_FORMAT:
+            raise KeyError(state["format"])
+        stored = dict(state["description"])
+    except FileNotFoundError:
+        raise InputError("no such checkpoint", "", source) from None
+    except Exception as error:
+        reason = next(iter(str(error).splitlines()), type(error).__name__)[:100]
+        raise InputError(f"is not a checkpoint of this version ({reason})", "", source) from None
+    for name in sorted(stored.keys() | description.keys(), key=lambda name: name != "method"):
+        ours, theirs = description.get(name), stored.get(name)
+        if ours != theirs:
+            message = f"is a run with {name} {theirs}, not {ours}; use the same, or another --checkpoint"
+            raise InputError(message, "", source)
+    return state

@@ -1,0 +1,124 @@
+"""How good a policy is: greedy games on fixed instances that are never trained on."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from alloc.allocators.learned.curriculum import Aimed, Curriculum, aim
+from alloc.allocators.learned.families import RECIPES, draw_instance
+from alloc.allocators.learned.network import ActorCritic
+from alloc.allocators.learned.turns import choose
+from alloc.problems import Instance
+from alloc.problems.game import Board, Rules, begin, flown, make_board, step, time_over_reference, worth
+from alloc.problems.generate import paper_like
+
+VALIDATION_SEED = 2 * 10**9
+
+PRICE = 1.0
+"""Weight of energy in all validation games."""
+
+DISTANCE_WEIGHT = 0.25
+"""What a unit of distance per agent counts in `cost`: a seventh of the energy as much as 0.5 % of the makespan."""
+
+MOST_OWN = 24
+"""Own instances that are validated on at the most."""
+
+
+@dataclass(frozen=True)
+class Validation:
+    """How one network plays the validation games, at the best position of each.
+
+    Attributes
+    ----------
+    cost : float
+        What the best networks are chosen by, the lower the better: mean of T / T_ref - 1, and of the distance, weighed.
+        A task left unserved counts 1.
+    time, distance : float
+        Mean T / T_ref, and mean distance per agent in the board's scale, on the first board: instances like the
+        paper's scenario 1, or one's own.
+    others_time : float
+        Mean T / T_ref on the other boards; T_ref is a bound there that cannot always be met.
+    reward : float
+        Rise of the worth in a game: the cumulative reward of (12).
+    """
+
+    cost: float
+    time: float
+    distance: float
+    others_time: float
+    reward: float
+
+
+def validation_boards(curriculum: Curriculum, small: bool = False) -> list[Board]:
+    """Return the games on which networks are compared: always the same.
+
+    Parameters
+    ----------
+    small : bool
+        A few small games instead, for trying things out.
+    """
+    rng = np.random.default_rng(VALIDATION_SEED)
+    seeds = iter(range(VALIDATION_SEED, VALIDATION_SEED + 1000))
+    first = [paper_like(*((20, 4, 80) if small else (100, 20, 400)), next(seeds)) for _ in range(2 if small else 12)]
+    kinds = [first]
+    if not small and curriculum.families != ("paper",):
+        named = tuple(RECIPES) if "mixed" in curriculum.families else curriculum.families
+        kinds.append([draw_instance(name, 60, 10, next(seeds), rng) for name in named for _ in range(2)])
+    return [_board(aim(kind), rng) for kind in kinds]
+
+
+def own_games(instances: Sequence[Instance], curriculum: Curriculum) -> tuple[Curriculum, list[Board]]:
+    """Return a curriculum of these instances, and boards of the last fifth of them, which then is not trained on.
+
+    With fewer than five instances all are trained and validated on.
+    """
+    aimed = aim(instances)
+    kept = len(aimed) // 5
+    train, held = (aimed[:-kept], aimed[-kept:]) if kept else (aimed, aimed)
+    sizes: dict[tuple[int, int], list[Aimed]] = {}
+    for one in held[:MOST_OWN]:
+        sizes.setdefault((one.instance.n, one.instance.m), []).append(one)
+    rng = np.random.default_rng(VALIDATION_SEED)
+    return replace(curriculum, own=tuple(train)), [_board(alike, rng) for alike in sizes.values()]
+
+
+def _board(aimed: Sequence[Aimed], rng: np.random.Generator) -> Board:
+    return make_board([one.instance for one in aimed], [one.hours for one in aimed], [PRICE] * len(aimed), rng)
+
+
+@torch.no_grad()
+def validate(network: ActorCritic, boards: Sequence[Board], rules: Rules, curriculum: Curriculum) -> Validation:
+    """Play `boards` greedily, and judge the best position of each game."""
+    outcomes = [_play(network, board, rules, 2 * curriculum.steps(board)) for board in boards]
+    cost, reward = (float(torch.cat(column).mean()) for column in list(zip(*outcomes, strict=True))[::3])
+    times = [float(outcome[1].mean()) for outcome in outcomes]
+    others = outcomes[1:] or outcomes
+    return Validation(
+        cost,
+        times[0],
+        float(outcomes[0][2].mean()),
+        float(torch.cat([outcome[1] for outcome in others]).mean()),
+        reward,
+    )
+
+
+def _play(network: ActorCritic, board: Board, rules: Rules, steps: int) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    """Return cost, T / T_ref, distance and rise of the worth of each game, all of shape (B,)."""
+    state = begin(board)
+    start = worth(board, state, rules)
+    best = (torch.full_like(start, torch.inf), start, start, start)
+    for _ in range(steps):
+        _, slot = choose(board, state, network(board, state), rules)
+        state = step(board, state, slot)
+        time, unserved = time_over_reference(board, state.group)
+        distance = flown(board, state, rules)
+        cost = time - 1 + unserved + DISTANCE_WEIGHT * distance
+        now = (cost, time, distance, worth(board, state, rules) - start)
+        one, two, three, four = (torch.where(cost < best[0], a, b) for a, b in zip(now, best, strict=True))
+        best = (one, two, three, four)
+        if bool(state.done.all()):
+            break
+    return best
