@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-HEAVY = ("torch", "cvxpy", "ortools", "deap", "matplotlib", "highspy", "ray", "numba")
+HEAVY = ("torch", "cvxpy", "ortools", "deap", "matplotlib", "highspy", "ray", "numba", "gymnasium", "pettingzoo")
 
 
 @pytest.mark.parametrize("package", ["alloc.problems", "alloc.problems.generate", "alloc.allocators"])

@@ -1,0 +1,130 @@
+"""The game with one bid a step as a Gymnasium environment, for learners with a single agent."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+import torch
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from alloc.problems.environments.episode import Game, Info, Source, draw, episode_figures, plan_figures, sizes_of
+from alloc.problems.errors import InputError
+from alloc.problems.game import (
+    PAIR_FEATURES,
+    TASK_FEATURES,
+    Rules,
+    State,
+    Turn,
+    begin,
+    marginal_contributions,
+    moved,
+    observe_pairs,
+    observe_tasks,
+    open_bids,
+    step,
+)
+
+ONE_BY_ONE = Rules(most_moves=1)
+
+
+class BiddingEnv(gymnasium.Env[NDArray[np.float32], np.int64]):
+    """A planner moves one agent a step, until it stops.
+
+    Action ``agent * (m + 1) + task`` sends an agent to a task, with m for being idle; ``n * (m + 1)`` stops.
+    Observations are `observe_pairs` and then `observe_tasks`, laid flat: all within -2 and 2, and the same as the
+    policies of this package see. The reward is the marginal contribution of the move: rewards of an episode add up to
+    the rise of `worth`.
+
+    Illegal actions - going where the agent is, cannot go, or has been before - change nothing, bring `illegal_reward`
+    and cost a step; `action_masks` names the legal ones, as MaskablePPO of sb3-contrib asks for them. Infos hold
+    ``episode_energy``, ``episode_battery`` (in percent) and ``illegal``, at the end also the scores of the plan.
+
+    Parameters
+    ----------
+    instances : sequence of Instance, or callable
+        Drawn from at every reset, or called with a numpy generator.
+    rules : Rules
+        Agents must bid; one bid a step is granted, whatever `most_moves` says.
+    price : float
+        Weight of energy in the reward.
+    max_steps : int, optional
+        Steps after which the game is truncated; four per agent by default.
+    illegal_reward : float
+
+    Raises
+    ------
+    InputError
+        If agents are to choose at once, or instances differ in size.
+
+    References
+    ----------
+    Towers et al. (2024), arXiv:2407.17032.
+    """
+
+    metadata = {"render_modes": []}  # noqa: RUF012
+
+    def __init__(
+        self,
+        instances: Source,
+        *,
+        rules: Rules = ONE_BY_ONE,
+        price: float = 0.5,
+        max_steps: int | None = None,
+        illegal_reward: float = 0.0,
+    ) -> None:
+        if rules.turn != Turn.BIDDING:
+            raise InputError(
+                "agents of this environment bid; SimultaneousEnv is the one where they choose at once", "turn"
+            )
+        self._source, self._sizes = instances, sizes_of(instances)
+        n, m = self._sizes
+        self.rules, self.price, self.illegal_reward = rules, price, illegal_reward
+        self.max_steps = 4 * n if max_steps is None else max_steps
+        size = (m + 1) * (n * PAIR_FEATURES + TASK_FEATURES)
+        self.observation_space = spaces.Box(-2, 2, (size,), np.float32)
+        self.action_space = spaces.Discrete(n * (m + 1) + 1)
+        self._game: Game
+        self._state: State
+        self._steps = 0
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """Begin a game on an instance drawn anew; with a seed, the same games follow."""
+        super().reset(seed=seed)
+        self._game = draw(self._source, self._sizes, self.price, self.np_random)
+        self._state, self._steps = begin(self._game.board), 0
+        return self._observation(), self._info(illegal=False, over=False)
+
+    def step(self, action: np.int64) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+        """Move an agent, or stop."""
+        board, before, number = self._game.board, self._state, int(action)
+        legal = bool(self.action_masks()[number])
+        reward, self._steps = self.illegal_reward, self._steps + 1
+        if legal:
+            bid = torch.tensor([[number]])
+            reward = marginal_contributions(board, before, bid, self.rules).item()
+            self._state = step(board, before, moved(board, before, bid))
+        ended = bool(self._state.done)
+        cut = not ended and self._steps >= self.max_steps
+        return self._observation(), reward, ended, cut, self._info(illegal=not legal, over=ended or cut)
+
+    def action_masks(self) -> NDArray[np.bool_]:
+        """Return which actions are legal now, shape (n * (m + 1) + 1,)."""
+        can = open_bids(self._game.board, self._state, self.rules).flatten().numpy()
+        return np.append(can, not bool(self._state.done))
+
+    def _observation(self) -> NDArray[np.float32]:
+        board, state = self._game.board, self._state
+        parts = [observe_pairs(board, state).flatten(), observe_tasks(board, state).flatten()]
+        figures: NDArray[np.float32] = torch.cat(parts).numpy()
+        return figures
+
+    def _info(self, illegal: bool, over: bool) -> dict[str, Any]:
+        info: Info = {**episode_figures(self._game, self._state), "illegal": illegal}
+        if over:
+            info.update(plan_figures(self._game, self._state))
+        return dict(info)
