@@ -54,12 +54,12 @@ class Curriculum:
 
     families: tuple[str, ...] = ("mixed",)
     first_tasks: tuple[int, int] = (4, 8)
-    tasks: tuple[int, int] = (6, 16)
+    tasks: tuple[int, int] = (3, 16)
     grown: float = 0.4
     agents_per_task: tuple[float, float] = (3.5, 12.0)
     most_agents: int = 80
     price: tuple[float, float] = (0.2, 3.0)
-    eased_share: float = 0.3
+    eased_share: float = 0.2
     easing: float = 1.3
     pairs: int = 12_000
     games: tuple[int, int] = (8, 48)

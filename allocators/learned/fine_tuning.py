@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import torch
 
+from alloc.allocators.learned.gappo import BreedingParameters, breed, fitness
 from alloc.allocators.learned.learner import Lesson, LessonReport
 from alloc.allocators.learned.network import ActorCritic
-from alloc.allocators.learned.population import BreedingParameters, breed, fitness
 from alloc.allocators.learned.ppo import Ppo, PpoParameters
 from alloc.allocators.search import Search
 from alloc.problems.game import Board

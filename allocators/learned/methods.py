@@ -10,7 +10,7 @@ from alloc.problems import InputError
 from alloc.problems.errors import nearest
 
 METHODS = {
-    "gappo": ("ppo", "Ppo", "PpoParameters"),
+    "gappo": ("gappo", "Ppo", "GappoParameters"),
     "ppo": ("ppo", "Ppo", "PpoParameters"),
     "a2c": ("a2c", "A2c", "A2cParameters"),
     "dqn": ("dqn", "Dqn", "DqnParameters"),

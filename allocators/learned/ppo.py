@@ -58,7 +58,7 @@ class PpoParameters:
     learning_rate: float = 1e-3
     final_share: float = 0.05
     highest_rate: float = 3e-3
-    kl_target: float | None = 0.012
+    kl_target: float | None = None
     discount: float = 0.99
     smoothing: float = 0.95
     clip: float = 0.2

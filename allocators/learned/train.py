@@ -17,12 +17,11 @@ import torch
 from alloc.allocators.learned.checkpoint import described, read_checkpoint, write_checkpoint
 from alloc.allocators.learned.curriculum import Curriculum
 from alloc.allocators.learned.engine import Engine, SerialEngine
+from alloc.allocators.learned.gappo import BreedingParameters, GappoParameters, breed, fitness
 from alloc.allocators.learned.learner import Lesson, LessonReport
 from alloc.allocators.learned.methods import new_learner
 from alloc.allocators.learned.network import ActorCritic, NetworkSize
 from alloc.allocators.learned.policy_file import save_policy
-from alloc.allocators.learned.population import BreedingParameters, breed, fitness
-from alloc.allocators.learned.ppo import PpoParameters
 from alloc.allocators.learned.training_log import TrainingLog
 from alloc.allocators.learned.validation import Validation, validate, validation_boards
 from alloc.problems.game import PLANNING, Board, Rules
@@ -54,7 +53,7 @@ class TrainingParameters:
     population: int = 4
     decisions: int = 20_000
     network: NetworkSize = field(default_factory=NetworkSize)
-    learner: Any = field(default_factory=PpoParameters)
+    learner: Any = field(default_factory=GappoParameters)
     breeding: BreedingParameters = field(default_factory=BreedingParameters)
     curriculum: Curriculum = field(default_factory=Curriculum)
     rules: Rules = PLANNING

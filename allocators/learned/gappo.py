@@ -18,6 +18,19 @@ import numpy as np
 import torch
 from deap import base, tools
 
+from alloc.allocators.learned.ppo import Ppo, PpoParameters
+
+__all__ = ["BreedingParameters", "GappoParameters", "Member", "Ppo", "breed", "fitness"]
+
+
+@dataclass(frozen=True)
+class GappoParameters(PpoParameters):
+    """What a member of the population adds to plain PPO: a step size by the divergence, and a replay buffer."""
+
+    kl_target: float | None = 0.012
+    capacity: int = 10_000
+
+
 Member = dict[str, Any]
 """State of a learner by PPO, as `Learner.state` returns it: of its parts, breeding changes `network`, the weights by
 name, and the step size in `optimiser`."""
