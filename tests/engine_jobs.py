@@ -67,3 +67,17 @@ def sleep_long(item: str) -> None:
 def pid(item: int) -> int:
     time.sleep(0.05)
     return os.getpid()
+
+
+def square_where_it_is_safe(item: tuple[int, str]) -> int:
+    """Leave a file for every try, with the machine in it, and end only where the machine is not the doomed one."""
+    import ray
+
+    number, folder = item
+    machine, doomed = ray.get_runtime_context().get_node_id(), Path(folder) / "doomed"
+    path = Path(folder) / f"{number}-{os.getpid()}"
+    path.write_text(machine)
+    path.rename(path.with_suffix(".try"))
+    while not doomed.exists() or doomed.read_text() in ("", machine):
+        time.sleep(0.05)
+    return number * number

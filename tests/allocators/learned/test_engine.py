@@ -13,7 +13,8 @@ import engine_jobs as jobs
 import pytest
 import torch
 
-from alloc.allocators.learned.engine import Engine, EngineError, ProcessEngine, SerialEngine, make_engine
+from alloc.allocators.learned.engine import Engine, EngineError, SerialEngine, make_engine
+from alloc.allocators.learned.process_engine import ProcessEngine
 from alloc.problems import InputError
 
 
@@ -130,7 +131,7 @@ SCRIPT = """
 import sys, threading
 import engine_jobs as jobs
 from alloc.allocators.interrupt import signals_set
-from alloc.allocators.learned.engine import ProcessEngine
+from alloc.allocators.learned.process_engine import ProcessEngine
 if __name__ == "__main__":
     stop = threading.Event()
     with signals_set(stop), ProcessEngine(2) as engine:
