@@ -1,7 +1,8 @@
 """From a policy to a plan: games on the whole instance first, then games on parts of it, until time is up."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import torch
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from alloc.allocators.learned.curriculum import reference_makespan
 from alloc.allocators.learned.fine_tuning import FineTuning
+from alloc.allocators.learned.limits import NEAR
 from alloc.allocators.learned.network import ActorCritic
 from alloc.allocators.learned.rollout import Best, play, position
 from alloc.allocators.search import Search
@@ -19,8 +21,14 @@ from alloc.problems.game.parts import Parts, lay_out_parts
 
 Ints = NDArray[np.int64]
 
-ATTRACTION = 0.3
-"""Factor on the distance from a task that lacks something to those with a surplus, in making parts."""
+STREAMS = 2
+"""Batches of games that are played side by side, in as many threads if the run may have them."""
+
+MOST_LANES = 64
+"""Games on one part in a stream."""
+
+MOST_ROUNDS = 120
+"""Most rounds of a game on the whole instance."""
 
 ROUNDING = 1e-9
 """Share of the need by which a group may be off and still be right."""
@@ -35,11 +43,11 @@ class PlannerParameters:
     near : int
         Candidates per agent in games on the whole instance.
     lane_pairs : int
-        Pairs of agent and candidate in the games that are played side by side.
+        Pairs of agent and candidate in the games of a stream.
     part_tasks : (int, int)
         Least and most tasks of a part.
     rounds : int
-        Most rounds of a game.
+        Most rounds of a game on a part.
     fresh_share : float
         Share of the games on parts in which everybody begins at the nearest task.
     ruined : (float, float)
@@ -48,16 +56,21 @@ class PlannerParameters:
         Least and most of what scores are divided by in games on parts.
     patience : int
         Sweeps over all parts without success after which a longer makespan is aimed at.
+    makespan_share : float
+        Share of the budget after which energy counts, if it does, even if the makespan may not be the least.
+    first_price : float
+        Weight of energy in the first game.
     """
 
-    near: int = 20
-    lane_pairs: int = 40_000
+    near: int = NEAR
+    lane_pairs: int = 12_000
     part_tasks: tuple[int, int] = (2, 6)
-    rounds: int = 60
+    rounds: int = 12
     fresh_share: float = 0.3
     ruined: tuple[float, float] = (0.2, 0.9)
     temperature: tuple[float, float] = (0.5, 1.0)
-    patience: int = 12
+    patience: int = 30
+    makespan_share: float = 0.6
     first_price: float = 1.0
 
 
@@ -88,142 +101,164 @@ class Planner:
         self.search, self.networks = search, networks
         self.parameters = parameters or PlannerParameters()
         self.tuning = tuning
+        self.run_all: Callable[..., Iterable[Best]] = map
         self.rng = np.random.default_rng(search.seed)
-        self.generator = torch.Generator().manual_seed(search.seed)
+        self.generators = [torch.Generator().manual_seed(search.seed + stream) for stream in range(STREAMS)]
         self.failed = reference_makespan(search.instance)
         self.aim = self.failed
-        self.stale = 0
-        self.sweeps = 0
+        self.stale, self.least_shortfall = 0, np.inf
+        self.plan = np.full(search.instance.n, IDLE)
 
     def run(self) -> None:
         """Play until the budget ends; every improvement has been submitted by then."""
         self.play_whole()
-        while not self.search.should_stop():
-            self._sweep()
-            self.search.iteration += 1
+        with ThreadPoolExecutor(STREAMS) as pool:
+            self.run_all = pool.map if self.search.threads > 1 else map
+            while not self.search.should_stop():
+                self._sweep()
+                self.search.iteration += 1
 
     def play_whole(self) -> None:
-        """Play one greedy game on the whole instance, then one per further network or price."""
+        """Play one greedy game on the whole instance."""
         search, parameters = self.search, self.parameters
         instance = search.instance
         plan = None if search.start is None else search.start.task_of_agent
         board = make_board([instance], [self.aim], [parameters.first_price], self.rng, near=parameters.near, plan=plan)
-        for network in self.networks[:1]:
-            best = play(network, board, steps=2 * parameters.rounds, should_stop=self._late)
-            place = pick(board.goal, best.slot)[0].numpy()
-            self._submit(np.where(place == instance.m, IDLE, place))
+        best = play(self.networks[0], board, steps=MOST_ROUNDS, should_stop=self._late)
+        place = pick(board.goal, best.slot)[0].numpy()
+        self._go_on_from(np.where(place == instance.m, IDLE, place))
 
     def _late(self) -> bool:
         return self.search.best is not None and self.search.should_stop()
 
-    def _submit(self, plan: Ints) -> None:
+    def _go_on_from(self, plan: Ints) -> None:
+        """Score a plan, with all tasks served that can be, and take it for the one to be improved."""
         search = self.search
         allocation = Allocation(plan)
-        served = np.isin(np.flatnonzero(search.instance.workload > 0), plan)
-        if not served.all():
+        if not np.isin(np.flatnonzero(search.instance.workload > 0), plan).all():
             allocation = serve_all(search.instance, allocation)
         search.submit(allocation)
+        self.plan = allocation.task_of_agent
 
     def _sweep(self) -> None:
         """Cover the instance with parts, play each many times, and keep what is better."""
+        self._set_aim()
+        surplus = self._surplus()
+        shortfall = float(-surplus[surplus < 0].sum())
+        self.stale = 0 if shortfall < self.least_shortfall else self.stale + 1
+        self.least_shortfall = min(shortfall, self.least_shortfall)
+        tasks, agents = self._cover(surplus)
+        parts = lay_out_parts(self.search.instance, self.aim, self.plan, tasks, agents)
+        if self.tuning is not None and self.tuning.is_due():
+            self.networks = self.tuning.learn(parts)
+        network = self.networks[int(self.rng.integers(len(self.networks)))]
+        goal = Objective.MAKESPAN if shortfall > 0 else self.search.objective
+        accepted, slots = self._play_parts(network, parts, PRICES[goal])
+        if accepted.any():
+            self._go_on_from(parts.merge(self.plan, slots, accepted))
+
+    def _set_aim(self) -> None:
+        """Decide on the makespan to aim at: the least possible, as far as is known, and then as little energy."""
         search = self.search
         assert search.best is not None
         assert search.fastest is not None
-        energy = self._set_aim()
-        plan = search.best.allocation.task_of_agent if energy else search.fastest.allocation.task_of_agent
-        network = self.networks[int(self.rng.integers(len(self.networks)))]
-        tasks, agents = self._cover(plan)
-        if not len(tasks):
-            return
-        parts = lay_out_parts(search.instance, self.aim, plan, tasks, agents)
-        if self.tuning is not None and self.tuning.is_due():
-            self.networks = self.tuning.learn(parts)
-        accepted, slots = self._play_parts(network, parts)
-        if accepted.any():
-            self._submit(parts.merge(plan, slots, accepted))
-        self.sweeps += 1
-
-    def _set_aim(self) -> bool:
-        """Decide on the makespan to aim at; return whether it is reached already, and energy counts."""
-        search = self.search
         reached = search.fastest.evaluation.served_makespan
         if search.objective is Objective.MAKESPAN_ENERGY and (
-            reached <= self.failed * (1 + 1e-9) or search.remaining_s < 0.5 * (search.budget.time_limit_s or np.inf)
+            reached <= self.failed * (1 + ROUNDING) or self._spent() > self.parameters.makespan_share
         ):
             self.aim = search.makespan_limit
-            return True
-        if reached <= self.aim * (1 + 1e-9):
-            self.aim, self.stale = (self.failed + reached) / 2, 0
+            self.plan = search.best.allocation.task_of_agent
+        elif reached <= self.aim * (1 + ROUNDING):
+            self._aim_at((self.failed + reached) / 2)
         elif self.stale >= self.parameters.patience:
-            self.failed, self.aim, self.stale = self.aim, (self.aim + reached) / 2, 0
-        self.stale += 1
-        return False
+            self.failed = self.aim
+            self._aim_at((self.aim + reached) / 2)
 
-    def _cover(self, plan: Ints) -> tuple[Ints, list[Ints]]:
+    def _aim_at(self, hours: float) -> None:
+        self.aim, self.stale, self.least_shortfall = hours, 0, np.inf
+
+    def _spent(self) -> float:
+        """Share of the budget that is spent."""
+        search, budget = self.search, self.search.budget
+        of_time = search.elapsed_s / budget.time_limit_s if budget.time_limit_s else 0.0
+        return max(of_time, search.iteration / budget.iterations if budget.iterations else 0.0)
+
+    def _cover(self, surplus: NDArray[np.float64]) -> tuple[Ints, list[Ints]]:
         """Partition tasks into neighbours, and find the agents that work there."""
         instance, rng = self.search.instance, self.rng
         low, high = self.parameters.part_tasks
         size = int(min(rng.integers(low, high + 1), instance.m))
-        tasks = cover(instance.task_position, self._surplus(plan), size, rng)
+        tasks = cover(instance.task_position, surplus, size, rng)
         part_of = np.full(instance.m + 1, -1)
         part_of[tasks.ravel()] = np.repeat(np.arange(len(tasks)), size)
-        chosen = part_of[plan]  # idle agents have no part yet: index -1 is the last entry
-        idle = np.flatnonzero(plan == IDLE)
+        chosen = part_of[self.plan]  # idle agents have no part yet: index -1 is the last entry
+        idle = np.flatnonzero(self.plan == IDLE)
         if len(idle):
             chosen[idle] = rng.integers(len(tasks), size=len(idle))
         order = np.argsort(chosen, kind="stable")
         first = np.searchsorted(chosen[order], np.arange(len(tasks) + 1))
         return tasks, [order[first[p] : first[p + 1]] for p in range(len(tasks))]
 
-    def _surplus(self, plan: Ints) -> NDArray[np.float64]:
+    def _surplus(self) -> NDArray[np.float64]:
         """Ability that each task has too much for the makespan aimed at, negative where it lacks some, shape (m,)."""
         instance = self.search.instance
+        plan = self.plan
         agent = np.flatnonzero(plan != IDLE)
         share = working_share(instance.speed[agent], instance.reach.distance_of(agent, plan[agent]), self.aim)
         group = np.bincount(plan[agent], instance.ability[agent] * share, minlength=instance.m)
         need = instance.workload / max(self.aim, 1e-300)
         return np.where(np.abs(group - need) <= ROUNDING * need, 0.0, group - need)
 
-    def _play_parts(self, network: ActorCritic, parts: Parts) -> tuple[NDArray[np.bool_], Ints]:
-        parameters, rng = self.parameters, self.rng
-        board, count = parts.board, len(parts.tasks)
-        pairs = board.shape[1] * board.shape[2]
-        lanes = int(np.clip(parameters.lane_pairs // (count * pairs), 1, 64))
-        rows = torch.arange(count).repeat_interleave(lanes)
-        low, high = np.log(PRICES[self.search.objective])
-        price = torch.from_numpy(np.exp(rng.uniform(low, high, count * lanes)).astype(np.float32))
-        ruined = rng.uniform(*parameters.ruined, count * lanes)
-        ruined[rng.random(count * lanes) < parameters.fresh_share] = 1.0
-        back = torch.from_numpy(rng.random((count * lanes, board.shape[1])) < ruined[:, None])
-        start = torch.where(back, parts.home[rows], board.start[rows])
-        games = replace(board[rows], price=price, start=start)
-        best = play(
-            network,
-            games,
-            steps=parameters.rounds,
-            temperature=float(rng.uniform(*parameters.temperature)),
-            generator=self.generator,
-            total=True,
-            should_stop=self.search.should_stop,
-        )
-        now = _stand(board)
-        order = np.lexsort(
-            (best.distance.numpy(), best.shortfall.numpy().round(6), best.unserved.numpy(), rows.numpy())
-        )
-        first = torch.from_numpy(order[::lanes].copy())
-        found = Best(best.slot[first], best.unserved[first], best.shortfall[first], best.distance[first])
+    def _play_parts(
+        self, network: ActorCritic, parts: Parts, prices: tuple[float, float]
+    ) -> tuple[NDArray[np.bool_], Ints]:
+        """Play the parts in several streams; return which games are better than the plan, and their slots."""
+        board = parts.board
+        streams = [self._games(parts, prices) for _ in self.generators]
+        temperatures = self.rng.uniform(*self.parameters.temperature, len(streams)).tolist()
+
+        def one(number: int) -> Best:
+            if self.search.threads > 1:
+                torch.set_num_threads(1)  # each thread has its own setting
+            return play(
+                network,
+                streams[number],
+                steps=self.parameters.rounds,
+                temperature=temperatures[number],
+                generator=self.generators[number],
+                total=True,
+                should_stop=self.search.should_stop,
+            )
+
+        played = list(self.run_all(one, range(len(streams))))
+        best = Best(*(torch.cat([getattr(part, field.name) for part in played]) for field in fields(Best)))
+        count = len(parts.tasks)
+        row = np.tile(np.arange(count).repeat(len(played[0].shortfall) // count), len(played))
+        order = np.lexsort((best.distance.numpy(), best.shortfall.numpy().round(6), best.unserved.numpy(), row))
+        first = torch.from_numpy(order[:: len(row) // count].copy())
+        found = Best(*(getattr(best, field.name)[first] for field in fields(Best)))
+        now = position(board, begin(board), total=True)
         return found.better_than(now).numpy(), found.slot.numpy()
 
-
-def _stand(board: Board) -> Best:
-    return position(board, begin(board), total=True)
+    def _games(self, parts: Parts, prices: tuple[float, float]) -> Board:
+        """Lay out several games on every part, from various beginnings and at various prices."""
+        parameters, rng, board, count = self.parameters, self.rng, parts.board, len(parts.tasks)
+        pairs = board.shape[1] * board.shape[2]
+        lanes = count * int(np.clip(parameters.lane_pairs // (count * pairs), 1, MOST_LANES))
+        rows = torch.arange(count).repeat_interleave(lanes // count)
+        price = np.exp(rng.uniform(*np.log(prices), lanes))
+        ruined = rng.uniform(*parameters.ruined, lanes)
+        ruined[rng.random(lanes) < parameters.fresh_share] = 1.0
+        back = torch.from_numpy(rng.random((lanes, board.shape[1])) < ruined[:, None])
+        start = torch.where(back, parts.home[rows], board.start[rows])
+        return replace(board[rows], price=torch.from_numpy(price.astype(np.float32)), start=start)
 
 
 def cover(position: NDArray[np.float64], surplus: NDArray[np.float64], size: int, rng: np.random.Generator) -> Ints:
     """Partition places into groups of neighbours, shape (groups, size); some are left over.
 
-    Each group is made of a place and of those left that are nearest to it, more or less. Places that lack something
-    come first, in random order, and those with a surplus seem nearer to them.
+    Each group is made of a place and of those left that are nearest to it, more or less. Where places lack something,
+    only they get a group, with the nearest that have as much to spare.
 
     Parameters
     ----------
@@ -235,17 +270,26 @@ def cover(position: NDArray[np.float64], surplus: NDArray[np.float64], size: int
     position = np.nan_to_num(position)
     free = np.ones(m, dtype=bool)
     groups = []
-    for centre in np.lexsort((rng.random(m), surplus >= 0)).tolist():
+    lacking = np.flatnonzero(surplus < 0)
+    for centre in rng.permutation(lacking if len(lacking) else m).tolist():
         if not free[centre]:
             continue
         if free.sum() < size:
             break
         with np.errstate(over="ignore"):
             away = np.sqrt(((position - position[centre]) ** 2).sum(1)) * rng.uniform(0.6, 1.4, m)
+        away[~free], away[centre] = np.inf, -2.0
         if surplus[centre] < 0:
-            away[surplus > 0] *= ATTRACTION
-        away[~free], away[centre] = np.inf, -1.0
+            away[_helpers(away, surplus, -surplus[centre])[: size - 1]] = -1.0
         group = np.argpartition(away, size - 1)[:size]
         free[group] = False
         groups.append(group)
     return np.array(groups, dtype=np.int64).reshape(-1, size)
+
+
+def _helpers(away: NDArray[np.float64], surplus: NDArray[np.float64], lack: float) -> Ints:
+    """Return the nearest places with a surplus, as many as make up for what is lacking."""
+    able = np.flatnonzero((surplus > 0) & np.isfinite(away))
+    able = able[np.argsort(away[able])]
+    enough = np.searchsorted(np.cumsum(surplus[able]), lack) + 1
+    return able[:enough]
