@@ -75,9 +75,10 @@ def collect(
     generator: torch.Generator,
     rules: Rules = PLANNING,
     reward_scale: float = 1.0,
+    state: State | None = None,
 ) -> Trajectories:
-    """Play up to `steps` steps of every game on `board`, drawing actions from the policy."""
-    state = begin(board)
+    """Play up to `steps` steps of every game on `board`, from `state` on, drawing actions from the policy."""
+    state = begin(board) if state is None else state
     before = worth(board, state, rules)
     columns: list[tuple[State, Tensor, Tensor, Tensor, Tensor, Tensor]] = []
     for _ in range(steps):

@@ -6,8 +6,8 @@ import pytest
 import torch
 from torch.nn.utils import parameters_to_vector
 
-from alloc.allocators.learned.network import ActorCritic, NetworkSize
 from alloc.allocators.learned.gappo import BreedingParameters, Member, breed, fitness, new_member
+from alloc.allocators.learned.network import ActorCritic, NetworkSize
 
 SMALL = NetworkSize(pair_width=4, task_width=4, heads=1)
 

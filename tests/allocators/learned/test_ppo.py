@@ -5,8 +5,8 @@ import pytest
 import torch
 
 from alloc.allocators.learned.curriculum import Curriculum
-from alloc.allocators.learned.network import ActorCritic
 from alloc.allocators.learned.gappo import new_member
+from alloc.allocators.learned.network import ActorCritic
 from alloc.allocators.learned.ppo import PpoParameters, adapt_learning_rate, advantages, collect, loss, update
 from alloc.problems.game import begin, step, value_of
 
