@@ -27,8 +27,8 @@ STREAMS = 2
 MOST_LANES = 64
 """Games on one part in a stream."""
 
-MOST_ROUNDS = 120
-"""Most rounds of a game on the whole instance."""
+WHOLE_ROUNDS = 16
+"""Most rounds of a game on the whole instance, besides two for every agent that the mean task gets."""
 
 ROUNDING = 1e-9
 """Share of the need by which a group may be off and still be right."""
@@ -52,6 +52,10 @@ class PlannerParameters:
         Share of the games on parts in which everybody begins at the nearest task.
     ruined : (float, float)
         Least and most chance of an agent to begin at the nearest task in the other games; the rest keep their place.
+    scattered_share : float
+        Share of the streams in which agents begin at any candidate instead of the nearest.
+    scattered : (float, float)
+        Least and most chance of an agent to do so.
     temperature : (float, float)
         Least and most of what scores are divided by in games on parts.
     patience : int
@@ -68,6 +72,8 @@ class PlannerParameters:
     rounds: int = 12
     fresh_share: float = 0.3
     ruined: tuple[float, float] = (0.2, 0.9)
+    scattered_share: float = 0.5
+    scattered: tuple[float, float] = (0.05, 0.4)
     temperature: tuple[float, float] = (0.5, 1.0)
     patience: int = 30
     makespan_share: float = 0.6
@@ -124,7 +130,7 @@ class Planner:
         instance = search.instance
         plan = None if search.start is None else search.start.task_of_agent
         board = make_board([instance], [self.aim], [parameters.first_price], self.rng, near=parameters.near, plan=plan)
-        best = play(self.networks[0], board, steps=MOST_ROUNDS, should_stop=self._late)
+        best = play(self.networks[0], board, steps=WHOLE_ROUNDS + 2 * instance.n // instance.m, should_stop=self._late)
         place = pick(board.goal, best.slot)[0].numpy()
         self._go_on_from(np.where(place == instance.m, IDLE, place))
 
@@ -249,8 +255,13 @@ class Planner:
         price = np.exp(rng.uniform(*np.log(prices), lanes))
         ruined = rng.uniform(*parameters.ruined, lanes)
         ruined[rng.random(lanes) < parameters.fresh_share] = 1.0
+        away = parts.home[rows]
+        if rng.random() < parameters.scattered_share:
+            ruined = rng.uniform(*parameters.scattered, lanes)
+            luck = torch.from_numpy(rng.random((lanes, *board.shape[1:])))
+            away = luck.masked_fill(~board.legal[rows], -1.0).argmax(2)
         back = torch.from_numpy(rng.random((lanes, board.shape[1])) < ruined[:, None])
-        start = torch.where(back, parts.home[rows], board.start[rows])
+        start = torch.where(back, away, board.start[rows])
         return replace(board[rows], price=torch.from_numpy(price.astype(np.float32)), start=start)
 
 
