@@ -74,7 +74,7 @@ def read_checkpoint(path: Path, description: dict[str, str]) -> dict[str, Any]:
     except Exception as error:
         reason = next(iter(str(error).splitlines()), type(error).__name__)[:100]
         raise InputError(f"is not a checkpoint of this version ({reason})", "", source) from None
-    for name in sorted(stored.keys() | description.keys(), key=lambda name: name != "method"):
+    for name in sorted(stored.keys() | description.keys(), key=lambda name: (name != "method", name)):
         ours, theirs = description.get(name), stored.get(name)
         if ours != theirs:
             message = f"is a run with {name} {theirs}, not {ours}; use the same, or another --checkpoint"

@@ -52,19 +52,12 @@ class Validation:
     reward: float
 
 
-def validation_boards(curriculum: Curriculum, small: bool = False) -> list[Board]:
-    """Return the games on which networks are compared: always the same.
-
-    Parameters
-    ----------
-    small : bool
-        A few small games instead, for trying things out.
-    """
+def validation_boards(curriculum: Curriculum) -> list[Board]:
+    """Return the games on which networks are compared, always the same: like the paper's, and of the families."""
     rng = np.random.default_rng(VALIDATION_SEED)
     seeds = iter(range(VALIDATION_SEED, VALIDATION_SEED + 1000))
-    first = [paper_like(*((20, 4, 80) if small else (100, 20, 400)), next(seeds)) for _ in range(2 if small else 12)]
-    kinds = [first]
-    if not small and curriculum.families != ("paper",):
+    kinds = [[paper_like(100, 20, 400, next(seeds)) for _ in range(12)]]
+    if curriculum.families != ("paper",):
         named = tuple(RECIPES) if "mixed" in curriculum.families else curriculum.families
         kinds.append([draw_instance(name, 60, 10, next(seeds), rng) for name in named for _ in range(2)])
     return [_board(aim(kind), rng) for kind in kinds]

@@ -1,35 +1,105 @@
+"""``alloc train``: mistakes are told beforehand, interrupts lose nothing, and kill -9 changes no curve."""
+
+import csv
+import json
 import os
+import random
 import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
+import torch
+from safetensors import safe_open
 
-from alloc.allocators.learned.train import Trainer
+from alloc.allocators.learned.engine import ENGINES
+from alloc.allocators.learned.families import FAMILIES
+from alloc.allocators.learned.ppo import Ppo
+from alloc.cli import train as module
+from alloc.problems.formats import write_instance
+from alloc.problems.game import Reward, Turn
+from alloc.problems.generate import paper_like
+
+QUICK = ("--instances", "mine", "--lesson", "150", "--set", "epochs=1")
+
+
+@pytest.fixture
+def mine(tmp_path: Path) -> Path:
+    """A folder with instances on which a generation takes no time."""
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    for seed in range(2):
+        write_instance(paper_like(8, 2, 35, seed), folder / f"{seed}.json")
+    return folder
+
+
+def curve(path: Path) -> list[list[str]]:
+    """All figures but those of time."""
+    with path.open(newline="") as file:
+        return [row[:-2] for row in csv.reader(file)]
+
+
+def weights(path: Path) -> dict[str, torch.Tensor]:
+    with safe_open(path, framework="pt") as file:
+        return {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
 
 
 @pytest.mark.parametrize(
-    "more", [("--resume",), ("--checkpoint", "p.safetensors"), ("--checkpoint", "nowhere/c"), ("--population", "0")]
+    "more",
+    [
+        ("--resume",),
+        ("--checkpoint", "p.safetensors"),
+        ("--checkpoint", "nowhere/c"),
+        ("--population", "0"),
+        ("--family", "mixt"),
+        ("--set", "clip"),
+        ("--set", "clipp=1"),
+        ("--instances", "nowhere.json"),
+        ("--init", "nowhere.safetensors"),
+        ("--workers", "2"),
+        ("--turn", "both"),
+    ],
 )
 def test_bad_usage_is_told_before_training(alloc, more):
-    """Missing checkpoints and impossible files are told at once, in one line."""
+    """Whatever cannot work is told at once, in one line."""
     ran = alloc("train", "gappo", "--output", "p.safetensors", *more)
     assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
     assert not Path("p.safetensors").exists()
 
 
-def test_interrupted_before_the_first_generation_writes_no_policy(alloc, monkeypatch):
-    """Ctrl-C ends a training between two updates; without a whole generation there is no policy."""
-    inner = Trainer.advance
+def test_methods_that_cannot_be_trained_so(alloc):
+    """Unknown methods are told, and that a single network is no population."""
+    assert "did you mean 'gappo'" in alloc("train", "gapo", "--output", "p.safetensors").err
+    ran = alloc("train", "ppo", "--output", "p.safetensors", "--population", "3")
+    assert (ran.code, ran.err.count("\n")) == (2, 1)
 
-    def advance(self, should_stop):
-        os.kill(os.getpid(), signal.SIGINT)
-        return inner(self, should_stop)
 
-    monkeypatch.setattr(Trainer, "advance", advance)
-    ran = alloc("train", "gappo", "--output", "p.safetensors", "--population", "2", "--threads", "1")
+def test_tensorboard_that_is_not_installed_is_told_before_training(alloc, monkeypatch):
+    """The extra to install is named."""
+    monkeypatch.setitem(sys.modules, "torch.utils.tensorboard", None)
+    ran = alloc("train", "ppo", "--output", "p.safetensors", "--tensorboard", "events")
+    assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
+    assert "alloc-mrta[train]" in ran.err
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_interrupted_before_the_first_generation_writes_no_policy(alloc, monkeypatch, mine, number):
+    """A signal ends a training in the midst of a lesson; without a whole generation there is no policy."""
+
+    def take(self, lesson):
+        os.kill(os.getpid(), number)
+        time.sleep(10)
+        raise AssertionError("not interrupted")
+
+    monkeypatch.setattr(Ppo, "take", take)
+    before = signal.getsignal(number)
+    ran = alloc("train", "ppo", "--output", "p.safetensors", *QUICK)
     assert ran.code == 1
     assert "interrupted" in ran.err
     assert not Path("p.safetensors").exists()
+    assert signal.getsignal(number) is before
 
 
 def test_a_run_is_not_overwritten_by_mistake(alloc):
@@ -39,3 +109,89 @@ def test_a_run_is_not_overwritten_by_mistake(alloc):
     assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
     assert "--resume" in ran.err
     assert Path("p.checkpoint").read_bytes() == b"weeks of training"
+
+
+def test_resumed_by_another_command_it_goes_on_to_the_same_curve(alloc, mine):
+    """Two generations, and then two more, are four; progress and the outcome are told."""
+    whole = alloc("train", "gappo", "--output", "w", *QUICK, "--steps", "1500", "--population", "2")
+    assert whole.code == 0
+    assert "T 1." in whole.err
+    assert (
+        alloc(
+            "train", "gappo", "--output", "p", *QUICK, "--steps", "1500", "--population", "2", "--iterations", "2"
+        ).code
+        == 0
+    )
+    ran = alloc("train", "gappo", "--output", "p", *QUICK, "--steps", "1500", "--population", "2", "--resume")
+    assert ran.code == 0
+    assert curve(Path("p.csv")) == curve(Path("w.csv"))
+    other = alloc("train", "gappo", "--output", "p", *QUICK, "--population", "3", "--resume")
+    assert (other.code, other.err.count("\n")) == (2, 1)
+    assert "population 2, not 3" in other.err
+
+
+def test_killed_at_any_moment_it_resumes_to_the_same_curve(alloc, mine):
+    """kill -9 in mid-training, again and again, leaves whole files, and changes neither log nor policy."""
+    options = [*QUICK, "--steps", "6000", "--population", "2"]
+    assert alloc("train", "gappo", "--output", "w", *options).code == 0
+    command = [sys.executable, "-c", "from alloc.cli.main import main; raise SystemExit(main())"]
+    command += ["train", "gappo", "--output", "p", *options]
+    rng = random.Random(0)
+    killed = 0
+    for number in range(20):
+        more = ["--resume"] if Path("p.checkpoint").exists() else []
+        run = subprocess.Popen([*command, *more], stderr=subprocess.DEVNULL)
+        if number < 2:
+            before = Path("p.checkpoint").stat().st_mtime_ns if more else 0
+            while run.poll() is None and not _is_newer("p.checkpoint", before):
+                time.sleep(0.01)
+            time.sleep(rng.uniform(0, 0.4))
+            run.kill()
+        code = run.wait()
+        killed += code == -signal.SIGKILL
+        if code == 0:
+            break
+    assert killed > 0
+    assert curve(Path("p.csv")) == curve(Path("w.csv"))
+    expected, got = weights(Path("w")), weights(Path("p"))
+    assert expected.keys() == got.keys()
+    assert all(torch.equal(weight, got[name]) for name, weight in expected.items())
+
+
+def _is_newer(name: str, moment: int) -> bool:
+    return os.path.exists(name) and os.stat(name).st_mtime_ns > moment
+
+
+def test_a_policy_is_a_beginning(alloc, mine):
+    """--init starts from the networks of a policy, whatever method trained it; the file tells how it came about."""
+    assert alloc("train", "ppo", "--output", "p", *QUICK, "--steps", "300", "--seed", "3").code == 0
+    ran = alloc("train", "gappo", "--output", "g", *QUICK, "--init", "p", "--iterations", "0", "--checkpoint", "c")
+    assert ran.code == 1
+    state = torch.load("c", weights_only=True)
+    first = {name.removeprefix("0."): weight for name, weight in weights(Path("p")).items()}
+    for member in state["members"]:
+        assert all(torch.equal(member["network"][name], weight) for name, weight in first.items())
+    with safe_open("p", framework="pt") as file:
+        said = file.metadata()
+    assert said["method"] == "ppo"
+    training = json.loads(said["training"])
+    assert training["seed"] == 3
+    assert training["decisions"] >= 150
+    assert training["turn"] == "bidding"
+
+
+def test_the_game_of_the_paper_can_be_trained_on(alloc, mine):
+    """All agents choosing at once for coverage is a training, too."""
+    ran = alloc(
+        "train", "ppo", "--output", "p", *QUICK, "--iterations", "1", "--turn", "simultaneous", "--reward", "coverage"
+    )
+    assert ran.code == 0
+
+
+def test_options_are_those_of_the_library(alloc):
+    """The command line, which must not wait for torch, names the same turns, rewards, engines and families."""
+    assert set(module.Turn) == set(Turn)
+    assert set(module.Reward) == set(Reward)
+    assert {engine.value for engine in module.Engine} == set(ENGINES)
+    shown = " ".join(alloc("train", "--help").out.replace("│", " ").split())
+    assert all(family in shown for family in FAMILIES)

@@ -4,21 +4,27 @@ import random
 
 import pytest
 import torch
-from torch.nn.utils import parameters_to_vector
 
-from alloc.allocators.learned.gappo import BreedingParameters, Member, breed, fitness, new_member
-from alloc.allocators.learned.network import ActorCritic, NetworkSize
+from alloc.allocators.learned.gappo import BreedingParameters, Member, breed, fitness
+from alloc.allocators.learned.network import NetworkSize
+from alloc.allocators.learned.ppo import Ppo, PpoParameters
 
 SMALL = NetworkSize(pair_width=4, task_width=4, heads=1)
 
 
 def members(count: int) -> list[Member]:
-    torch.manual_seed(0)
-    return [new_member(ActorCritic(SMALL), 1e-3 * (number + 1)) for number in range(count)]
+    """States of learners with different weights and step sizes."""
+    return [
+        Ppo(SMALL, PpoParameters(learning_rate=1e-3 * (number + 1)), seed=number).state() for number in range(count)
+    ]
 
 
 def weights(member: Member) -> torch.Tensor:
-    return parameters_to_vector(member.network.parameters()).detach()
+    return torch.cat([weight.flatten() for weight in member["network"].values()])
+
+
+def rate(member: Member) -> float:
+    return float(member["optimiser"]["param_groups"][0]["lr"])
 
 
 def test_fitness_by_hand() -> None:
@@ -41,29 +47,36 @@ def test_children_without_mutation_lie_between_their_parents() -> None:
     """Crossover blends weight by weight, so that each lies between those of two members."""
     before = members(3)
     parameters = BreedingParameters(elite=1, crossover_probability=1.0, mutation_probability=0.0)
+    everyone = torch.stack([weights(member) for member in before])
     for child in breed(before, [1.0, 2.0, 3.0], parameters, seed=3)[1:]:
-        everyone = torch.stack([weights(member) for member in before])
         assert (weights(child) >= everyone.amin(0) - 1e-6).all()
         assert (weights(child) <= everyone.amax(0) + 1e-6).all()
 
 
-def test_mutation_changes_some_weights_a_little() -> None:
-    """About a tenth of the weights are disturbed; the parent keeps its own."""
+def test_mutation_changes_some_weights_and_the_step_size_a_little() -> None:
+    """About a tenth of the weights are disturbed, the learning rate by a quarter; the parent keeps its own."""
     before = members(2)
     kept = [weights(member).clone() for member in before]
+    rates = [rate(member) for member in before]
     parameters = BreedingParameters(elite=1, crossover_probability=0.0, mutation_probability=1.0)
     child = breed(before, [5.0, 0.0], parameters, seed=5)[1]
     changed = min((weights(child) != old).float().mean().item() for old in kept)
     assert 0.02 < changed < 0.3
+    assert min(abs(rate(child) / old - factor) for old in rates for factor in (0.8, 1.25)) < 1e-9
     assert all(torch.equal(weights(member), old) for member, old in zip(before, kept, strict=True))
+    assert [rate(member) for member in before] == rates
 
 
-def test_children_learn_on_their_own() -> None:
-    """A child's optimiser holds the child's weights, not its parent's."""
+def test_children_are_states_that_a_learner_takes_up() -> None:
+    """A child has its parent's optimiser and weights of its own, and no memory in common with the parent."""
     before = members(2)
-    child = breed(before, [1.0, 0.0], BreedingParameters(elite=1), seed=0)[1]
-    held = {id(weight) for group in child.optimiser.param_groups for weight in group["params"]}
-    assert held == {id(weight) for weight in child.network.parameters()}
+    child = breed(before, [1.0, 0.0], BreedingParameters(elite=1, mutation_probability=1.0), seed=0)[1]
+    learner = Ppo(SMALL)
+    learner.load(child)
+    assert torch.equal(weights(learner.state()), weights(child))
+    assert learner.learning_rate == rate(child)
+    held = {weight.untyped_storage().data_ptr() for member in before for weight in member["network"].values()}
+    assert not held & {weight.untyped_storage().data_ptr() for weight in child["network"].values()}
 
 
 def test_breeding_is_seeded_and_leaves_the_global_generator_alone() -> None:

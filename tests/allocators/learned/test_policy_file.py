@@ -10,6 +10,7 @@ from safetensors.torch import save_file
 from alloc.allocators.learned.network import ActorCritic, NetworkSize
 from alloc.allocators.learned.policy_file import load_policy, save_policy
 from alloc.problems import InputError
+from alloc.problems.game import FEATURE_SET
 
 
 @pytest.fixture
@@ -60,7 +61,7 @@ def test_policy_of_another_feature_set(tmp_path: Path, networks: list[ActorCriti
     """A policy for other observations is an error, not a wrong answer."""
     save_policy(tmp_path / "p.safetensors", networks, "gappo")
     path = tmp_path / "p.safetensors"
-    path.write_bytes(path.read_bytes().replace(b"bidding-2", b"bidding-0"))
+    path.write_bytes(path.read_bytes().replace(FEATURE_SET.encode(), b"x" * len(FEATURE_SET)))
     with pytest.raises(InputError, match="features"):
         load_policy(path, "gappo")
 

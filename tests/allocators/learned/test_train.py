@@ -1,77 +1,219 @@
-"""Training: resumes to the same curve, stops at once, and leaves whole files."""
+"""Training: resumes to the same curve on any engine, keeps the best, stops in time, and leaves whole files."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 import torch
-from torch.nn.utils import parameters_to_vector
+from safetensors import safe_open
 
 from alloc.allocators.learned import train as module
-from alloc.allocators.learned.curriculum import Curriculum, validation_boards
+from alloc.allocators.learned.curriculum import Curriculum
+from alloc.allocators.learned.engine import ProcessEngine, SerialEngine
+from alloc.allocators.learned.learner import Lesson, LessonReport
 from alloc.allocators.learned.network import NetworkSize
 from alloc.allocators.learned.policy_file import load_policy
-from alloc.allocators.learned.ppo import PpoParameters
-from alloc.allocators.learned.train import Trainer, TrainingParameters, train
+from alloc.allocators.learned.ppo import Ppo, PpoParameters
+from alloc.allocators.learned.train import Limits, Report, Trainer, TrainingParameters, train
+from alloc.allocators.learned.validation import Validation, own_games
 from alloc.problems import InputError
+from alloc.problems.game import PAPER
+from alloc.problems.generate import paper_like
 
+CURRICULUM, BOARDS = own_games([paper_like(10, 3, 44, seed) for seed in range(3)], Curriculum(games=(2, 4)))
 TINY = TrainingParameters(
     population=3,
-    updates_per_generation=1,
+    decisions=60,
     network=NetworkSize(8, 8, 2),
-    ppo=PpoParameters(epochs=1, minibatch=64),
-    curriculum=Curriculum(tasks=(3, 4), agents_per_task=(3.0, 3.0), games=4),
+    learner=PpoParameters(epochs=1, minibatch=64, capacity=200),
+    curriculum=CURRICULUM,
 )
+TIMES = ("seconds", "decisions_per_second")
 
 
-@pytest.fixture(autouse=True)
-def few_validation_games(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Judge by two of the validation boards' games each; all of them would take a second per member."""
-    boards = [board[torch.arange(2)] for board in validation_boards()[1:2]]
-    monkeypatch.setattr(module, "validation_boards", lambda: boards)
+def trainer(seed: int = 5, **changes: Any) -> Trainer:
+    return Trainer(replace(TINY, **changes), seed, BOARDS)
 
 
-def weights(trainer: Trainer) -> torch.Tensor:
-    return torch.cat([parameters_to_vector(member.network.parameters()).detach() for member in trainer.members])
+def figures(history: Sequence[Report]) -> list[dict[str, float]]:
+    return [{name: value for name, value in asdict(report).items() if name not in TIMES} for report in history]
 
 
-def test_a_resumed_run_goes_on_as_if_nothing_had_happened(tmp_path: Path) -> None:
-    """Two generations at once, and two with a checkpoint between them, give the same figures and weights."""
-    whole = Trainer(TINY, seed=5)
-    whole.advance()
-    expected = whole.advance()
-    first = Trainer(TINY, seed=5)
-    first.advance()
+def weights(run: Trainer) -> torch.Tensor:
+    everyone = [member["network"] for member in run.members] + run.best
+    return torch.cat([weight.flatten() for network in everyone for weight in network.values()])
+
+
+@pytest.fixture
+def paths(tmp_path: Path) -> dict[str, Path]:
+    return {"output": tmp_path / "p", "checkpoint": tmp_path / "c", "log": tmp_path / "log.csv"}
+
+
+@pytest.fixture
+def planned(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Has generations bring the costs that a test plans, for one member."""
+
+    def plan(*costs: float) -> None:
+        coming = iter(costs)
+        monkeypatch.setattr(module, "validate", lambda *_: Validation(next(coming), 1.0, 0.1, 1.0, 0.0))
+
+    return plan
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{}, {"method": "ppo", "population": 1}, {"rules": PAPER}],
+    ids=["gappo", "ppo", "rules of the paper"],
+)
+def test_a_resumed_run_goes_on_as_if_nothing_had_happened(tmp_path: Path, changes: dict[str, Any]) -> None:
+    """Four generations at once, and two and two with a checkpoint between, give the same figures and weights."""
+    limits = Limits(steps=1000)
+    whole, first, second = (trainer(**changes) for _ in range(3))
+    for _ in range(4):
+        whole.advance(limits)
+    first.advance(limits)
+    first.advance(limits)
     first.save(tmp_path / "checkpoint")
-    second = Trainer.resume(tmp_path / "checkpoint", TINY)
-    got = second.advance()
-    assert expected is not None
-    assert got is not None
-    assert asdict(replace(got, seconds=0.0)) == asdict(replace(expected, seconds=0.0))
+    second.resume(tmp_path / "checkpoint")
+    second.advance(limits)
+    second.advance(limits)
+    assert figures(whole.history) == figures(second.history)
     assert torch.equal(weights(whole), weights(second))
 
 
-def test_train_writes_policy_checkpoint_and_log(tmp_path: Path) -> None:
-    """After every generation all three files are whole; the policy holds the population, the fittest first."""
-    paths = [tmp_path / name for name in ("policy", "checkpoint", "log.csv")]
-    trainer = Trainer(TINY, seed=1)
-    train(trainer, paths[0], checkpoint=paths[1], log=paths[2], generations=2)
-    assert len(load_policy(paths[0], "gappo")) == 3
-    assert Trainer.resume(paths[1], TINY).generation == 2
-    lines = paths[2].read_text().splitlines()
+def test_processes_train_the_same() -> None:
+    """Members that learn in other processes learn the same to the last bit."""
+    here, there = trainer(), trainer()
+    with ProcessEngine(2) as engine:
+        for _ in range(2):
+            here.advance()
+            there.advance(engine=engine)
+    assert figures(here.history) == figures(there.history)
+    assert torch.equal(weights(here), weights(there))
+
+
+def test_seeds_matter() -> None:
+    """Another seed begins with other weights and gives members other lessons."""
+    one, other = trainer(1), trainer(2)
+    assert not torch.equal(weights(one), weights(other))
+    lessons = {one._lesson(member, Limits()).seed for member in range(3)}
+    one.advance()
+    lessons |= {one._lesson(member, Limits()).seed for member in range(3)}
+    assert len(lessons) == 6
+
+
+def test_lessons_change_nothing_but_their_own_learner() -> None:
+    """A generation that is dropped leaves the run as it was, though its lessons were taken."""
+    run = trainer()
+    before = weights(run).clone()
+    asked = iter([False, False, True])
+    assert run.advance(engine=SerialEngine(), should_stop=lambda: next(asked)) is None
+    assert run.generation == 0
+    assert torch.equal(weights(run), before)
+
+
+def test_train_writes_policy_checkpoint_and_log(paths: dict[str, Path]) -> None:
+    """After every generation all three files are whole; the policy holds the population, and how it came about."""
+    run = trainer(1)
+    train(run, **paths, limits=Limits(iterations=2))
+    assert len(load_policy(paths["output"], "gappo")) == 3
+    with safe_open(paths["output"], framework="pt") as file:
+        said = file.metadata()
+    assert f'"generation": {run.best_generation}' in said["training"]
+    again = trainer(1)
+    again.resume(paths["checkpoint"])
+    assert again.generation == 2
+    lines = paths["log"].read_text().splitlines()
     assert len(lines) == 3
-    assert lines[0].startswith("generation,seconds,fitness")
+    assert lines[0].startswith("generation,decisions,evaluations,cost")
 
 
-def test_training_stops_between_updates(tmp_path: Path) -> None:
-    """An interrupted generation is dropped, and what the last one wrote stays as it is."""
-    paths = [tmp_path / name for name in ("policy", "checkpoint", "log.csv")]
-    trainer = Trainer(TINY, seed=1)
-    train(trainer, paths[0], checkpoint=paths[1], log=paths[2], generations=1)
-    before = [path.read_bytes() for path in paths]
-    asked = iter([False, False, True, True, True, True])
-    train(trainer, paths[0], checkpoint=paths[1], log=paths[2], generations=9, should_stop=lambda: next(asked))
-    assert [path.read_bytes() for path in paths] == before
+def test_the_log_and_the_policy_are_put_right(paths: dict[str, Path]) -> None:
+    """A run that was killed after its checkpoint, before the other files, writes them when it is taken up."""
+    run = trainer(1)
+    train(run, **paths, limits=Limits(iterations=2))
+    log = paths["log"].read_bytes()
+    paths["log"].write_bytes(log[: len(log) // 2])
+    paths["output"].unlink()
+    again = trainer(1)
+    again.resume(paths["checkpoint"])
+    train(again, **paths, limits=Limits(iterations=2))
+    assert paths["log"].read_bytes() == log
+    for one, two in zip(load_policy(paths["output"], "gappo"), run.best, strict=True):
+        assert all(torch.equal(weight, two[name]) for name, weight in one.state_dict().items())
+
+
+def test_the_best_networks_are_kept(paths: dict[str, Path], planned: Callable[..., None]) -> None:
+    """The policy is that of the generation with the least cost, not the last one."""
+    planned(0.5, 0.2, 0.3, 0.4)
+    run = trainer(population=1, method="ppo")
+    for generation in range(1, 5):
+        run.advance()
+        if generation == 2:
+            second = {name: weight.clone() for name, weight in run.members[0]["network"].items()}
+    assert run.best_generation == 2
+    assert [report.best_cost for report in run.history] == [0.5, 0.2, 0.2, 0.2]
+    run.write_policy(paths["output"])
+    (kept,) = load_policy(paths["output"], "ppo")
+    assert all(torch.equal(weight, second[name]) for name, weight in kept.state_dict().items())
+
+
+def test_patience_ends_a_run_that_gets_no_better(paths: dict[str, Path], planned: Callable[..., None]) -> None:
+    """Two generations in a row without better networks end it, one does not."""
+    planned(0.5, 0.6, 0.4, 0.4, 0.5, 0.1)
+    run = trainer(population=1, method="ppo")
+    train(run, **paths, limits=Limits(iterations=9, patience=2))
+    assert [report.cost for report in run.history] == [0.5, 0.6, 0.4, 0.4, 0.5]
+
+
+def test_steps_are_those_of_all_members_together(paths: dict[str, Path]) -> None:
+    """Training ends with the update that reaches the steps, and the last lessons are shorter."""
+    run = trainer()
+    train(run, **paths, limits=Limits(steps=400))
+    assert run.history[-1].decisions >= 400
+    assert run.history[-2].decisions < 400
+    assert run._lesson(0, Limits(steps=run.history[-1].decisions + 6)).decisions == 2
+
+
+def test_progress_follows_the_first_limit_given() -> None:
+    """Schedules follow the steps; without them the generations, and the clock alone only if there is nothing else."""
+    run = trainer()
+    assert run.progress(Limits()) == run.progress(Limits(steps=9)) == 0
+    run.advance()
+    done, spent = run.history[0].decisions, run.history[0].seconds
+    assert run.progress(Limits(steps=2 * done, iterations=1, minutes=1e-9)) == 0.5
+    assert run.progress(Limits(iterations=4, minutes=1e-9)) == 0.25
+    assert run.progress(Limits(minutes=spent / 60 * 4)) == pytest.approx(0.25)
+    assert run.progress(Limits(minutes=0)) == 1
+    assert run.is_over(Limits(minutes=0))
+
+
+def test_members_begin_with_given_weights() -> None:
+    """The networks of a policy file are dealt out in turn; without any, all members begin alike."""
+    given = [Ppo(TINY.network, seed=seed).policy.state_dict() for seed in (8, 9)]
+    run = Trainer(TINY, 0, BOARDS, given)
+    for member, expected in zip(run.members, (given[0], given[1], given[0]), strict=True):
+        assert all(torch.equal(member["network"][name], weight) for name, weight in expected.items())
+    alike = trainer().members
+    assert all(torch.equal(alike[0]["network"][name], weight) for name, weight in alike[2]["network"].items())
+
+
+def test_cost_and_decisions_of_all_members_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A report adds up what the members did, and fitness (12) gets their network evaluations."""
+
+    def take(self: Ppo, lesson: Lesson) -> LessonReport:
+        return LessonReport(10, 100, 1.0, 2.0, 0.0, 1e-3)
+
+    seen = []
+    monkeypatch.setattr(Ppo, "take", take)
+    monkeypatch.setattr(module, "fitness", lambda *columns: seen.append(columns[2]) or [1.0, 3.0, 2.0])
+    run = trainer()
+    run.advance()
+    run.advance()
+    assert (run.history[-1].decisions, run.history[-1].evaluations, run.history[-1].fitness) == (60, 600, 3.0)
+    assert seen == [[100, 100, 100]] * 2
 
 
 @pytest.mark.parametrize("content", [None, b"", b"not a checkpoint"])
@@ -80,12 +222,23 @@ def test_bad_checkpoints(tmp_path: Path, content: bytes | None) -> None:
     if content is not None:
         (tmp_path / "checkpoint").write_bytes(content)
     with pytest.raises(InputError, match="checkpoint") as caught:
-        Trainer.resume(tmp_path / "checkpoint", TINY)
+        trainer().resume(tmp_path / "checkpoint")
     assert "\n" not in str(caught.value)
 
 
-def test_checkpoint_of_another_shape(tmp_path: Path) -> None:
-    """A checkpoint of another population is refused."""
-    Trainer(TINY).save(tmp_path / "checkpoint")
-    with pytest.raises(InputError, match="another population or network size"):
-        Trainer.resume(tmp_path / "checkpoint", replace(TINY, population=2))
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"population": 2}, "is a run with population 3, not 2"),
+        ({"seed": 6}, "is a run with seed 5, not 6"),
+        ({"method": "ppo"}, "is a run with method gappo, not ppo"),
+        ({"learner": PpoParameters(epochs=2)}, "is a run with learner"),
+        ({"curriculum": Curriculum(("travel",))}, "is a run with curriculum.families mixed, not travel"),
+        ({"curriculum": replace(CURRICULUM, own=CURRICULUM.own[:1])}, "is a run with instances"),
+    ],
+)
+def test_checkpoints_of_other_runs_are_refused(tmp_path: Path, changes: dict[str, Any], message: str) -> None:
+    """A checkpoint knows what it is a run of, and says what differs."""
+    trainer().save(tmp_path / "checkpoint")
+    with pytest.raises(InputError, match=message):
+        trainer(**changes).resume(tmp_path / "checkpoint")

@@ -1,0 +1,58 @@
+"""Validation: the figures are those of the plans that the policy makes, by the one scorer."""
+
+import numpy as np
+import pytest
+import torch
+from boards import plan_of
+
+from alloc.allocators.learned.curriculum import Curriculum
+from alloc.allocators.learned.network import ActorCritic, NetworkSize
+from alloc.allocators.learned.turns import choose
+from alloc.allocators.learned.validation import DISTANCE_WEIGHT, own_games, validate, validation_boards
+from alloc.problems import evaluate
+from alloc.problems.game import PLANNING, begin, step
+from alloc.problems.generate import paper_like
+
+
+@pytest.fixture
+def network() -> ActorCritic:
+    torch.manual_seed(3)
+    return ActorCritic(NetworkSize(8, 8, 2))
+
+
+def test_time_is_that_of_the_best_plan_met(network: ActorCritic) -> None:
+    """T, distance and cost agree with the evaluator's of every plan along the game, at its cheapest."""
+    instance = paper_like(10, 3, 44, 1)
+    curriculum, (board,) = own_games([instance], Curriculum())
+    got = validate(network, [board], PLANNING, curriculum)
+    scale = 0.66 / instance.reach.rows(instance.reach.origin)[0].mean()
+    state, costs = begin(board), []
+    while not state.done.all():
+        _, slot = choose(board, state, network(board, state))
+        state = step(board, state, slot)
+        score = evaluate(instance, plan_of(board, state))
+        time = score.served_makespan / curriculum.own[0].hours
+        distance = score.distance * scale / instance.n
+        costs.append((time - 1 + len(score.unserved_tasks) + DISTANCE_WEIGHT * distance, time, distance))
+    assert (got.cost, got.time, got.distance) == pytest.approx(min(costs), rel=1e-4)
+    assert got.others_time == got.time
+
+
+def test_the_last_fifth_of_own_instances_is_held_out() -> None:
+    """With five or more instances, networks are judged by some that they do not learn from."""
+    instances = [paper_like(10, 3, 44, seed) for seed in range(10)]
+    curriculum, boards = own_games(instances, Curriculum())
+    assert [one.instance for one in curriculum.own] == instances[:8]
+    assert [board.shape[0] for board in boards] == [2]
+    few, (board,) = own_games(instances[:3], Curriculum())
+    assert len(few.own) == board.shape[0] == 3
+
+
+def test_validation_games_are_always_the_same() -> None:
+    """Paper-like games of scenario 1's size come first, then every family twice."""
+    boards, again = (validation_boards(Curriculum()) for _ in range(2))
+    assert [board.shape[:2] for board in boards] == [(12, 100), (20, 60)]
+    assert all(torch.equal(one.need, two.need) for one, two in zip(boards, again, strict=True))
+    assert np.allclose(boards[0].need.sum(1), 100)
+    assert len(validation_boards(Curriculum(("paper",)))) == 1
+    assert validation_boards(Curriculum(("travel", "depots")))[1].shape[0] == 4
