@@ -5,6 +5,7 @@ References
 Fang et al. (2025), Algorithm 1, doi:10.20944/preprints202502.0192.v1.
 """
 
+import copy
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
@@ -192,7 +193,11 @@ class Trainer:
         learner = new_learner(self.parameters.method, self.parameters.network, self.parameters.learner, self.seed)
         if weights is not None:
             learner.policy.load_state_dict(weights)
-        return learner.state()
+        state = learner.state()
+        for target, source in (("target", "network"), ("targets", "networks")):
+            if target in state:  # target networks begin as copies, of given weights as well
+                state[target] = copy.deepcopy(state[source])
+        return state
 
     @property
     def generation(self) -> int:

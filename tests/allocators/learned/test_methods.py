@@ -17,7 +17,7 @@ def test_learners_by_name() -> None:
 
 def test_settings_are_read_as_the_kind_of_their_defaults() -> None:
     """Whole numbers, broken ones and none are told apart."""
-    read = method_parameters("gappo", {"epochs": "5", "clip": "0.1", "kl_target": "none"})
+    read = method_parameters("ppo", {"epochs": "5", "clip": "0.1", "kl_target": "none"})
     assert read == PpoParameters(epochs=5, clip=0.1, kl_target=None)
 
 
