@@ -81,8 +81,8 @@ def train_command(
         list[str] | None,
         typer.Option(
             metavar="NAME",
-            help="Instances to train on: mixed, paper (small ones like the paper's), elsewhere, real, heavy-tailed, clustered, "
-            "depots, short-range, travel, battery, priority, unbalanced or varied; may be repeated.",
+            help="Instances to train on: mixed, paper (small ones like the paper's), elsewhere, real, heavy-tailed, "
+            "clustered, depots, short-range, travel, battery, priority, unbalanced or varied; may be repeated.",
             show_default="mixed",
         ),
     ] = None,
