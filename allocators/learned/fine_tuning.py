@@ -62,7 +62,8 @@ class _PartGames:
         rows = torch.from_numpy(rng.integers(len(board.price), size=games))
         ruined = rng.uniform(0.2, 1.4, (games, 1))
         back = torch.from_numpy(rng.random((games, board.shape[1])) < ruined)
-        price = torch.from_numpy(np.exp(rng.uniform(*np.log(self.parameters.price), games)).astype(np.float32))
+        low, high = np.log(self.parameters.price)
+        price = torch.from_numpy(np.exp(rng.uniform(low, high, games)).astype(np.float32))
         return replace(board[rows], price=price, start=torch.where(back, self.parts.home[rows], board.start[rows]))
 
     def steps(self, board: Board) -> int:

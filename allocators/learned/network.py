@@ -117,7 +117,8 @@ class ActorCritic(nn.Module):
         both = torch.cat([weight, heard.flatten(2)], -1)
         total = empty.scatter_add(1, task.expand(-1, -1, heads + width), both)
         shares = total[..., heads:].unflatten(-1, (heads, width // heads)) / (total[..., :heads, None] + 1e-6)
-        return shares.flatten(2)
+        mean: Tensor = shares.flatten(2)
+        return mean
 
     def _neighbours(self, board: Board, token: Tensor) -> Tensor:
         """Places attend to each other, those near by more, by a learned slope per head, shape (B, m + 1, width)."""
@@ -136,7 +137,8 @@ class ActorCritic(nn.Module):
         group = token.gather(1, tasks_of(board, state)[..., None].expand(-1, -1, width))
         query = self.query(torch.cat([group, board.ability[..., None] - 1], -1))
         likeness = query @ self.key(token).transpose(1, 2) / width**0.5
-        return likeness if board.goal.shape[2] == board.places else likeness.gather(2, board.goal)
+        scores: Tensor = likeness if board.goal.shape[2] == board.places else likeness.gather(2, board.goal)
+        return scores
 
     def heads(self, token: Tensor) -> tuple[Tensor, Tensor]:
         """Return the score of granting nothing and the value of the state, both of shape (B,)."""

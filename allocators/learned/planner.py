@@ -193,7 +193,7 @@ class Planner:
         """Partition tasks into neighbours, and find the agents that work there."""
         instance, rng = self.search.instance, self.rng
         low, high = self.parameters.part_tasks
-        size = int(min(rng.integers(low, high + 1), instance.m))
+        size = min(int(rng.integers(low, high + 1)), instance.m)
         tasks = cover(instance.task_position, surplus, size, rng)
         part_of = np.full(instance.m + 1, -1)
         part_of[tasks.ravel()] = np.repeat(np.arange(len(tasks)), size)
@@ -252,7 +252,8 @@ class Planner:
         pairs = board.shape[1] * board.shape[2]
         lanes = count * int(np.clip(parameters.lane_pairs // (count * pairs), 1, MOST_LANES))
         rows = torch.arange(count).repeat_interleave(lanes // count)
-        price = np.exp(rng.uniform(*np.log(prices), lanes))
+        cheap, dear = np.log(prices)
+        price = np.exp(rng.uniform(cheap, dear, lanes))
         ruined = rng.uniform(*parameters.ruined, lanes)
         ruined[rng.random(lanes) < parameters.fresh_share] = 1.0
         away = parts.home[rows]

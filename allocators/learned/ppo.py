@@ -209,14 +209,16 @@ class Ppo:
         fault = value_loss(scores.value, samples.target[index])
         loss = parameters.value_weight * fault - gain - parameters.entropy_weight * entropy.mean()
         self.optimiser.zero_grad(set_to_none=True)
-        loss.backward()  # type: ignore[no-untyped-call]
+        loss.backward()
         nn.utils.clip_grad_norm_(self.network.parameters(), parameters.max_gradient_norm)
         self.optimiser.step()
         moved = shift.detach()
         return float((moved.exp() - 1 - moved).mean()), float(entropy.detach().mean())
 
     def _shuffled(self, samples: Samples, generator: torch.Generator) -> tuple[Tensor, ...]:
-        return torch.randperm(len(samples.game), generator=generator).split(self.parameters.minibatch)
+        order = torch.randperm(len(samples.game), generator=generator)
+        batches: tuple[Tensor, ...] = order.split(self.parameters.minibatch)
+        return batches
 
     def _set_rate(self, rate: float) -> None:
         for group in self.optimiser.param_groups:

@@ -21,7 +21,7 @@ from alloc.problems.game import (
     time_over_reference,
 )
 from alloc.problems.game.board import LEAST
-from alloc.problems.game.observation import lacks, pair_features
+from alloc.problems.game.observation import Sight, lacks, pair_features
 
 SCORE_CHUNK = 250_000
 """Pairs scored at once, to bound the memory."""
@@ -182,15 +182,14 @@ class _Local:
 def _observe(board: Board, state: State, game: Tensor, agent: Tensor, slot: Tensor) -> Tensor:
     """Return `pair_features` of some pairs, shape (k, PAIR_FEATURES)."""
     lack, need = lacks(board, state), board.need.clamp(min=LEAST)
-    now = state.slot[game, agent]
-    own, other = (
-        (
-            *(values[game, board.goal[game, agent, place]] for values in (lack, need, board.supply)),
-            board.contribution[game, agent, place],
-            board.distance[game, agent, place],
-        )
-        for place in (now, slot)
-    )
+
+
+    def sight(chosen: Tensor) -> Sight:
+        place = board.goal[game, agent, chosen]
+        given, distance = board.contribution[game, agent, chosen], board.distance[game, agent, chosen]
+        return lack[game, place], need[game, place], board.supply[game, place], given, distance
+
+    own, other = sight(state.slot[game, agent]), sight(slot)
     return pair_features(board.price[game], board.ability[game, agent], board.choice[game, agent], own, other)
 
 

@@ -90,7 +90,7 @@ class State:
     at: Tensor
     hopped: Tensor
 
-    def __getitem__(self, rows: Tensor) -> State:
+    def __getitem__(self, rows: Tensor | tuple[Tensor, ...]) -> State:
         """Return the states with these numbers."""
         return State(*(getattr(self, field.name)[rows] for field in fields(self)))
 
