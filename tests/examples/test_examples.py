@@ -3,11 +3,13 @@
 import subprocess
 import sys
 
+import pytest
+
 
 def run(script, *arguments):
     """Run a script as a user would; return what it prints."""
     done = subprocess.run(
-        [sys.executable, str(script), *arguments], capture_output=True, text=True, timeout=60, check=False
+        [sys.executable, str(script), *arguments], capture_output=True, text=True, timeout=110, check=False
     )
     assert done.returncode == 0, done.stderr
     return done.stdout
@@ -31,3 +33,13 @@ def test_replan(checkout):
     assert printed.count("drones drop out") == 2
     last_lines = [block.strip().splitlines()[-2] for block in printed.split("; done in")[:-1]]
     assert all(line.endswith(" 0 unserved") for line in last_lines)
+
+
+@pytest.mark.slow
+def test_train_stable_baselines3(checkout):
+    """A short training of somebody else's PPO on the environment ends with a plan better than chance."""
+    pytest.importorskip("stable_baselines3")
+    output = run(checkout / "examples" / "train_stable_baselines3.py", "--steps", "3000")
+    makespan = {line.split()[0]: float(line.split()[3]) for line in output.splitlines()}
+    assert makespan["optimal"] <= makespan["greedy"]
+    assert makespan["optimal"] <= makespan["learned"] < makespan["random"]
