@@ -183,7 +183,6 @@ def _observe(board: Board, state: State, game: Tensor, agent: Tensor, slot: Tens
     """Return `pair_features` of some pairs, shape (k, PAIR_FEATURES)."""
     lack, need = lacks(board, state), board.need.clamp(min=LEAST)
 
-
     def sight(chosen: Tensor) -> Sight:
         place = board.goal[game, agent, chosen]
         given, distance = board.contribution[game, agent, chosen], board.distance[game, agent, chosen]
