@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import torch
 
+from alloc.allocators.learned.validation import VALIDATION
 from alloc.problems import Instance
 from alloc.problems.errors import InputError
 from alloc.problems.formats import write_bytes_atomically
@@ -23,7 +24,7 @@ def described(parameters: "TrainingParameters", seed: int) -> dict[str, str]:
     """Return all that decides a training curve, flat, as text."""
     own = parameters.curriculum.own
     plain = replace(parameters, curriculum=replace(parameters.curriculum, own=()))
-    text = {"seed": str(seed), "features": FEATURE_SET, **_flat("", asdict(plain))}
+    text = {"seed": str(seed), "features": FEATURE_SET, "validation": VALIDATION, **_flat("", asdict(plain))}
     text["instances"] = ", ".join(_digest(aimed.instance) for aimed in own) or "none"
     return text
 

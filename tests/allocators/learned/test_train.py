@@ -11,11 +11,12 @@ from safetensors import safe_open
 
 from alloc.allocators.learned import train as module
 from alloc.allocators.learned.curriculum import Curriculum
-from alloc.allocators.learned.engine import ProcessEngine, SerialEngine
+from alloc.allocators.learned.engine import SerialEngine
 from alloc.allocators.learned.learner import Lesson, LessonReport
 from alloc.allocators.learned.network import NetworkSize
 from alloc.allocators.learned.policy_file import load_policy
 from alloc.allocators.learned.ppo import Ppo, PpoParameters
+from alloc.allocators.learned.process_engine import ProcessEngine
 from alloc.allocators.learned.train import Limits, Report, Trainer, TrainingParameters, train
 from alloc.allocators.learned.validation import Validation, own_games
 from alloc.problems import InputError

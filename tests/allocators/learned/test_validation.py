@@ -1,11 +1,14 @@
 """Validation: the figures are those of the plans that the policy makes, by the one scorer."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
 from boards import plan_of
 
-from alloc.allocators.learned.curriculum import Curriculum
+from alloc.allocators.learned.curriculum import Curriculum, reference_board
+from alloc.allocators.learned.families import RECIPES
 from alloc.allocators.learned.network import ActorCritic, NetworkSize
 from alloc.allocators.learned.turns import choose
 from alloc.allocators.learned.validation import DISTANCE_WEIGHT, own_games, validate, validation_boards
@@ -33,9 +36,17 @@ def test_time_is_that_of_the_best_plan_met(network: ActorCritic) -> None:
         score = evaluate(instance, plan_of(board, state))
         time = score.served_makespan / curriculum.own[0].hours
         distance = score.distance * scale / instance.n
-        costs.append((time - 1 + len(score.unserved_tasks) + DISTANCE_WEIGHT * distance, time, distance))
+        costs.append((1 - 1 / time + len(score.unserved_tasks) + DISTANCE_WEIGHT * distance, time, distance))
     assert (got.cost, got.time, got.distance) == pytest.approx(min(costs), rel=1e-4)
     assert got.others_time == got.time
+
+
+def test_a_bad_game_does_not_decide(network: ActorCritic) -> None:
+    """However far from its reference a makespan is, it costs no more than an unserved task."""
+    boards = [reference_board([paper_like(10, 3, 44, 1)] * 2, [1.0] * 2, np.random.default_rng(0))]
+    hard = replace(boards[0], need=boards[0].need * torch.tensor([[1.0], [1e6]]))
+    costs = [validate(network, [board], PLANNING, Curriculum()).cost for board in (boards[0], hard)]
+    assert 0 < costs[1] - costs[0] < 0.6
 
 
 def test_the_last_fifth_of_own_instances_is_held_out() -> None:
@@ -51,7 +62,7 @@ def test_the_last_fifth_of_own_instances_is_held_out() -> None:
 def test_validation_games_are_always_the_same() -> None:
     """Paper-like games of scenario 1's size come first, then every family twice."""
     boards, again = (validation_boards(Curriculum()) for _ in range(2))
-    assert [board.shape[:2] for board in boards] == [(12, 100), (20, 60)]
+    assert [board.shape[:2] for board in boards] == [(12, 100), (2 * len(RECIPES), 60)]
     assert all(torch.equal(one.need, two.need) for one, two in zip(boards, again, strict=True))
     assert np.allclose(boards[0].need.sum(1), 100)
     assert len(validation_boards(Curriculum(("paper",)))) == 1
