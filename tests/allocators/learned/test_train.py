@@ -13,6 +13,7 @@ from alloc.allocators.learned import train as module
 from alloc.allocators.learned.curriculum import Curriculum
 from alloc.allocators.learned.engine import SerialEngine
 from alloc.allocators.learned.learner import Lesson, LessonReport
+from alloc.allocators.learned.methods import METHODS
 from alloc.allocators.learned.network import NetworkSize
 from alloc.allocators.learned.policy_file import load_policy
 from alloc.allocators.learned.ppo import Ppo, PpoParameters
@@ -43,7 +44,7 @@ def figures(history: Sequence[Report]) -> list[dict[str, float]]:
 
 
 def weights(run: Trainer) -> torch.Tensor:
-    everyone = [member["network"] for member in run.members] + run.best
+    everyone = [member.get("network", member.get("networks")) for member in run.members] + run.best
     return torch.cat([weight.flatten() for network in everyone for weight in network.values()])
 
 
@@ -65,8 +66,12 @@ def planned(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
 
 @pytest.mark.parametrize(
     "changes",
-    [{}, {"method": "ppo", "population": 1}, {"rules": PAPER}],
-    ids=["gappo", "ppo", "rules of the paper"],
+    [
+        {},
+        *({"method": name, "population": 1, "learner": None} for name in METHODS if name != "gappo"),
+        {"rules": PAPER},
+    ],
+    ids=[*METHODS, "rules of the paper"],
 )
 def test_a_resumed_run_goes_on_as_if_nothing_had_happened(tmp_path: Path, changes: dict[str, Any]) -> None:
     """Four generations at once, and two and two with a checkpoint between, give the same figures and weights."""
