@@ -1,0 +1,53 @@
+"""The probe games themselves, and that the methods by PPO solve them; the others do so beside their own tests."""
+
+import pytest
+import torch
+from probes import PROBES, best_worth, probe, share_learned
+from same_lesson import assert_taken_up_elsewhere
+
+from alloc.allocators.learned.gappo import GappoParameters
+from alloc.allocators.learned.ppo import Ppo, PpoParameters
+from alloc.problems.game import State, begin, group_ability, worth
+
+PARAMETERS = {"ppo": PpoParameters(), "gappo": GappoParameters()}
+
+
+def known_answer(name: str) -> torch.Tensor:
+    """Where everybody must be at the end of each game of a probe, by thinking and not by trying, shape (B, n)."""
+    board = probe(name).board
+    if name == "right_task":
+        return board.need[:, :-1].argmin(1, keepdim=True)
+    if name == "pairing":
+        return (board.ability[:, :, None] - board.need[:, None, :-1]).abs().argmin(2)
+    if name == "when_to_stop":
+        return torch.tensor([0, 0, 1]).expand_as(board.start)
+    return torch.where(board.price[:, None] > 1, torch.tensor([0, 0]), torch.tensor([0, 1]))
+
+
+@pytest.mark.parametrize("name", PROBES)
+def test_answers_are_known(name: str) -> None:
+    """What is best is common sense: the task that can be done, like to like, enough is enough, and mind the price."""
+    board = probe(name).board
+    slot = known_answer(name)
+    state = State(**{**vars(begin(board)), "slot": slot, "group": group_ability(board, slot)})
+    torch.testing.assert_close(worth(board, state), best_worth(board))
+
+
+@pytest.mark.parametrize("name", PROBES)
+def test_playing_without_learning_is_not_enough(name: str) -> None:
+    """A network that has learned nothing fails, and so does one that stays."""
+    board = probe(name).board
+    assert (worth(board, begin(board)) < best_worth(board) - 1e-3).any()
+
+
+@pytest.mark.parametrize("method", PARAMETERS)
+@pytest.mark.parametrize("name", PROBES)
+def test_ppo_solves_probes(name: str, method: str) -> None:
+    """Games with known answers are solved, all of them."""
+    assert share_learned(Ppo(parameters=PARAMETERS[method]), name) == 1.0
+
+
+@pytest.mark.parametrize("method", PARAMETERS)
+def test_a_lesson_depends_on_state_and_lesson_only(method: str) -> None:
+    """Stored with its replay buffer between lessons and taken up by another learner, training goes on bit for bit."""
+    assert_taken_up_elsewhere(lambda seed: Ppo(parameters=PARAMETERS[method], seed=seed))
