@@ -10,7 +10,7 @@ from typing import NoReturn
 
 import typer
 
-from alloc.cli import compare, convert, evaluate, generate, methods, pareto, solve, train, validate
+from alloc.cli import compare, convert, evaluate, generate, methods, pareto, solve, train, tune, validate
 from alloc.cli.console import complain, write_out
 from alloc.cli.options import examples
 
@@ -37,7 +37,7 @@ app = typer.Typer(
         closing="Exit codes: 0 every task is served, 1 not, 2 bad usage or bad input.",
     ),
 )
-for module in (solve, compare, pareto, evaluate, generate, validate, convert, methods, train):
+for module in (solve, compare, pareto, evaluate, generate, validate, convert, methods, train, tune):
     module.register(app)
 
 

@@ -2,7 +2,7 @@
 
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
@@ -155,7 +155,16 @@ def train_command(
 
     if tensorboard is not None:
         event_writer(Path(tensorboard)).close()
-    parameters = _parameters(method, population, lesson, settings or [], turn, reward, family or ["mixed"], init)
+    parameters = training_parameters(
+        method,
+        family=family or ["mixed"],
+        lesson=lesson,
+        population=population,
+        settings=settings or [],
+        turn=turn,
+        reward=reward,
+        init=init,
+    )
     trainer = _trainer(parameters, seed, instances, init, kept if resume else None)
     if steps is None and minutes is None and iterations is None:
         steps = STEPS
@@ -186,16 +195,24 @@ def _close(trainer: "Trainer", policy: Path) -> None:
     say(f"{policy} holds the networks of generation {best.generation}: T {best.time:.4f}, distance {best.distance:.4f}")
 
 
-def _parameters(
+def training_parameters(
     method: str,
-    population: int | None,
-    lesson: int,
-    settings: list[str],
-    turn: Turn,
-    reward: Reward,
+    *,
     family: list[str],
-    init: str | None,
+    lesson: int,
+    population: int | None = None,
+    settings: Sequence[str] = (),
+    turn: Turn = Turn.BIDDING,
+    reward: Reward = Reward.MAKESPAN,
+    init: str | None = None,
 ) -> "TrainingParameters":
+    """Return what the options ask for.
+
+    Raises
+    ------
+    InputError
+        If there is no such method, family or hyperparameter, or no policy to start from.
+    """
     from alloc.allocators.learned.curriculum import Curriculum
     from alloc.allocators.learned.families import FAMILIES
     from alloc.allocators.learned.methods import method_parameters
@@ -220,7 +237,7 @@ def _parameters(
     )
 
 
-def _pairs(settings: list[str]) -> dict[str, str]:
+def _pairs(settings: Sequence[str]) -> dict[str, str]:
     for setting in settings:
         if "=" not in setting:
             raise typer.BadParameter(f"{setting!r} is not NAME=VALUE", param_hint="'--set'")

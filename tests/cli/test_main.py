@@ -11,7 +11,7 @@ from alloc.cli import options
 from alloc.cli import solve as solve_module
 from alloc.problems import Objective
 
-COMMANDS = ("solve", "compare", "evaluate", "generate", "validate", "convert", "methods", "train")
+COMMANDS = ("solve", "compare", "evaluate", "generate", "validate", "convert", "methods", "train", "tune")
 
 
 def python(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
