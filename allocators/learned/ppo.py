@@ -281,6 +281,6 @@ def _samples(played: Trajectories, gain: Tensor, target: Tensor, centre: Tensor)
         actions,
         played.log_probability[when, game],
         centre[when, game],
-        (advantage - several.mean()) / (several.std() + 1e-6),
+        (advantage - several.mean()) / (several.std(correction=0) + 1e-6),
         target[when, game],
     )
