@@ -1,6 +1,5 @@
 """PPO: its formulas against numbers worked by hand, its step against the loss written out, and that it learns."""
 
-
 import pytest
 import torch
 from boards import layout
