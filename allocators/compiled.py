@@ -20,6 +20,18 @@ def compiled(function: Function) -> Function:
         return cast(Function, numba.njit(nogil=True)(function))
 
 
+def compiled_loosely(function: Function) -> Function:
+    """Compile `function` as `compiled` does, with sums in any order and divisions by 0 unchecked: for networks.
+
+    Infinities keep their meaning.
+    """
+    options = {"nogil": True, "error_model": "numpy", "fastmath": {"contract", "reassoc", "arcp", "nsz", "afn"}}
+    try:
+        return cast(Function, numba.njit(cache=True, **options)(function))
+    except RuntimeError:
+        return cast(Function, numba.njit(**options)(function))
+
+
 def inlined(function: Function) -> Function:
     """Put `function` into each compiled loop that calls it, where a call would cost more than its work."""
     return cast(Function, numba.njit(inline="always", nogil=True)(function))

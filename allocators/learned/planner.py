@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, fields, replace
+from dataclasses import astuple, dataclass, fields
 
 import numpy as np
 import torch
@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 
 from alloc.allocators.learned.curriculum import reference_makespan
 from alloc.allocators.learned.fine_tuning import FineTuning
+from alloc.allocators.learned.lanes import Games, play_games
 from alloc.allocators.learned.limits import NEAR
 from alloc.allocators.learned.network import ActorCritic
-from alloc.allocators.learned.rollout import Best, play, position
+from alloc.allocators.learned.rollout import Best, position
 from alloc.allocators.search import Search
 from alloc.problems import IDLE, Allocation, Objective, serve_all
-from alloc.problems.game import Board, begin, make_board, pick
+from alloc.problems.game import begin, make_board, pick
 from alloc.problems.game.board import working_share
 from alloc.problems.game.parts import Parts, lay_out_parts
 
@@ -109,7 +110,6 @@ class Planner:
         self.tuning = tuning
         self.run_all: Callable[..., Iterable[Best]] = map
         self.rng = np.random.default_rng(search.seed)
-        self.generators = [torch.Generator().manual_seed(search.seed + stream) for stream in range(STREAMS)]
         self.failed = reference_makespan(search.instance)
         self.aim = self.failed
         self.stale, self.least_shortfall = 0, np.inf
@@ -130,7 +130,9 @@ class Planner:
         instance = search.instance
         plan = None if search.start is None else search.start.task_of_agent
         board = make_board([instance], [self.aim], [parameters.first_price], self.rng, near=parameters.near, plan=plan)
-        best = play(self.networks[0], board, steps=WHOLE_ROUNDS + 2 * instance.n // instance.m, should_stop=self._late)
+        games = Games(np.zeros(1, dtype=np.int64), board.price.numpy(), board.start.numpy())
+        rounds = WHOLE_ROUNDS + 2 * instance.n // instance.m
+        best = play_games(self.networks[0], board, games, rounds=rounds, should_stop=self._late)
         place = pick(board.goal, best.slot)[0].numpy()
         self._go_on_from(np.where(place == instance.m, IDLE, place))
 
@@ -219,51 +221,47 @@ class Planner:
         self, network: ActorCritic, parts: Parts, prices: tuple[float, float]
     ) -> tuple[NDArray[np.bool_], Ints]:
         """Play the parts in several streams; return which games are better than the plan, and their slots."""
-        board = parts.board
-        streams = [self._games(parts, prices) for _ in self.generators]
-        temperatures = self.rng.uniform(*self.parameters.temperature, len(streams)).tolist()
+        streams = [self._games(parts, prices) for _ in range(STREAMS)]
+        temperatures = self.rng.uniform(*self.parameters.temperature, STREAMS).tolist()
+        seeds = self.rng.integers(2**63, size=STREAMS).tolist()
 
         def one(number: int) -> Best:
-            if self.search.threads > 1:
-                torch.set_num_threads(1)  # each thread has its own setting
-            return play(
+            return play_games(
                 network,
+                parts.board,
                 streams[number],
-                steps=self.parameters.rounds,
+                rounds=self.parameters.rounds,
+                seed=seeds[number],
                 temperature=temperatures[number],
-                generator=self.generators[number],
                 total=True,
                 should_stop=self.search.should_stop,
             )
 
-        played = list(self.run_all(one, range(len(streams))))
-        best = Best(*(torch.cat([getattr(part, field.name) for part in played]) for field in fields(Best)))
-        count = len(parts.tasks)
-        row = np.tile(np.arange(count).repeat(len(played[0].shortfall) // count), len(played))
+        best = Best(
+            *(torch.cat(column) for column in zip(*map(astuple, self.run_all(one, range(STREAMS))), strict=True))
+        )
+        row = np.concatenate([games.row for games in streams])
         order = np.lexsort((best.distance.numpy(), best.shortfall.numpy().round(6), best.unserved.numpy(), row))
-        first = torch.from_numpy(order[:: len(row) // count].copy())
+        first = torch.from_numpy(order[:: len(row) // len(parts.tasks)].copy())
         found = Best(*(getattr(best, field.name)[first] for field in fields(Best)))
-        now = position(board, begin(board), total=True)
+        now = position(parts.board, begin(parts.board), total=True)
         return found.better_than(now).numpy(), found.slot.numpy()
 
-    def _games(self, parts: Parts, prices: tuple[float, float]) -> Board:
+    def _games(self, parts: Parts, prices: tuple[float, float]) -> Games:
         """Lay out several games on every part, from various beginnings and at various prices."""
         parameters, rng, board, count = self.parameters, self.rng, parts.board, len(parts.tasks)
         pairs = board.shape[1] * board.shape[2]
         lanes = count * int(np.clip(parameters.lane_pairs // (count * pairs), 1, MOST_LANES))
-        rows = torch.arange(count).repeat_interleave(lanes // count)
-        cheap, dear = np.log(prices)
-        price = np.exp(rng.uniform(cheap, dear, lanes))
+        row = np.arange(count).repeat(lanes // count)
         ruined = rng.uniform(*parameters.ruined, lanes)
         ruined[rng.random(lanes) < parameters.fresh_share] = 1.0
-        away = parts.home[rows]
+        away = parts.home.numpy()[row]
         if rng.random() < parameters.scattered_share:
             ruined = rng.uniform(*parameters.scattered, lanes)
-            luck = torch.from_numpy(rng.random((lanes, *board.shape[1:])))
-            away = luck.masked_fill(~board.legal[rows], -1.0).argmax(2)
-        back = torch.from_numpy(rng.random((lanes, board.shape[1])) < ruined[:, None])
-        start = torch.where(back, away, board.start[rows])
-        return replace(board[rows], price=torch.from_numpy(price.astype(np.float32)), start=start)
+            away = np.where(board.legal.numpy()[row], rng.random((lanes, *board.shape[1:])), -1.0).argmax(2)
+        back = rng.random((lanes, board.shape[1])) < ruined[:, None]
+        start = np.where(back, away, board.start.numpy()[row])
+        return Games(row, np.exp(rng.uniform(*np.log(prices), lanes)), start)
 
 
 def cover(position: NDArray[np.float64], surplus: NDArray[np.float64], size: int, rng: np.random.Generator) -> Ints:
