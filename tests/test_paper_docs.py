@@ -1,0 +1,60 @@
+"""What the documents say of the code is there: every `path:name`, and a word on every part of the paper."""
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PAGES = ("paper.md", "gappo.md")
+
+
+def text_of(page: str) -> str:
+    return (ROOT / "docs" / page).read_text("utf-8")
+
+
+def references(page: str) -> list[tuple[str, str]]:
+    return re.findall(r"`([\w/]+\.py):([\w.]+)`", text_of(page))
+
+
+def defines(body: list[ast.stmt], name: str) -> bool:
+    """Whether statements define a function, a class, a constant or a field, or by dots a member of a class."""
+    first, _, rest = name.partition(".")
+    for node in body:
+        if isinstance(node, ast.ClassDef) and node.name == first:
+            return not rest or defines(node.body, rest)
+        if isinstance(node, ast.FunctionDef) and node.name == first:
+            return not rest
+        targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
+        if any(isinstance(target, ast.Name) and target.id == first for target in targets):
+            return not rest
+    return False
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_name_is_in_the_code(page: str) -> None:
+    """A function, class or constant that is renamed or moved takes its mention along."""
+    named = references(page)
+    missing = [f"{path}:{name}" for path, name in named if not (ROOT / path).is_file()]
+    trees = {path: ast.parse((ROOT / path).read_text("utf-8")).body for path, _ in named if (ROOT / path).is_file()}
+    missing += [f"{path}:{name}" for path, name in named if path in trees and not defines(trees[path], name)]
+    assert len(named) > 3
+    assert missing == []
+
+
+def test_names_that_are_not_there_are_told() -> None:
+    """Neither a wrong function nor a wrong member of a class passes."""
+    body = ast.parse("LIMIT = 1\nclass A:\n    size: int = 2\n    def go(self): ...\n").body
+    assert [defines(body, name) for name in ("LIMIT", "A", "A.size", "A.go")] == [True] * 4
+    assert [defines(body, name) for name in ("go", "A.stop", "LIMIT.x", "A.go.x")] == [False] * 4
+
+
+def test_every_part_of_the_paper_has_its_word() -> None:
+    """Equations 1 to 19, all 39 lines of Algorithm 1, Table 1 and figures 1 to 6 are gone through."""
+    text = text_of("paper.md")
+    assert [int(number) for number in re.findall(r"\*\*\((\d+)\)\*\*", text)] == list(range(1, 20))
+    rows = re.findall(r"^\| (\d+)(?:-(\d+))? \|", text, re.MULTILINE)
+    lines = [line for first, last in rows for line in range(int(first), int(last or first) + 1)]
+    assert lines == list(range(1, 40))
+    assert all(part in text for part in ("**Table 1.**", "figure 1.**", "**Figures 2 to 5.**", "**Figure 6.**"))
