@@ -214,7 +214,7 @@ def working_share(speed: NDArray[np.float64], distance: NDArray[np.float64], hou
     if not np.isfinite(speed).any():
         return np.ones_like(distance)
     with np.errstate(over="ignore"):
-        return np.clip(1 - distance / speed / hours, 0.0, 1.0)
+        return np.clip(1 - distance / speed / max(hours, 1e-300), 0.0, 1.0)
 
 
 def _start(

@@ -89,8 +89,7 @@ def lay_out_parts(
     with np.errstate(over="ignore"):
         need = np.minimum(instance.workload[tasks] / max(hours, 1e-300) / unit[:, None], LARGEST)
     supply = np.log(np.maximum((contribution * legal).sum(1), LEAST) / np.maximum(need, LEAST)) / 2 - 1
-    priority = instance.priority[tasks]
-    weight = priority / np.where(priority.mean(1) > 0, priority.mean(1), 1.0)[:, None]
+    weight = _weights(instance.priority[tasks], instance.workload[tasks] > 0)
     away = np.where(legal, distance, np.inf)
     home = np.where(legal.any(2), away.argmin(2), j)
     slot = (plan[someone][..., None] == tasks[:, None]) & legal
@@ -106,7 +105,7 @@ def lay_out_parts(
                 "ability": ability,
                 "need": np.pad(need, ((0, 0), (0, 1))),
                 "weight": np.pad(weight, ((0, 0), (0, 1))),
-                "goal": np.broadcast_to(np.arange(j + 1), (count, width, j + 1)),
+                "goal": np.broadcast_to(np.arange(j + 1), (count, width, j + 1)).copy(),
                 "legal": legal,
                 "distance": np.pad(scaled(distance, scale[:, None, None]), last),
                 "contribution": np.concatenate([contribution, ability[..., None]], axis=2),
@@ -122,3 +121,12 @@ def lay_out_parts(
         scale=torch.from_numpy(scale),
     )
     return Parts(board, who, tasks, torch.from_numpy(home))
+
+
+def _weights(priority: NDArray[np.float64], useful: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Priority over its mean among the tasks with workload, by part; 1 where none of these has any; shape (G, j)."""
+    priority = np.where(useful, priority, 0.0)
+    highest = priority.max(1, keepdims=True)
+    priority = np.where(highest > 0, priority / np.where(highest > 0, highest, 1.0), useful)
+    mean = priority.sum(1, keepdims=True) / np.maximum(useful.sum(1, keepdims=True), 1)
+    return priority / np.where(mean > 0, mean, 1.0)
