@@ -75,6 +75,27 @@ def test_weights_that_do_not_fit(tmp_path: Path, networks: list[ActorCritic]) ->
         load_policy(path, "gappo")
 
 
+def test_truncated_files(tmp_path: Path, networks: list[ActorCritic]) -> None:
+    """A file cut short anywhere, in its head or in its weights, is refused in one line."""
+    save_policy(tmp_path / "p.safetensors", networks, "gappo")
+    path = tmp_path / "p.safetensors"
+    whole = path.read_bytes()
+    for length in (4, 100, len(whole) // 2, len(whole) - 1):
+        path.write_bytes(whole[:length])
+        with pytest.raises(InputError, match="is not a policy file") as caught:
+            load_policy(path, "gappo")
+        assert "\n" not in str(caught.value)
+
+
+def test_fewer_networks_than_said(tmp_path: Path, networks: list[ActorCritic]) -> None:
+    """A file that promises more networks than it holds is refused."""
+    save_policy(tmp_path / "p.safetensors", networks, "gappo")
+    path = tmp_path / "p.safetensors"
+    path.write_bytes(path.read_bytes().replace(b'"networks":"2"', b'"networks":"3"'))
+    with pytest.raises(InputError, match="size"):
+        load_policy(path, "gappo")
+
+
 def test_tensors_without_description(tmp_path: Path) -> None:
     """A safetensors file from elsewhere is no policy."""
     save_file({"a": torch.zeros(2)}, tmp_path / "p.safetensors")

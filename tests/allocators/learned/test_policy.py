@@ -1,0 +1,152 @@
+"""Policies as shipped: what they promise on instances and sizes that training never saw."""
+
+import threading
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from alloc.allocators import Budget, RefusedError, Status, load, solve
+from alloc.allocators.base import Allocator
+from alloc.allocators.learned.network import ActorCritic, NetworkSize
+from alloc.allocators.learned.policy_file import save_policy
+from alloc.problems import Allocation, Family, InputError, Instance, Objective, random_instance
+from alloc.problems.generate import paper, paper_like
+
+SHIPPED = [
+    name
+    for name in ("gappo", "ppo", "a2c", "dqn", "ddpg")
+    if (files("alloc.allocators.learned") / "policies" / f"{name}.safetensors").is_file()
+]
+
+
+@pytest.fixture(scope="module")
+def gappo() -> Allocator:
+    return load("gappo")
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_first_answer_on_unseen_paper_instances(name: str) -> None:
+    """One greedy game, before any search: T is within 15 % of the optimum on three instances of scenario 1."""
+    policy = load(name)
+    for seed in range(3):
+        makespan = solve(paper(1, seed), policy, iterations=0, time_limit_s=None).makespan
+        assert makespan is not None
+        assert makespan <= 1.15
+
+
+def test_games_on_parts_reach_the_bound(gappo: Allocator) -> None:
+    """A few sweeps bring T to 1 on a small instance like the paper's, which proves it optimal."""
+    result = solve(paper_like(40, 8, 160, seed=3), gappo, iterations=40, time_limit_s=None)
+    assert result.makespan == 1.0
+    assert result.status is Status.OPTIMAL
+
+
+def test_energy_counts(gappo: Allocator) -> None:
+    """With energy in the objective the same policy flies less than without, and slack saves more."""
+    instance = paper_like(40, 8, 160, seed=3)
+    results = [
+        solve(instance, gappo, objective=goal, iterations=10, time_limit_s=None, makespan_slack=slack)
+        for goal, slack in (("makespan", 0.0), ("makespan-energy", 0.0), ("makespan-energy", 0.2))
+    ]
+    energies = [result.energy for result in results]
+    assert energies[0] > energies[1] > energies[2]
+    assert results[2].makespan <= 1.2 * results[1].makespan * (1 + 1e-9)
+
+
+def test_reach_and_speed_are_respected(gappo: Allocator) -> None:
+    """With short ranges, travel times and own positions no agent is sent too far, and T is near the bound."""
+    for family in (
+        Family(agents=60, tasks=12, starts="own", communication_range=(0.3, 0.6), battery=None),
+        Family(agents=60, tasks=12, starts="own", speed=(0.5, 2.0), battery=None),
+    ):
+        result = solve(random_instance(family, 11), gappo, iterations=5, time_limit_s=None)
+        assert result.evaluation is not None
+        assert result.evaluation.violations == ()
+        assert result.gap is None or result.gap < 0.25
+
+
+def test_same_seed_same_answer(gappo: Allocator) -> None:
+    """Counted in sweeps, a run is reproducible, from several threads at once too."""
+    instance = paper_like(30, 6, 120, seed=9)
+    answers: list[Allocation | None] = [None] * 3
+
+    def run(number: int) -> None:
+        settings = {"iterations": 3, "time_limit_s": None, "seed": 3, "threads": 1, "handle_signals": False}
+        answers[number] = solve(instance, gappo, objective="makespan-energy", **settings).allocation
+
+    workers = [threading.Thread(target=run, args=(number,)) for number in range(3)]
+    for worker in workers:
+        worker.start()
+    for worker in workers:
+        worker.join()
+    assert answers[0] is not None
+    assert answers[0] == answers[1] == answers[2]
+
+
+def test_global_generators_are_left_alone(gappo: Allocator) -> None:
+    """A run draws from its own generators, and leaves torch's thread count as it was."""
+    threads, before = torch.get_num_threads(), torch.random.get_rng_state()
+    solve(paper_like(30, 6, 120, seed=9), gappo, iterations=2, time_limit_s=None)
+    assert torch.equal(torch.random.get_rng_state(), before)
+    assert torch.get_num_threads() == threads
+
+
+def test_a_warm_start_is_built_on(gappo: Allocator) -> None:
+    """Started from a perfect plan, the answer is as good."""
+    instance = Instance(ability=np.ones(12), workload=np.full(4, 3.0))
+    perfect = Allocation(np.arange(12) % 4)
+    assert solve(instance, gappo, start=perfect, iterations=2, time_limit_s=None).makespan == 1.0
+
+
+def test_local_search_goes_on_from_the_policy() -> None:
+    """The hybrid is no worse than one game of the policy alone."""
+    instance = paper_like(40, 8, 160, seed=3)
+    alone = solve(instance, "gappo", iterations=0, time_limit_s=None, objective="makespan-energy").evaluation
+    both = solve(instance, "gappo-ls", iterations=20, time_limit_s=None, objective="makespan-energy").evaluation
+    assert alone is not None
+    assert both is not None
+    assert both.is_better_than(alone, Objective.MAKESPAN_ENERGY)
+
+
+def test_too_large_an_instance_is_refused_beforehand(gappo: Allocator) -> None:
+    """Where a single game would not end in time, it says so and names its limit."""
+    huge = Instance(ability=np.ones(10_000), workload=np.ones(1_000))
+    assert gappo.refusal(huge, Objective.MAKESPAN, Budget(time_limit_s=1.0)) is not None
+    with pytest.raises(RefusedError, match="may take 5 s"):
+        solve(huge, gappo, time_limit_s=1.0)
+
+
+def test_a_policy_of_ones_own(tmp_path: Path) -> None:
+    """A policy file that somebody trained is played by the method that trained it, and by no other."""
+    torch.manual_seed(0)
+    save_policy(tmp_path / "own.safetensors", [ActorCritic(NetworkSize(8, 8, 2))], "ppo")
+    instance = paper_like(12, 4, 50, 0)
+    result = solve(instance, "ppo", policy=tmp_path / "own.safetensors", iterations=2, time_limit_s=None)
+    assert result.makespan is not None
+    with pytest.raises(InputError, match="method: is 'ppo', this version needs 'gappo'"):
+        load("gappo", policy=tmp_path / "own.safetensors")
+
+
+def test_unknown_policy_file() -> None:
+    """A policy file that is not there is told before anything runs."""
+    with pytest.raises(InputError, match="no such policy file"):
+        load("gappo", policy="/nonexistent/policy.safetensors")
+
+
+@pytest.mark.parametrize("device", ["nonsense", "cuda:99", "xpu:7", "meta"])
+def test_devices_that_are_not_there(device: str) -> None:
+    """A device that cannot be used is told in one line."""
+    with pytest.raises(InputError, match=r"device: .* cannot be used here") as caught:
+        load("gappo", device=device)
+    assert "\n" not in str(caught.value)
+
+
+def test_degenerate_instances(gappo: Allocator) -> None:
+    """One agent and one task, nothing to do, nobody able: no method may stumble over them."""
+    assert solve(Instance(ability=[2], workload=[3]), gappo, time_limit_s=0.3).makespan == 1.5
+    assert solve(Instance(ability=[1, 1], workload=[0, 0]), gappo, time_limit_s=0.3).makespan == 0
+    nobody = Instance(ability=[1], workload=[1], allowed_tasks=[[]])
+    assert solve(nobody, gappo, time_limit_s=0.3).status is Status.INFEASIBLE
