@@ -1,0 +1,342 @@
+"""The planner: parts that cover what is lacking, aims, and what comes out on instances of every kind."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import torch
+from boards import EXTREMES
+from oracle import brute_force
+from tiny_instances import tiny_instance
+
+from alloc.allocators import Budget, Deadline, Search
+from alloc.allocators.learned.network import ActorCritic, NetworkSize
+from alloc.allocators.learned.planner import Planner, PlannerParameters, cover
+from alloc.problems import IDLE, Allocation, Family, Instance, Objective, evaluate, random_instance
+from alloc.problems.game.parts import lay_out_parts
+from alloc.problems.generate import paper_like
+
+QUICK = PlannerParameters(lane_pairs=1500, rounds=8)
+ENERGY = Objective.MAKESPAN_ENERGY
+
+
+@pytest.fixture(scope="module")
+def network() -> ActorCritic:
+    """A network that knows nothing: what is promised here does not hang on what was learned."""
+    torch.manual_seed(0)
+    network = ActorCritic(NetworkSize(8, 8, 2)).requires_grad_(False)
+    network.reserve[-1].bias.fill_(-1.0)
+    return network
+
+
+def planner(
+    network: ActorCritic,
+    instance: Instance,
+    objective: Objective = Objective.MAKESPAN,
+    iterations: int | None = 3,
+    time_limit_s: float | None = None,
+    **settings: object,
+) -> Planner:
+    budget = Budget(time_limit_s, iterations)
+    return Planner(Search(instance, objective, budget, **settings), [network], QUICK)  # type: ignore[arg-type]
+
+
+def planned(network: ActorCritic, instance: Instance, **settings: object) -> Search:
+    """Run a planner to its end."""
+    one = planner(network, instance, **settings)  # type: ignore[arg-type]
+    one.run()
+    return one.search
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_cover_partitions_tasks_into_neighbours(seed: int) -> None:
+    """Groups are of one size and share no task; all tasks are in one, but for fewer than a group."""
+    rng = np.random.default_rng(seed)
+    m, size = int(rng.integers(1, 30)), int(rng.integers(1, 6))
+    size = min(size, m)
+    groups = cover(rng.random((m, 3)), np.zeros(m), size, rng)
+    assert groups.shape == (m // size, size)
+    assert len(np.unique(groups)) == groups.size
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_cover_is_about_what_is_lacking(seed: int) -> None:
+    """Where something is lacking, each group has a task that lacks, and as much to spare as is left within its size."""
+    rng = np.random.default_rng(seed)
+    m, size = int(rng.integers(4, 30)), int(rng.integers(2, 5))
+    surplus = rng.integers(-3, 4, m).astype(float)
+    surplus[0] = -1.0
+    groups = cover(rng.random((m, 3)), surplus, size, rng)
+    assert len(np.unique(groups)) == groups.size
+    spare = set(np.flatnonzero(surplus > 0).tolist())
+    for group in groups.tolist():
+        assert (surplus[group] < 0).any()
+        if spare:
+            assert spare & set(group), "help was left, and none was taken in"
+        spare -= set(group)
+
+
+def test_cover_brings_lack_and_surplus_together() -> None:
+    """The nearest that can help come along, however far they are, and no more of them than are needed."""
+    place = np.arange(10.0)[:, None] * [1.0, 0.0, 0.0]
+    surplus = np.zeros(10)
+    surplus[[0, 7, 8, 9]] = [-2.5, 2.0, 1.0, 5.0]
+    groups = cover(place, surplus, 4, np.random.default_rng(0))
+    assert groups.shape == (1, 4)
+    assert {0, 7, 8} < set(groups[0].tolist())
+    assert 9 not in groups[0]
+    assert set(cover(place, surplus, 2, np.random.default_rng(0))[0].tolist()) in ({0, 7}, {0, 8}, {0, 9})
+
+
+def test_cover_groups_near_tasks() -> None:
+    """Two far clusters of four are never mixed."""
+    place = np.repeat([[0.0, 0, 0], [9.0, 0, 0]], 4, axis=0) + 0.1 * np.random.default_rng(0).random((8, 3))
+    for seed in range(20):
+        groups = cover(place, np.zeros(8), 4, np.random.default_rng(seed))
+        assert sorted(map(sorted, groups.tolist())) == [[0, 1, 2, 3], [4, 5, 6, 7]]
+
+
+@pytest.mark.parametrize("scale", [1e-300, 1e300])
+def test_cover_survives_every_position(scale: float) -> None:
+    """Unknown, huge and tiny positions make groups that share no task."""
+    rng = np.random.default_rng(0)
+    place = scale * rng.uniform(-1, 1, (12, 3))
+    place[3] = np.nan
+    groups = cover(place, np.zeros(12), 3, rng)
+    assert sorted(groups.ravel().tolist()) == list(range(12))
+
+
+def test_parts_hold_everyone_who_works_there(network: ActorCritic) -> None:
+    """Each part has the agents of its tasks and some of the idle; nobody is in two."""
+    instance = paper_like(40, 9, 170, 1)
+    one = planner(network, instance)
+    one.plan = np.random.default_rng(0).integers(-1, 9, 40)
+    for _ in range(10):
+        tasks, agents = one._cover(np.zeros(9))
+        together = np.concatenate(agents)
+        assert len(np.unique(together)) == len(together)
+        for some, who in zip(tasks, agents, strict=True):
+            assert set(one.plan[who].tolist()) <= {*some.tolist(), IDLE}
+            assert set(np.flatnonzero(np.isin(one.plan, some)).tolist()) <= set(who.tolist())
+        assert set(np.flatnonzero(one.plan == IDLE).tolist()) <= set(together.tolist())
+
+
+def test_a_sweep_leaves_all_other_agents_alone(network: ActorCritic) -> None:
+    """Agents of parts that were not accepted, and those in no part, stay where they are."""
+    instance = paper_like(40, 9, 170, 1)
+    one = planner(network, instance)
+    one.plan = instance.start_task.copy()
+    tasks, agents = one._cover(one._surplus())
+    parts = lay_out_parts(instance, one.aim, one.plan, tasks, agents)
+    accepted, slots = one._play_parts(network, parts, (0.4, 2.4))
+    assert accepted.any()
+    merged = parts.merge(one.plan, slots, accepted)
+    may_move = np.concatenate([agents[part] for part in np.flatnonzero(accepted)])
+    others = np.setdiff1d(np.arange(40), may_move)
+    assert np.array_equal(merged[others], one.plan[others])
+    assert not np.array_equal(merged, one.plan)
+    assert evaluate(instance, Allocation(merged)).violations == ()
+
+
+def test_what_is_accepted_lacks_less(network: ActorCritic) -> None:
+    """With every merged plan less is lacking in total, or as much at less distance."""
+    instance = paper_like(40, 9, 170, 1)
+    one = planner(network, instance)
+    one.play_whole()
+    met = []
+    for _ in range(12):
+        surplus, score = one._surplus(), evaluate(instance, Allocation(one.plan))
+        met.append((round(float(-surplus[surplus < 0].sum()), 4), score.distance))
+        tasks, agents = one._cover(surplus)
+        parts = lay_out_parts(instance, one.aim, one.plan, tasks, agents)
+        accepted, slots = one._play_parts(network, parts, (0.4, 2.4))
+        one.plan = parts.merge(one.plan, slots, accepted)
+    assert all(later <= earlier for earlier, later in pairwise(met))
+    assert met[-1] < met[0]
+
+
+@pytest.mark.parametrize("objective", list(Objective))
+def test_never_worse_than_the_start(network: ActorCritic, objective: Objective) -> None:
+    """Whatever it begins from, what comes back is as good, and each improvement is better than the one before."""
+    instance = paper_like(30, 6, 130, 2)
+    start = Allocation(np.arange(30) % 6)
+    search = planned(network, instance, objective=objective, start=start)
+    assert search.best is not None
+    assert not evaluate(instance, start).is_better_than(search.best.evaluation, objective)
+    for earlier, later in pairwise(search.trace):
+        assert not earlier.evaluation.is_better_than(later.evaluation, Objective.MAKESPAN)
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_tiny_instances_by_brute_force(network: ActorCritic, seed: int) -> None:
+    """On instances of every kind the plan is allowed, serves all that can be served, and is not below the optimum."""
+    instance = tiny_instance(seed)
+    search = planned(network, instance, objective=ENERGY, iterations=2)
+    best = brute_force(instance)
+    assert search.best is not None
+    got = search.best.evaluation
+    assert got.violations == ()
+    assert len(got.unserved_tasks) == best.unserved
+    assert got.served_makespan >= best.makespan * (1 - 1e-9)
+
+
+def test_most_tiny_instances_are_solved(network: ActorCritic) -> None:
+    """Even with a network that knows nothing, games on parts find the least makespan of four in five."""
+    hit = 0
+    for seed in range(20):
+        instance = tiny_instance(seed)
+        search = planned(network, instance, iterations=5)
+        assert search.best is not None
+        hit += search.best.evaluation.served_makespan <= brute_force(instance).makespan * (1 + 1e-9)
+    assert hit >= 16
+
+
+def test_first_aim_is_the_bound_and_then_half_way(network: ActorCritic) -> None:
+    """Aims: the bound; halfway to what was reached after patience is out; nearer the bound when an aim is reached."""
+    instance = Instance(ability=[3, 3, 3], workload=[4, 5])  # the bound of 1 cannot be met: 5 / 3 or 4 / 3 at best
+    one = planner(network, instance)
+    bound = one.aim
+    assert bound == one.failed == one.search.lower_bound
+    one._go_on_from(np.array([0, 1, IDLE]))  # T = 5 / 3
+    one._set_aim()
+    assert one.aim == bound
+    one.stale = one.parameters.patience
+    one._set_aim()
+    assert one.failed == bound
+    assert one.aim == pytest.approx((bound + 5 / 3) / 2)
+    assert one.stale == 0
+    one._go_on_from(np.array([0, 1, 1]))  # T = 4 / 3, which is within the aim
+    assert one.aim >= 4 / 3
+    one._set_aim()
+    assert one.aim == pytest.approx((bound + 4 / 3) / 2)
+    one.stale = one.parameters.patience
+    one._set_aim()
+    assert one.failed == pytest.approx((bound + 4 / 3) / 2)
+
+
+def test_energy_counts_once_the_bound_is_met_or_time_is_short(network: ActorCritic) -> None:
+    """With energy in the objective the aim becomes the makespan reached, at the bound, or late in the run."""
+    instance = Instance(ability=[3, 3, 3], workload=[4, 5])
+    early, late = (planner(network, instance, ENERGY, iterations=10) for _ in range(2))
+    late.search.iteration = 7
+    for one in (early, late):
+        one._go_on_from(np.array([0, 1, 1]))
+        one._set_aim()
+    assert early.aim == early.failed
+    assert late.aim == pytest.approx(4 / 3)
+    met = planner(network, Instance(ability=[2, 1], workload=[2, 1], task_position=[[0, 0], [1, 0]]), ENERGY)
+    met._go_on_from(np.array([0, 1]))
+    met._set_aim()
+    assert met.aim == 1.0
+
+
+def test_bounds_that_cannot_be_met_do_not_hold_it_up(network: ActorCritic) -> None:
+    """Where the bound is out of reach, bisection on the aim finds the optimum all the same."""
+    instance = Instance(ability=[5, 5, 5, 4, 4], workload=[9, 8, 6], agent_position=np.zeros((5, 2)))
+    best = brute_force(instance)
+    one = planner(network, instance, iterations=12)
+    one.parameters = replace(QUICK, patience=2)
+    one.run()
+    assert one.search.best is not None
+    assert best.makespan > one.search.lower_bound * 1.01
+    assert one.search.best.evaluation.makespan == pytest.approx(best.makespan)
+
+
+def test_tasks_that_nobody_can_do_are_no_aim(network: ActorCritic) -> None:
+    """A huge task out of reach, and tasks without a hand left, spoil neither bound nor search."""
+    far = Instance(
+        ability=[1] * 10,
+        workload=[6, 4, 90],
+        task_position=[[0, 0], [1, 0], [99, 0]],
+        start_task=[0] * 10,
+        communication_range=[5] * 10,
+    )
+    assert planner(network, far).aim == pytest.approx(1.0)
+    for objective in Objective:
+        search = planned(network, far, objective=objective, iterations=6)
+        assert search.best is not None
+        assert search.best.evaluation.served_makespan == pytest.approx(1.0)
+    few = Instance(ability=[3, 1], workload=[2, 5, 1, 4])
+    search = planned(network, few, iterations=6)
+    assert search.best is not None
+    assert len(search.best.evaluation.unserved_tasks) == brute_force(few).unserved == 2
+
+
+def test_slack_and_limit_buy_energy(network: ActorCritic) -> None:
+    """The more time a plan may take, the less it flies; a limit that is given is what is aimed at."""
+    instance = paper_like(24, 5, 100, 3)
+    spent = []
+    for deadline in (Deadline(), Deadline(slack=0.3), Deadline(limit=3.0)):
+        search = planned(network, instance, objective=ENERGY, iterations=8, deadline=deadline)
+        assert search.best is not None
+        assert search.best.evaluation.makespan is not None
+        assert search.best.evaluation.makespan <= search.makespan_limit * (1 + 1e-9)
+        spent.append(search.best.evaluation.energy)
+    assert spent[2] < spent[1] < spent[0]
+    assert planner(network, instance, ENERGY, deadline=Deadline(limit=3.0)).aim == 3.0
+    assert planner(network, instance, ENERGY, deadline=Deadline(limit=0.5)).aim == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("objective", list(Objective))
+def test_same_seed_same_answer(network: ActorCritic, objective: Objective) -> None:
+    """Counted in sweeps, answers agree move by move with one thread and with two; another seed's differ."""
+    instance = random_instance(Family(agents=24, tasks=5, starts="own", speed=(0.5, 2.0)), 1)
+    runs = [planned(network, instance, objective=objective, threads=threads, seed=4) for threads in (1, 1, 2)]
+    other = planned(network, instance, objective=objective, seed=5)
+    traces = [[one.allocation for one in search.trace] for search in (*runs, other)]
+    assert traces[0] == traces[1] == traces[2]
+    assert traces[0] != traces[3]
+
+
+def test_it_stops_in_time(network: ActorCritic) -> None:
+    """Sweeps and the games in them end when time is up; with no time at all there is still an answer."""
+    instance = paper_like(100, 20, 400, 0)
+    for limit in (0.0, 0.5):
+        one = planner(network, instance, ENERGY, iterations=None, time_limit_s=limit)
+        one.run()
+        assert one.search.best is not None
+        assert one.search.best.evaluation.unserved_tasks == ()
+    assert one.search.iteration > 0
+    assert one.search.elapsed_s < 5.0, "the machine may be busy, but not that busy"
+
+
+@pytest.mark.parametrize("objective", list(Objective))
+@pytest.mark.parametrize("name", list(EXTREMES))
+def test_ends_of_what_is_valid(network: ActorCritic, name: str, objective: Objective) -> None:
+    """Huge and tiny numbers, no positions, nobody able, nothing to do: there is an allowed answer."""
+    search = planned(network, EXTREMES[name], objective=objective)
+    assert search.best is not None
+    assert search.best.evaluation.violations == ()
+
+
+def test_idle_agents_are_put_to_work(network: ActorCritic) -> None:
+    """Agents that begin idle, or are left idle by a start, join where they are needed."""
+    instance = Instance(ability=np.ones(12), workload=np.full(3, 4.0), task_position=np.eye(3))
+    start = Allocation(np.array([0, 1, 2, *[IDLE] * 9]))
+    search = planned(network, instance, start=start, iterations=8)
+    assert search.best is not None
+    assert search.best.evaluation.makespan == 1.0
+
+
+def test_networks_take_turns(network: ActorCritic) -> None:
+    """All networks of a policy are asked for games on parts, the first one for the game on the whole."""
+    asked: list[int] = []
+
+    class Spy(ActorCritic):
+        def __init__(self, number: int) -> None:
+            super().__init__(network.size)
+            self.load_state_dict(network.state_dict())
+            self.requires_grad_(False)
+            self.number = number
+
+        def places(self, *args: object) -> torch.Tensor:
+            asked.append(self.number)
+            return super().places(*args)  # type: ignore[arg-type]
+
+    search = Search(paper_like(12, 4, 50, 3), ENERGY, Budget(None, 8))
+    one = Planner(search, [Spy(0), Spy(1), Spy(2)], QUICK)
+    one.play_whole()
+    assert set(asked) == {0}
+    one.run()
+    assert set(asked) == {0, 1, 2}
