@@ -26,7 +26,8 @@ def parts() -> Parts:
     instance = paper_like(24, 6, 100, 0)
     tasks = np.array([[0, 1, 2], [3, 4, 5]])
     agents = [np.flatnonzero(np.isin(instance.start_task, some)) for some in tasks]
-    return lay_out_parts(instance, 1.0, instance.start_task, tasks, agents)
+    plan = instance.start_task // 3 * 3 + (instance.start_task + 1) % 3  # everybody at another task of the same part
+    return lay_out_parts(instance, 1.0, plan, tasks, agents)
 
 
 def search(time_limit_s: float | None = 10.0, iterations: int | None = None, seed: int = 0) -> Search:
@@ -78,7 +79,7 @@ def test_generations_follow_each_other(networks: list[ActorCritic], parts: Parts
 
 
 def test_games_begin_at_home_or_where_the_plan_is(parts: Parts) -> None:
-    """Of the agents some begin at the nearest task, others where the plan has them, at prices of the range asked for."""
+    """Some agents begin at the nearest task, others where the plan has them, at prices of the range asked for."""
     games = _PartGames(parts, FineTuningParameters(games=200))
     board = games.draw(np.random.default_rng(0), 0.0)
     assert board.shape[0] == 200
