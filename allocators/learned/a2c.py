@@ -25,7 +25,7 @@ from alloc.problems.game import Rules, begin, moved, step
 
 @dataclass(frozen=True)
 class A2cParameters:
-    """Hyperparameters of A2C.
+    """Hyperparameters of A2C; those that matter are from a small random search, `tests/benchmarks/tune_rivals.py`.
 
     Attributes
     ----------
@@ -45,11 +45,11 @@ class A2cParameters:
         Where gradients are clipped.
     """
 
-    learning_rate: float = 2e-3
+    learning_rate: float = 1.1e-3
     final_share: float = 0.1
-    steps: int = 5
-    discount: float = 0.99
-    entropy_weight: float = 0.01
+    steps: int = 2
+    discount: float = 0.97
+    entropy_weight: float = 0.024
     value_weight: float = 0.5
     reward_scale: float = 20.0
     max_gradient_norm: float = 0.5

@@ -33,7 +33,7 @@ from alloc.problems.game import Board, Rules, State
 
 @dataclass(frozen=True)
 class DdpgParameters:
-    """Hyperparameters of DDPG.
+    """Hyperparameters of DDPG; those that matter are from a small random search, `tests/benchmarks/tune_rivals.py`.
 
     Attributes
     ----------
@@ -65,19 +65,19 @@ class DdpgParameters:
         Where gradients are clipped.
     """
 
-    learning_rate: float = 1e-3
+    learning_rate: float = 5e-4
     actor_share: float = 1.0
     final_share: float = 0.1
-    discount: float = 0.9
+    discount: float = 0.5
     reward_scale: float = 5.0
     softness: float = 1.0
-    entropy_weight: float = 0.1
+    entropy_weight: float = 0.07
     final_entropy_weight: float = 0.01
     exploring: float = 0.2
     capacity: int = 10_000
-    minibatch: int = 64
+    minibatch: int = 32
     reuse: float = 1.0
-    target_share: float = 0.01
+    target_share: float = 0.005
     max_gradient_norm: float = 10.0
 
 

@@ -29,7 +29,7 @@ from alloc.problems.game import Board, Rules, State
 
 @dataclass(frozen=True)
 class DqnParameters:
-    """Hyperparameters of DQN.
+    """Hyperparameters of DQN; those that matter are from a small random search, `tests/benchmarks/tune_rivals.py`.
 
     Attributes
     ----------
@@ -59,17 +59,17 @@ class DqnParameters:
         Where gradients are clipped.
     """
 
-    learning_rate: float = 1e-3
+    learning_rate: float = 7e-4
     final_share: float = 0.1
-    discount: float = 0.9
+    discount: float = 0.5
     reward_scale: float = 5.0
-    temperature: float = 0.1
-    final_temperature: float = 0.01
-    exploring: float = 0.2
+    temperature: float = 0.2
+    final_temperature: float = 0.02
+    exploring: float = 0.05
     capacity: int = 10_000
     minibatch: int = 64
     reuse: float = 1.0
-    target_period: int = 100
+    target_period: int = 300
     double: bool = True
     max_gradient_norm: float = 10.0
 
