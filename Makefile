@@ -31,10 +31,10 @@ wheel: $(VENV)/.checked  ## build dist/*.whl
 # Decisions of agents that each shipped policy was trained on; the seed of all is 0.
 METHODS := gappo ppo a2c dqn ddpg
 STEPS_gappo := 4000000
-STEPS_ppo := 1000000
-STEPS_a2c := 1000000
-STEPS_dqn := 600000
-STEPS_ddpg := 600000
+STEPS_ppo := 250000
+STEPS_a2c := 250000
+STEPS_dqn := 150000
+STEPS_ddpg := 120000
 OPTIONS_gappo := --population 3
 
 policies: $(METHODS:%=out/policies/%.safetensors)  ## train all shipped policies from nothing; `make -j 2 policies` on two cores

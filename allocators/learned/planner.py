@@ -71,12 +71,12 @@ class PlannerParameters:
     """
 
     near: int = NEAR
-    lane_pairs: int = 12_000
+    lane_pairs: int = 4_000
     part_tasks: tuple[int, int] = (2, 6)
-    rounds: int = 12
+    rounds: int = 8
     fresh_share: float = 0.3
     ruined: tuple[float, float] = (0.2, 0.9)
-    scattered_share: float = 0.5
+    scattered_share: float = 0.4
     scattered: tuple[float, float] = (0.05, 0.4)
     temperature: tuple[float, float] = (0.5, 1.0)
     patience: int = 30
