@@ -1,7 +1,7 @@
 """Loops that numba compiles to machine code: at their first call, or read from its cache where that may be written."""
 
 from collections.abc import Callable
-from typing import TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numba
 
@@ -25,7 +25,11 @@ def compiled_loosely(function: Function) -> Function:
 
     Infinities keep their meaning.
     """
-    options = {"nogil": True, "error_model": "numpy", "fastmath": {"contract", "reassoc", "arcp", "nsz", "afn"}}
+    options: dict[str, Any] = {
+        "nogil": True,
+        "error_model": "numpy",
+        "fastmath": {"contract", "reassoc", "arcp", "nsz", "afn"},
+    }
     try:
         return cast(Function, numba.njit(cache=True, **options)(function))
     except RuntimeError:

@@ -61,7 +61,8 @@ class Lane(NamedTuple):
 def gumbel(random: RandomState) -> float:
     """Draw from the standard Gumbel distribution."""
     luck = (F(draw(random, 1 << 24)) + F(0.5)) * F(2.0**-24)
-    return -np.log(-np.log(luck))
+    drawn: float = -np.log(-np.log(luck))
+    return drawn
 
 
 @compiled_loosely

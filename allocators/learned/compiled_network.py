@@ -3,7 +3,8 @@
 What is computed is what `network.py` and `problems.game.observation` say, in single precision; tests compare them.
 """
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import NamedTuple, cast
 
 import numpy as np
 import torch
@@ -18,7 +19,7 @@ Real = NDArray[np.float32]
 Small = NDArray[np.int32]
 Flags = NDArray[np.bool_]
 
-F = np.float32
+F = cast(Callable[[float], float], np.float32)  # to mypy, as to the loops, its numbers are floats like others
 
 
 class Weights(NamedTuple):
@@ -354,4 +355,5 @@ def know_places(
             key[k, j] = said[k]
     layer(pooled, weights.reserve1, said, True)
     layer(said, weights.reserve2, wide[:1], False)
-    return wide[0]
+    score: float = wide[0]
+    return score

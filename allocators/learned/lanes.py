@@ -55,7 +55,8 @@ def views_of(board: Board) -> list[View]:
     pairs = [tensor.numpy() for tensor in (board.legal, board.distance, board.contribution)]
     contiguous = [np.ascontiguousarray(array) for array in (*columns, goal, *pairs)]
     return [
-        View(*(array[game] for array in contiguous), price=float(board.price[game])) for game in range(len(board.price))
+        View._make([*(array[game] for array in contiguous), float(board.price[game])])
+        for game in range(len(board.price))
     ]
 
 
