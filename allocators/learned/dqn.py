@@ -29,7 +29,10 @@ from alloc.problems.game import Board, Rules, State
 
 @dataclass(frozen=True)
 class DqnParameters:
-    """Hyperparameters of DQN; those that matter are from a small random search, `tests/benchmarks/tune_rivals.py`.
+    """Hyperparameters of DQN.
+
+    Rounded from the best of four trials of 25,000 decisions with one seed each (`tests/benchmarks/tune_rivals.py`): too
+    few to tell one from the next.
 
     Attributes
     ----------
