@@ -35,8 +35,8 @@ from alloc.problems.game import Board, Rules, State
 class DdpgParameters:
     """Hyperparameters of DDPG.
 
-    Rounded from the third of four trials of 25,000 decisions with one seed each (`tests/benchmarks/tune_rivals.py`). The
-    two ahead of it evaluate twice as many states per decision; too few trials to tell one from the next.
+    Rounded from the third of four trials of 25,000 decisions with one seed each (`tests/benchmarks/tune_rivals.py`).
+    The two ahead of it evaluate twice as many states per decision; too few trials to tell one from the next.
 
     Attributes
     ----------
