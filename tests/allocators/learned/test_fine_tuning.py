@@ -12,6 +12,8 @@ from alloc.problems import Objective
 from alloc.problems.game.parts import Parts, lay_out_parts
 from alloc.problems.generate import paper_like
 
+pytestmark = pytest.mark.timeout(400)  # the first game waits for the compiler, long on a busy machine
+
 FEW = FineTuningParameters(games=8, rounds=4)
 
 

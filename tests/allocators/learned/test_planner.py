@@ -20,6 +20,8 @@ from alloc.problems import IDLE, Allocation, Family, Instance, Objective, evalua
 from alloc.problems.game.parts import lay_out_parts
 from alloc.problems.generate import paper_like
 
+pytestmark = pytest.mark.timeout(400)  # the first game waits for the compiler, long on a busy machine
+
 QUICK = PlannerParameters(lane_pairs=1500, rounds=8)
 ENERGY = Objective.MAKESPAN_ENERGY
 

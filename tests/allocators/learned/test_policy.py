@@ -15,6 +15,8 @@ from alloc.allocators.learned.policy_file import save_policy
 from alloc.problems import Allocation, Family, InputError, Instance, Objective, random_instance
 from alloc.problems.generate import paper, paper_like
 
+pytestmark = pytest.mark.timeout(400)  # the first game waits for the compiler, long on a busy machine
+
 SHIPPED = [
     name
     for name in ("gappo", "ppo", "a2c", "dqn", "ddpg")
