@@ -30,12 +30,12 @@ wheel: $(VENV)/.checked  ## build dist/*.whl
 
 # Decisions of agents that each shipped policy was trained on; the seed of all is 0.
 METHODS := gappo ppo a2c dqn ddpg
-STEPS_gappo := 4000000
+STEPS_gappo := 1200000
 STEPS_ppo := 250000
 STEPS_a2c := 250000
 STEPS_dqn := 150000
 STEPS_ddpg := 120000
-OPTIONS_gappo := --population 3
+OPTIONS_gappo := --population 3 --set highest_rate=0.001
 
 policies: $(METHODS:%=out/policies/%.safetensors)  ## train all shipped policies from nothing; `make -j 2 policies` on two cores
 	@echo "to ship them: cp out/policies/*.safetensors allocators/learned/policies/"

@@ -1,6 +1,6 @@
 """Games to train on: small instances of many kinds, drawn anew for every update.
 
-Sizes are far below those of the paper's scenarios, which are never trained on. Seeds start where nobody else's do:
+Sizes are below those of the paper's scenarios, which are never trained on. Seeds start where nobody else's do:
 10^9 for training, 2 * 10^9 for validation.
 """
 

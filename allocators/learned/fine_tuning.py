@@ -72,7 +72,7 @@ class _PartGames:
 
 
 class FineTuning:
-    """The population at work on one instance, members in turn; each round of them is a generation.
+    """The population at work on one instance, members in turn; after some lessons of each comes a generation.
 
     Parameters
     ----------

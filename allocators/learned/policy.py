@@ -6,6 +6,7 @@ from pathlib import Path
 import torch
 
 from alloc.allocators.base import Allocator, Proposal
+from alloc.allocators.learned.dqn import DqnParameters
 from alloc.allocators.learned.fine_tuning import FineTuning
 from alloc.allocators.learned.lanes import warm_up as compile_games
 from alloc.allocators.learned.limits import too_large
@@ -82,6 +83,7 @@ class Dqn(PolicyAllocator):
     """A network that estimates what each bid is worth."""
 
     method, trained_by = BUILT_IN["dqn"], "dqn"
+    parameters = PlannerParameters(temperature=(DqnParameters().final_temperature, DqnParameters().temperature))
 
 
 class Ddpg(PolicyAllocator):

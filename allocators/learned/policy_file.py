@@ -14,7 +14,7 @@ from safetensors.torch import save
 from alloc.allocators.learned.network import ActorCritic, NetworkSize
 from alloc.problems import InputError
 from alloc.problems.formats import write_bytes_atomically
-from alloc.problems.game import AGENT_FEATURES, FEATURE_SET, PAIR_FEATURES, TASK_FEATURES
+from alloc.problems.game import AGENT_FEATURES, FEATURE_SET, PAIR_FEATURES, TASK_FEATURES, Turn
 
 POLICY_FORMAT = "alloc-policy/1"
 
@@ -92,11 +92,22 @@ def load_policy(path: Path | str, method: str | None, device: torch.device | Non
     for key in ("format", "method", "features", "feature_counts"):
         if said.get(key) != expected[key]:
             raise InputError(f"is {said.get(key)!r}, this version needs {expected[key]!r}; train anew", key, source)
+    turn = _training(said).get("turn", Turn.BIDDING)
+    if method is not None and turn != Turn.BIDDING:
+        raise InputError(f"was trained for turns by {turn}, but plans are made by {Turn.BIDDING}", "turn", source)
     try:
         return [_network(size, tensors, number, device) for number in range(count)]
     except (RuntimeError, ValueError) as error:
         reason = next(iter(str(error).splitlines()), type(error).__name__)
         raise InputError(f"holds other weights than its size says ({reason})", "size", source) from None
+
+
+def _training(said: Mapping[str, str]) -> dict[str, str]:
+    try:
+        figures = json.loads(said.get("training", "{}"))
+    except ValueError:
+        return {}
+    return figures if isinstance(figures, dict) else {}
 
 
 def _network(

@@ -12,10 +12,7 @@ from alloc.problems.game import (
     Board,
     Rules,
     State,
-    Turn,
     begin,
-    difference_rewards,
-    marginal_contributions,
     step,
     worth,
 )
@@ -34,8 +31,6 @@ class Trajectories:
         As `choose` returns them, filled up with -1.
     log_probability : Tensor, shape (S, B, k)
         Of each action, by the policy that played.
-    share : Tensor, shape (S, B, k)
-        What each action brought: its marginal contribution.
     value, reward : Tensor, shape (S, B)
         Value of the state before the step, and rise of the worth.
     last_value : Tensor, shape (B,)
@@ -46,7 +41,6 @@ class Trajectories:
     state: State
     actions: Tensor
     log_probability: Tensor
-    share: Tensor
     value: Tensor
     reward: Tensor
     last_value: Tensor
@@ -80,25 +74,21 @@ def collect(
     """Play up to `steps` steps of every game on `board`, from `state` on, drawing actions from the policy."""
     state = begin(board) if state is None else state
     before = worth(board, state, rules)
-    columns: list[tuple[State, Tensor, Tensor, Tensor, Tensor, Tensor]] = []
+    columns: list[tuple[State, Tensor, Tensor, Tensor, Tensor]] = []
     for _ in range(steps):
         if bool(state.done.all()):
             break
         scores = network(board, state)
         actions, slot = choose(board, state, scores, rules, 1.0, generator)
         log_probability, _ = log_probabilities(board, state, scores, actions, rules)
-        if rules.turn == Turn.SIMULTANEOUS:
-            share = difference_rewards(board, state, slot, rules)
-        else:
-            share = marginal_contributions(board, state, actions, rules)
         after = step(board, state, slot)
         now = worth(board, after, rules)
         alive = ~state.done
         reward = reward_scale * (now - before)
-        columns.append((state, actions, log_probability, reward_scale * share, scores.value * alive, reward * alive))
+        columns.append((state, actions, log_probability, scores.value * alive, reward * alive))
         state, before = after, now
     last = network(board, state).value.masked_fill(state.done, 0.0)
-    states, actions_, log_probabilities_, shares, values, rewards = zip(*columns, strict=True)
+    states, actions_, log_probabilities_, values, rewards = zip(*columns, strict=True)
     stacked = State(*(torch.stack([getattr(one, field.name) for one in states]) for field in fields(State)))
     moves = max(one.shape[1] for one in actions_)
     return Trajectories(
@@ -106,7 +96,6 @@ def collect(
         stacked,
         _padded(actions_, moves, -1),
         _padded(log_probabilities_, moves, 0.0),
-        _padded(shares, moves, 0.0),
         torch.stack(values),
         torch.stack(rewards),
         last,

@@ -141,7 +141,7 @@ def hop(board: Board, state: State) -> Tensor:
 
 
 def grant(board: Board, state: State, bids: Tensor, reserve: Tensor, most_moves: int | None = None) -> Tensor:
-    """Grant the best bid of each neighbourhood: bids above the reserve that share no task with a better one.
+    """Grant the best bid of each neighbourhood: bids above the reserve that share no task with one granted before.
 
     Parameters
     ----------

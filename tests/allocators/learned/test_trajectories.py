@@ -116,12 +116,10 @@ def test_traces_are_cut_as_by_v_trace() -> None:
 
 @pytest.mark.parametrize("rules", ALL_RULES.values(), ids=list(ALL_RULES))
 def test_rewards_add_up_to_the_rise_of_worth(board: Board, network: ActorCritic, rules: Rules) -> None:
-    """The recorded actions lead to a state that is worth more by the rewards; where agents bid, by their shares too."""
+    """The recorded actions lead to a state that is worth more by the rewards."""
     played = play(network, board, 5, rules)
     rise = worth(board, after(played, rules), rules) - worth(board, begin(board), rules)
     torch.testing.assert_close(played.reward.sum(0), 5 * rise, atol=1e-4, rtol=1e-4)
-    if rules.turn == Turn.BIDDING:
-        torch.testing.assert_close(played.share.sum(2), played.reward, atol=1e-4, rtol=1e-4)
 
 
 def test_the_rise_of_worth_is_that_of_the_evaluator(network: ActorCritic) -> None:
