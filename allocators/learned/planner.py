@@ -66,25 +66,27 @@ class PlannerParameters:
         Sweeps over all parts without success after which a longer makespan is aimed at.
     makespan_share : float
         Share of the budget after which energy counts, if it does, even if the makespan may not be the least.
-    first_price : float
-        Weight of energy in the first game.
+    first_price, second_price : float
+        Weight of energy in the first game, which is the first answer; and in the second, from where games on parts go
+        on if energy counts: it is easier to mend a lack than to save energy.
     """
 
     near: int = NEAR
     lane_pairs: int = 4_000
-    part_tasks: tuple[int, int] = (2, 6)
+    part_tasks: tuple[int, int] = (2, 5)
     rounds: int = 8
     fresh_share: float = 0.3
     ruined: tuple[float, float] = (0.2, 0.9)
-    scattered_share: float = 0.4
+    scattered_share: float = 0.1
     scattered: tuple[float, float] = (0.05, 0.4)
-    temperature: tuple[float, float] = (0.5, 1.0)
+    temperature: tuple[float, float] = (0.4, 0.9)
     patience: int = 30
     makespan_share: float = 0.6
-    first_price: float = 1.0
+    first_price: float = 0.8
+    second_price: float = 3.0
 
 
-PRICES = {Objective.MAKESPAN: (0.2, 0.8), Objective.MAKESPAN_ENERGY: (0.4, 2.4)}
+PRICES = {Objective.MAKESPAN: (0.2, 0.8), Objective.MAKESPAN_ENERGY: (0.6, 3.0)}
 """Weights of energy that games on parts are played at."""
 
 
@@ -125,19 +127,21 @@ class Planner:
 
     def run(self) -> None:
         """Play until the budget ends; every improvement has been submitted by then."""
-        self.play_whole()
+        self.play_whole(self.parameters.first_price)
+        if self.search.objective is Objective.MAKESPAN_ENERGY and not self.search.should_stop():
+            self.play_whole(self.parameters.second_price)
         with ThreadPoolExecutor(STREAMS) as pool:
             self.run_all = pool.map if self.search.threads > 1 else map
             while not self.search.should_stop():
                 self._sweep()
                 self.search.iteration += 1
 
-    def play_whole(self) -> None:
-        """Play one greedy game on the whole instance."""
+    def play_whole(self, price: float) -> None:
+        """Play one greedy game on the whole instance, and go on from where it ends."""
         search, parameters = self.search, self.parameters
         instance = search.instance
         plan = None if search.start is None else search.start.task_of_agent
-        board = make_board([instance], [self.aim], [parameters.first_price], self.rng, near=parameters.near, plan=plan)
+        board = make_board([instance], [self.aim], [price], self.rng, near=parameters.near, plan=plan)
         games = Games(np.zeros(1, dtype=np.int64), board.price.numpy(), board.start.numpy())
         rounds = WHOLE_ROUNDS + 2 * instance.n // instance.m
         best = play_games(self.networks[0], board, games, rounds=rounds, should_stop=self._late)

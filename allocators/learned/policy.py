@@ -17,6 +17,10 @@ from alloc.allocators.search import Budget, Search
 from alloc.problems import Allocation, InputError, Instance, Objective
 
 
+LOCAL_PRICE = 2.0
+"""Weight of energy in the game that local search goes on from."""
+
+
 class PolicyAllocator(Allocator):
     """A learned policy, as shipped or from a file that `alloc train` wrote; subclasses say which.
 
@@ -122,7 +126,7 @@ class GappoLs(Gappo):
         """Play one game on the whole instance, then improve its plan by local search."""
         from alloc.allocators.heuristic.local.improve import improve
 
-        Planner(search, self.networks, self.parameters).play_whole()
+        Planner(search, self.networks, self.parameters).play_whole(LOCAL_PRICE)
         improve(search)
 
 

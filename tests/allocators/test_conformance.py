@@ -2,7 +2,6 @@
 
 import inspect
 import sys
-from importlib.resources import files
 from typing import ClassVar
 
 import pytest
@@ -60,31 +59,21 @@ class TestGappoLs(AllocatorConformance):
     name = "gappo-ls"
 
 
-def unless_shipped(name: str) -> pytest.MarkDecorator:
-    """Skip a method whose policy has not been trained yet."""
-    policy = files("alloc.allocators.learned") / "policies" / f"{name}.safetensors"
-    return pytest.mark.skipif(not policy.is_file(), reason=f"the policy of {name} is not there yet")
-
-
-@unless_shipped("ppo")
 class TestPpo(AllocatorConformance):
     name = "ppo"
     iterations = 4
 
 
-@unless_shipped("a2c")
 class TestA2c(AllocatorConformance):
     name = "a2c"
     iterations = 4
 
 
-@unless_shipped("dqn")
 class TestDqn(AllocatorConformance):
     name = "dqn"
     iterations = 4
 
 
-@unless_shipped("ddpg")
 class TestDdpg(AllocatorConformance):
     name = "ddpg"
     iterations = 4
