@@ -16,7 +16,6 @@ from alloc.allocators.registry import BUILT_IN
 from alloc.allocators.search import Budget, Search
 from alloc.problems import Allocation, InputError, Instance, Objective
 
-
 LOCAL_PRICE = 2.0
 """Weight of energy in the game that local search goes on from."""
 

@@ -148,7 +148,7 @@ def test_what_is_accepted_lacks_less(network: ActorCritic) -> None:
     """With every merged plan less is lacking in total, or as much at less distance."""
     instance = paper_like(40, 9, 170, 1)
     one = planner(network, instance)
-    one.play_whole()
+    one.play_whole(1.0)
     met = []
     for _ in range(12):
         surplus, score = one._surplus(), evaluate(instance, Allocation(one.plan))
@@ -335,7 +335,7 @@ def test_networks_take_turns(network: ActorCritic, monkeypatch: pytest.MonkeyPat
 
     monkeypatch.setattr("alloc.allocators.learned.planner.play_games", spy)
     one = Planner(Search(paper_like(12, 4, 50, 3), ENERGY, Budget(None, 8)), networks, QUICK)
-    one.play_whole()
+    one.play_whole(1.0)
     assert asked == [0]
     one.run()
     assert set(asked) == {0, 1, 2}
