@@ -12,6 +12,7 @@ import multiprocessing
 import os
 import sys
 import threading
+import time
 from collections.abc import Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, fields
@@ -30,6 +31,9 @@ PAGE = Path(__file__).parents[2] / "docs" / "learned_methods.md"
 EQUAL = 1e-9
 """Relative difference up to which two makespans or energies are equal, as for the evaluator."""
 
+ENOUGH = 0.9
+"""Share of a core below which the time that a run was given is not to be believed."""
+
 
 @dataclass(frozen=True, order=True)
 class Task:
@@ -45,7 +49,10 @@ class Task:
 
 @dataclass(frozen=True)
 class Row:
-    """What came of it: makespans in hours (served tasks alone in `served`), energy, seconds; `why` there is nothing."""
+    """What came of it: makespans in hours (served tasks alone in `served`), energy, seconds; `why` there is nothing.
+
+    `busy` is processor time over wall-clock time: well below 1, something else had the core, or the method waited.
+    """
 
     task: Task
     makespan: float = np.inf
@@ -56,6 +63,7 @@ class Row:
     first_seconds: float = np.nan
     first_makespan: float = np.nan
     bound: float = 0.0
+    busy: float = np.nan
     why: str = ""
 
     @property
@@ -91,6 +99,7 @@ def measure(task: Task, *, first_only: bool = False) -> Row:
     allocator, instance = loaded(task.method), ALL[task.family](task.seed)
     enough = threading.Event()
     gc.collect()
+    begin, spent = time.monotonic(), time.process_time()
     try:
         result = solve(
             instance,
@@ -119,6 +128,7 @@ def measure(task: Task, *, first_only: bool = False) -> Row:
         first_seconds=first.time_s,
         first_makespan=first.evaluation.served_makespan,
         bound=result.lower_bound or 0.0,
+        busy=(time.process_time() - spent) / max(time.monotonic() - begin, 1e-9),
     )
 
 
@@ -148,6 +158,11 @@ def run(
             print(f"{count} of {len(left)} runs: {row.task.method}, {row.task.family}", file=sys.stderr, flush=True)
     if kept is not None:
         write(kept, [done[task] for task in sorted(done)])
+    poor = sum(done[task].busy < ENOUGH for task in tasks)
+    if poor:
+        print(
+            f"{poor} of {len(tasks)} runs had less than {ENOUGH:.0%} of a core: is the machine busy?", file=sys.stderr
+        )
     return [done[task] for task in tasks]
 
 

@@ -137,6 +137,8 @@ def behind(found: Cells, limits: list[float], method: str = "gappo") -> str:
             line.append("; ".join(told))
         if any(line):
             lines.append([family, objective, *line])
+    if not any(key[2] == method for key in found):
+        return ""
     if not lines:
         return f"`{method}` is nowhere behind {' or '.join(RIVALS)}."
     head = "family | objective | " + " | ".join(_named(limit) for limit in limits)
@@ -183,7 +185,7 @@ def main() -> None:
     found, least = cells(rows), references(rows)
     limits = options.time_limits
     parts = (summary(found, limits), behind(found, limits), family_tables(found, least, limits))
-    text = "First on most instances, and on how many:\n\n" + "\n\n".join(parts)
+    text = "First on most instances, and on how many:\n\n" + "\n\n".join(filter(None, parts))
     print(text)
     plot = options.plot or (PAGE.with_name("who_wins.png") if options.publish else None)
     if plot is not None:
