@@ -32,7 +32,7 @@ SPACES: dict[str, tuple[float, float] | tuple[int, int]] = {
 }
 """Least and most of what is tuned, drawn in proportion; a method is tuned in those that it has and uses."""
 
-SHARES: dict[str, tuple[float, float]] = {"discount": (0.8, 1.0), "clip": (0.05, 0.4), "smoothing": (0.8, 1.0)}
+SHARES: dict[str, tuple[float, float]] = {"discount": (0.4, 1.0), "clip": (0.05, 0.4), "smoothing": (0.8, 1.0)}
 """The same, drawn evenly."""
 
 

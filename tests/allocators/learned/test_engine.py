@@ -99,7 +99,8 @@ def test_an_item_that_always_kills_is_given_up(tmp_path: Path) -> None:
         first = engine.map(jobs.pid, [0])
         assert first is not None
         os.kill(first[0], signal.SIGKILL)
-        assert gone(first[0])
+        while engine._workers[0].alive:  # its threads may outlive its first one for a moment
+            time.sleep(0.01)
         assert engine.map(jobs.square, [3]) == [9]
 
 
