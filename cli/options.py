@@ -5,7 +5,23 @@ from typing import Annotated
 
 import typer
 
-BUILT_IN_METHODS = ("auto", "greedy", "local-search", "milp", "cpsat", "ga", "hedonic", "auction", "lp-round", "gappo")
+BUILT_IN_METHODS = (
+    "auto",
+    "greedy",
+    "local-search",
+    "milp",
+    "cpsat",
+    "ga",
+    "hedonic",
+    "auction",
+    "lp-round",
+    "gappo",
+    "gappo-ls",
+    "ppo",
+    "a2c",
+    "dqn",
+    "ddpg",
+)
 """For completion alone, which must not wait for numpy; a test compares them with the registry."""
 
 READABLE = "a .json or .npz file, a folder with agents.csv and tasks.csv, or - for JSON on standard input"
