@@ -212,7 +212,7 @@ def _hint(option: str, method: Method) -> str:
     """Say which option may be meant, or which of our methods takes this one."""
     takers = [other.name for other in BUILT_IN.values() if option in other.options]
     if takers:
-        return f"; {' and '.join(takers)} does"
+        return f"; {', '.join(takers)} {'do' if len(takers) > 1 else 'does'}"
     return nearest(option, method.options) if method.options else ""
 
 

@@ -6,7 +6,10 @@ from pathlib import Path
 
 import pytest
 
+import alloc.problems
+
 ROOT = Path(__file__).parents[1]
+CODE = Path(alloc.problems.__file__).parents[1]  # where it is installed: beside the documents, or not
 PAGES = ("paper.md", "gappo.md")
 
 
@@ -36,8 +39,8 @@ def defines(body: list[ast.stmt], name: str) -> bool:
 def test_every_name_is_in_the_code(page: str) -> None:
     """A function, class or constant that is renamed or moved takes its mention along."""
     named = references(page)
-    missing = [f"{path}:{name}" for path, name in named if not (ROOT / path).is_file()]
-    trees = {path: ast.parse((ROOT / path).read_text("utf-8")).body for path, _ in named if (ROOT / path).is_file()}
+    missing = [f"{path}:{name}" for path, name in named if not (CODE / path).is_file()]
+    trees = {path: ast.parse((CODE / path).read_text("utf-8")).body for path, _ in named if (CODE / path).is_file()}
     missing += [f"{path}:{name}" for path, name in named if path in trees and not defines(trees[path], name)]
     assert len(named) > 3
     assert missing == []

@@ -171,7 +171,7 @@ def test_names_known_without_numpy_are_those_of_the_registry():
     ("words", "count", "expected"),
     [
         ("alloc sol", 1, ["solve"]),
-        ("alloc solve x.json --method g", 4, ["greedy", "ga", "gappo"]),
+        ("alloc solve x.json --method g", 4, ["greedy", "ga", "gappo", "gappo-ls"]),
         ("alloc compare x.json --methods greedy,c", 4, ["greedy,cpsat"]),
         ("alloc solve x", 2, []),
     ],
