@@ -39,8 +39,9 @@ def defines(body: list[ast.stmt], name: str) -> bool:
 def test_every_name_is_in_the_code(page: str) -> None:
     """A function, class or constant that is renamed or moved takes its mention along."""
     named = references(page)
-    missing = [f"{path}:{name}" for path, name in named if not (CODE / path).is_file()]
-    trees = {path: ast.parse((CODE / path).read_text("utf-8")).body for path, _ in named if (CODE / path).is_file()}
+    files = {path: (ROOT if path.startswith("examples/") else CODE) / path for path, _ in named}
+    missing = [f"{path}:{name}" for path, name in named if not files[path].is_file()]
+    trees = {path: ast.parse(file.read_text("utf-8")).body for path, file in files.items() if file.is_file()}
     missing += [f"{path}:{name}" for path, name in named if path in trees and not defines(trees[path], name)]
     assert len(named) > 3
     assert missing == []
