@@ -195,6 +195,18 @@ class Planner:
         elif self.stale >= self.parameters.patience:
             self.failed = self.aim
             self._aim_at((self.aim + reached) / 2)
+        elif self.aim < self._balanced() * (1 - ROUNDING):
+            self._aim_at(min(self._balanced(), (self.aim + reached) / 2))
+
+    def _balanced(self) -> float:
+        """Hours that the plan would take if its work were shared out without a rest, flights included; 0 without."""
+        instance = self.search.instance
+        agent = np.flatnonzero(self.plan != IDLE)
+        if not np.isfinite(instance.speed).any() or not len(agent):
+            return 0.0
+        ability = instance.ability[agent]
+        flight = instance.reach.distance_of(agent, self.plan[agent]) / instance.speed[agent]
+        return float((instance.workload.sum() + ability @ flight) / ability.sum())
 
     def _aim_at(self, hours: float) -> None:
         self.aim, self.stale, self.least_shortfall = hours, 0, np.inf

@@ -339,3 +339,18 @@ def test_networks_take_turns(network: ActorCritic, monkeypatch: pytest.MonkeyPat
     assert asked == [0]
     one.run()
     assert set(asked) == {0, 1, 2}
+
+
+def test_with_finite_speeds_the_aim_allows_for_the_flights() -> None:
+    """Two agents of 1 per hour fly 1 h and 3 h to work of 2 in all: shared out without a rest, it ends after 3 h."""
+    instance = Instance(
+        ability=[1.0, 1.0],
+        workload=[1.0, 1.0],
+        task_position=[[0.0, 0.0], [1.0, 0.0]],
+        agent_position=[[0.0, 1.0], [1.0, 3.0]],
+        speed=[1.0, 1.0],
+    )
+    planner = Planner(Search(instance, Objective.MAKESPAN, Budget(1.0)), [ActorCritic()])
+    assert planner._balanced() == 0.0
+    planner.plan = np.array([0, 1])
+    assert planner._balanced() == pytest.approx((2 + 1 + 3) / 2)
