@@ -195,8 +195,8 @@ class Planner:
         elif self.stale >= self.parameters.patience:
             self.failed = self.aim
             self._aim_at((self.aim + reached) / 2)
-        elif self.aim < self._balanced() * (1 - ROUNDING):
-            self._aim_at(min(self._balanced(), (self.aim + reached) / 2))
+        elif self.aim < (balanced := self._balanced()) * (1 - ROUNDING):
+            self._aim_at(min(balanced, (self.aim + reached) / 2))
 
     def _balanced(self) -> float:
         """Hours that the plan would take if its work were shared out without a rest, flights included; 0 without."""
