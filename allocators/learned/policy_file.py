@@ -92,7 +92,7 @@ def load_policy(path: Path | str, method: str | None, device: torch.device | Non
     for key in ("format", "method", "features", "feature_counts"):
         if said.get(key) != expected[key]:
             raise InputError(f"is {said.get(key)!r}, this version needs {expected[key]!r}; train anew", key, source)
-    turn = _training(said).get("turn", Turn.BIDDING)
+    turn = _turn(said, source)
     if method is not None and turn != Turn.BIDDING:
         raise InputError(f"was trained for turns by {turn}, but plans are made by {Turn.BIDDING}", "turn", source)
     try:
@@ -102,12 +102,12 @@ def load_policy(path: Path | str, method: str | None, device: torch.device | Non
         raise InputError(f"holds other weights than its size says ({reason})", "size", source) from None
 
 
-def _training(said: Mapping[str, str]) -> dict[str, str]:
+def _turn(said: Mapping[str, str], source: str) -> str:
     try:
-        figures = json.loads(said.get("training", "{}"))
-    except ValueError:
-        return {}
-    return figures if isinstance(figures, dict) else {}
+        turn: str = json.loads(said.get("training", "{}")).get("turn", Turn.BIDDING)
+    except (AttributeError, ValueError):
+        raise InputError("does not describe its training; use a file by `alloc train`", "training", source) from None
+    return turn
 
 
 def _network(

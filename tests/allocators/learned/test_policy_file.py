@@ -101,3 +101,14 @@ def test_tensors_without_description(tmp_path: Path) -> None:
     save_file({"a": torch.zeros(2)}, tmp_path / "p.safetensors")
     with pytest.raises(InputError, match="does not describe its networks"):
         load_policy(tmp_path / "p.safetensors", "gappo")
+
+
+def test_policies_for_other_turns_are_refused(tmp_path: Path) -> None:
+    """What agents that choose at once learned does not bid; training goes on from it all the same."""
+    path = tmp_path / "policy.safetensors"
+    save_policy(path, [ActorCritic()], "ppo", {"turn": "simultaneous"})
+    with pytest.raises(InputError, match=r"turn: was trained for turns by simultaneous"):
+        load_policy(path, "ppo")
+    assert len(load_policy(path, None)) == 1
+    save_policy(path, [ActorCritic()], "ppo", {"turn": "bidding"})
+    assert len(load_policy(path, "ppo")) == 1
