@@ -10,7 +10,7 @@ from alloc.problems.generate import paper, paper_like, random_instance
 from alloc.problems.generate_covering import machine_covering
 from alloc.problems.generate_family import Family
 from alloc.problems.instance import IDLE, Instance
-from alloc.problems.matching import contested_tasks, fewest_unserved, serve_all
+from alloc.problems.matching import contested_tasks, easiest_tasks, fewest_unserved, serve_all
 from alloc.problems.reach import Reach
 
 __all__ = [
@@ -27,6 +27,7 @@ __all__ = [
     "agent_classes",
     "contested_tasks",
     "count_classes",
+    "easiest_tasks",
     "energy_lower_bound",
     "evaluate",
     "fewest_unserved",

@@ -3,6 +3,7 @@
 from collections import deque
 
 import numpy as np
+from numpy.typing import NDArray
 
 from alloc.problems.allocation import Allocation
 from alloc.problems.instance import IDLE, Instance, IntArray
@@ -183,6 +184,25 @@ def fewest_unserved(instance: Instance) -> int:
     copies = np.minimum(np.bincount(reach.origin, minlength=len(degree)), degree)
     graph = table[np.repeat(np.arange(len(degree)), copies)][:, tasks].T.tocsr()
     return int((maximum_bipartite_matching(graph, perm_type="column") == IDLE).sum())
+
+
+def easiest_tasks(instance: Instance) -> NDArray[np.bool_]:
+    """Return which tasks to serve where not all can be, shape (m,): as many as possible, and of these the least work.
+
+    Tasks that can be served together are the independent sets of a matroid, so that taking them from the least
+    workload on, where they can be served along with those before, gives the least sum, and the least k-th workload for
+    each k (Edmonds 1971, doi:10.1007/BF01584082). Tasks without workload are not among them.
+    """
+    tasks = _needs_agent(instance)
+    tasks = tasks[np.argsort(instance.workload[tasks], kind="stable")]
+    served = np.zeros(instance.m, dtype=np.bool_)
+    if instance.reach.is_complete:
+        served[tasks[: instance.n]] = True
+        return served
+    matching = _start(instance, np.full(instance.n, IDLE, dtype=np.intp), len(tasks))
+    for j in tasks.tolist():
+        served[j] = matching.serve(j) is None
+    return served
 
 
 def contested_tasks(instance: Instance) -> IntArray | None:

@@ -91,10 +91,11 @@ def judge(view: View, lane: Lane, total: bool) -> None:
             else:
                 unserved += 1
     shortfall = short / max(needed, 1e-3) if total else max(worst, 0.0)
-    distance = 0.0
+    distance, crew = 0.0, 0
     for agent in range(len(lane.slot)):
         distance += view.distance[agent, lane.slot[agent]]
-    distance /= len(lane.slot)
+        crew += view.ability[agent] > 0
+    distance /= max(crew, 1)
     old = lane.figures
     if unserved != old[UNSERVED]:
         better = unserved < old[UNSERVED]

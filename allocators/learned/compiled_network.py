@@ -211,7 +211,8 @@ def see_places(view: View, task: Small, group: Real, lack: Real, x: Real, weight
     places = len(lack)
     members = np.zeros(places, dtype=np.float32)
     for agent in range(len(task)):
-        members[task[agent]] += F(1)
+        if view.ability[agent] > 0:
+            members[task[agent]] += F(1)
     total = F(0)
     short = F(0)
     spare = F(0)

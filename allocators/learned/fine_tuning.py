@@ -123,8 +123,8 @@ class FineTuning:
             [sum(report.evaluations for report in reports) for reports in latest],
             BREEDING,
         )
-        states = breed([member.state() for member in self.members], scores, BREEDING, self.lessons)
-        for member, state in zip(self.members, states, strict=True):
+        members = [copy.deepcopy(member.state()) for member in self.members]  # loading one changes what it shares
+        for member, state in zip(self.members, breed(members, scores, BREEDING, self.lessons), strict=True):
             member.load(copy.deepcopy(state))
 
 

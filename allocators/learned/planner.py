@@ -1,8 +1,10 @@
 """From a policy to a plan: games on the whole instance first, then games on parts of it, until time is up."""
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import astuple, dataclass, fields, replace
+from functools import cached_property
 
 import numpy as np
 import scipy.optimize
@@ -10,17 +12,17 @@ import scipy.sparse.csgraph  # noqa: F401 - bounds and matchings load both: load
 import torch
 from numpy.typing import NDArray
 
-from alloc.allocators.learned.curriculum import reference_makespan
+from alloc.allocators.learned.aims import Aims
 from alloc.allocators.learned.fine_tuning import FineTuning
 from alloc.allocators.learned.lanes import Games, play_games
 from alloc.allocators.learned.limits import NEAR
 from alloc.allocators.learned.network import ActorCritic
 from alloc.allocators.learned.rollout import Best, position
 from alloc.allocators.search import Search
-from alloc.problems import IDLE, Allocation, Instance, Objective, fewest_unserved, serve_all
+from alloc.problems import IDLE, Allocation, Instance, Objective, easiest_tasks, fewest_unserved, serve_all
 from alloc.problems.distances import unit_of
-from alloc.problems.game import begin, make_board, pick
-from alloc.problems.game.board import working_share
+from alloc.problems.game import Board, begin, make_board, pick
+from alloc.problems.game.candidates import Layout, near_tasks
 from alloc.problems.game.parts import Parts, lay_out_parts
 
 Ints = NDArray[np.int64]
@@ -32,10 +34,7 @@ MOST_LANES = 64
 """Games on one part in a stream."""
 
 WHOLE_ROUNDS = 16
-"""Most rounds of a game on the whole instance, besides two for every agent that the mean task gets."""
-
-ROUNDING = 1e-9
-"""Share of the need by which a group may be off and still be right."""
+"""Most rounds of a game on the whole instance, besides two for every agent that the largest task needs."""
 
 
 @dataclass(frozen=True)
@@ -50,8 +49,10 @@ class PlannerParameters:
         Pairs of agent and candidate in the games of a stream.
     part_tasks : (int, int)
         Least and most tasks of a part.
+    larger_parts, far_share : int, float
+        How much larger parts may be when patience runs out, and the share of those then that are of tasks anywhere.
     rounds : int
-        Most rounds of a game on a part.
+        Most rounds of a game on a part, besides two for every agent that a task lacks.
     fresh_share : float
         Share of the games on parts in which everybody begins at the nearest task.
     ruined : (float, float)
@@ -63,7 +64,7 @@ class PlannerParameters:
     temperature : (float, float)
         Least and most of what scores are divided by in games on parts.
     patience : int
-        Sweeps over all parts without success after which a longer makespan is aimed at.
+        Sweeps over all parts without success after which a longer makespan is aimed at; see `Aims`.
     makespan_share : float
         Share of the budget after which energy counts, if it does, even if the makespan may not be the least.
     first_price, second_price : float
@@ -74,6 +75,8 @@ class PlannerParameters:
     near: int = NEAR
     lane_pairs: int = 4_000
     part_tasks: tuple[int, int] = (2, 5)
+    larger_parts: int = 3
+    far_share: float = 0.5
     rounds: int = 8
     fresh_share: float = 0.3
     ruined: tuple[float, float] = (0.2, 0.9)
@@ -115,19 +118,15 @@ class Planner:
         self.tuning = tuning
         self.run_all: Callable[..., Iterable[Best]] = map
         self.rng = np.random.default_rng(search.seed)
-        self.failed = max(reference_makespan(_servable(search.instance)), self._given_limit())
-        self.aim = self.failed
-        self.stale, self.least_shortfall = 0, np.inf
+        self.instance = _servable(search.instance)
+        self.aims = Aims(search, self.instance, self.parameters.patience, self.parameters.makespan_share)
         self.plan = np.full(search.instance.n, IDLE)
-
-    def _given_limit(self) -> float:
-        """Hours that the user gave, up to which a plan need be no faster."""
-        energy_counts = self.search.objective is Objective.MAKESPAN_ENERGY
-        return self.search.deadline.limit or 0.0 if energy_counts else 0.0
 
     def run(self) -> None:
         """Play until the budget ends; every improvement has been submitted by then."""
         self.play_whole(self.parameters.first_price)
+        if not (self.instance.workload > 0).any():
+            return
         if self.search.objective is Objective.MAKESPAN_ENERGY and not self.search.should_stop():
             self.play_whole(self.parameters.second_price)
         with ThreadPoolExecutor(STREAMS) as pool:
@@ -138,115 +137,71 @@ class Planner:
 
     def play_whole(self, price: float) -> None:
         """Play one greedy game on the whole instance, and go on from where it ends."""
-        search, parameters = self.search, self.parameters
-        instance = search.instance
+        search, instance = self.search, self.instance
         plan = None if search.start is None else search.start.task_of_agent
-        board = make_board([instance], [self.aim], [price], self.rng, near=parameters.near, plan=plan)
+        board = make_board([instance], [self.aims.hours], [price], self.rng, near=self.parameters.near, plan=plan)
         games = Games(np.zeros(1, dtype=np.int64), board.price.numpy(), board.start.numpy())
-        rounds = WHOLE_ROUNDS + 2 * instance.n // instance.m
+        rounds = WHOLE_ROUNDS + 2 * most_helpers(board)
         best = play_games(self.networks[0], board, games, rounds=rounds, should_stop=self._late)
         place = pick(board.goal, best.slot)[0].numpy()
         self._go_on_from(np.where(place == instance.m, IDLE, place))
 
     def _late(self) -> bool:
-        return self.search.best is not None and self.search.should_stop()
+        """Whether a game has to end where it is: the first one goes on unless the time itself is up."""
+        search = self.search
+        return search.should_stop() if search.best is not None else search.interrupted or search.remaining_s <= 0
 
     def _go_on_from(self, plan: Ints) -> None:
         """Score a plan, with all tasks served that can be, and take it for the one to be improved."""
-        search = self.search
         allocation = Allocation(plan)
-        if not np.isin(np.flatnonzero(search.instance.workload > 0), plan).all():
-            allocation = serve_all(search.instance, allocation)
-        search.submit(allocation)
+        if not np.isin(np.flatnonzero(self.instance.workload > 0), plan).all():
+            allocation = serve_all(self.instance, allocation)
+        self.search.submit(allocation)
         self.plan = allocation.task_of_agent
 
     def _sweep(self) -> None:
         """Cover the instance with parts, play each many times, and keep what is better."""
-        self._set_aim()
-        surplus = self._surplus()
+        search, aims = self.search, self.aims
+        assert search.best is not None
+        if aims.set(self.plan):
+            self.plan = search.best.allocation.task_of_agent
+        surplus = aims.surplus(self.plan)
         shortfall = float(-surplus[surplus < 0].sum())
-        self.stale = 0 if shortfall < self.least_shortfall else self.stale + 1
-        self.least_shortfall = min(shortfall, self.least_shortfall)
+        aims.note(shortfall)
         tasks, agents = self._cover(surplus)
-        parts = lay_out_parts(self.search.instance, self.aim, self.plan, tasks, agents)
+        parts = lay_out_parts(self.instance, aims.hours, self.plan, tasks, agents)
         if self.tuning is not None and self.tuning.is_due():
             self.networks = self.tuning.learn(parts)
         network = self.networks[int(self.rng.integers(len(self.networks)))]
-        goal = Objective.MAKESPAN if shortfall > 0 else self.search.objective
+        goal = Objective.MAKESPAN if shortfall > 0 else search.objective
         accepted, slots = self._play_parts(network, parts, PRICES[goal])
         if accepted.any():
             self._go_on_from(parts.merge(self.plan, slots, accepted))
 
-    def _set_aim(self) -> None:
-        """Decide on the makespan to aim at: the least possible, as far as is known, and then as little energy."""
-        search = self.search
-        assert search.best is not None
-        assert search.fastest is not None
-        reached = search.fastest.evaluation.served_makespan
-        if search.fastest.evaluation.unserved_tasks and self._given_limit() < reached < self.failed * (1 - ROUNDING):
-            self.failed = 0.0  # the bound was for other tasks than those that are served
-        if search.objective is Objective.MAKESPAN_ENERGY and (
-            reached <= self.failed * (1 + ROUNDING) or self._spent() > self.parameters.makespan_share
-        ):
-            self.aim = search.makespan_limit
-            self.plan = search.best.allocation.task_of_agent
-        elif reached <= self.aim * (1 + ROUNDING):
-            self._aim_at((self.failed + reached) / 2)
-        elif self.stale >= self.parameters.patience:
-            self.failed = self.aim
-            self._aim_at((self.aim + reached) / 2)
-        elif self.aim < (balanced := self._balanced()) * (1 - ROUNDING):
-            self._aim_at(min(balanced, (self.aim + reached) / 2))
-
-    def _balanced(self) -> float:
-        """Hours that the plan would take if its work were shared out without a rest, flights included; 0 without."""
-        instance = self.search.instance
-        agent = np.flatnonzero(self.plan != IDLE)
-        if not np.isfinite(instance.speed).any() or not len(agent):
-            return 0.0
-        ability = instance.ability[agent]
-        flight = instance.reach.distance_of(agent, self.plan[agent]) / instance.speed[agent]
-        return float((instance.workload.sum() + ability @ flight) / ability.sum())
-
-    def _aim_at(self, hours: float) -> None:
-        self.aim, self.stale, self.least_shortfall = hours, 0, np.inf
-
-    def _spent(self) -> float:
-        """Share of the budget that is spent."""
-        search, budget = self.search, self.search.budget
-        of_time = search.elapsed_s / budget.time_limit_s if budget.time_limit_s else 0.0
-        return max(of_time, search.iteration / budget.iterations if budget.iterations else 0.0)
-
     def _cover(self, surplus: NDArray[np.float64]) -> tuple[Ints, list[Ints]]:
-        """Partition tasks into neighbours, and find the agents that work there."""
-        instance, rng = self.search.instance, self.rng
+        """Partition tasks into neighbours, and find the agents that work there, and idle ones that could."""
+        instance, rng = self.instance, self.rng
         low, high = self.parameters.part_tasks
+        in_vain = min(1.0, self.aims.stale / self.parameters.patience)
+        high += round(self.parameters.larger_parts * in_vain)
         size = min(int(rng.integers(low, high + 1)), instance.m)
-        tasks = cover(instance.task_position, surplus, size, rng)
+        tasks = cover(instance.task_position, surplus, size, rng, self.parameters.far_share * in_vain)
         part_of = np.full(instance.m + 1, -1)
         part_of[tasks.ravel()] = np.repeat(np.arange(len(tasks)), size)
         chosen = part_of[self.plan]  # idle agents have no part yet: index -1 is the last entry
         idle = np.flatnonzero(self.plan == IDLE)
         if len(idle):
-            chosen[idle] = rng.integers(len(tasks), size=len(idle))
+            goal, _, legal = self._near
+            chance = np.where(legal[idle] & (part_of[goal[idle]] >= 0), rng.random((len(idle), goal.shape[1])), -1.0)
+            chosen[idle] = part_of[goal[idle, chance.argmax(1)]]  # -1 where the agent can go to no part
         order = np.argsort(chosen, kind="stable")
         first = np.searchsorted(chosen[order], np.arange(len(tasks) + 1))
         return tasks, [order[first[p] : first[p + 1]] for p in range(len(tasks))]
 
-    def _surplus(self) -> NDArray[np.float64]:
-        """Ability that each task has too much for the makespan aimed at, negative where it lacks some, shape (m,).
-
-        A task without anyone lacks nothing: the plan serves as many tasks as can be, and no part of it serves more.
-        """
-        instance = self.search.instance
-        plan = self.plan
-        agent = np.flatnonzero(plan != IDLE)
-        share = working_share(instance.speed[agent], instance.reach.distance_of(agent, plan[agent]), self.aim)
-        group = np.bincount(plan[agent], instance.ability[agent] * share, minlength=instance.m)
-        with np.errstate(over="ignore"):
-            need = instance.workload / max(self.aim, 1e-300)
-        alone = np.bincount(plan[agent], minlength=instance.m) == 0
-        return np.where(alone | (np.abs(group - need) <= ROUNDING * need), 0.0, group - need)
+    @cached_property
+    def _near(self) -> Layout:
+        """Candidates of each agent, in games on the whole; see `near_tasks`."""
+        return near_tasks(self.instance, self.parameters.near, None)
 
     def _play_parts(
         self, network: ActorCritic, parts: Parts, prices: tuple[float, float]
@@ -255,13 +210,14 @@ class Planner:
         streams = [self._games(parts, prices) for _ in range(STREAMS)]
         temperatures = self.rng.uniform(*self.parameters.temperature, STREAMS).tolist()
         seeds = self.rng.integers(2**63, size=STREAMS).tolist()
+        rounds = self.parameters.rounds + 2 * most_lacking(parts.board)
 
         def one(number: int) -> Best:
             return play_games(
                 network,
                 parts.board,
                 streams[number],
-                rounds=self.parameters.rounds,
+                rounds=rounds,
                 seed=seeds[number],
                 temperature=temperatures[number],
                 total=True,
@@ -297,15 +253,31 @@ class Planner:
 
 
 def _servable(instance: Instance) -> Instance:
-    """Return the instance without the work that no allocation does along with the rest: no bound may count it in."""
+    """Return the instance without the work that is left, where not all tasks can be served; no bound counts it in."""
     everyone = instance.reach.is_complete and instance.n >= instance.m
     if everyone or fewest_unserved(instance) == 0:
         return instance
-    plan = serve_all(instance, Allocation.idle(instance)).task_of_agent
-    return replace(instance, workload=np.where(np.isin(np.arange(instance.m), plan), instance.workload, 0.0))
+    return replace(instance, workload=np.where(easiest_tasks(instance), instance.workload, 0.0))
 
 
-def cover(position: NDArray[np.float64], surplus: NDArray[np.float64], size: int, rng: np.random.Generator) -> Ints:
+def most_helpers(board: Board) -> int:
+    """Return how many mean agents the largest task needs, but not more than there are: one joins it in a round."""
+    return min(board.shape[1], math.ceil(float(board.need.max())))
+
+
+def most_lacking(board: Board) -> int:
+    """Return how many mean agents a task lacks at the most when the games begin, but not more than there are."""
+    lack = float((board.need - begin(board).group)[:, :-1].max())
+    return min(board.shape[1], math.ceil(max(0.0, lack)))
+
+
+def cover(
+    position: NDArray[np.float64],
+    surplus: NDArray[np.float64],
+    size: int,
+    rng: np.random.Generator,
+    far_share: float = 0.0,
+) -> Ints:
     """Partition places into groups of neighbours, shape (groups, size); some are left over.
 
     Each group is made of a place and of those left that are nearest to it, more or less. Where places lack something,
@@ -316,6 +288,8 @@ def cover(position: NDArray[np.float64], surplus: NDArray[np.float64], size: int
     position : ndarray, shape (m, 3)
     surplus : ndarray, shape (m,)
         Negative where something is lacking.
+    far_share : float
+        Share of the groups that are of places anywhere.
     """
     m = len(position)
     position = np.nan_to_num(position)
@@ -329,6 +303,8 @@ def cover(position: NDArray[np.float64], surplus: NDArray[np.float64], size: int
         if free.sum() < size:
             break
         away = np.sqrt(((position - position[centre]) ** 2).sum(1)) * rng.uniform(0.6, 1.4, m)
+        if rng.random() < far_share:
+            away = rng.random(m)
         away[~free], away[centre] = np.inf, -2.0
         if surplus[centre] < 0:
             away[_helpers(away, surplus, -surplus[centre])[: size - 1]] = -1.0

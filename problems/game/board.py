@@ -90,6 +90,11 @@ class Board:
         """Number of tasks and 1."""
         return self.need.shape[1]
 
+    @property
+    def crew(self) -> Tensor:
+        """Number of agents in each game, shape (B,): without those that only fill it up and have no ability."""
+        return (self.ability > 0).sum(1).clamp(min=1)
+
     def __getitem__(self, rows: Tensor) -> Board:
         """Return the games with these numbers."""
         return Board(*(getattr(self, field.name)[rows] for field in fields(self)))

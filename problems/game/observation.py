@@ -110,7 +110,7 @@ def observe_agents(board: Board, state: State) -> Tensor:
 def observe_tasks(board: Board, state: State) -> Tensor:
     """Return what is known of each place and of all together, shape (B, m + 1, TASK_FEATURES)."""
     lack, need = lacks(board, state), board.need.clamp(min=LEAST)
-    members = torch.zeros_like(need).scatter_add_(1, tasks_of(board, state), torch.ones_like(board.ability))
+    members = torch.zeros_like(need).scatter_add_(1, tasks_of(board, state), (board.ability > 0).float())
     needed = board.need[:, :-1] > 0
     ratio = (state.group / need)[:, :-1].masked_fill(~needed, 1.0).amin(1)
     short = lack[:, :-1].clamp(min=0).sum(1) / need[:, :-1].sum(1)

@@ -97,7 +97,7 @@ def lay_out_parts(
     last = ((0, 0), (0, 0), (0, 1))
     position = instance.task_position[tasks]
     apart = scaled(distances(position[:, :, None], position[:, None], instance.reach.unit), scale[:, None, None])
-    legal = np.concatenate([legal, real[..., None] | True], axis=2)
+    legal = np.concatenate([legal, np.ones((count, width, 1), dtype=bool)], axis=2)
     board = Board(
         **{
             name: torch.from_numpy(np.ascontiguousarray(value if value.dtype.kind in "ib" else single(value)))

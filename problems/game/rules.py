@@ -221,7 +221,7 @@ def _flight(board: Board, state: State, slot: Tensor, goal: Tensor) -> Tensor:
 
 def flown(board: Board, state: State, rules: Rules = PLANNING) -> Tensor:
     """Return the mean distance per agent, shape (B,): directly to the last place (19), or hop by hop."""
-    return (state.hopped if rules.flying else pick(board.distance, state.slot)).mean(1)
+    return (state.hopped if rules.flying else pick(board.distance, state.slot)).sum(1) / board.crew
 
 
 def battery_left(board: Board, state: State) -> Tensor:

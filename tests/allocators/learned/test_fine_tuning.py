@@ -1,13 +1,17 @@
 """Learning on: when it happens, what it learns from, and that shipped networks stay as they are."""
 
+from itertools import permutations
+
 import numpy as np
 import pytest
 import torch
 
 from alloc.allocators import Budget, Search
-from alloc.allocators.learned.fine_tuning import GENERATION, FineTuning, FineTuningParameters, _PartGames
+from alloc.allocators.learned.fine_tuning import BREEDING, GENERATION, FineTuning, FineTuningParameters, _PartGames
+from alloc.allocators.learned.learner import LessonReport
 from alloc.allocators.learned.network import ActorCritic, NetworkSize
 from alloc.allocators.learned.planner import Planner, PlannerParameters
+from alloc.allocators.learned.ppo import Ppo
 from alloc.problems import Objective
 from alloc.problems.game.parts import Parts, lay_out_parts
 from alloc.problems.generate import paper_like
@@ -78,6 +82,29 @@ def test_generations_follow_each_other(networks: list[ActorCritic], parts: Parts
         assert ends[-1].isfinite().all()
     assert torch.equal(ends[0], ends[1])
     assert not torch.equal(ends[0], ends[2])
+
+
+@pytest.mark.parametrize("rewards", list(permutations((1.0, 2.0, 3.0))))
+def test_the_fittest_survive_a_generation(parts: Parts, rewards: tuple[float, ...]) -> None:
+    """Whatever the order of their fitness, the elite pass unchanged, weights and optimiser together."""
+    torch.manual_seed(0)
+    shipped = [ActorCritic(NetworkSize(8, 8, 2)).requires_grad_(False) for _ in rewards]
+    tuning = FineTuning(search(), shipped, FEW)
+    for _ in range(len(rewards)):
+        tuning.learn(parts)
+    before = [(weights([one.policy]).clone(), moments(one)) for one in tuning.members]
+    tuning._reports = [LessonReport(1, 1, reward, 1.0, 0.0, 1e-4) for reward in rewards]
+    tuning._breed()
+    after = [(weights([one.policy]), moments(one)) for one in tuning.members]
+    fittest = sorted(range(len(rewards)), key=lambda number: -rewards[number])[: BREEDING.elite]
+    for place, number in enumerate(fittest):
+        for mine, its in zip(after[place], before[number], strict=True):
+            assert torch.equal(mine, its)
+
+
+def moments(member: Ppo) -> torch.Tensor:
+    """First moments of the member's optimiser."""
+    return torch.cat([state["exp_avg"].flatten() for state in member.optimiser.state.values()]).clone()
 
 
 def test_games_begin_at_home_or_where_the_plan_is(parts: Parts) -> None:

@@ -1,7 +1,6 @@
 """The planner: parts that cover what is lacking, aims, and what comes out on instances of every kind."""
 
 import copy
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -14,9 +13,10 @@ from tiny_instances import tiny_instance
 from alloc.allocators import Budget, Deadline, Search
 from alloc.allocators.learned.lanes import play_games
 from alloc.allocators.learned.network import ActorCritic, NetworkSize
-from alloc.allocators.learned.planner import Planner, PlannerParameters, cover
+from alloc.allocators.learned.planner import Planner, PlannerParameters, cover, most_helpers, most_lacking
 from alloc.allocators.learned.rollout import Best
 from alloc.problems import IDLE, Allocation, Family, Instance, Objective, evaluate, random_instance
+from alloc.problems.game import make_board
 from alloc.problems.game.parts import lay_out_parts
 from alloc.problems.generate import paper_like
 
@@ -132,8 +132,8 @@ def test_a_sweep_leaves_all_other_agents_alone(network: ActorCritic) -> None:
     instance = paper_like(40, 9, 170, 1)
     one = planner(network, instance)
     one.plan = instance.start_task.copy()
-    tasks, agents = one._cover(one._surplus())
-    parts = lay_out_parts(instance, one.aim, one.plan, tasks, agents)
+    tasks, agents = one._cover(one.aims.surplus(one.plan))
+    parts = lay_out_parts(instance, one.aims.hours, one.plan, tasks, agents)
     accepted, slots = one._play_parts(network, parts, (0.4, 2.4))
     assert accepted.any()
     merged = parts.merge(one.plan, slots, accepted)
@@ -151,10 +151,10 @@ def test_what_is_accepted_lacks_less(network: ActorCritic) -> None:
     one.play_whole(1.0)
     met = []
     for _ in range(12):
-        surplus, score = one._surplus(), evaluate(instance, Allocation(one.plan))
+        surplus, score = one.aims.surplus(one.plan), evaluate(instance, Allocation(one.plan))
         met.append((round(float(-surplus[surplus < 0].sum()), 4), score.distance))
         tasks, agents = one._cover(surplus)
-        parts = lay_out_parts(instance, one.aim, one.plan, tasks, agents)
+        parts = lay_out_parts(instance, one.aims.hours, one.plan, tasks, agents)
         accepted, slots = one._play_parts(network, parts, (0.4, 2.4))
         one.plan = parts.merge(one.plan, slots, accepted)
     assert all(later <= earlier for earlier, later in pairwise(met))
@@ -201,23 +201,23 @@ def test_first_aim_is_the_bound_and_then_half_way(network: ActorCritic) -> None:
     """Aims: the bound; halfway to what was reached after patience is out; nearer the bound when an aim is reached."""
     instance = Instance(ability=[3, 3, 3], workload=[4, 5])  # the bound of 1 cannot be met: 5 / 3 or 4 / 3 at best
     one = planner(network, instance)
-    bound = one.aim
-    assert bound == one.failed == one.search.lower_bound
+    bound = one.aims.hours
+    assert bound == one.aims.failed == one.search.lower_bound
     one._go_on_from(np.array([0, 1, IDLE]))  # T = 5 / 3
-    one._set_aim()
-    assert one.aim == bound
-    one.stale = one.parameters.patience
-    one._set_aim()
-    assert one.failed == bound
-    assert one.aim == pytest.approx((bound + 5 / 3) / 2)
-    assert one.stale == 0
+    one.aims.set(one.plan)
+    assert one.aims.hours == bound
+    one.aims.stale = one.aims.patience
+    one.aims.set(one.plan)
+    assert one.aims.failed == bound
+    assert one.aims.hours == pytest.approx((bound + 5 / 3) / 2)
+    assert one.aims.stale == 0
     one._go_on_from(np.array([0, 1, 1]))  # T = 4 / 3, which is within the aim
-    assert one.aim >= 4 / 3
-    one._set_aim()
-    assert one.aim == pytest.approx((bound + 4 / 3) / 2)
-    one.stale = one.parameters.patience
-    one._set_aim()
-    assert one.failed == pytest.approx((bound + 4 / 3) / 2)
+    assert one.aims.hours >= 4 / 3
+    one.aims.set(one.plan)
+    assert one.aims.hours == pytest.approx((bound + 4 / 3) / 2)
+    one.aims.stale = one.aims.patience
+    one.aims.set(one.plan)
+    assert one.aims.failed == pytest.approx((bound + 4 / 3) / 2)
 
 
 def test_energy_counts_once_the_bound_is_met_or_time_is_short(network: ActorCritic) -> None:
@@ -227,13 +227,13 @@ def test_energy_counts_once_the_bound_is_met_or_time_is_short(network: ActorCrit
     late.search.iteration = 7
     for one in (early, late):
         one._go_on_from(np.array([0, 1, 1]))
-        one._set_aim()
-    assert early.aim == early.failed
-    assert late.aim == pytest.approx(4 / 3)
+        one.aims.set(one.plan)
+    assert early.aims.hours == early.aims.failed
+    assert late.aims.hours == pytest.approx(4 / 3)
     met = planner(network, Instance(ability=[2, 1], workload=[2, 1], task_position=[[0, 0], [1, 0]]), ENERGY)
     met._go_on_from(np.array([0, 1]))
-    met._set_aim()
-    assert met.aim == 1.0
+    met.aims.set(met.plan)
+    assert met.aims.hours == 1.0
 
 
 def test_bounds_that_cannot_be_met_do_not_hold_it_up(network: ActorCritic) -> None:
@@ -241,7 +241,7 @@ def test_bounds_that_cannot_be_met_do_not_hold_it_up(network: ActorCritic) -> No
     instance = Instance(ability=[5, 5, 5, 4, 4], workload=[9, 8, 6], agent_position=np.zeros((5, 2)))
     best = brute_force(instance)
     one = planner(network, instance, iterations=12)
-    one.parameters = replace(QUICK, patience=2)
+    one.aims.patience = 2
     one.run()
     assert one.search.best is not None
     assert best.makespan > one.search.lower_bound * 1.01
@@ -257,7 +257,7 @@ def test_tasks_that_nobody_can_do_are_no_aim(network: ActorCritic) -> None:
         start_task=[0] * 10,
         communication_range=[5] * 10,
     )
-    assert planner(network, far).aim == pytest.approx(1.0)
+    assert planner(network, far).aims.hours == pytest.approx(1.0)
     for objective in Objective:
         search = planned(network, far, objective=objective, iterations=6)
         assert search.best is not None
@@ -266,6 +266,63 @@ def test_tasks_that_nobody_can_do_are_no_aim(network: ActorCritic) -> None:
     search = planned(network, few, iterations=6)
     assert search.best is not None
     assert len(search.best.evaluation.unserved_tasks) == brute_force(few).unserved == 2
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_of_tasks_that_cannot_all_be_served_the_least_work_is_done(network: ActorCritic, seed: int) -> None:
+    """With more tasks than agents everywhere in reach, the makespan is that of brute force."""
+    rng = np.random.default_rng(seed)
+    instance = Instance(ability=rng.integers(1, 6, 3), workload=rng.integers(1, 30, 5))
+    search = planned(network, instance, iterations=10)
+    assert search.best is not None
+    got, best = search.best.evaluation, brute_force(instance)
+    assert (len(got.unserved_tasks), got.served_makespan) == (best.unserved, pytest.approx(best.makespan))
+
+
+def test_a_task_that_needs_most_agents_gets_them_in_the_first_game(network: ActorCritic) -> None:
+    """One agent joins a task in a round: a game goes on as long as the largest task takes."""
+    instance = Instance(ability=np.ones(60), workload=[48.0, *[2.0] * 6], start_task=np.arange(60) % 7)
+    one = planner(network, instance)
+    board = make_board([instance], [1.0], [1.0], np.random.default_rng(0))
+    assert most_helpers(board) == 48
+    parts = lay_out_parts(instance, 1.0, np.arange(60) % 7, np.arange(7)[None], [np.arange(60)])
+    assert most_lacking(parts.board) == 48 - 9
+    asked = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            "alloc.allocators.learned.planner.play_games",
+            lambda *args, **settings: asked.append(settings["rounds"]) or play_games(*args, **settings),
+        )
+        one.play_whole(1.0)
+    assert asked == [16 + 2 * 48]
+
+
+def test_slow_aims_are_given_up(network: ActorCritic) -> None:
+    """An aim that most of the lack still separates from after its share of the budget is halved to what was reached."""
+    instance = paper_like(40, 8, 170, 0)
+    one = planner(network, instance, iterations=100)
+    one.play_whole(1.0)
+    aims, first = one.aims, one.aims.hours
+    for shortfall, iteration in ((50.0, 0), *((40.0, 20),) * 5):
+        one.search.iteration = iteration
+        aims.note(shortfall)
+    assert not aims._is_too_slow(), "the first check has nothing to compare with"
+    for _ in range(5):
+        aims.note(30.0)
+    one.search.iteration = 40
+    aims.set(one.plan)
+    assert aims.failed == first
+    assert aims.hours > first
+
+
+def test_nothing_to_serve_ends_at_once(network: ActorCritic) -> None:
+    """Where nobody can serve anything there is an answer, and no game on parts."""
+    instance = Instance(
+        ability=[1, 1], workload=[1], agent_position=[[0, 0]] * 2, task_position=[[9, 9]], communication_range=[1, 1]
+    )
+    search = planned(network, instance, iterations=None, time_limit_s=60.0)
+    assert search.best is not None
+    assert search.iteration == 0
 
 
 def test_slack_and_limit_buy_energy(network: ActorCritic) -> None:
@@ -279,8 +336,8 @@ def test_slack_and_limit_buy_energy(network: ActorCritic) -> None:
         assert search.best.evaluation.makespan <= search.makespan_limit * (1 + 1e-9)
         spent.append(search.best.evaluation.energy)
     assert spent[2] < spent[1] < spent[0]
-    assert planner(network, instance, ENERGY, deadline=Deadline(limit=3.0)).aim == 3.0
-    assert planner(network, instance, ENERGY, deadline=Deadline(limit=0.5)).aim == pytest.approx(1.0)
+    assert planner(network, instance, ENERGY, deadline=Deadline(limit=3.0)).aims.hours == 3.0
+    assert planner(network, instance, ENERGY, deadline=Deadline(limit=0.5)).aims.hours == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("objective", list(Objective))
@@ -351,6 +408,6 @@ def test_with_finite_speeds_the_aim_allows_for_the_flights() -> None:
         speed=[1.0, 1.0],
     )
     planner = Planner(Search(instance, Objective.MAKESPAN, Budget(1.0)), [ActorCritic()])
-    assert planner._balanced() == 0.0
+    assert planner.aims._balanced(planner.plan) == 0.0
     planner.plan = np.array([0, 1])
-    assert planner._balanced() == pytest.approx((2 + 1 + 3) / 2)
+    assert planner.aims._balanced(planner.plan) == pytest.approx((2 + 1 + 3) / 2)

@@ -9,7 +9,7 @@ from boards import layout
 from strategies import rebuilt
 
 from alloc.problems import IDLE, Family, random_instance
-from alloc.problems.game import Board, begin, observe_pairs
+from alloc.problems.game import Board, begin, flown, observe_agents, observe_pairs, observe_tasks, worth
 from alloc.problems.game.parts import lay_out_parts
 
 
@@ -62,3 +62,18 @@ def test_merge_takes_what_was_accepted() -> None:
     assert parts.merge(plan, slots, np.array([False, True])).tolist() == [0, 0, 1, 3, IDLE]
     both = parts.merge(plan, np.array([[2, 0, 1], [0, 2, 2]]), np.array([True, True]))
     assert both.tolist() == [IDLE, 0, 1, 2, IDLE]
+
+
+def test_a_part_is_the_same_game_beside_a_larger_one() -> None:
+    """Who fills up a part is neither counted nor seen: observations and rewards are those of the part alone."""
+    instance = random_instance(Family(agents=40, tasks=6), 2)
+    plan = np.array([0, 1, 2, *[3, 4, 5] * 12, IDLE])
+    tasks, agents = np.array([[0, 1, 2], [3, 4, 5]]), [np.array([0, 1, 2, 39]), np.arange(3, 39)]
+    both = lay_out_parts(instance, 1.0, plan, tasks, agents).board[torch.tensor([0])]
+    alone = lay_out_parts(instance, 1.0, plan, tasks[:1], agents[:1]).board
+    assert both.shape[1] == 9 * alone.shape[1]
+    there, here = begin(both), begin(alone)
+    torch.testing.assert_close(observe_tasks(both, there), observe_tasks(alone, here))
+    torch.testing.assert_close(observe_agents(both, there)[:, :4], observe_agents(alone, here))
+    torch.testing.assert_close(flown(both, there), flown(alone, here))
+    torch.testing.assert_close(worth(both, there), worth(alone, here))
