@@ -29,7 +29,6 @@ STYLES = {
     "no adaptive rate": (ORANGE, "--"),
     "no energy term": (PURPLE, "--"),
     "no replay": (SKY, "--"),
-    "default settings": ("#777777", ":"),
 }
 """Colours that colour-blind readers can tell apart; they are used once in each panel."""
 
