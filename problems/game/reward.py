@@ -69,7 +69,7 @@ def marginal_contributions(board: Board, state: State, granted: Tensor, rules: R
         They add up to the rise of `worth`.
     """
     _, n, c = board.shape
-    gain, cost = _gain(rules), board.price / board.crew
+    gain, crew = _gain(rules), board.crew
     rows = torch.arange(len(granted), device=granted.device)
     group, before = state.group, gain(board, state.group)
     brought = []
@@ -82,7 +82,7 @@ def marginal_contributions(board: Board, state: State, granted: Tensor, rules: R
         group[rows, board.goal[rows, agent, slot]] += board.contribution[rows, agent, slot] * real
         after = gain(board, group)
         further = _further(board, state, agent, slot, rules) * real
-        brought.append(after - before - cost * further)
+        brought.append(after - before - board.price * further / crew)
         before = after
     return torch.stack(brought, 1)
 
@@ -113,8 +113,8 @@ def difference_rewards(board: Board, state: State, slot: Tensor, rules: Rules = 
     agents = torch.arange(n, device=slot.device).expand_as(slot)
     games = torch.arange(len(slot), device=slot.device)[:, None]
     further = _further(board, state, agents, slot, rules, games) * (slot != state.slot)
-    cost = (board.price / board.crew)[:, None]
-    return gain(board, after)[:, None] - gain(board, without).transpose(0, 1) - cost * further
+    cost = board.price[:, None] * further / board.crew[:, None]
+    return gain(board, after)[:, None] - gain(board, without).transpose(0, 1) - cost
 
 
 def _gain(rules: Rules) -> Callable[[Board, Tensor], Tensor]:
