@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from alloc.allocators.learned.compiled_game import Lane, begin_game, play_rounds
 from alloc.allocators.learned.compiled_network import View, weights_of
+from alloc.allocators.learned.limits import PLACES
 from alloc.allocators.learned.network import ActorCritic
 from alloc.allocators.learned.rollout import Best, play
 from alloc.problems import Instance
@@ -17,7 +18,7 @@ from alloc.problems.game import Board, make_board
 from alloc.problems.game.board import LEAST
 
 SLICE = 200_000
-"""Pairs times rounds that are played between two looks at the clock, some 20 ms."""
+"""Pairs times rounds that are played between two looks at the clock, some 20 to 100 ms."""
 
 
 class Games(NamedTuple):
@@ -125,7 +126,7 @@ def _play_compiled(
     state = np.random.default_rng(seed).integers(1, 2**63, (count, 1), dtype=np.uint64)
     best = games.start.astype(np.int32)
     figures = np.full((count, 3), np.inf)
-    at_once = max(1, SLICE // (n * c))
+    at_once = max(1, SLICE // (n * c + len(views[0].need) ** 2 // PLACES))
     for game, row in enumerate(games.row.tolist()):
         if game and should_stop():
             break

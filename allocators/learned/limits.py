@@ -9,6 +9,9 @@ NEAR = 20
 PAIRS_PER_SECOND = 40_000
 """Pairs of agent and candidate whose game is over after a second on one slow core."""
 
+PLACES = 12
+"""Pairs of places, which attend to each other, that take as long in a game as one pair of agent and candidate."""
+
 LARGEST = 3_000_000
 """Pairs beyond which one game takes more than a few gigabytes."""
 
@@ -24,7 +27,7 @@ def too_large(instance: Instance, budget: Budget) -> str | None:
         return f"{m} tasks are more than the {MOST_TASKS} that it has memory for; use local-search"
     if pairs > LARGEST:
         return f"{n} agents are more than the {LARGEST // (NEAR + 1)} that it has memory for; use local-search"
-    seconds = pairs / PAIRS_PER_SECOND
+    seconds = (pairs + m * m // PLACES) / PAIRS_PER_SECOND
     if budget.time_limit_s is None or seconds <= max(1.0, budget.time_limit_s):
         return None
-    return f"a game of {n} agents may take {seconds:.0f} s; give more time, or use local-search"
+    return f"a game of {n} agents and {m} tasks may take {seconds:.0f} s; give more time, or use local-search"
