@@ -105,7 +105,12 @@ def train_command(
     ] = 20_000,
     settings: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="A hyperparameter of the method; may be repeated."),
+        typer.Option(
+            "--set",
+            metavar="NAME=VALUE",
+            help="A hyperparameter of the method, such as clip=0.1; may be repeated. A name that the method does not "
+            "have, such as in help=, is answered by all that it has, and their defaults.",
+        ),
     ] = None,
     turn: Annotated[Turn, typer.Option(help="Who moves: the best bids, or all agents at once.")] = Turn.BIDDING,
     reward: Annotated[Reward, typer.Option(help="Makespan, or the paper's coverage (3).")] = Reward.MAKESPAN,

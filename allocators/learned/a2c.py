@@ -9,53 +9,18 @@ References
 Mnih et al. (2016), arXiv:1602.01783; Fang et al. (2025), equation (16), doi:10.20944/preprints202502.0192.v1.
 """
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
+from alloc.allocators.learned.hyperparameters import A2cParameters
 from alloc.allocators.learned.learner import Lesson, LessonReport
 from alloc.allocators.learned.network import ActorCritic, NetworkSize
 from alloc.allocators.learned.trajectories import Trajectories, collect
 from alloc.allocators.learned.turns import log_probabilities
 from alloc.problems.game import Rules, begin, moved, step
-
-
-@dataclass(frozen=True)
-class A2cParameters:
-    """Hyperparameters of A2C.
-
-    Rounded from one of five trials of 25,000 decisions with one seed each (`tests/benchmarks/tune_rivals.py`): it
-    had the second least cost, and did better than the first guess in a run of 100,000. Seeds differ as much as trials.
-
-    Attributes
-    ----------
-    learning_rate : float
-        First step size of Adam.
-    final_share : float
-        Step size at the end of the training, as a share of the first; it falls linearly with progress.
-    steps : int
-        Steps of every game that are played before each gradient step, n.
-    discount : float
-        gamma, per step.
-    entropy_weight, value_weight : float
-        Weights of the entropy bonus and of the critic's loss.
-    reward_scale : float
-        Factor on rewards, which are fractions of 1 by nature.
-    max_gradient_norm : float
-        Where gradients are clipped.
-    """
-
-    learning_rate: float = 1.1e-3
-    final_share: float = 0.1
-    steps: int = 2
-    discount: float = 0.97
-    entropy_weight: float = 0.024
-    value_weight: float = 0.5
-    reward_scale: float = 20.0
-    max_gradient_norm: float = 0.5
 
 
 def n_step_returns(reward: Tensor, alive: Tensor, last_value: Tensor, discount: float) -> Tensor:

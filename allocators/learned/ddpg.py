@@ -18,70 +18,17 @@ softmax; Christodoulou (2019), arXiv:1910.07207, for critics that value all choi
 equation (18), doi:10.20944/preprints202502.0192.v1.
 """
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
+from alloc.allocators.learned.hyperparameters import DdpgParameters
 from alloc.allocators.learned.learner import Lesson, LessonReport
 from alloc.allocators.learned.network import ActorCritic, NetworkSize
 from alloc.allocators.learned.transitions import Memory, after, gains, play
 from alloc.problems.game import Board, Rules, State
-
-
-@dataclass(frozen=True)
-class DdpgParameters:
-    """Hyperparameters of DDPG.
-
-    Rounded from the third of four trials of 25,000 decisions with one seed each (`tests/benchmarks/tune_rivals.py`).
-    The two ahead of it evaluate twice as many states per decision; too few trials to tell one from the next.
-
-    Attributes
-    ----------
-    learning_rate : float
-        First step size of Adam, for the critic.
-    actor_share : float
-        Step size of the actor, as a share of the critic's.
-    final_share : float
-        Step sizes at the end of the training, as a share of the first; they fall linearly with progress.
-    discount : float
-        gamma, per move.
-    reward_scale : float
-        Factor on rewards, which are fractions of 1 by nature.
-    softness : float
-        Temperature of the softmax that gives the shares, and of the draws.
-    entropy_weight, final_entropy_weight : float
-        Of the bonus on the entropy of the shares, at the beginning and at the end; it falls exponentially.
-    exploring : float
-        Share of the rounds that begin with a bid at random; falls linearly to 0.
-    capacity : int
-        Moves that the memory holds, C.
-    minibatch : int
-        Moves per gradient step.
-    reuse : float
-        How often each move is learned from, on average.
-    target_share : float
-        How far the target networks follow with each gradient step, 0 to 1 (Polyak).
-    max_gradient_norm : float
-        Where gradients are clipped.
-    """
-
-    learning_rate: float = 5e-4
-    actor_share: float = 1.0
-    final_share: float = 0.1
-    discount: float = 0.5
-    reward_scale: float = 5.0
-    softness: float = 1.0
-    entropy_weight: float = 0.07
-    final_entropy_weight: float = 0.01
-    exploring: float = 0.2
-    capacity: int = 10_000
-    minibatch: int = 32
-    reuse: float = 1.0
-    target_share: float = 0.005
-    max_gradient_norm: float = 10.0
 
 
 def shares_of(gain: Tensor, softness: float) -> Tensor:
@@ -151,7 +98,8 @@ class Ddpg:
             for group in self.optimisers[name].param_groups:
                 group["lr"] = rate * share
         bonus = parameters.entropy_weight
-        bonus *= (parameters.final_entropy_weight / parameters.entropy_weight) ** lesson.progress
+        if bonus > 0:
+            bonus *= (parameters.final_entropy_weight / parameters.entropy_weight) ** lesson.progress
         decisions = evaluations = 0
         rewards, entropies = [], []
         while decisions < lesson.decisions:

@@ -14,67 +14,17 @@ estimate; Wang et al. (2016), arXiv:1511.06581, for values as a sum; Fang et al.
 doi:10.20944/preprints202502.0192.v1.
 """
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
+from alloc.allocators.learned.hyperparameters import DqnParameters
 from alloc.allocators.learned.learner import Lesson, LessonReport
 from alloc.allocators.learned.network import ActorCritic, NetworkSize
 from alloc.allocators.learned.transitions import Memory, after, gains, play
 from alloc.problems.game import Board, Rules, State
-
-
-@dataclass(frozen=True)
-class DqnParameters:
-    """Hyperparameters of DQN.
-
-    Rounded from the best of four trials of 25,000 decisions with one seed each (`tests/benchmarks/tune_rivals.py`): too
-    few to tell one from the next.
-
-    Attributes
-    ----------
-    learning_rate : float
-        First step size of Adam.
-    final_share : float
-        Step size at the end of the training, as a share of the first; it falls linearly with progress.
-    discount : float
-        gamma of (17), per move.
-    reward_scale : float
-        Factor on rewards, which are fractions of 1 by nature.
-    temperature, final_temperature : float
-        Of the softmax over Q by which bids are drawn, at the beginning and at the end; it falls exponentially.
-    exploring : float
-        Share of the rounds that begin with a bid at random; falls linearly to 0.
-    capacity : int
-        Moves that the memory holds, C.
-    minibatch : int
-        Moves per gradient step.
-    reuse : float
-        How often each move is learned from, on average.
-    target_period : int
-        Gradient steps after which the target network is set to the one that learns.
-    double : bool
-        Whether the network that learns picks the move that the target network values.
-    max_gradient_norm : float
-        Where gradients are clipped.
-    """
-
-    learning_rate: float = 7e-4
-    final_share: float = 0.1
-    discount: float = 0.5
-    reward_scale: float = 5.0
-    temperature: float = 0.2
-    final_temperature: float = 0.02
-    exploring: float = 0.05
-    capacity: int = 10_000
-    minibatch: int = 64
-    reuse: float = 1.0
-    target_period: int = 300
-    double: bool = True
-    max_gradient_norm: float = 10.0
 
 
 def td_target(reward: Tensor, following: Tensor, over: Tensor, discount: float) -> Tensor:

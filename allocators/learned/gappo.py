@@ -11,62 +11,20 @@ import copy
 import random
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import torch
 from deap import base, tools
 
-from alloc.allocators.learned.ppo import Ppo, PpoParameters
+from alloc.allocators.learned.hyperparameters import BreedingParameters, GappoParameters
+from alloc.allocators.learned.ppo import Ppo
 
 __all__ = ["BreedingParameters", "GappoParameters", "Member", "Ppo", "breed", "fitness"]
-
-
-@dataclass(frozen=True)
-class GappoParameters(PpoParameters):
-    """What a member of the population adds to plain PPO: a step size by the divergence, and a replay buffer."""
-
-    kl_target: float | None = 0.012
-    capacity: int = 10_000
-
 
 Member = dict[str, Any]
 """State of a learner by PPO, as `Learner.state` returns it: of its parts, breeding changes `network`, the weights by
 name, and the step size in `optimiser`."""
-
-
-@dataclass(frozen=True)
-class BreedingParameters:
-    """How a generation follows from the last.
-
-    Attributes
-    ----------
-    elite : int
-        Members that pass unchanged.
-    tournament : int
-        Members that compete to be a parent.
-    crossover_probability : float
-        Chance that a child blends the weights of two parents.
-    mutation_probability : float
-        Chance that a child's weights are disturbed.
-    mutated_share : float
-        Share of the weights that a mutation disturbs.
-    mutation_size : float
-        Standard deviation of the disturbance.
-    return_weight, entropy_weight, cost_weight : float
-        alpha, beta and gamma of (12).
-    """
-
-    elite: int = 2
-    tournament: int = 2
-    crossover_probability: float = 0.3
-    mutation_probability: float = 0.5
-    mutated_share: float = 0.1
-    mutation_size: float = 0.01
-    return_weight: float = 1.0
-    entropy_weight: float = 0.005
-    cost_weight: float = 0.005
 
 
 class _Fitness(base.Fitness):  # type: ignore[misc]

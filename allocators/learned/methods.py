@@ -1,16 +1,20 @@
-"""The learning methods by name."""
+"""The learning methods by name; knows nothing of torch until one of them is built."""
 
 from dataclasses import fields
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from alloc.allocators.learned.learner import Learner
-from alloc.allocators.learned.network import NetworkSize
+from alloc.allocators.learned import hyperparameters
+from alloc.allocators.learned.ranges import RANGES
 from alloc.problems import InputError
 from alloc.problems.errors import nearest
 
+if TYPE_CHECKING:
+    from alloc.allocators.learned.learner import Learner
+    from alloc.allocators.learned.network import NetworkSize
+
 METHODS = {
-    "gappo": ("gappo", "Ppo", "GappoParameters"),
+    "gappo": ("ppo", "Ppo", "GappoParameters"),
     "ppo": ("ppo", "Ppo", "PpoParameters"),
     "a2c": ("a2c", "A2c", "A2cParameters"),
     "dqn": ("dqn", "Dqn", "DqnParameters"),
@@ -19,14 +23,13 @@ METHODS = {
 """Module, learner and parameters of each; `gappo` breeds a population of learners by `ppo`."""
 
 
-def _part(method: str, number: int) -> Any:
+def _names(method: str) -> tuple[str, str, str]:
     if method not in METHODS:
         raise InputError(f"{method!r} learns nothing{nearest(method, tuple(METHODS))}", "METHOD")
-    names = METHODS[method]
-    return getattr(import_module(f"alloc.allocators.learned.{names[0]}"), names[number])
+    return METHODS[method]
 
 
-def new_learner(method: str, size: NetworkSize, parameters: Any, seed: int) -> Learner:
+def new_learner(method: str, size: "NetworkSize", parameters: Any, seed: int) -> "Learner":
     """Return a learner that knows nothing yet.
 
     Raises
@@ -34,7 +37,8 @@ def new_learner(method: str, size: NetworkSize, parameters: Any, seed: int) -> L
     InputError
         If there is no such method.
     """
-    learner: Learner = _part(method, 1)(size, parameters, seed)
+    module, name, _ = _names(method)
+    learner: Learner = getattr(import_module(f"alloc.allocators.learned.{module}"), name)(size, parameters, seed)
     return learner
 
 
@@ -49,18 +53,26 @@ def method_parameters(method: str, settings: dict[str, str] | None = None) -> An
     Raises
     ------
     InputError
-        If there is no such method or field, or a text does not read as the field's type.
+        If there is no such method or field, a text does not read as the field's type, or a value is out of its range.
     """
-    kind = _part(method, 2)
-    given = settings or {}
-    known = {field.name: field for field in fields(kind)}
+    kind = getattr(hyperparameters, _names(method)[2])
     default = kind()
+    known = [field.name for field in fields(kind)]
     values = {}
-    for name, text in given.items():
+    for name, text in (settings or {}).items():
         if name not in known:
-            raise InputError(f"{method} has no parameter {name!r}{nearest(name, tuple(known))}", "--set")
+            defaults = ", ".join(f"{one}={_text(getattr(default, one))}" for one in known)
+            raise InputError(f"{method} has no parameter {name!r}; its parameters and defaults: {defaults}", "--set")
         values[name] = _read(name, text, getattr(default, name))
-    return kind(**values)
+    try:
+        return kind(**values)
+    except InputError as error:
+        raise InputError(f"{error.place} {error.message}", "--set") from None
+
+
+def _text(value: Any) -> str:
+    """Return a value as `_read` takes it."""
+    return str(value).lower()
 
 
 def _read(name: str, text: str, default: Any) -> Any:
@@ -68,8 +80,8 @@ def _read(name: str, text: str, default: Any) -> Any:
     try:
         if isinstance(default, bool):
             return {"true": True, "false": False}[text.lower()]
-        if text.lower() == "none":
+        if text.lower() == "none" and None in RANGES[name]:
             return None
-        return int(text) if isinstance(default, int) else type(default)(text) if default is not None else float(text)
+        return int(text) if isinstance(default, int) else float(text)
     except (KeyError, ValueError):
-        raise InputError(f"{name} must be like {default!r}, got {text!r}", "--set") from None
+        raise InputError(f"{name} must be like {_text(default)}, got {text!r}", "--set") from None

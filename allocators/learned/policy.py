@@ -6,8 +6,8 @@ from pathlib import Path
 import torch
 
 from alloc.allocators.base import Allocator, Proposal
-from alloc.allocators.learned.dqn import DqnParameters
 from alloc.allocators.learned.fine_tuning import FineTuning
+from alloc.allocators.learned.hyperparameters import DqnParameters
 from alloc.allocators.learned.lanes import warm_up as compile_games
 from alloc.allocators.learned.limits import too_large
 from alloc.allocators.learned.planner import Planner, PlannerParameters

@@ -7,13 +7,13 @@ doi:10.20944/preprints202502.0192.v1. That all who moved in a step share its adv
 arXiv:2103.01955).
 """
 
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
+from alloc.allocators.learned.hyperparameters import PpoParameters
 from alloc.allocators.learned.learner import Lesson, LessonReport
 from alloc.allocators.learned.network import ActorCritic, NetworkSize
 from alloc.allocators.learned.replay import Replay
@@ -21,54 +21,10 @@ from alloc.allocators.learned.trajectories import Trajectories, advantages, coll
 from alloc.allocators.learned.turns import log_probabilities
 from alloc.problems.game import Board, Rules, State
 
+__all__ = ["Ppo", "PpoParameters", "Samples", "adapted_rate", "reused", "samples_of", "surrogate", "value_loss"]
+
 LOWEST_LEARNING_RATE = 2e-5
 """Where slowing down ends."""
-
-
-@dataclass(frozen=True)
-class PpoParameters:
-    """Hyperparameters of PPO; the paper leaves all of them open, so these are ours.
-
-    Attributes
-    ----------
-    learning_rate : float
-        First step size.
-    final_share : float
-        The most that the step size may be at the end, as a share of `highest_rate`; falls linearly with progress.
-    highest_rate : float
-        The most that the step size may grow to.
-    kl_target : float or None
-        Divergence per update at which the step size stays as it is; None for a step size that only falls.
-    discount, smoothing : float
-        gamma and lambda of (9).
-    clip : float
-        epsilon of (13).
-    entropy_weight, value_weight : float
-        Weights of the entropy bonus and of (15).
-    reward_scale : float
-        Factor on rewards, which are fractions of 1 by nature.
-    epochs, minibatch : int
-        Passes over the trajectories of an update, and states per gradient step.
-    max_gradient_norm : float
-        Where gradients are clipped.
-    capacity : int
-        States that the replay buffer holds, C; 0 for learning from fresh games only.
-    """
-
-    learning_rate: float = 1e-3
-    final_share: float = 0.05
-    highest_rate: float = 3e-3
-    kl_target: float | None = None
-    discount: float = 0.99
-    smoothing: float = 0.95
-    clip: float = 0.2
-    entropy_weight: float = 0.003
-    value_weight: float = 0.5
-    reward_scale: float = 20.0
-    epochs: int = 3
-    minibatch: int = 128
-    max_gradient_norm: float = 0.5
-    capacity: int = 0
 
 
 class Samples(NamedTuple):

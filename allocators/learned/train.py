@@ -18,7 +18,8 @@ import torch
 from alloc.allocators.learned.checkpoint import described, read_checkpoint, write_checkpoint
 from alloc.allocators.learned.curriculum import Curriculum
 from alloc.allocators.learned.engine import Engine, SerialEngine
-from alloc.allocators.learned.gappo import BreedingParameters, GappoParameters, breed, fitness
+from alloc.allocators.learned.gappo import breed, fitness
+from alloc.allocators.learned.hyperparameters import BreedingParameters, GappoParameters
 from alloc.allocators.learned.learner import Lesson, LessonReport
 from alloc.allocators.learned.methods import new_learner
 from alloc.allocators.learned.network import ActorCritic, NetworkSize

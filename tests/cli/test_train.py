@@ -57,6 +57,8 @@ def weights(path: Path) -> dict[str, torch.Tensor]:
         ("--family", "mixt"),
         ("--set", "clip"),
         ("--set", "clipp=1"),
+        ("--set", "learning_rate=-1"),
+        ("--set", "clip=nan"),
         ("--instances", "nowhere.json"),
         ("--init", "nowhere.safetensors"),
         ("--workers", "2"),

@@ -1,8 +1,10 @@
 """Methods by name, and their hyperparameters as text."""
 
+from dataclasses import fields
+
 import pytest
 
-from alloc.allocators.learned.methods import method_parameters, new_learner
+from alloc.allocators.learned.methods import METHODS, method_parameters, new_learner
 from alloc.allocators.learned.network import NetworkSize
 from alloc.allocators.learned.ppo import Ppo, PpoParameters
 from alloc.problems import InputError
@@ -25,11 +27,27 @@ def test_settings_are_read_as_the_kind_of_their_defaults() -> None:
     ("method", "settings", "message"),
     [
         ("gapo", {}, "did you mean 'gappo'"),
-        ("ppo", {"clipp": "1"}, "did you mean 'clip'"),
+        ("ppo", {"clipp": "1"}, "ppo has no parameter 'clipp'"),
         ("ppo", {"epochs": "1.5"}, "epochs must be like 3, got '1.5'"),
+        ("ppo", {"epochs": "none"}, "epochs must be like 3, got 'none'"),
+        ("dqn", {"double": "maybe"}, "double must be like true, got 'maybe'"),
+        ("ppo", {"learning_rate": "-1"}, "learning_rate must be a number above 0 and at most 1, got -1$"),
+        ("ppo", {"reward_scale": "0"}, "reward_scale must be a number from 1e-09 to 1e[+]09, got 0$"),
+        ("ppo", {"clip": "nan"}, "clip must be a number from 1e-09 to 1e[+]09, got nan$"),
+        ("ppo", {"epochs": "0"}, "epochs must be a whole number from 1 to 1e[+]06, got 0$"),
     ],
 )
 def test_mistakes_are_named(method: str, settings: dict[str, str], message: str) -> None:
-    """Unknown methods, unknown parameters and unreadable values are told."""
+    """Unknown methods, unknown parameters, unreadable values and such out of range are told."""
     with pytest.raises(InputError, match=message):
         method_parameters(method, settings)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_an_unknown_parameter_is_answered_by_all(method: str) -> None:
+    """All names and defaults of the method are listed, just as they are set."""
+    with pytest.raises(InputError) as caught:
+        method_parameters(method, {"unknown": "1"})
+    listed = caught.value.message.rpartition(": ")[2].split(", ")
+    assert method_parameters(method, dict(entry.split("=") for entry in listed)) == method_parameters(method)
+    assert len(listed) == len(fields(method_parameters(method)))

@@ -169,7 +169,7 @@ def test_divergence_tells_how_far_the_policy_moved(board: Board) -> None:
     """No step, no divergence; and a longer step diverges more, so that the rate can follow."""
     found = []
     for rate in (0.0, 1e-4, 1e-2):
-        learner = Ppo(SMALL, PpoParameters(learning_rate=rate))
+        learner = Ppo(SMALL, PpoParameters(learning_rate=1e-2))
         fresh = played(learner, board)
         found.append(learner.update(fresh, None, PLANNING, torch.Generator().manual_seed(0), highest=rate)[0])
     assert found[0] == pytest.approx(0, abs=1e-6)
