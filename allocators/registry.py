@@ -202,6 +202,10 @@ def load(name: str, **options: Any) -> Allocator:
         raise InputError(f"method {name!r} needs {modules}; install with: pip install {modules}", "method")
     if name not in BUILT_IN:
         return _plugin_class(name)(**given)
+    if "policy" in given:
+        from alloc.allocators.learned.policy_header import read_header
+
+        read_header(given["policy"])  # what is no policy is told before the seconds that torch takes
     module, _, attribute = _TARGETS[name].partition(":")
     allocator = getattr(importlib.import_module(module), attribute)(**given)
     assert isinstance(allocator, Allocator)

@@ -140,6 +140,6 @@ def usable(device: str) -> torch.device:
     try:
         torch.zeros(1, device=device).item()
         return torch.device(device)
-    except (RuntimeError, AssertionError) as error:
-        reason = next(iter(str(error).splitlines()), "unusable")[:100]
-        raise InputError(f"{device!r} cannot be used here ({reason}); use cpu", "device") from None
+    except (RuntimeError, AssertionError, ImportError):  # torch's own words are about its insides
+        able = "cpu or cuda" if torch.cuda.is_available() else "cpu"
+        raise InputError(f"{device!r} cannot be used here; use {able}", "device") from None

@@ -1,17 +1,18 @@
 """Stored policies: weights in safetensors with a description that must match; a policy file never runs code."""
 
 import json
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
 
 import torch
-from safetensors import SafetensorError, safe_open
+from safetensors import safe_open
 from safetensors.torch import save
 
+from alloc.allocators.learned.methods import METHODS
 from alloc.allocators.learned.network import ActorCritic, NetworkSize
+from alloc.allocators.learned.policy_header import read_header
 from alloc.problems import InputError
 from alloc.problems.formats import write_bytes_atomically
 from alloc.problems.game import AGENT_FEATURES, FEATURE_SET, PAIR_FEATURES, TASK_FEATURES, Turn
@@ -44,7 +45,16 @@ def save_policy(
         "version": version("alloc-mrta"),
         "training": json.dumps(dict(figures or {})),
     }
-    write_bytes_atomically(path, save(tensors, metadata=said))
+    write_bytes_atomically(path, _sorted(save(tensors, metadata=said)))
+
+
+def _sorted(data: bytes) -> bytes:
+    """Return a file of safetensors with its metadata in order, else that of a hash table: another every time."""
+    end = 8 + int.from_bytes(data[:8], "little")
+    header = json.loads(data[8:end])
+    header["__metadata__"] = dict(sorted(header["__metadata__"].items()))
+    text = json.dumps(header, ensure_ascii=False, separators=(",", ":")).encode()
+    return data[:8] + text.ljust(end - 8) + data[end:]
 
 
 def _description(size: NetworkSize, count: int, method: str) -> dict[str, str]:
@@ -71,30 +81,28 @@ def load_policy(path: Path | str, method: str | None, device: torch.device | Non
     Raises
     ------
     InputError
-        If the file cannot be read, was made by another method, or for other features or sizes than this version has.
+        If the file cannot be read, was made by another method, or for other features or sizes than this version has,
+        or holds weights that are not finite.
     """
-    source = str(path)
-    try:
-        with safe_open(source, framework="pt") as file:
-            said = file.metadata() or {}
-            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
-    except FileNotFoundError:  # said of files that may not be read as well
-        reason = "may not be read; change its permissions" if os.path.exists(source) else "no such policy file"
-        raise InputError(reason, "", source) from None
-    except (OSError, SafetensorError) as error:
-        reason = next(iter(str(error).splitlines()), type(error).__name__)
-        raise InputError(f"is not a policy file ({reason}); use one by `alloc train`", "", source) from None
+    source, said = str(path), read_header(path)
+    with safe_open(source, framework="pt") as file:
+        tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
     try:
         size, count = NetworkSize(**json.loads(said["size"])), int(said["networks"])
     except (KeyError, TypeError, ValueError):
         raise InputError("does not describe its networks; use a file by `alloc train`", "metadata", source) from None
-    expected = _description(size, count, said.get("method", "") if method is None else method)
+    theirs = said.get("method", "")
+    if method not in (None, theirs) and theirs in METHODS:
+        raise InputError(f"holds a policy of {theirs}; use it with --method {theirs}", "", source)
+    expected = _description(size, count, theirs if method is None else method)
     for key in ("format", "method", "features", "feature_counts"):
         if said.get(key) != expected[key]:
             raise InputError(f"is {said.get(key)!r}, this version needs {expected[key]!r}; train anew", key, source)
     turn = _turn(said, source)
     if method is not None and turn != Turn.BIDDING:
         raise InputError(f"was trained for turns by {turn}, but plans are made by {Turn.BIDDING}", "turn", source)
+    if not all(bool(tensor.isfinite().all()) for tensor in tensors.values()):
+        raise InputError("weights are not finite; train anew", "", source)
     try:
         return [_network(size, tensors, number, device) for number in range(count)]
     except (RuntimeError, ValueError) as error:

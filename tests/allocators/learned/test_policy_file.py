@@ -1,10 +1,13 @@
 """Stored policies: round trip, and refusal of whatever does not fit."""
 
+import json
+import math
 import pickle
 from pathlib import Path
 
 import pytest
 import torch
+from safetensors import safe_open
 from safetensors.torch import save_file
 
 from alloc.allocators.learned.network import ActorCritic, NetworkSize
@@ -45,16 +48,44 @@ def test_other_files(tmp_path: Path, content: bytes) -> None:
 
 
 def test_a_folder_is_no_policy(tmp_path: Path) -> None:
-    """A folder is refused as well."""
-    with pytest.raises(InputError, match="is not a policy file"):
+    """A folder is called one, and no name at all is told."""
+    with pytest.raises(InputError, match="is a folder"):
         load_policy(tmp_path, "gappo")
+    with pytest.raises(InputError, match="policy: names no file"):
+        load_policy("", "gappo")
 
 
 def test_policy_of_another_method(tmp_path: Path, networks: list[ActorCritic]) -> None:
     """A policy that another method trained is not used by mistake."""
     save_policy(tmp_path / "p.safetensors", networks, "dqn")
-    with pytest.raises(InputError, match="method: is 'dqn', this version needs 'gappo'"):
+    with pytest.raises(InputError, match="holds a policy of dqn; use it with --method dqn"):
         load_policy(tmp_path / "p.safetensors", "gappo")
+    save_policy(tmp_path / "p.safetensors", networks, "newer")
+    with pytest.raises(InputError, match="method: is 'newer', this version needs 'gappo'"):
+        load_policy(tmp_path / "p.safetensors", "gappo")
+
+
+@pytest.mark.parametrize("weight", [math.nan, math.inf, -math.inf])
+def test_weights_that_are_not_finite(tmp_path: Path, networks: list[ActorCritic], weight: float) -> None:
+    """A policy of a training that went astray is refused, whichever network it is in."""
+    with torch.no_grad():
+        next(networks[1].parameters()).flatten()[-1] = weight
+    save_policy(tmp_path / "p.safetensors", networks, "gappo")
+    for method in ("gappo", None):
+        with pytest.raises(InputError, match=r"p\.safetensors: weights are not finite"):
+            load_policy(tmp_path / "p.safetensors", method)
+
+
+def test_the_same_networks_give_the_same_bytes(tmp_path: Path, networks: list[ActorCritic]) -> None:
+    """Files of two trainings that went alike are alike, and others can read them as before."""
+    figures = {"seed": 3, "place": "Århus"}
+    files = [tmp_path / f"{number}.safetensors" for number in range(6)]
+    for path in files:
+        save_policy(path, networks, "gappo", figures)
+    assert len({path.read_bytes() for path in files}) == 1
+    with safe_open(files[0], framework="pt") as file:
+        assert json.loads(file.metadata()["training"]) == figures
+        assert torch.equal(file.get_tensor("1.critic.0.weight"), networks[1].state_dict()["critic.0.weight"])
 
 
 def test_policy_of_another_feature_set(tmp_path: Path, networks: list[ActorCritic]) -> None:
