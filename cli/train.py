@@ -197,7 +197,10 @@ def _close(trainer: "Trainer", policy: Path) -> None:
         note(f"no generation is complete, and {policy} is not written")
         raise typer.Exit(1)
     best = trainer.history[trainer.best_generation - 1]
-    say(f"{policy} holds the networks of generation {best.generation}: T {best.time:.4f}, distance {best.distance:.4f}")
+    say(
+        f"{policy} holds the networks of generation {best.generation}: T {best.time:.4f}, distance {best.distance:.4f}"
+        f", {number(best.unserved, 3)} tasks unserved"
+    )
 
 
 def training_parameters(
@@ -306,6 +309,7 @@ def _tell(report: "Report", trainer: "Trainer", limits: "Limits") -> None:
     say(
         f"gen {report.generation}  {report.decisions:,} decisions  {number(report.decisions_per_second, 3)}/s"
         f"  T {report.time:.4f}  distance {report.distance:.4f}  others {report.others_time:.4f}"
+        f"  unserved {number(report.unserved, 3)}"
         f"  cost {report.cost:.4f} (best {report.best_cost:.4f}, gen {trainer.best_generation})"
         f"  reward {number(report.reward, 3)}  entropy {number(report.entropy, 3)}  KL {number(report.divergence, 2)}"
         f"  rate {number(report.learning_rate, 2)}  {report.seconds / 60:.1f} min, {left:.1f} left"

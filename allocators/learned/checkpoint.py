@@ -17,7 +17,7 @@ from alloc.problems.game import FEATURE_SET
 if TYPE_CHECKING:
     from alloc.allocators.learned.train import TrainingParameters
 
-CHECKPOINT_FORMAT = "alloc-checkpoint/2"
+CHECKPOINT_FORMAT = "alloc-checkpoint/3"
 
 
 def described(parameters: "TrainingParameters", seed: int) -> dict[str, str]:

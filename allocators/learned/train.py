@@ -92,7 +92,7 @@ class Report:
         From 1.
     decisions, evaluations : int
         Decisions of agents and states evaluated by networks up to now, by all members together.
-    cost, time, distance, others_time : float
+    cost, unserved, time, distance, others_time : float
         Of the best member; see `Validation`.
     best_cost : float
         The least cost up to now.
@@ -110,6 +110,7 @@ class Report:
     decisions: int
     evaluations: int
     cost: float
+    unserved: float
     time: float
     distance: float
     others_time: float
@@ -296,6 +297,7 @@ class Trainer:
             decisions=decisions + (last.decisions if last else 0),
             evaluations=sum(one.report.evaluations for one in taught) + (last.evaluations if last else 0),
             cost=validation.cost,
+            unserved=validation.unserved,
             time=validation.time,
             distance=validation.distance,
             others_time=validation.others_time,

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -39,6 +40,8 @@ class Validation:
     cost : float
         What the best networks are chosen by, the lower the better: mean over the boards of 1 - T_ref / T, which a
         single bad game cannot dominate, and of the distance, weighed. A task left unserved counts 1.
+    unserved : float
+        Mean over the boards of the tasks left unserved in a game: their part of the cost.
     time, distance : float
         Mean T / T_ref, and mean distance per agent in the board's scale, on the first board: instances like the
         paper's scenario 1, or one's own.
@@ -49,6 +52,7 @@ class Validation:
     """
 
     cost: float
+    unserved: float
     time: float
     distance: float
     others_time: float
@@ -88,27 +92,42 @@ def _board(aimed: Sequence[Aimed], rng: np.random.Generator) -> Board:
 @torch.no_grad()
 def validate(network: ActorCritic, boards: Sequence[Board], rules: Rules, curriculum: Curriculum) -> Validation:
     """Play `boards` greedily, and judge the best position of each game."""
-    outcomes = [_play(network, board, rules, 2 * curriculum.steps(board)) for board in boards]
-    cost, reward = (float(np.mean([outcome[part].mean() for outcome in outcomes])) for part in (0, 3))
-    others = torch.cat([outcome[1] for outcome in outcomes[1:] or outcomes])
-    time, distance = (float(outcomes[0][part].mean()) for part in (1, 2))
-    return Validation(cost, time, distance, float(1 / others.clamp(min=1).reciprocal().mean()), reward)
+    played = [_play(network, board, rules, 2 * curriculum.steps(board)) for board in boards]
+    others = torch.cat([outcome.time for outcome in played[1:] or played])
+    return Validation(
+        cost=float(np.mean([outcome.cost.mean() for outcome in played])),
+        unserved=float(np.mean([outcome.unserved.mean() for outcome in played])),
+        time=float(played[0].time.mean()),
+        distance=float(played[0].distance.mean()),
+        others_time=float(1 / others.clamp(min=1).reciprocal().mean()),
+        reward=float(np.mean([outcome.rise.mean() for outcome in played])),
+    )
 
 
-def _play(network: ActorCritic, board: Board, rules: Rules, steps: int) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-    """Return cost, T / T_ref, distance and rise of the worth of each game, all of shape (B,)."""
+class _Outcome(NamedTuple):
+    """Cost, tasks unserved, T / T_ref, distance and rise of the worth of each game, all of shape (B,)."""
+
+    cost: Tensor
+    unserved: Tensor
+    time: Tensor
+    distance: Tensor
+    rise: Tensor
+
+
+def _play(network: ActorCritic, board: Board, rules: Rules, steps: int) -> _Outcome:
+    """Play a board, and return the figures of the best position of each game."""
     state = begin(board)
     start = worth(board, state, rules)
-    best = (torch.full_like(start, torch.inf), start, start, start)
+    best = _Outcome(torch.full_like(start, torch.inf), start, start, start, start)
     for _ in range(steps):
         _, slot = choose(board, state, network(board, state), rules)
         state = step(board, state, slot)
         time, unserved = time_over_reference(board, state.group)
         distance = flown(board, state, rules)
         cost = 1 - 1 / time.clamp(min=1) + unserved + DISTANCE_WEIGHT * distance
-        now = (cost, time, distance, worth(board, state, rules) - start)
-        one, two, three, four = (torch.where(cost < best[0], a, b) for a, b in zip(now, best, strict=True))
-        best = (one, two, three, four)
+        now = _Outcome(cost, unserved.to(cost.dtype), time, distance, worth(board, state, rules) - start)
+        better = cost < best.cost
+        best = _Outcome(*(torch.where(better, one, other) for one, other in zip(now, best, strict=True)))
         if bool(state.done.all()):
             break
     return best

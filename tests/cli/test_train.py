@@ -119,6 +119,8 @@ def test_resumed_by_another_command_it_goes_on_to_the_same_curve(alloc, mine):
     whole = alloc("train", "gappo", "--output", "w", *QUICK, "--steps", "1500", "--population", "2")
     assert whole.code == 0
     assert "T 1." in whole.err
+    assert "  unserved 0  cost 0." in whole.err
+    assert "0 tasks unserved" in whole.err.splitlines()[-1]
     assert (
         alloc(
             "train", "gappo", "--output", "p", *QUICK, "--steps", "1500", "--population", "2", "--iterations", "2"

@@ -59,7 +59,7 @@ def planned(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
 
     def plan(*costs: float) -> None:
         coming = iter(costs)
-        monkeypatch.setattr(module, "validate", lambda *_: Validation(next(coming), 1.0, 0.1, 1.0, 0.0))
+        monkeypatch.setattr(module, "validate", lambda *_: Validation(next(coming), 0.5, 1.0, 0.1, 1.0, 0.0))
 
     return plan
 
@@ -133,7 +133,7 @@ def test_train_writes_policy_checkpoint_and_log(paths: dict[str, Path]) -> None:
     assert again.generation == 2
     lines = paths["log"].read_text().splitlines()
     assert len(lines) == 3
-    assert lines[0].startswith("generation,decisions,evaluations,cost")
+    assert lines[0].startswith("generation,decisions,evaluations,cost,unserved,time")
 
 
 def test_the_log_and_the_policy_are_put_right(paths: dict[str, Path]) -> None:
@@ -161,6 +161,7 @@ def test_the_best_networks_are_kept(paths: dict[str, Path], planned: Callable[..
             second = {name: weight.clone() for name, weight in run.members[0]["network"].items()}
     assert run.best_generation == 2
     assert [report.best_cost for report in run.history] == [0.5, 0.2, 0.2, 0.2]
+    assert [report.unserved for report in run.history] == [0.5] * 4
     run.write_policy(paths["output"])
     (kept,) = load_policy(paths["output"], "ppo")
     assert all(torch.equal(weight, second[name]) for name, weight in kept.state_dict().items())

@@ -37,7 +37,7 @@ def test_hopeless_trials_end_early(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     """A trial that does worse than most before it is pruned."""
     pytest.importorskip("optuna")
     costs = iter([0.1] * 15 + [0.9] * 3)
-    monkeypatch.setattr(module, "validate", lambda *_: Validation(next(costs), 1.0, 0.1, 1.0, 0.0))
+    monkeypatch.setattr(module, "validate", lambda *_: Validation(next(costs), 0.0, 1.0, 0.1, 1.0, 0.0))
     study = open_study(tmp_path / "study.db", "ppo", 0)
     tune(study, replace(TINY, decisions=1), 6, Limits(iterations=3), boards=BOARDS)
     assert [trial.state.name for trial in study.trials] == ["COMPLETE"] * 5 + ["PRUNED"]

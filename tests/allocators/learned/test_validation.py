@@ -12,7 +12,7 @@ from alloc.allocators.learned.families import RECIPES
 from alloc.allocators.learned.network import ActorCritic, NetworkSize
 from alloc.allocators.learned.turns import choose
 from alloc.allocators.learned.validation import DISTANCE_WEIGHT, own_games, validate, validation_boards
-from alloc.problems import evaluate
+from alloc.problems import Instance, evaluate
 from alloc.problems.game import PLANNING, begin, step
 from alloc.problems.generate import paper_like
 
@@ -36,8 +36,9 @@ def test_time_is_that_of_the_best_plan_met(network: ActorCritic) -> None:
         score = evaluate(instance, plan_of(board, state))
         time = score.served_makespan / curriculum.own[0].hours
         distance = score.distance * scale / instance.n
-        costs.append((1 - 1 / time + len(score.unserved_tasks) + DISTANCE_WEIGHT * distance, time, distance))
-    assert (got.cost, got.time, got.distance) == pytest.approx(min(costs), rel=1e-4)
+        unserved = len(score.unserved_tasks)
+        costs.append((1 - 1 / time + unserved + DISTANCE_WEIGHT * distance, unserved, time, distance))
+    assert (got.cost, got.unserved, got.time, got.distance) == pytest.approx(min(costs), rel=1e-4)
     assert got.others_time == got.time
 
 
@@ -47,6 +48,15 @@ def test_a_bad_game_does_not_decide(network: ActorCritic) -> None:
     hard = replace(boards[0], need=boards[0].need * torch.tensor([[1.0], [1e6]]))
     costs = [validate(network, [board], PLANNING, Curriculum()).cost for board in (boards[0], hard)]
     assert 0 < costs[1] - costs[0] < 0.6
+
+
+def test_unserved_tasks_are_their_part_of_the_cost(network: ActorCritic) -> None:
+    """What nobody can serve is told, as a mean over boards as the cost is; the rest of the cost is small."""
+    served, unserved = paper_like(10, 3, 44, 1), Instance(ability=[1], workload=[1, 1, 1], allowed_tasks=[[]])
+    curriculum, boards = own_games([served, unserved], Curriculum())
+    got = validate(network, boards, PLANNING, curriculum)
+    assert got.unserved == 1.5
+    assert 0 <= got.cost - got.unserved < 1
 
 
 def test_the_last_fifth_of_own_instances_is_held_out() -> None:
