@@ -31,6 +31,9 @@ EXAMPLES = examples(
 
 STEPS = 500_000
 
+MOST_NAMES = 10
+"""Instances that are named at the most."""
+
 
 class Turn(StrEnum):
     """As `alloc.problems.game.Turn`, without torch; a test compares the two."""
@@ -90,7 +93,7 @@ def train_command(
         str | None,
         typer.Option(
             metavar="FILE|DIR",
-            help="Train on these instances instead; with five or more, the last fifth "
+            help="Train on these instances instead; with five or more, a fifth of them, drawn at random, "
             "judges the networks and is not trained on.",
         ),
     ] = None,
@@ -262,14 +265,32 @@ def _trainer(
     from alloc.allocators.learned.validation import own_games
 
     boards: list[Board] | None = None
+    problems = [] if instances is None else _read(instances)
     if instances is not None:
-        curriculum, boards = own_games(_read(instances), parameters.curriculum)
+        curriculum, boards = own_games(problems, parameters.curriculum)
         parameters = replace(parameters, curriculum=curriculum)
     weights = [] if init is None else [network.state_dict() for network in load_policy(init, None)]
     trainer = Trainer(parameters, seed, boards, weights)
     if checkpoint is not None:
         trainer.resume(checkpoint)
+    if instances is not None:
+        _tell_held_out(problems)
     return trainer
+
+
+def _tell_held_out(instances: "Sequence[Instance]") -> None:
+    from alloc.allocators.learned.validation import hold_out
+
+    train, held = hold_out(instances)
+    idle = sum(not (instance.workload > 0).any() for instance in instances)
+    if idle:
+        note(f"{idle} of {len(instances)} instances left out: there is no work to do")
+    if train == held:
+        note("the networks are judged on the instances that they learn from; with five or more, a fifth is held out")
+    else:
+        names = ", ".join(instance.name for instance in held[:MOST_NAMES])
+        more = f" and {len(held) - MOST_NAMES} more" if len(held) > MOST_NAMES else ""
+        note(f"{len(held)} of {len(instances)} instances held out to judge the networks: {names}{more}")
 
 
 def _read(name: str) -> "list[Instance]":

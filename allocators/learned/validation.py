@@ -12,7 +12,7 @@ from alloc.allocators.learned.curriculum import Aimed, Curriculum, aim
 from alloc.allocators.learned.families import RECIPES, draw_instance
 from alloc.allocators.learned.network import ActorCritic
 from alloc.allocators.learned.turns import choose
-from alloc.problems import Instance
+from alloc.problems import InputError, Instance
 from alloc.problems.game import Board, Rules, begin, flown, make_board, step, time_over_reference, worth
 from alloc.problems.generate import paper_like
 
@@ -70,19 +70,35 @@ def validation_boards(curriculum: Curriculum) -> list[Board]:
     return [_board(aim(kind), rng) for kind in kinds]
 
 
-def own_games(instances: Sequence[Instance], curriculum: Curriculum) -> tuple[Curriculum, list[Board]]:
-    """Return a curriculum of these instances, and boards of the last fifth of them, which then is not trained on.
+def hold_out(instances: Sequence[Instance]) -> tuple[list[Instance], list[Instance]]:
+    """Split instances into those to train on, and a fifth to validate on: drawn at random, but always the same.
 
-    With fewer than five instances all are trained and validated on.
+    Those without any work are left out: whatever is done there costs nothing. Of fewer than five others, all are for
+    both.
+
+    Raises
+    ------
+    InputError
+        If there is nothing to do in any.
     """
-    aimed = aim(instances)
-    kept = len(aimed) // 5
-    train, held = (aimed[:-kept], aimed[-kept:]) if kept else (aimed, aimed)
+    busy = [instance for instance in instances if (instance.workload > 0).any()]
+    if not busy:
+        raise InputError("there is no work to do in any instance; nothing can be learned", "--instances")
+    count = min(MOST_OWN, len(busy) // 5)
+    if not count:
+        return busy, busy
+    held = set(np.random.default_rng(VALIDATION_SEED).choice(len(busy), count, replace=False).tolist())
+    return [one for i, one in enumerate(busy) if i not in held], [one for i, one in enumerate(busy) if i in held]
+
+
+def own_games(instances: Sequence[Instance], curriculum: Curriculum) -> tuple[Curriculum, list[Board]]:
+    """Return a curriculum of the instances to train on, and boards of those to validate on; see `hold_out`."""
+    train, held = hold_out(instances)
     sizes: dict[tuple[int, int], list[Aimed]] = {}
-    for one in held[:MOST_OWN]:
+    for one in aim(held[:MOST_OWN]):
         sizes.setdefault((one.instance.n, one.instance.m), []).append(one)
     rng = np.random.default_rng(VALIDATION_SEED)
-    return replace(curriculum, own=tuple(train)), [_board(alike, rng) for alike in sizes.values()]
+    return replace(curriculum, own=tuple(aim(train))), [_board(alike, rng) for alike in sizes.values()]
 
 
 def _board(aimed: Sequence[Aimed], rng: np.random.Generator) -> Board:

@@ -19,6 +19,7 @@ from alloc.allocators.learned.engine import ENGINES
 from alloc.allocators.learned.families import FAMILIES
 from alloc.allocators.learned.ppo import Ppo
 from alloc.cli import train as module
+from alloc.problems import Instance
 from alloc.problems.formats import write_instance
 from alloc.problems.game import Reward, Turn
 from alloc.problems.generate import paper_like
@@ -183,6 +184,19 @@ def test_a_policy_is_a_beginning(alloc, mine):
     assert training["seed"] == 3
     assert training["decisions"] >= 150
     assert training["turn"] == "bidding"
+
+
+def test_what_judges_the_networks_is_named(alloc, mine):
+    """Some of one's own instances are held out, and named; those with nothing to do count for nothing."""
+    ran = alloc("train", "ppo", "--output", "p", *QUICK, "--iterations", "1")
+    assert "note: the networks are judged on the instances that they learn from" in ran.err
+    for seed in range(2, 6):
+        write_instance(paper_like(8, 2, 35, seed), mine / f"{seed}.json")
+    for name in ("x", "y"):
+        write_instance(Instance(name=name, ability=[1], workload=[0]), mine / f"{name}.json")
+    ran = alloc("train", "ppo", "--output", "q", *QUICK, "--iterations", "1")
+    assert "note: 2 of 8 instances left out: there is no work to do\n" in ran.err
+    assert "note: 1 of 8 instances held out to judge the networks: paper-like-" in ran.err
 
 
 def test_the_game_of_the_paper_can_be_trained_on(alloc, mine):

@@ -11,8 +11,8 @@ from alloc.allocators.learned.curriculum import Curriculum, reference_board
 from alloc.allocators.learned.families import RECIPES
 from alloc.allocators.learned.network import ActorCritic, NetworkSize
 from alloc.allocators.learned.turns import choose
-from alloc.allocators.learned.validation import DISTANCE_WEIGHT, own_games, validate, validation_boards
-from alloc.problems import Instance, evaluate
+from alloc.allocators.learned.validation import DISTANCE_WEIGHT, hold_out, own_games, validate, validation_boards
+from alloc.problems import InputError, Instance, evaluate
 from alloc.problems.game import PLANNING, begin, step
 from alloc.problems.generate import paper_like
 
@@ -59,14 +59,32 @@ def test_unserved_tasks_are_their_part_of_the_cost(network: ActorCritic) -> None
     assert 0 <= got.cost - got.unserved < 1
 
 
-def test_the_last_fifth_of_own_instances_is_held_out() -> None:
-    """With five or more instances, networks are judged by some that they do not learn from."""
+def test_a_fifth_of_own_instances_is_held_out() -> None:
+    """With five or more instances, networks are judged by some that they do not learn from, always the same."""
     instances = [paper_like(10, 3, 44, seed) for seed in range(10)]
+    train, held = hold_out(instances)
+    assert (len(train), len(held)) == (8, 2)
+    assert sorted([*train, *held], key=instances.index) == instances
+    assert held != instances[-2:]
+    assert hold_out(instances) == (train, held)
     curriculum, boards = own_games(instances, Curriculum())
-    assert [one.instance for one in curriculum.own] == instances[:8]
+    assert [one.instance for one in curriculum.own] == train
     assert [board.shape[0] for board in boards] == [2]
     few, (board,) = own_games(instances[:3], Curriculum())
     assert len(few.own) == board.shape[0] == 3
+
+
+def test_instances_without_work_judge_nobody(network: ActorCritic) -> None:
+    """Where there is nothing to do no network is better than another: such instances are left out."""
+    idle = Instance(ability=[1, 2], workload=[0, 0])
+    busy = [paper_like(10, 3, 44, seed) for seed in range(6)]
+    train, held = hold_out([idle, *busy, idle, idle, idle])
+    assert (len(train), len(held)) == (5, 1)
+    assert idle not in train + held
+    curriculum, boards = own_games([*busy, *[idle] * 4], Curriculum())
+    assert validate(network, boards, PLANNING, curriculum).cost > 0
+    with pytest.raises(InputError, match="no work to do in any instance"):
+        hold_out([idle, idle])
 
 
 def test_validation_games_are_always_the_same() -> None:
