@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from alloc.cli import options
-from alloc.cli.console import note, number, percent, say, table, write_json
-from alloc.cli.files import check_writable
+from alloc.cli.console import STANDARD, note, number, percent, say, table, write_json
+from alloc.cli.files import check_outputs
 from alloc.cli.options import Objective, examples
 
 if TYPE_CHECKING:
@@ -53,7 +53,9 @@ def compare_command(
     from alloc.allocators.interrupt import signals_set
     from alloc.problems.formats import read_instance
 
-    check_writable(csv)
+    check_outputs(("--csv", csv), read=[("INSTANCE", instance) for instance in instances])
+    if json and csv == STANDARD:
+        raise typer.BadParameter("and --json cannot both be standard output", param_hint="'--csv'")
     names, numbers = _names(methods), _seeds(seeds)
     for name in names:
         if name != "auto":

@@ -1,7 +1,7 @@
 """Files that commands read, and those that they are to write, looked at before a long run."""
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -52,6 +52,38 @@ def save(document: Callable[[], dict[str, Any]], output: str | None, *, json: bo
         write_text_atomically(output, text)
     if json or output == STANDARD:
         write_out(text)
+
+
+Named = tuple[str, str | None]
+"""An argument or option, and the file that it names, if any."""
+
+
+def check_outputs(*written: Named, read: Iterable[Named] = ()) -> None:
+    """Raise an `InputError` if a file cannot be written, or is one that is read or that another option writes.
+
+    What is replaced on purpose, as by ``--start FILE --output FILE``, is not to be in `read`.
+    """
+    from alloc.problems import InputError
+
+    taken = {path: option for option, name in read if name for path in _parts(name)}
+    for option, name in written:
+        check_writable(name)
+        if name is None or name == STANDARD or not _may_be_replaced(name):
+            continue
+        other = taken.setdefault(os.path.realpath(name), option)
+        if other != option:
+            raise InputError(f"is {other} and {option} at once; name another file", source=name)
+
+
+def _parts(name: str) -> list[str]:
+    """Return the places of the files that an instance may be read from; all of its tables if it is a folder."""
+    tables = ("agents.csv", "tasks.csv", "instance.json") if os.path.isdir(name) else ()
+    return [os.path.realpath(name), *(os.path.realpath(os.path.join(name, table)) for table in tables)]
+
+
+def _may_be_replaced(name: str) -> bool:
+    """Whether it is a file, or will be: a device such as /dev/null may be written by many."""
+    return os.path.isfile(name) or not os.path.exists(name)
 
 
 def check_writable(name: str | None) -> None:

@@ -6,7 +6,7 @@ import typer
 
 from alloc.cli import options
 from alloc.cli.console import note, number, percent, say, table
-from alloc.cli.files import check_writable, read_known, save
+from alloc.cli.files import check_outputs, read_known, save
 from alloc.cli.options import examples
 
 if TYPE_CHECKING:
@@ -52,7 +52,8 @@ def pareto_command(
     """Trace the front of makespan against energy: what each hour saved costs."""
     from alloc.allocators.pareto import pareto
 
-    check_writable(output)
+    read = [("INSTANCE", instance)]
+    check_outputs(("--output", output), ("--plot", plot), read=read)
     if plot is not None:
         from alloc.cli.plot import check_plot
 

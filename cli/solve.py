@@ -6,7 +6,7 @@ import typer
 
 from alloc.cli import options
 from alloc.cli.console import note, say
-from alloc.cli.files import check_writable, read_pair, save
+from alloc.cli.files import check_outputs, read_pair, save
 from alloc.cli.options import Objective, examples
 
 if TYPE_CHECKING:
@@ -67,7 +67,8 @@ def solve_command(
     from alloc.allocators import solve
     from alloc.cli.progress import Progress
 
-    check_writable(output)
+    read = [("INSTANCE", instance), ("--policy", policy)]
+    check_outputs(("--output", output), ("--plot", plot), read=read)
     if plot is not None:
         from alloc.cli.plot import check_plot
 
