@@ -2,6 +2,7 @@
 
 import hashlib
 import io
+import zipfile
 from dataclasses import asdict, fields, is_dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -56,6 +57,31 @@ def write_checkpoint(path: Path, description: dict[str, str], state: dict[str, A
     write_bytes_atomically(path, buffer.getvalue())
 
 
+def generations_in(path: Path) -> int:
+    """Return how many generations a checkpoint of any version holds.
+
+    Raises
+    ------
+    InputError
+        If there is none at `path`.
+    """
+    return len(_stored(path)["history"])
+
+
+def _stored(path: Path) -> dict[str, Any]:
+    source = str(path)
+    try:
+        if zipfile.is_zipfile(path):
+            state: dict[str, Any] = torch.load(path, weights_only=True)
+            if {"format", "description", "history"} <= state.keys():
+                return state
+    except Exception:  # torch's own words are about pickles
+        pass
+    if not path.exists():
+        raise InputError("no such checkpoint; leave --resume out to begin one", "", source)
+    raise InputError("is no checkpoint, or is damaged; name another by --checkpoint, or remove it", "", source)
+
+
 def read_checkpoint(path: Path, description: dict[str, str]) -> dict[str, Any]:
     """Return the state that was stored in a checkpoint of a run like this.
 
@@ -64,17 +90,11 @@ def read_checkpoint(path: Path, description: dict[str, str]) -> dict[str, Any]:
     InputError
         If there is no checkpoint of this version at `path`, or it is one of a run with another description.
     """
-    source = str(path)
-    try:
-        state: dict[str, Any] = torch.load(path, weights_only=True)
-        if state["format"] != CHECKPOINT_FORMAT:
-            raise KeyError(state["format"])
-        stored = dict(state["description"])
-    except FileNotFoundError:
-        raise InputError("no such checkpoint", "", source) from None
-    except Exception as error:
-        reason = next(iter(str(error).splitlines()), type(error).__name__)[:100]
-        raise InputError(f"is not a checkpoint of this version ({reason})", "", source) from None
+    source, state = str(path), _stored(path)
+    if state["format"] != CHECKPOINT_FORMAT:
+        message = f"is a checkpoint of another version ({state['format']}, not {CHECKPOINT_FORMAT}); train anew"
+        raise InputError(message, "", source)
+    stored = state["description"]
     for name in sorted(stored.keys() | description.keys(), key=lambda name: (name != "method", name)):
         ours, theirs = description.get(name), stored.get(name)
         if ours != theirs:

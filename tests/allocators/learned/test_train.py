@@ -9,6 +9,7 @@ import pytest
 import torch
 from safetensors import safe_open
 
+from alloc.allocators.learned import checkpoint
 from alloc.allocators.learned import train as module
 from alloc.allocators.learned.curriculum import Curriculum
 from alloc.allocators.learned.engine import SerialEngine
@@ -231,6 +232,31 @@ def test_bad_checkpoints(tmp_path: Path, content: bytes | None) -> None:
     with pytest.raises(InputError, match="checkpoint") as caught:
         trainer().resume(tmp_path / "checkpoint")
     assert "\n" not in str(caught.value)
+
+
+def test_damaged_checkpoints(tmp_path: Path) -> None:
+    """A checkpoint cut short, or with a hole, is told in plain words, not in those of torch."""
+    path = tmp_path / "checkpoint"
+    trainer().save(path)
+    whole = path.read_bytes()
+    for content in (whole[:100], whole[: len(whole) // 2], whole[:-1], whole[:30] + b"x" * 200 + whole[230:]):
+        path.write_bytes(content)
+        with pytest.raises(InputError) as caught:
+            trainer().resume(path)
+        assert caught.value.message == "is no checkpoint, or is damaged; name another by --checkpoint, or remove it"
+
+
+def test_checkpoints_of_other_versions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """They are not gone on with, but what they hold is known."""
+    monkeypatch.setattr(checkpoint, "CHECKPOINT_FORMAT", "alloc-checkpoint/2")
+    run = trainer()
+    run.save(tmp_path / "none")
+    run.advance()
+    run.save(tmp_path / "one")
+    monkeypatch.undo()
+    assert [checkpoint.generations_in(tmp_path / name) for name in ("none", "one")] == [0, 1]
+    with pytest.raises(InputError, match="is a checkpoint of another version"):
+        trainer().resume(tmp_path / "one")
 
 
 @pytest.mark.parametrize(
