@@ -2,7 +2,7 @@
 
 import signal
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from alloc.cli.console import note, number, say
-from alloc.cli.files import check_writable
+from alloc.cli.console import STANDARD, note, number, say
+from alloc.cli.files import check_outputs, check_writable
 from alloc.cli.options import examples
+from alloc.cli.training import check_free, learner_parameters, new_trainer, read_instances, training_parameters
 
 if TYPE_CHECKING:
-    from alloc.allocators.learned.train import Limits, Report, Trainer, TrainingParameters
-    from alloc.problems import Instance
-    from alloc.problems.game import Board
+    from alloc.allocators.learned.train import Limits, Report, Trainer
 
 EXAMPLES = examples(
     "alloc train gappo --output policy.safetensors --steps 2000000",
@@ -30,9 +29,6 @@ EXAMPLES = examples(
 )
 
 STEPS = 500_000
-
-MOST_NAMES = 10
-"""Instances that are named at the most."""
 
 
 class Turn(StrEnum):
@@ -145,19 +141,27 @@ def train_command(
     ] = 1,
 ) -> None:
     """Train a learned method, with a checkpoint after each generation."""
-    policy = Path(output)
-    kept, lines = Path(checkpoint or policy.with_suffix(".checkpoint")), Path(log or policy.with_suffix(".csv"))
-    for path in (policy, kept, lines):
-        check_writable(str(path))
-    if len({policy, kept, lines}) < 3:
-        raise typer.BadParameter("policy, checkpoint and log must be three files", param_hint="'--output'")
+    check_writable(output)
+    kept = checkpoint or str(Path(output).with_suffix(".checkpoint"))
+    lines = log or str(Path(output).with_suffix(".csv"))
+    check_outputs(("--output", output), ("--checkpoint", kept), ("--log", lines), read=[("--init", init)])
+    if STANDARD in (output, kept, lines):
+        raise typer.BadParameter("policy, checkpoint and log must be files", param_hint="'--output'")
+    # from cheap to dear: nobody need wait for torch to be told of a mistake that can be seen without it
+    families = family or ["mixed"]
+    learner = learner_parameters(method, families, settings or [])
     if population is not None and method != "gappo":
         raise typer.BadParameter(f"{method} trains one network; gappo breeds several", param_hint="'--population'")
-    from alloc.problems import InputError
+    from alloc.allocators.learned.engine import check_engine, make_engine
 
-    if kept.exists() and not resume:
-        raise InputError("holds a training run; go on with --resume, or name another by --checkpoint", source=str(kept))
-    from alloc.allocators.learned.engine import make_engine
+    check_engine(engine.value, workers, address)
+    problems = None if instances is None else read_instances(instances)
+    if init is not None:
+        from alloc.allocators.learned.policy_header import read_header
+
+        read_header(init)
+    policy, run = Path(output), Path(kept)
+    check_free(policy, run, Path(lines), resume=resume)
     from alloc.allocators.learned.train import Limits, train
     from alloc.allocators.learned.training_log import event_writer
 
@@ -165,15 +169,15 @@ def train_command(
         event_writer(Path(tensorboard)).close()
     parameters = training_parameters(
         method,
-        family=family or ["mixed"],
+        learner,
+        families=families,
         lesson=lesson,
         population=population,
-        settings=settings or [],
-        turn=turn,
-        reward=reward,
+        turn=turn.value,
+        reward=reward.value,
         init=init,
     )
-    trainer = _trainer(parameters, seed, instances, init, kept if resume else None)
+    trainer = new_trainer(parameters, seed, problems, init, run if resume else None)
     if steps is None and minutes is None and iterations is None:
         steps = STEPS
     limits = Limits(steps, iterations, minutes, patience)
@@ -183,8 +187,8 @@ def train_command(
                 train(
                     trainer,
                     policy,
-                    checkpoint=kept,
-                    log=lines,
+                    checkpoint=run,
+                    log=Path(lines),
                     limits=limits,
                     tensorboard=None if tensorboard is None else Path(tensorboard),
                     engine=where,
@@ -204,107 +208,6 @@ def _close(trainer: "Trainer", policy: Path) -> None:
         f"{policy} holds the networks of generation {best.generation}: T {best.time:.4f}, distance {best.distance:.4f}"
         f", {number(best.unserved, 3)} tasks unserved"
     )
-
-
-def training_parameters(
-    method: str,
-    *,
-    family: list[str],
-    lesson: int,
-    population: int | None = None,
-    settings: Sequence[str] = (),
-    turn: Turn = Turn.BIDDING,
-    reward: Reward = Reward.MAKESPAN,
-    init: str | None = None,
-) -> "TrainingParameters":
-    """Return what the options ask for.
-
-    Raises
-    ------
-    InputError
-        If there is no such method, family or hyperparameter, or no policy to start from.
-    """
-    from alloc.allocators.learned.curriculum import Curriculum
-    from alloc.allocators.learned.families import FAMILIES
-    from alloc.allocators.learned.methods import method_parameters
-    from alloc.allocators.learned.network import NetworkSize
-    from alloc.allocators.learned.policy_file import load_policy
-    from alloc.allocators.learned.train import TrainingParameters
-    from alloc.problems import InputError
-    from alloc.problems.errors import nearest
-    from alloc.problems.game import Rules
-
-    for name in family:
-        if name not in FAMILIES:
-            raise InputError(f"no such family: {name!r}{nearest(name, FAMILIES)}", "--family")
-    return TrainingParameters(
-        method=method,
-        population=(population or 4) if method == "gappo" else 1,
-        decisions=lesson,
-        network=NetworkSize() if init is None else load_policy(init, None)[0].size,
-        learner=method_parameters(method, _pairs(settings)),
-        curriculum=Curriculum(tuple(family)),
-        rules=Rules(turn.value, reward.value),
-    )
-
-
-def _pairs(settings: Sequence[str]) -> dict[str, str]:
-    for setting in settings:
-        if "=" not in setting:
-            raise typer.BadParameter(f"{setting!r} is not NAME=VALUE", param_hint="'--set'")
-    return dict(setting.split("=", 1) for setting in settings)
-
-
-def _trainer(
-    parameters: "TrainingParameters", seed: int, instances: str | None, init: str | None, checkpoint: Path | None
-) -> "Trainer":
-    from dataclasses import replace
-
-    from alloc.allocators.learned.policy_file import load_policy
-    from alloc.allocators.learned.train import Trainer
-    from alloc.allocators.learned.validation import own_games
-
-    boards: list[Board] | None = None
-    problems = [] if instances is None else _read(instances)
-    if instances is not None:
-        curriculum, boards = own_games(problems, parameters.curriculum)
-        parameters = replace(parameters, curriculum=curriculum)
-    weights = [] if init is None else [network.state_dict() for network in load_policy(init, None)]
-    trainer = Trainer(parameters, seed, boards, weights)
-    if checkpoint is not None:
-        trainer.resume(checkpoint)
-    if instances is not None:
-        _tell_held_out(problems)
-    return trainer
-
-
-def _tell_held_out(instances: "Sequence[Instance]") -> None:
-    from alloc.allocators.learned.validation import hold_out
-
-    train, held = hold_out(instances)
-    idle = sum(not (instance.workload > 0).any() for instance in instances)
-    if idle:
-        note(f"{idle} of {len(instances)} instances left out: there is no work to do")
-    if train == held:
-        note("the networks are judged on the instances that they learn from; with five or more, a fifth is held out")
-    else:
-        names = ", ".join(instance.name for instance in held[:MOST_NAMES])
-        more = f" and {len(held) - MOST_NAMES} more" if len(held) > MOST_NAMES else ""
-        note(f"{len(held)} of {len(instances)} instances held out to judge the networks: {names}{more}")
-
-
-def _read(name: str) -> "list[Instance]":
-    """Read an instance, or all that lie in a folder."""
-    from alloc.problems import InputError
-    from alloc.problems.formats import read_instance
-
-    folder = Path(name)
-    if not folder.is_dir() or (folder / "agents.csv").exists():
-        return [read_instance(name)]
-    found = [path for path in sorted(folder.iterdir()) if path.suffix in (".json", ".npz") or path.is_dir()]
-    if not found:
-        raise InputError("holds no instances", source=name)
-    return [read_instance(str(path)) for path in found]
 
 
 @contextmanager

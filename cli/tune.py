@@ -8,6 +8,7 @@ import typer
 from alloc.cli.console import note, number, say
 from alloc.cli.files import check_writable
 from alloc.cli.options import examples
+from alloc.cli.training import learner_parameters, training_parameters
 
 if TYPE_CHECKING:
     import optuna
@@ -40,9 +41,9 @@ def tune_command(
 ) -> None:
     """Tune the hyperparameters of a learned method by validation."""
     check_writable(study)
-    from alloc.cli.train import training_parameters
-
-    parameters = training_parameters(method, family=family or ["mixed"], lesson=max(1, min(20_000, steps // 5)))
+    families = family or ["mixed"]
+    learner = learner_parameters(method, families)
+    parameters = training_parameters(method, learner, families=families, lesson=max(1, min(20_000, steps // 5)))
     import torch
 
     torch.set_num_threads(1)

@@ -9,9 +9,8 @@ import contextlib
 import pickle
 import traceback
 from collections.abc import Callable, Iterator, Sequence
+from importlib.util import find_spec
 from typing import Any, Protocol, Self, TypeVar
-
-import torch
 
 from alloc.problems import InputError
 from alloc.problems.errors import nearest
@@ -135,12 +134,26 @@ def result(answered: bytes) -> Any:
 
 @contextlib.contextmanager
 def _torch_threads(threads: int) -> Iterator[None]:
+    import torch  # here, so that options are checked before the seconds that it takes
+
     before = torch.get_num_threads()
     torch.set_num_threads(threads)
     try:
         yield
     finally:
         torch.set_num_threads(before)
+
+
+def check_engine(name: str, workers: int | None = None, address: str | None = None) -> None:
+    """Raise an `InputError` for options that `make_engine` would refuse, as far as that can be told at once."""
+    if name not in ENGINES:
+        raise InputError(f"no such engine: {name!r}{nearest(name, ENGINES)}", "--engine")
+    if workers is not None and name != "processes":
+        raise InputError("belongs to --engine processes", "--workers")
+    if address is not None and name != "ray":
+        raise InputError("belongs to --engine ray", "--address")
+    if name == "ray" and find_spec("ray") is None:
+        raise InputError("Ray is not installed: pip install 'alloc-mrta[cluster]'", "--engine")
 
 
 def make_engine(
@@ -165,12 +178,7 @@ def make_engine(
         If there is no such engine, if an option does not belong to it, if Ray is not installed or nobody is at
         `address`.
     """
-    if name not in ENGINES:
-        raise InputError(f"no such engine: {name!r}{nearest(name, ENGINES)}", "--engine")
-    if workers is not None and name != "processes":
-        raise InputError("belongs to --engine processes", "--workers")
-    if address is not None and name != "ray":
-        raise InputError("belongs to --engine ray", "--address")
+    check_engine(name, workers, address)
     if name == "ray":
         from alloc.allocators.learned.ray_engine import RayEngine
 

@@ -14,9 +14,12 @@ from pathlib import Path
 import pytest
 import torch
 from safetensors import safe_open
+from safetensors.torch import save_file
 
 from alloc.allocators.learned.engine import ENGINES
 from alloc.allocators.learned.families import FAMILIES
+from alloc.allocators.learned.network import ActorCritic, NetworkSize
+from alloc.allocators.learned.policy_file import save_policy
 from alloc.allocators.learned.ppo import Ppo
 from alloc.cli import train as module
 from alloc.problems import Instance
@@ -41,6 +44,10 @@ def curve(path: Path) -> list[list[str]]:
     """All figures but those of time."""
     with path.open(newline="") as file:
         return [row[:-2] for row in csv.reader(file)]
+
+
+def files() -> dict[Path, bytes]:
+    return {path: path.read_bytes() for path in Path().rglob("*") if path.is_file()}
 
 
 def weights(path: Path) -> dict[str, torch.Tensor]:
@@ -106,13 +113,106 @@ def test_interrupted_before_the_first_generation_writes_no_policy(alloc, monkeyp
     assert signal.getsignal(number) is before
 
 
-def test_a_run_is_not_overwritten_by_mistake(alloc):
+def test_a_run_is_not_overwritten_by_mistake(alloc, mine):
     """Where a checkpoint stands already, a new training has to be told to go on, or to go elsewhere."""
-    Path("p.checkpoint").write_bytes(b"weeks of training")
-    ran = alloc("train", "gappo", "--output", "p.safetensors")
+    assert alloc("train", "ppo", "--output", "p.safetensors", *QUICK, "--iterations", "1").code == 0
+    before = files()
+    ran = alloc("train", "ppo", "--output", "p.safetensors", *QUICK)
     assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
-    assert "--resume" in ran.err
-    assert Path("p.checkpoint").read_bytes() == b"weeks of training"
+    assert "p.checkpoint: holds a training run; go on with --resume" in ran.err
+    assert files() == before
+    Path("p.safetensors").unlink()  # without the policy the checkpoint alone says it
+    assert "p.checkpoint: holds a training run" in alloc("train", "ppo", "--output", "p.safetensors", *QUICK).err
+
+
+def test_a_run_without_a_generation_blocks_none(alloc, mine):
+    """What a run leaves behind that failed or ended at once may be resumed, and need not be removed."""
+    assert alloc("train", "gappo", "--output", "p", *QUICK, "--iterations", "0").code == 1
+    assert Path("p.checkpoint").exists()
+    ran = alloc("train", "gappo", "--output", "p", *QUICK, "--iterations", "1", "--population", "2", "--resume")
+    assert (ran.code, ran.err.count("\n")) == (2, 1)
+    assert "is a run with population 4, not 2" in ran.err
+    ran = alloc("train", "gappo", "--output", "p", *QUICK, "--iterations", "0", "--population", "2")
+    assert ran.code == 1
+    ran = alloc("train", "gappo", "--output", "p", *QUICK, "--iterations", "1", "--population", "2", "--resume")
+    assert ran.code == 0
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        (("gapo",), "did you mean 'gappo'"),
+        (("gappo", "--family", "mixt"), "did you mean 'mixed'"),
+        (("gappo", "--set", "clip=-1"), "clip must be"),
+        (("gappo", "--instances", "nowhere.json"), "nowhere.json: there is no such file"),
+        (("gappo", "--init", "nowhere"), "nowhere: no such policy file"),
+        (("gappo", "--workers", "2"), "belongs to --engine processes"),
+    ],
+)
+def test_what_is_wrong_in_any_case_comes_first(alloc, more, message):
+    """Whoever mistypes an option is told of that, not of a checkpoint that is beside the point."""
+    Path("p.checkpoint").write_bytes(b"weeks of training")
+    ran = alloc("train", *more, "--output", "p.safetensors")
+    assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
+    assert message in ran.err
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        (("--output", "small.json"), "small.json: is there already, and no policy file"),
+        (("--output", "tensors"), "tensors: is there already, and no policy file"),
+        (("--output", "small.json", "--resume", "--checkpoint", "small.json"), "small.json: is --output and"),
+        (("--output", "policy"), "policy: holds a policy, and no checkpoint to go on from is beside it"),
+        (("--output", "policy", "--init", "policy"), "policy: is --init and --output at once"),
+        (("--output", "new", "--checkpoint", "small.json"), "small.json: is there already, and no checkpoint"),
+        (("--output", "new", "--log", "small.json"), "small.json: is there already, and no log of a training"),
+        (("--output", "new", "--log", "new"), "new: is --output and --log at once"),
+        (("--output", ""), "'': is no name of a file"),
+        (("--output", "-"), "policy, checkpoint and log must be files"),
+    ],
+)
+def test_what_training_did_not_write_is_not_replaced(alloc, small, more, message):
+    """Instances, tensors from elsewhere, policies and tables are safe from a mistyped name."""
+    save_file({"a": torch.zeros(2)}, "tensors")
+    save_policy("policy", [ActorCritic(NetworkSize(4, 4, 1))], "ppo")
+    before = files()
+    ran = alloc("train", "ppo", *more)
+    assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
+    assert message in ran.err
+    assert files() == before
+
+
+def test_empty_files_hold_nothing(alloc, mine):
+    """A temporary file, made beforehand, is a place to write to."""
+    for name in ("p", "p.checkpoint", "p.csv"):
+        Path(name).touch()
+    assert alloc("train", "ppo", "--output", "p", *QUICK, "--iterations", "1").code == 0
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("gapo",),
+        ("gappo", "--family", "mixt"),
+        ("gappo", "--set", "clipp=1"),
+        ("gappo", "--set", "clip=-1"),
+        ("gappo", "--resume"),
+        ("gappo", "--init", "nowhere"),
+        ("gappo", "--init", "small.json"),
+        ("gappo", "--instances", "nowhere.json"),
+        ("gappo", "--engine", "ray"),
+        ("gappo", "--output", "small.json"),
+    ],
+)
+def test_mistakes_are_told_before_torch_is_loaded(small, tmp_path, arguments):
+    """Nobody waits seconds to be told of a typing error."""
+    code = (
+        "import sys\nsys.modules['ray'] = None\nfrom alloc.cli.main import main\n"
+        "code = main(['train', '--output', 'p', *sys.argv[1:]])\nprint(code, 'torch' in sys.modules)"
+    )
+    ran = subprocess.run([sys.executable, "-c", code, *arguments], capture_output=True, text=True, cwd=tmp_path)
+    assert (ran.stdout, ran.stderr.count("\n")) == ("2 False\n", 1)
 
 
 def test_resumed_by_another_command_it_goes_on_to_the_same_curve(alloc, mine):
