@@ -113,7 +113,7 @@ def train_command(
     ] = None,
     turn: Annotated[Turn, typer.Option(help="Who moves: the best bids, or all agents at once.")] = Turn.BIDDING,
     reward: Annotated[Reward, typer.Option(help="Makespan, or the paper's coverage (3).")] = Reward.MAKESPAN,
-    seed: Annotated[int, typer.Option(min=0, help="Source of all randomness.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=2**63 - 1, help="Source of all randomness.")] = 0,
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint.")] = False,
     checkpoint: Annotated[
         str | None,

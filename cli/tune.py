@@ -37,7 +37,7 @@ def tune_command(
         list[str] | None,
         typer.Option(metavar="NAME", help="As for `alloc train`; may be repeated.", show_default="mixed"),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Source of all randomness.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, help="Source of all randomness.")] = 0,
 ) -> None:
     """Tune the hyperparameters of a learned method by validation."""
     check_writable(study)

@@ -65,6 +65,8 @@ def weights(path: Path) -> dict[str, torch.Tensor]:
         ("--family", "mixt"),
         ("--set", "clip"),
         ("--set", "clipp=1"),
+        ("--seed", str(2**63)),
+        ("--minutes", "nan"),
         ("--set", "learning_rate=-1"),
         ("--set", "clip=nan"),
         ("--instances", "nowhere.json"),
