@@ -17,7 +17,8 @@ EXAMPLES = examples(
     "alloc compare demo.json --methods greedy,ga,cpsat",
     "alloc compare instances/*.json --methods ga,gappo --seeds 5 --time-limit 3 --csv table.csv",
     "alloc compare demo.json --methods milp,gappo --objective makespan-energy --seeds 7,8,9 --json",
-    closing="A method that refuses an instance has a row with the reason. Ctrl-C prints what is finished.",
+    closing="A method that refuses an instance has a row with the reason. Ctrl-C prints what is finished, with exit "
+    "code 1.",
 )
 
 
@@ -63,7 +64,7 @@ def compare_command(
     limit = options.time_limit(time_limit, iterations)
     Budget(limit, iterations, target_gap)
     problems = [read_instance(instance) for instance in instances]
-    stop, rows = threading.Event(), []
+    stop, rows, total = threading.Event(), [], len(problems) * len(names)
     with signals_set(stop):
         for row in compare(
             problems,
@@ -77,11 +78,13 @@ def compare_command(
             stop=stop,
         ):
             rows.append(row)
-            _show_done(row, len(rows), len(problems) * len(names))
+            _show_done(row, len(rows), total)
     _print(share_bounds(rows), csv, json=json)
     if stop.is_set():
-        note(f"interrupted after {len(rows)} of {len(problems) * len(names)} rows")
-    raise typer.Exit(1 if any(row.unserved for row in rows) or not any(row.runs for row in rows) else 0)
+        note(f"interrupted after {len(rows)} of {total} rows")
+    complete = len(rows) == total and all(row.reason or row.runs == len(numbers) for row in rows)
+    served = any(row.runs for row in rows) and not any(row.unserved for row in rows)
+    raise typer.Exit(0 if complete and served else 1)
 
 
 def _names(text: str) -> list[str]:

@@ -71,5 +71,7 @@ def test_interrupted_comparison_prints_what_is_finished(alloc, small):
     ran = alloc("compare", "small.json", "hard.json", "--methods", "greedy,ga", "--time-limit", "30", "--json")
     assert "interrupted after" in ran.err
     done = [(row["instance"], row["method"]) for row in ran.json["rows"]]
+    assert ran.code == 1  # though every task is served in the rows that there are
+    assert all(row["unserved"] == 0 for row in ran.json["rows"])
     assert ("small", "greedy") in done
     assert ("hard", "ga") not in done
