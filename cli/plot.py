@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from alloc.cli.console import number, percent
+from alloc.cli.console import counted, number, percent
 from alloc.cli.plot_sites import draw_sites, name_sites, plain_text, shortened
 from alloc.cli.plot_times import MOST_ROWS, draw_times
 from alloc.problems import InputError
@@ -68,10 +68,10 @@ def draw(result: "Result") -> "Figure":
 
 def _title(result: "Result") -> str:
     name = plain_text(shortened(result.instance.name, 60))
-    text = f"{name}: {result.instance.n} agents, {result.instance.m} tasks, {result.method}"
+    text = f"{name}: {counted(result.instance.n, 'agent')}, {counted(result.instance.m, 'task')}, {result.method}"
     if result.evaluation is None:
         return f"{text}\nno allocation found"
     energy = f"energy {number(result.energy, 4)}"
     if result.makespan is None:
-        return f"{text}\n{len(result.evaluation.unserved_tasks)} tasks unserved, {energy}"
+        return f"{text}\n{counted(len(result.evaluation.unserved_tasks), 'task')} unserved, {energy}"
     return f"{text}\nT = {number(result.makespan, 4)} h, gap {percent(result.gap)}, {energy}"

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from alloc.cli.console import number
+from alloc.cli.console import counted, number
 from alloc.cli.plot import save_figure
 from alloc.cli.plot_colours import LIMIT, MAKESPAN
 from alloc.cli.plot_sites import plain_text, shortened
@@ -81,4 +81,4 @@ def _title(front: "Front") -> str:
         f"from T = {number(fastest.makespan, 4)} h, energy {number(fastest.energy, 4)}"
         f" to T = {number(cheapest.makespan, 4)} h, energy {number(cheapest.energy, 4)}"
     )
-    return f"{name}: {instance.n} agents, {instance.m} tasks\n{ends}"
+    return f"{name}: {counted(instance.n, 'agent')}, {counted(instance.m, 'task')}\n{ends}"

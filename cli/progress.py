@@ -7,7 +7,7 @@ import time
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from alloc.cli.console import number, percent
+from alloc.cli.console import counted, number, percent
 
 if TYPE_CHECKING:
     from alloc.allocators import Improvement
@@ -66,7 +66,8 @@ def progress_line(elapsed_s: float, best: "Improvement | None") -> str:
         return f"{elapsed_s:6.1f} s  no allocation yet; the first run of some methods compiles them"
     score = best.evaluation
     if score.makespan is None:
-        return f"{elapsed_s:6.1f} s  {len(score.unserved_tasks)} tasks unserved  energy {number(score.energy)}"
+        unserved = counted(len(score.unserved_tasks), "task")
+        return f"{elapsed_s:6.1f} s  {unserved} unserved  energy {number(score.energy)}"
     gap = max(0.0, 1 - best.lower_bound / score.makespan) if score.makespan else 0.0
     return f"{elapsed_s:6.1f} s  T {number(score.makespan)} h  gap {percent(gap)}  energy {number(score.energy)}"
 

@@ -4,7 +4,7 @@ import math
 
 from alloc.allocators import Result, Status, StopReason
 from alloc.allocators.explain import Bottleneck, explain
-from alloc.cli.console import number, percent
+from alloc.cli.console import counted, number, percent
 from alloc.problems import Instance, Objective
 
 STOPS = {
@@ -29,7 +29,7 @@ def summary(result: Result) -> str:
 
 
 def _headline(result: Result) -> str:
-    size = f"{result.instance.n} agents, {result.instance.m} tasks"
+    size = f"{counted(result.instance.n, 'agent')}, {counted(result.instance.m, 'task')}"
     return f"{result.instance.name} ({size}), {result.method}: {_status(result)}"
 
 
@@ -43,7 +43,7 @@ def _status(result: Result) -> str:
     if result.status is Status.FEASIBLE:
         return "every task is served; not proven to be the best"
     if result.status is Status.INFEASIBLE:
-        return f"{unserved} of {result.instance.m} tasks cannot be served along with the others"
+        return f"{unserved} of {counted(result.instance.m, 'task')} cannot be served along with the others"
     return "no allocation found"
 
 
@@ -129,8 +129,8 @@ def _room(result: Result, found: Bottleneck) -> str:
 
 
 def rounded_up(ability: float, *, whole: bool) -> str:
-    """Return `ability` rounded up, to a whole number or to three digits, so that it is enough as it stands."""
-    if whole:
+    """Return `ability` rounded up, so that it is enough: to three digits, or to a whole number of at most six."""
+    if whole and ability < 999_999:
         return f"{math.ceil(ability * (1 - 1e-12))}"
     unit = 10.0 ** (math.floor(math.log10(ability)) - 2)
     return f"{math.ceil(ability / unit * (1 - 1e-12)) * unit:.3g}"

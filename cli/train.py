@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from alloc.cli.console import STANDARD, note, number, say
+from alloc.cli.console import STANDARD, counted, note, number, say
 from alloc.cli.files import check_outputs, check_writable
 from alloc.cli.options import examples
 from alloc.cli.training import check_free, learner_parameters, new_trainer, read_instances, training_parameters
@@ -195,7 +195,7 @@ def train_command(
                     on_report=lambda report: _tell(report, trainer, limits),
                 )
         except KeyboardInterrupt:
-            note(f"interrupted; {kept} holds {trainer.generation} generations")
+            note(f"interrupted; {kept} holds {counted(trainer.generation, 'generation')}")
     _close(trainer, policy)
 
 

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from alloc.cli import options
-from alloc.cli.console import complain, number, percent, say, write_json
+from alloc.cli.console import complain, counted, number, percent, say, write_json
 from alloc.cli.options import examples
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def _words(fact: dict[str, Any]) -> str:
         served = f"at least {fact['fewest_unserved']} of the tasks cannot be served"
     bound = "" if fact["lower_bound"] is None else f", makespan at least {number(fact['lower_bound'])} h"
     return (
-        f"{fact['file']}: ok, {fact['agents']} agents with ability {number(fact['total_ability'])} in all,"
-        f" {fact['tasks']} tasks with workload {number(fact['total_workload'])},"
+        f"{fact['file']}: ok, {counted(fact['agents'], 'agent')} with ability {number(fact['total_ability'])} in all,"
+        f" {counted(fact['tasks'], 'task')} with workload {number(fact['total_workload'])},"
         f" an agent reaches {percent(fact['reach_density'])} of the tasks, {served}{bound}"
     )

@@ -21,6 +21,7 @@ def improvement(instance, tasks, bound=1.0):
 def test_line_tells_seconds_makespan_gap_and_energy(small):
     """The line holds what is known: nothing yet, unserved tasks, or T with gap and energy."""
     assert progress_line(2.0, None).startswith("   2.0 s  no allocation yet; ")
+    assert "  1 task unserved" in progress_line(2.0, improvement(small, [0, 1, -1, -1, -1]))
     assert "2 tasks unserved" in progress_line(2.0, improvement(small, [0, -1, -1, -1, -1]))
     assert "T 1.625 h  gap 38.5 %  energy 6" in progress_line(2.0, improvement(small, [0, 0, 0, 1, 2]))
 

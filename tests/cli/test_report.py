@@ -7,10 +7,19 @@ from alloc.problems import Instance
 
 @pytest.mark.parametrize(
     ("ability", "whole", "text"),
-    [(2.0, True, "2"), (2.0001, True, "3"), (0.96101, False, "0.962"), (123.4, False, "124")],
+    [
+        (2.0, True, "2"),
+        (2.0001, True, "3"),
+        (0.96101, False, "0.962"),
+        (123.4, False, "124"),
+        (999_998.5, True, "999999"),
+        (1_234_000.0, True, "1.24e+06"),
+        (1.2345e300, True, "1.24e+300"),
+    ],
 )
 def test_abilities_are_rounded_up(ability, whole, text):
-    """What is said to be enough is enough."""
+    """What is said to be enough is enough, and long numbers look as elsewhere."""
+    assert float(text) >= ability
     assert rounded_up(ability, whole=whole) == text
 
 
@@ -36,6 +45,12 @@ def test_finite_speeds_say_so():
     assert "One more agent there that is there at once" in "\n".join(
         holdup(solve(instance, "greedy", handle_signals=False))
     )
+
+
+def test_one_agent_and_one_task():
+    """One of a kind is not told as several."""
+    result = solve(Instance(name="one", ability=[3], workload=[6]), "greedy", handle_signals=False)
+    assert summary(result).startswith("one (1 agent, 1 task), greedy: ")
 
 
 def test_no_work_is_no_bottleneck():
