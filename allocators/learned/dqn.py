@@ -80,7 +80,8 @@ class Dqn:
             played = play(self.network, board, steps, generator, lesson.rules, warmth, exploring, scale)
             self.memory.add(played.transitions)
             repeats = max(1, round(parameters.reuse * len(played.transitions.action) / parameters.minibatch))
-            for _ in range(repeats if self.memory.kept else 0):
+            repeats = repeats if self.memory.kept else 0
+            for _ in range(repeats):
                 self.update(lesson.rules, generator)
             decisions += played.decisions
             evaluations += played.evaluations + repeats * parameters.minibatch * (3 if parameters.double else 2)

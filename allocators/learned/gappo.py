@@ -74,7 +74,8 @@ def breed(
         _Genome(_weights(member["network"]).tolist(), number, score)
         for number, (member, score) in enumerate(zip(members, scores, strict=True))
     ]
-    elite = tools.selBest(genomes, parameters.elite)
+    unchanged = min(parameters.elite, max(1, len(genomes) - 1))  # of two or more, one at least is a child
+    elite = tools.selBest(genomes, unchanged)
     following = [members[genome.number] for genome in elite]
     with _seeded(seed):
         while len(following) < len(members):

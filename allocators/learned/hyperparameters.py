@@ -66,8 +66,8 @@ class GappoParameters(PpoParameters):
 class A2cParameters:
     """Hyperparameters of A2C.
 
-    Rounded from one of five trials of 25,000 decisions with one seed each (`tests/benchmarks/tune_rivals.py`): it
-    had the second least cost, and did better than the first guess in a run of 100,000. Seeds differ as much as trials.
+    Rounded from one of five short trials with one seed each, too few to tell one from the next; in twelve longer ones
+    (`tests/benchmarks/from_scratch_tuning.py`) none did better.
 
     Attributes
     ----------
@@ -104,8 +104,8 @@ class A2cParameters:
 class DqnParameters:
     """Hyperparameters of DQN.
 
-    Rounded from the best of four trials of 25,000 decisions with one seed each (`tests/benchmarks/tune_rivals.py`): too
-    few to tell one from the next.
+    Rounded from the best of four short trials with one seed each, too few to tell one from the next; others that did a
+    little better in small games: `tests/benchmarks/from_scratch_tuned.json`.
 
     Attributes
     ----------
@@ -157,8 +157,8 @@ class DqnParameters:
 class DdpgParameters:
     """Hyperparameters of DDPG.
 
-    Rounded from the third of four trials of 25,000 decisions with one seed each (`tests/benchmarks/tune_rivals.py`).
-    The two ahead of it evaluate twice as many states per decision; too few trials to tell one from the next.
+    Rounded from the third of four short trials with one seed each, as the two ahead of it evaluate twice as many states
+    per decision; others that did a little better in small games: `tests/benchmarks/from_scratch_tuned.json`.
 
     Attributes
     ----------
@@ -217,7 +217,7 @@ class BreedingParameters:
     Attributes
     ----------
     elite : int
-        Members that pass unchanged.
+        Members that pass unchanged; one less than there are, at the most.
     tournament : int
         Members that compete to be a parent.
     crossover_probability : float

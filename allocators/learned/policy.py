@@ -106,8 +106,9 @@ class Gappo(PolicyAllocator):
     method, trained_by = BUILT_IN["gappo"], "gappo"
 
     def plan(self, search: Search) -> None:
-        """Play, and learn on in between."""
-        Planner(search, self.networks, self.parameters, FineTuning(search, self.networks)).run()
+        """Play, and learn on in between: on the CPU, where learners work."""
+        tuning = FineTuning(search, self.networks) if self.device.type == "cpu" else None
+        Planner(search, self.networks, self.parameters, tuning).run()
 
 
 class GappoLs(Gappo):

@@ -146,7 +146,7 @@ def teach(assignment: _Assignment) -> _Taught:
     """Take a lesson and play the validation games: a pure function, the same wherever it runs."""
     parameters = assignment.parameters
     learner = new_learner(parameters.method, parameters.network, parameters.learner, 0)
-    learner.load(assignment.state)
+    learner.load(copy.deepcopy(assignment.state))  # optimisers go on writing where their state came from
     report = learner.take(assignment.lesson)
     validation = validate(learner.policy, assignment.boards, parameters.rules, parameters.curriculum)
     policy = {name: weight.clone() for name, weight in learner.policy.state_dict().items()}

@@ -103,14 +103,6 @@ class Board:
         """Return the same board on another device."""
         return Board(*(getattr(self, field.name).to(device) for field in fields(self)))
 
-    def repeat(self, price: Tensor) -> Board:
-        """Return as many copies of a board with one game as there are prices; the copies share their memory."""
-        copies = {
-            field.name: getattr(self, field.name).expand(len(price), *getattr(self, field.name).shape[1:])
-            for field in fields(self)
-        }
-        return Board(**{**copies, "price": price})
-
 
 def make_board(
     instances: Sequence[Instance],

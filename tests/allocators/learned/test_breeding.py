@@ -43,6 +43,16 @@ def test_elite_passes_unchanged() -> None:
     assert after[1] is before[2]
 
 
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_small_populations_breed_too(count: int) -> None:
+    """There is a child among two members, however large the elite; a single member stays as it is."""
+    before = members(count)
+    after = breed(before, list(range(count)), BreedingParameters(elite=5, mutation_probability=1.0), seed=1)
+    assert len(after) == count
+    assert sum(not any(member is old for old in before) for member in after) == min(1, count - 1)
+    assert after[0] is before[-1]
+
+
 def test_children_without_mutation_lie_between_their_parents() -> None:
     """Crossover blends weight by weight, so that each lies between those of two members."""
     before = members(3)

@@ -112,13 +112,18 @@ def test_seeds_matter() -> None:
 
 
 def test_lessons_change_nothing_but_their_own_learner() -> None:
-    """A generation that is dropped leaves the run as it was, though its lessons were taken."""
-    run = trainer()
+    """A generation that is dropped leaves the run as it was, weights and optimisers, though its lessons were taken."""
+    run, undisturbed = trainer(), trainer()
+    for one in (run, undisturbed):
+        one.advance()
     before = weights(run).clone()
     asked = iter([False, False, True])
     assert run.advance(engine=SerialEngine(), should_stop=lambda: next(asked)) is None
-    assert run.generation == 0
+    assert run.generation == 1
     assert torch.equal(weights(run), before)
+    for one in (run, undisturbed):
+        one.advance()
+    assert torch.equal(weights(run), weights(undisturbed))
 
 
 def test_train_writes_policy_checkpoint_and_log(paths: dict[str, Path]) -> None:

@@ -116,16 +116,12 @@ def test_group_ability_is_that_of_the_evaluator(instance: Instance, random) -> N
     assert torch.equal(group_ability(board, state.slot), state.group)
 
 
-def test_repeat_and_choose_games(pair: Instance) -> None:
-    """Copies differ in their price alone, and games are chosen by number."""
-    board = layout(pair)
-    copies = board.repeat(torch.tensor([0.1, 0.2, 0.3]))
-    assert copies.shape == (3, 3, 3)
-    assert copies.price.tolist() == pytest.approx([0.1, 0.2, 0.3])
-    one = copies[torch.tensor([2])]
-    assert one.price.item() == pytest.approx(0.3)
-    for name, value in fields(one).items():
-        assert name == "price" or torch.equal(value, getattr(board, name)), name
+def test_games_are_chosen_by_number() -> None:
+    """A board of chosen games has these, in this order, and a game may be chosen twice."""
+    games = [paper_like(8, 3, 30, seed) for seed in range(3)]
+    chosen = layout(*games)[torch.tensor([2, 0, 2])]
+    for name, value in fields(layout(games[2], games[0], games[2])).items():
+        assert torch.equal(value, getattr(chosen, name)), name
 
 
 def test_boards_of_several_instances_are_those_of_each() -> None:

@@ -218,7 +218,7 @@ def test_the_reward_ranks_plans_as_its_objective(reward: Reward) -> None:
     """At balanced load the worth of the game is highest at the same plan for both rewards."""
     board = layout(Instance(ability=[3, 1, 1, 1], workload=[4, 2]), price=0.0)
     slots = torch.tensor(list(itertools.product(range(2), repeat=4)))
-    boards = board.repeat(torch.zeros(len(slots)))
+    boards = board[torch.zeros(len(slots), dtype=torch.int64)]
     gain = potential if reward == Reward.MAKESPAN else coverage
     value = gain(boards, group_ability(boards, slots))
     group = group_ability(boards, slots)[value == value.max()] * 1.5
