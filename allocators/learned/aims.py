@@ -24,7 +24,10 @@ CHECK_SHARE, CHECK_SWEEPS = 0.06, 5
 
 TOO_SLOW, NEARLY = 0.5, 0.002
 """Share of what was lacking at the last check that must be gone by the next, or the aim is given up; and share of all
-that is needed below which what is lacking is so little that only patience counts."""
+that is needed below which what is lacking is so little that only patience counts, as it does below a mean ability."""
+
+UNCONCERNED = 5
+"""Sweeps without success that mean nothing."""
 
 
 class Aims:
@@ -57,6 +60,7 @@ class Aims:
     def __init__(self, search: Search, instance: Instance, patience: int, makespan_share: float) -> None:
         self.search, self.instance = search, instance
         self.patience, self.makespan_share = patience, makespan_share
+        self._mean_ability = float(instance.ability.mean())
         bound = self._bound()
         if instance is search.instance:
             search.raise_bound(bound)
@@ -116,11 +120,16 @@ class Aims:
         self.least_shortfall = min(shortfall, self.least_shortfall)
         self._sweeps += 1
 
+    @property
+    def in_vain(self) -> float:
+        """How much of the patience is used up, from 0 to 1."""
+        return min(1.0, max(0, self.stale - UNCONCERNED) / max(1, self.patience - UNCONCERNED))
+
     def _is_too_slow(self) -> bool:
         """Whether most of what was lacking a while ago still is, and that is more than a rest."""
         if self._sweeps < CHECK_SWEEPS or self._spent() - self._checked < CHECK_SHARE:
             return False
-        rest = NEARLY * float(self.instance.workload.sum()) / max(self.hours, 1e-300)
+        rest = max(self._mean_ability, NEARLY * float(self.instance.workload.sum()) / max(self.hours, 1e-300))
         slow = self.least_shortfall > max(TOO_SLOW * self._shortfall_then, rest)
         self._checked, self._sweeps, self._shortfall_then = self._spent(), 0, self.least_shortfall
         return slow

@@ -182,7 +182,7 @@ class Planner:
         """Partition tasks into neighbours, and find the agents that work there, and idle ones that could."""
         instance, rng = self.instance, self.rng
         low, high = self.parameters.part_tasks
-        in_vain = min(1.0, self.aims.stale / self.parameters.patience)
+        in_vain = self.aims.in_vain if (surplus < 0).any() else 0.0
         high += round(self.parameters.larger_parts * in_vain)
         size = min(int(rng.integers(low, high + 1)), instance.m)
         tasks = cover(instance.task_position, surplus, size, rng, self.parameters.far_share * in_vain)
@@ -193,7 +193,7 @@ class Planner:
         if len(idle):
             goal, _, legal = self._near
             chance = np.where(legal[idle] & (part_of[goal[idle]] >= 0), rng.random((len(idle), goal.shape[1])), -1.0)
-            chosen[idle] = part_of[goal[idle, chance.argmax(1)]]  # -1 where the agent can go to no part
+            chosen[idle] = np.where(chance.max(1) >= 0, part_of[goal[idle, chance.argmax(1)]], -1)
         order = np.argsort(chosen, kind="stable")
         first = np.searchsorted(chosen[order], np.arange(len(tasks) + 1))
         return tasks, [order[first[p] : first[p + 1]] for p in range(len(tasks))]

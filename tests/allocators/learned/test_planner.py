@@ -303,16 +303,31 @@ def test_slow_aims_are_given_up(network: ActorCritic) -> None:
     one = planner(network, instance, iterations=100)
     one.play_whole(1.0)
     aims, first = one.aims, one.aims.hours
-    for shortfall, iteration in ((50.0, 0), *((40.0, 20),) * 5):
-        one.search.iteration = iteration
+    for shortfall in (50.0, 49.0, 48.0, 47.0, 46.0):
         aims.note(shortfall)
+    one.search.iteration = 20
     assert not aims._is_too_slow(), "the first check has nothing to compare with"
     for _ in range(5):
         aims.note(30.0)
+    assert not aims._is_too_slow(), "no share of the budget has gone by"
     one.search.iteration = 40
     aims.set(one.plan)
     assert aims.failed == first
     assert aims.hours > first
+
+
+def test_little_that_is_lacking_is_worth_the_patience(network: ActorCritic) -> None:
+    """Less than a mean agent's ability in all does not end an aim, and parts get larger only after a while in vain."""
+    aims = planner(network, paper_like(40, 8, 170, 0), iterations=100).aims
+    for iteration in (20, 40, 60):
+        for _ in range(5):
+            aims.note(3.0)
+        aims.search.iteration = iteration
+        assert not aims._is_too_slow()
+    assert aims.stale == 14
+    assert aims.in_vain == pytest.approx((14 - 5) / (30 - 5))
+    aims.note(2.0)
+    assert aims.in_vain == 0
 
 
 def test_nothing_to_serve_ends_at_once(network: ActorCritic) -> None:
