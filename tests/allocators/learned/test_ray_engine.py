@@ -1,6 +1,9 @@
-"""The Ray engine: a machine of the cluster dies in mid-work, and nothing is lost."""
+"""The Ray engine: a machine of the cluster dies in mid-work, also of a whole training, and nothing is lost."""
 
+import contextlib
+import csv
 import signal
+import subprocess
 import sys
 import threading
 import time
@@ -11,9 +14,14 @@ from typing import Any
 import engine_jobs as jobs
 import pytest
 import torch
+from ray_cluster import add_machine, at_work, kill_at_work, living, ray_cluster
+from safetensors.torch import load_file
 
 from alloc.allocators.learned.engine import Engine, EngineError, SerialEngine, make_engine
+from alloc.cli.main import main
 from alloc.problems import InputError
+from alloc.problems.formats import write_instance
+from alloc.problems.generate import paper_like
 
 
 def test_without_ray_the_mend_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -35,20 +43,8 @@ def test_nobody_there(address: str) -> None:
 
 @pytest.fixture(scope="module")
 def cluster() -> Iterator[Any]:
-    """A head that does no work, and two machines of one processor each, all on this one."""
-    pytest.importorskip("ray")
-    from ray.cluster_utils import Cluster
-
-    small = {"object_store_memory": 80 * 2**20, "include_dashboard": False}
-    health = {"health_check_initial_delay_ms": 0, "health_check_period_ms": 1000, "health_check_failure_threshold": 3}
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("RAY_USAGE_STATS_ENABLED", "0")
-        patch.setenv("PYTHONPATH", str(Path(jobs.__file__).parent))  # where the workers find the jobs
-        cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 0, "_system_config": health, **small})
-        for _ in range(2):
-            cluster.add_node(num_cpus=1, **small)
+    with ray_cluster(machines=2) as cluster:
         yield cluster
-        cluster.shutdown()
 
 
 @pytest.fixture(scope="module")
@@ -105,13 +101,14 @@ def test_a_stop_drops_what_is_under_work(engine: Engine, tmp_path: Path) -> None
 
 @pytest.mark.slow
 def test_a_machine_dies_and_nothing_is_lost(cluster: Any, engine: Engine, tmp_path: Path) -> None:
-    """One of two machines is killed with an item under work; every result arrives, and is right."""
+    """One of three machines is killed with an item under work; every result arrives, and is right."""
+    add_machine(cluster)
     items = [(number, str(tmp_path)) for number in range(6)]
 
     def kill_one() -> None:
-        while len({path.read_text() for path in tmp_path.glob("*.try")}) < 2:
+        while len(busy := {path.read_text() for path in tmp_path.glob("*.try")}) < 2:
             time.sleep(0.02)
-        doomed = next(iter(cluster.worker_nodes))
+        doomed = next(machine for machine in cluster.worker_nodes if machine.node_id in busy)
         (tmp_path / "doomed").write_text(doomed.node_id)
         cluster.remove_node(doomed, allow_graceful=False)
 
@@ -123,3 +120,93 @@ def test_a_machine_dies_and_nothing_is_lost(cluster: Any, engine: Engine, tmp_pa
     tries = [path.name.partition("-")[0] for path in tmp_path.glob("*.try")]
     assert sorted(set(tries)) == list("012345")
     assert len(tries) > 6
+
+
+@pytest.fixture(scope="module")
+def options(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    """Arguments of a training of four generations, each long enough to be killed in its midst."""
+    mine = tmp_path_factory.mktemp("mine") / "mine.json"
+    write_instance(paper_like(10, 3, 44, 0), mine)
+    shape = ["--population", "3", "--iterations", "4", "--lesson", "200", "--seed", "1"]
+    return ["train", "gappo", "--instances", str(mine), *shape]
+
+
+@pytest.fixture(scope="module")
+def undisturbed(options: list[str], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The policy of that training in this process alone."""
+    policy = tmp_path_factory.mktemp("undisturbed") / "p"
+    assert main([*options, "--output", str(policy), "--engine", "serial"]) == 0
+    return policy
+
+
+@contextlib.contextmanager
+def training(cluster: Any, *options: str) -> Iterator[subprocess.Popen[str]]:
+    """The command in a process of its own, which does not outlive the block."""
+    command = [sys.executable, "-c", "from alloc.cli.main import main; raise SystemExit(main())", *options]
+    command += ["--engine", "ray", "--address", cluster.address]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+def curve(policy: Path) -> list[list[str]]:
+    """All figures of the log but those of time, and what they are called."""
+    with policy.with_suffix(".csv").open(newline="") as file:
+        return [row[:-2] for row in csv.reader(file)]
+
+
+def members(policy: Path) -> Any:
+    """All that the networks of the population are, with the states of their optimisers."""
+    return torch.load(policy.with_suffix(".checkpoint"), weights_only=True)["members"]
+
+
+def assert_same_end(policy: Path, expected: Path) -> None:
+    assert len(curve(expected)) == 5
+    assert curve(policy) == curve(expected)
+    torch.testing.assert_close(load_file(policy), load_file(expected), rtol=0, atol=0)
+    torch.testing.assert_close(members(policy), members(expected), rtol=0, atol=0)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+def test_a_machine_dies_in_a_training(cluster: Any, options: list[str], undisturbed: Path, tmp_path: Path) -> None:
+    """The lesson that a killed machine was at is taken again on another, and nobody needs to do anything."""
+    add_machine(cluster)
+    before, policy = living(cluster), tmp_path / "p"
+    with training(cluster, *options, "--output", str(policy)) as process:
+        assert process.stderr is not None
+        assert process.stderr.readline().startswith("gen 1 ")
+        killed = kill_at_work(cluster, goes_on=lambda: process.poll() is None)
+        assert killed is not None
+        assert process.poll() is None
+        assert len(curve(policy)) < 5
+        told = process.stderr.read()
+        assert process.wait() == 0, told
+    while living(cluster) == before:  # the cluster may hear later of the machine than of its lesson
+        time.sleep(0.1)
+    assert living(cluster) == before - 1
+    cluster.remove_node(killed)
+    assert_same_end(policy, undisturbed)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+def test_a_killed_training_is_resumed(cluster: Any, options: list[str], undisturbed: Path, tmp_path: Path) -> None:
+    """After kill -9 the cluster is free for the next command, which goes on where the checkpoint stands."""
+    policy = tmp_path / "p"
+    with training(cluster, *options, "--output", str(policy)) as process:
+        assert process.stderr is not None
+        assert process.stderr.readline().startswith("gen 1 ")
+        while process.poll() is None and not any(at_work(machine) for machine in cluster.worker_nodes):
+            time.sleep(0.01)
+    assert process.returncode == -signal.SIGKILL
+    behind = len(curve(policy)) - 1
+    assert behind < 4
+    with training(cluster, *options, "--output", str(policy), "--resume") as process:
+        assert process.stderr is not None
+        told = process.stderr.read()
+        assert process.wait() == 0, told
+    assert told.startswith((f"gen {behind + 1} ", f"gen {behind + 2} "))  # the checkpoint is written before the log
+    assert_same_end(policy, undisturbed)
