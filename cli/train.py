@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from alloc.cli.console import STANDARD, counted, note, number, say
+from alloc.cli.console import STANDARD, complain, counted, note, number, say
 from alloc.cli.files import check_outputs, check_writable
 from alloc.cli.options import examples
 from alloc.cli.training import check_free, learner_parameters, new_trainer, read_instances, training_parameters
@@ -152,7 +152,7 @@ def train_command(
     learner = learner_parameters(method, families, settings or [])
     if population is not None and method != "gappo":
         raise typer.BadParameter(f"{method} trains one network; gappo breeds several", param_hint="'--population'")
-    from alloc.allocators.learned.engine import check_engine, make_engine
+    from alloc.allocators.learned.engine import EngineError, check_engine, make_engine
 
     check_engine(engine.value, workers, address)
     problems = None if instances is None else read_instances(instances)
@@ -196,6 +196,9 @@ def train_command(
                 )
         except KeyboardInterrupt:
             note(f"interrupted; {kept} holds {counted(trainer.generation, 'generation')}")
+        except EngineError as error:
+            complain(f"{error}; {kept} holds {counted(trainer.generation, 'generation')}, and --resume goes on from them")
+            raise typer.Exit(1) from None
     _close(trainer, policy)
 
 

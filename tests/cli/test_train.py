@@ -16,7 +16,7 @@ import torch
 from safetensors import safe_open
 from safetensors.torch import save_file
 
-from alloc.allocators.learned.engine import ENGINES
+from alloc.allocators.learned.engine import ENGINES, EngineError, SerialEngine
 from alloc.allocators.learned.families import FAMILIES
 from alloc.allocators.learned.network import ActorCritic, NetworkSize
 from alloc.allocators.learned.policy_file import save_policy
@@ -113,6 +113,18 @@ def test_interrupted_before_the_first_generation_writes_no_policy(alloc, monkeyp
     assert "interrupted" in ran.err
     assert not Path("p.safetensors").exists()
     assert signal.getsignal(number) is before
+
+
+def test_an_engine_that_gives_up_is_told_in_one_line(alloc, monkeypatch, mine):
+    """Too little memory is no defect of the program; the line says what is kept, and how to go on."""
+
+    def give_up(*_):
+        raise EngineError("a worker process died 3 times at the same item")
+
+    monkeypatch.setattr(SerialEngine, "map", give_up)
+    ran = alloc("train", "ppo", "--output", "p.safetensors", *QUICK)
+    assert (ran.code, ran.out, ran.err.count("\n")) == (1, "", 1)
+    assert "died 3 times at the same item; p.checkpoint holds 0 generations, and --resume" in ran.err
 
 
 def test_a_run_is_not_overwritten_by_mistake(alloc, mine):
