@@ -133,7 +133,9 @@ def train_command(
     ] = None,
     address: Annotated[
         str | None,
-        typer.Option(help="For --engine ray: head of the cluster.", show_default="one of its own"),
+        typer.Option(
+            help="For --engine ray: head of the cluster.", show_default="RAY_ADDRESS, else the cluster on this machine"
+        ),
     ] = None,
     threads: Annotated[
         int,

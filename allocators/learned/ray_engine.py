@@ -37,7 +37,7 @@ class RayEngine(Engine):
     Raises
     ------
     InputError
-        If Ray is not installed, or nobody is at `address`.
+        If Ray is not installed, nobody is at `address`, or no machine there has so many processors.
     """
 
     def __init__(self, address: str | None = None, threads: int = 1, tries: int = TRIES) -> None:
@@ -49,6 +49,11 @@ class RayEngine(Engine):
         self._ours = not ray.is_initialized()
         if self._ours:
             self._connect(address or os.environ.get("RAY_ADDRESS", "auto"))
+        try:
+            self._check_processors(threads)
+        except InputError:
+            self.close()
+            raise
         self._task = ray.remote(num_cpus=threads, max_retries=tries - 1)(_work)
         self.threads = threads
 
@@ -60,6 +65,12 @@ class RayEngine(Engine):
         except Exception as error:
             reason = next(iter(str(error).splitlines()), type(error).__name__)
             raise InputError(f"no Ray cluster at {address!r}: {reason}", "--address") from None
+
+    def _check_processors(self, threads: int) -> None:
+        """Raise an `InputError` where Ray would wait forever, without a word, for a machine that is large enough."""
+        most = max((int(node["Resources"].get("CPU", 0)) for node in self._ray.nodes() if node["Alive"]), default=0)
+        if 0 < most < threads:  # a cluster without any may grow with the work
+            raise InputError(f"no machine of the cluster has {threads} processors; the largest has {most}", "--threads")
 
     def map(
         self, function: Callable[[T], R], items: Sequence[T], should_stop: Callable[[], bool] = never

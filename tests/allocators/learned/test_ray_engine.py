@@ -72,6 +72,14 @@ def test_same_results_in_order(engine: Engine) -> None:
 
 
 @pytest.mark.slow
+def test_more_threads_than_processors(cluster: Any, engine: Engine) -> None:
+    """What no machine can ever do is told at once, where Ray waits forever; the connection is still there."""
+    with pytest.raises(InputError, match=r"--threads: no machine of the cluster has 2 processors; the largest has 1"):
+        make_engine("ray", address=cluster.address, threads=2)
+    assert engine.map(jobs.square, [3]) == [9]
+
+
+@pytest.mark.slow
 def test_a_killed_worker_loses_nothing(engine: Engine, tmp_path: Path) -> None:
     """Items whose process is killed at the first try are done at the next."""
     results = engine.map(jobs.die_first, [(number, str(tmp_path / str(number))) for number in range(4)])
