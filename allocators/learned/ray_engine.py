@@ -63,8 +63,7 @@ class RayEngine(Engine):
             with _terminations_kept():
                 self._ray.init(address=address, log_to_driver=False, logging_level="ERROR")
         except Exception as error:
-            reason = next(iter(str(error).splitlines()), type(error).__name__)
-            raise InputError(f"no Ray cluster at {address!r}: {reason}", "--address") from None
+            raise InputError(f"no Ray cluster at {address!r}: {_reason(error)}", "--address") from None
 
     def _check_processors(self, threads: int) -> None:
         """Raise an `InputError` where Ray would wait forever, without a word, for a machine that is large enough."""
@@ -87,7 +86,7 @@ class RayEngine(Engine):
                 for task in done:
                     results[tasks[task]] = result(self._ray.get(task))
         except self._ray.exceptions.RayError as error:
-            raise EngineError(f"Ray gave an item up: {' '.join(str(error).split())[:300]}") from error
+            raise EngineError(f"Ray gave an item up: {_reason(error)}") from error
         finally:
             for task in pending:
                 self._ray.cancel(task, force=True)
@@ -103,6 +102,10 @@ class RayEngine(Engine):
 def _work(asked: bytes, threads: int) -> bytes:
     torch.set_num_threads(threads)
     return answer(asked)
+
+
+def _reason(error: Exception) -> str:
+    return " ".join(str(error).split())[:300] or type(error).__name__
 
 
 def _check_reachable(address: str) -> None:

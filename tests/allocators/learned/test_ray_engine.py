@@ -41,6 +41,17 @@ def test_nobody_there(address: str) -> None:
     assert time.monotonic() - began < 30
 
 
+def test_a_cluster_that_cannot_be_joined(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What Ray says against it is told, the versions in its later lines too."""
+
+    def refuse(**_: object) -> None:
+        raise RuntimeError("Version mismatch: The cluster was started with:\n    Ray: 2.9.0\n    Python: 3.9.1")
+
+    monkeypatch.setattr(pytest.importorskip("ray"), "init", refuse)
+    with pytest.raises(InputError, match=r"--address: no Ray cluster at 'x': Version .* with: Ray: 2\.9\.0 Python: 3"):
+        make_engine("ray", address="x")
+
+
 @pytest.fixture(scope="module")
 def cluster() -> Iterator[Any]:
     with ray_cluster(machines=2) as cluster:
