@@ -162,7 +162,7 @@ def test_improvements_are_told_from_the_calling_thread(exact):
         paper(1, 0),
         exact,
         objective="makespan-energy",
-        time_limit_s=2,
+        time_limit_s=0.5,
         on_improvement=lambda improvement: threads.add(threading.get_ident()),
     )
     assert threads == {threading.get_ident()}

@@ -95,9 +95,8 @@ def test_messages_are_counted() -> None:
     # both join the first task, the first wins; that is news to the second, which joins the other; that is news in turn
     assert int(said[1]) >= 3
     assert int(said[2]) >= 3
-    deaf = solve(
-        Instance(ability=[2, 1], workload=[2, 1], agent_position=[[0], [5]] @ np.eye(1, 2)), load("hedonic", hearing=1)
-    )
+    apart = Instance(ability=[2, 1], workload=[2, 1], agent_position=[[0], [5]] @ np.eye(1, 2))
+    deaf = solve(apart, load("hedonic", hearing=1), iterations=100, time_limit_s=None)
     assert "0 messages" in deaf.notes[0]
     assert "2 parts of the agents cannot hear each other" in deaf.notes[1]
 

@@ -47,7 +47,7 @@ def pair() -> Iterator[ProcessEngine]:
         yield engine
 
 
-@pytest.fixture(params=["serial", "one process", "two processes"])
+@pytest.fixture(scope="module", params=["serial", "one process", "two processes"])
 def engine(request: pytest.FixtureRequest, pair: ProcessEngine) -> Iterator[Engine]:
     with SerialEngine() if request.param == "serial" else ProcessEngine(1) as engine:
         yield pair if request.param == "two processes" else engine
