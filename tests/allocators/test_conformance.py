@@ -6,8 +6,13 @@ from typing import ClassVar
 
 import pytest
 
+from alloc.allocators import Budget, RefusedError, load
 from alloc.allocators.conformance import AllocatorConformance
+from alloc.allocators.conformance.cases import CASES
 from alloc.allocators.registry import BUILT_IN
+from alloc.allocators.search import Deadline
+from alloc.allocators.solve import refuse
+from alloc.problems import Objective
 
 
 class TestGreedy(AllocatorConformance):
@@ -84,6 +89,22 @@ def test_no_method_is_left_out():
     classes = [value for _, value in inspect.getmembers(sys.modules[__name__], inspect.isclass)]
     tested = {cls.name for cls in classes if issubclass(cls, AllocatorConformance)}
     assert tested - {""} == set(BUILT_IN)
+
+
+def test_who_refuses_what():
+    """The suite skips what a method refuses: finite speeds for three methods, slack for two, and nothing else."""
+    refused = set()
+    for name in BUILT_IN:
+        allocator = load(name)
+        for instance in CASES.values():
+            for what, slack in (("speeds" if instance.has_travel_time else "plain", 0.0), ("slack", 0.5)):
+                try:
+                    refuse(allocator, instance, Objective.MAKESPAN_ENERGY, Budget(), Deadline(slack))
+                except RefusedError:
+                    refused.add((name, what))
+                    break
+    speeds = {(name, "speeds") for name in ("ga", "hedonic", "auction")}
+    assert refused == speeds | {("greedy", "slack"), ("ga", "slack")}
 
 
 def test_a_subclass_must_say_what_it_tests():

@@ -37,14 +37,14 @@ def test_energy_of_a_paper_scenario(allocator):
 
 @pytest.mark.parametrize("seed", range(24))
 def test_tiny_instances(allocator, seed):
-    """On tiny instances whose tasks can all be served, makespan and energy are the least there are."""
+    """On tiny instances as many tasks are served as can be; if all are, makespan and energy are the least there are."""
     instance = tiny_instance(seed)
     best = brute_force(instance)
-    if best.unserved:
-        pytest.skip("not all tasks can be served")
     result = solve(instance, allocator, objective="makespan-energy", iterations=60, time_limit_s=None)
-    assert result.makespan == pytest.approx(best.makespan, rel=1e-9)
-    assert result.energy == pytest.approx(best.energy, rel=1e-9)
+    assert len(result.evaluation.unserved_tasks) == best.unserved
+    if not best.unserved:
+        assert result.makespan == pytest.approx(best.makespan, rel=1e-9)
+        assert result.energy == pytest.approx(best.energy, rel=1e-9)
 
 
 @settings(max_examples=30, deadline=None)

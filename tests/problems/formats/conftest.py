@@ -1,6 +1,9 @@
 """Instances of every kind, and what it means that two are the same."""
 
-from collections.abc import Callable
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -47,6 +50,25 @@ def the_error(path: Any, read: Callable[[Any], object] = read_instance) -> Input
     assert error.source == ("standard input" if path == "-" else str(path))
     assert error.message
     return error
+
+
+@pytest.fixture
+def bound(tmp_path: Path) -> Iterator[Path]:
+    """A folder of a user whom permissions bind: root is nobody until the test ends."""
+    if os.geteuid() != 0:
+        yield tmp_path
+        return
+    nobody = 65534
+    with tempfile.TemporaryDirectory() as folder:
+        os.chown(folder, nobody, nobody)
+        try:
+            os.setresuid(nobody, nobody, 0)
+        except (AttributeError, PermissionError):
+            pytest.skip("nothing is protected from root, who cannot be another here")
+        try:
+            yield Path(folder)
+        finally:
+            os.setresuid(0, 0, 0)
 
 
 @pytest.fixture
