@@ -66,22 +66,22 @@ class TestGappoLs(AllocatorConformance):
 
 class TestPpo(AllocatorConformance):
     name = "ppo"
-    iterations = 4
+    iterations = 2  # as its kin below, it plays by the planner of `gappo`
 
 
 class TestA2c(AllocatorConformance):
     name = "a2c"
-    iterations = 4
+    iterations = 2
 
 
 class TestDqn(AllocatorConformance):
     name = "dqn"
-    iterations = 4
+    iterations = 2
 
 
 class TestDdpg(AllocatorConformance):
     name = "ddpg"
-    iterations = 4
+    iterations = 2
 
 
 def test_no_method_is_left_out():
