@@ -199,7 +199,9 @@ def train_command(
         except KeyboardInterrupt:
             note(f"interrupted; {kept} holds {counted(trainer.generation, 'generation')}")
         except EngineError as error:
-            complain(f"{error}; {kept} holds {counted(trainer.generation, 'generation')}, and --resume goes on from them")
+            complain(
+                f"{error}; {kept} holds {counted(trainer.generation, 'generation')}, and --resume goes on from them"
+            )
             raise typer.Exit(1) from None
     _close(trainer, policy)
 
