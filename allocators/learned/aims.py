@@ -19,7 +19,7 @@ BOUND_SHARE = 0.1
 ROUNDING = 1e-9
 """Share of the need by which a group may be off and still be right."""
 
-CHECK_SHARE, CHECK_SWEEPS = 0.06, 5
+CHECK_SHARE, CHECK_SWEEPS = 0.1, 5
 """Share of the budget, and sweeps, after which it is asked how much of what was lacking still is."""
 
 TOO_SLOW, NEARLY = 0.5, 0.002
@@ -79,7 +79,7 @@ class Aims:
     def _aim_at(self, hours: float) -> None:
         self.hours, self.stale = hours, 0
         self.least_shortfall = self._shortfall_then = np.inf
-        self._checked, self._sweeps = self._spent(), 0
+        self._checked, self._sweeps = self.spent, 0
 
     def set(self, plan: Ints) -> bool:
         """Decide on the aim; return whether it is all about energy from here on."""
@@ -87,7 +87,7 @@ class Aims:
         assert search.fastest is not None
         reached = search.fastest.evaluation.served_makespan
         if search.objective is Objective.MAKESPAN_ENERGY and (
-            reached <= self.failed * (1 + ROUNDING) or self._spent() > self.makespan_share
+            reached <= self.failed * (1 + ROUNDING) or self.spent > self.makespan_share
         ):
             self.hours = search.makespan_limit
             return True
@@ -127,11 +127,11 @@ class Aims:
 
     def _is_too_slow(self) -> bool:
         """Whether most of what was lacking a while ago still is, and that is more than a rest."""
-        if self._sweeps < CHECK_SWEEPS or self._spent() - self._checked < CHECK_SHARE:
+        if self._sweeps < CHECK_SWEEPS or self.spent - self._checked < CHECK_SHARE:
             return False
         rest = max(self._mean_ability, NEARLY * float(self.instance.workload.sum()) / max(self.hours, 1e-300))
         slow = self.least_shortfall > max(TOO_SLOW * self._shortfall_then, rest)
-        self._checked, self._sweeps, self._shortfall_then = self._spent(), 0, self.least_shortfall
+        self._checked, self._sweeps, self._shortfall_then = self.spent, 0, self.least_shortfall
         return slow
 
     def _balanced(self, plan: Ints) -> float:
@@ -144,7 +144,8 @@ class Aims:
         flight = instance.reach.distance_of(agent, plan[agent]) / instance.speed[agent]
         return float((instance.workload.sum() + ability @ flight) / ability.sum())
 
-    def _spent(self) -> float:
+    @property
+    def spent(self) -> float:
         """Share of the budget that is spent."""
         search, budget = self.search, self.search.budget
         of_time = search.elapsed_s / budget.time_limit_s if budget.time_limit_s else 0.0

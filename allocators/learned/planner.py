@@ -34,7 +34,11 @@ MOST_LANES = 64
 """Games on one part in a stream."""
 
 WHOLE_ROUNDS = 16
-"""Most rounds of a game on the whole instance, besides two for every agent that the largest task needs."""
+"""Most rounds of a game on the whole instance, besides two for every agent that a task has in the mean, or one for each
+that the largest task needs."""
+
+SECOND_GAME = 0.15
+"""Share of the budget after which no second game on the whole instance is begun."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +56,7 @@ class PlannerParameters:
     larger_parts, far_share : int, float
         How much larger parts may be when patience runs out, and the share of those then that are of tasks anywhere.
     rounds : int
-        Most rounds of a game on a part, besides two for every agent that a task lacks.
+        Most rounds of a game on a part; more of them are worth less than more games.
     fresh_share : float
         Share of the games on parts in which everybody begins at the nearest task.
     ruined : (float, float)
@@ -83,7 +87,7 @@ class PlannerParameters:
     scattered_share: float = 0.1
     scattered: tuple[float, float] = (0.05, 0.4)
     temperature: tuple[float, float] = (0.4, 0.9)
-    patience: int = 30
+    patience: int = 20
     makespan_share: float = 0.6
     first_price: float = 0.8
     second_price: float = 3.0
@@ -127,7 +131,7 @@ class Planner:
         self.play_whole(self.parameters.first_price)
         if not (self.instance.workload > 0).any():
             return
-        if self.search.objective is Objective.MAKESPAN_ENERGY and not self.search.should_stop():
+        if self.search.objective is Objective.MAKESPAN_ENERGY and self.aims.spent < SECOND_GAME:
             self.play_whole(self.parameters.second_price)
         with ThreadPoolExecutor(STREAMS) as pool:
             self.run_all = pool.map if self.search.threads > 1 else map
@@ -141,7 +145,7 @@ class Planner:
         plan = None if search.start is None else search.start.task_of_agent
         board = make_board([instance], [self.aims.hours], [price], self.rng, near=self.parameters.near, plan=plan)
         games = Games(np.zeros(1, dtype=np.int64), board.price.numpy(), board.start.numpy())
-        rounds = WHOLE_ROUNDS + 2 * most_helpers(board)
+        rounds = WHOLE_ROUNDS + max(2 * instance.n // instance.m, most_helpers(board))
         best = play_games(self.networks[0], board, games, rounds=rounds, should_stop=self._late)
         place = pick(board.goal, best.slot)[0].numpy()
         self._go_on_from(np.where(place == instance.m, IDLE, place))
@@ -210,14 +214,13 @@ class Planner:
         streams = [self._games(parts, prices) for _ in range(STREAMS)]
         temperatures = self.rng.uniform(*self.parameters.temperature, STREAMS).tolist()
         seeds = self.rng.integers(2**63, size=STREAMS).tolist()
-        rounds = self.parameters.rounds + 2 * most_lacking(parts.board)
 
         def one(number: int) -> Best:
             return play_games(
                 network,
                 parts.board,
                 streams[number],
-                rounds=rounds,
+                rounds=self.parameters.rounds,
                 seed=seeds[number],
                 temperature=temperatures[number],
                 total=True,
@@ -263,12 +266,6 @@ def _servable(instance: Instance) -> Instance:
 def most_helpers(board: Board) -> int:
     """Return how many mean agents the largest task needs, but not more than there are: one joins it in a round."""
     return min(board.shape[1], math.ceil(float(board.need.max())))
-
-
-def most_lacking(board: Board) -> int:
-    """Return how many mean agents a task lacks at the most when the games begin, but not more than there are."""
-    lack = float((board.need - begin(board).group)[:, :-1].max())
-    return min(board.shape[1], math.ceil(max(0.0, lack)))
 
 
 def cover(

@@ -13,7 +13,7 @@ from tiny_instances import tiny_instance
 from alloc.allocators import Budget, Deadline, Search
 from alloc.allocators.learned.lanes import play_games
 from alloc.allocators.learned.network import ActorCritic, NetworkSize
-from alloc.allocators.learned.planner import Planner, PlannerParameters, cover, most_helpers, most_lacking
+from alloc.allocators.learned.planner import Planner, PlannerParameters, cover, most_helpers
 from alloc.allocators.learned.rollout import Best
 from alloc.problems import IDLE, Allocation, Family, Instance, Objective, evaluate, random_instance
 from alloc.problems.game import make_board
@@ -285,8 +285,6 @@ def test_a_task_that_needs_most_agents_gets_them_in_the_first_game(network: Acto
     one = planner(network, instance)
     board = make_board([instance], [1.0], [1.0], np.random.default_rng(0))
     assert most_helpers(board) == 48
-    parts = lay_out_parts(instance, 1.0, np.arange(60) % 7, np.arange(7)[None], [np.arange(60)])
-    assert most_lacking(parts.board) == 48 - 9
     asked = []
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
@@ -294,7 +292,7 @@ def test_a_task_that_needs_most_agents_gets_them_in_the_first_game(network: Acto
             lambda *args, **settings: asked.append(settings["rounds"]) or play_games(*args, **settings),
         )
         one.play_whole(1.0)
-    assert asked == [16 + 2 * 48]
+    assert asked == [16 + 48]
 
 
 def test_slow_aims_are_given_up(network: ActorCritic) -> None:
@@ -325,7 +323,7 @@ def test_little_that_is_lacking_is_worth_the_patience(network: ActorCritic) -> N
         aims.search.iteration = iteration
         assert not aims._is_too_slow()
     assert aims.stale == 14
-    assert aims.in_vain == pytest.approx((14 - 5) / (30 - 5))
+    assert aims.in_vain == pytest.approx((14 - 5) / (20 - 5))
     aims.note(2.0)
     assert aims.in_vain == 0
 
