@@ -32,8 +32,8 @@ class FineTuningParameters:
         Seconds of play before any learning: short runs are better spent on playing.
     share : float
         Share of the time thereafter that is spent on learning.
-    games : int
-        Games of an update.
+    games, pairs : int
+        Games of an update, at the most; and pairs of agent and candidate, so that no update takes long.
     rounds : int
         Most rounds of a game.
     price : (float, float)
@@ -44,6 +44,7 @@ class FineTuningParameters:
     after_s: float = 3.0
     share: float = 0.3
     games: int = 64
+    pairs: int = 12_000
     rounds: int = 15
     price: tuple[float, float] = (0.4, 2.4)
     ppo: PpoParameters = field(default_factory=lambda: PpoParameters(learning_rate=1e-4, highest_rate=3e-4, epochs=2))
@@ -58,7 +59,8 @@ class _PartGames:
 
     def draw(self, rng: np.random.Generator, progress: float) -> Board:
         """Draw a board on which everybody begins at the nearest task, or where the plan has them."""
-        board, games = self.parts.board, self.parameters.games
+        board = self.parts.board
+        games = max(1, min(self.parameters.games, self.parameters.pairs // (board.shape[1] * board.shape[2])))
         rows = torch.from_numpy(rng.integers(len(board.price), size=games))
         ruined = rng.uniform(0.2, 1.4, (games, 1))
         back = torch.from_numpy(rng.random((games, board.shape[1])) < ruined)

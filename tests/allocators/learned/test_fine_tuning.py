@@ -119,6 +119,8 @@ def test_games_begin_at_home_or_where_the_plan_is(parts: Parts) -> None:
     assert ((board.start == home) | (board.start == plan)).all()
     assert (board.start != home).any()
     assert (board.start != plan).any()
+    few = _PartGames(parts, FineTuningParameters(pairs=3 * board.shape[1] * board.shape[2]))
+    assert few.draw(np.random.default_rng(0), 0.0).shape[0] == 3
 
 
 def test_the_planner_plays_by_what_was_learned(networks: list[ActorCritic], monkeypatch: pytest.MonkeyPatch) -> None:
