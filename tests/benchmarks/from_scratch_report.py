@@ -188,9 +188,9 @@ def _frame(panels: Any) -> None:
         below.set_xlabel("decisions of agents, thousands, all members together")
     first = panels[0][0]
     first.set_yscale("log")
-    ticks = (0.03, 0.05, 0.1, 0.2, 0.5, 1, 2, 5)
+    ticks = (0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5)
     first.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
-    first.set_ylim(0.02, 6)
+    first.set_ylim(0.004, 6)
     first.minorticks_off()
     panels[1][0].set_ylim(0, 1)
 
