@@ -107,7 +107,7 @@ def test_probabilities_of_all_rounds_by_plain_python(board: Board, rules: Rules)
     assert sum(expected.values()) == pytest.approx(1)
     width = max(map(len, expected))
     actions = torch.tensor([[*one, *[-1] * (width - len(one))] for one in expected])
-    many = board.repeat(torch.ones(len(actions)))
+    many = board[torch.zeros(len(actions), dtype=torch.int64)]
     wide = Scores(*(one.expand(len(actions), *one.shape[1:]) for one in scores))
     got, _ = log_probabilities(many, begin(many), wide, actions, rules)
     assert got.sum(1).tolist() == pytest.approx([log(chance) for chance in expected.values()], abs=1e-4)
@@ -121,7 +121,7 @@ def test_draws_are_as_frequent_as_probable(board: Board, rules: Rules) -> None:
     draws = 20_000
     state, scores = begin(board), scores_of(board, 3)
     expected = chances(board, state, scores, rules)
-    many = board.repeat(torch.ones(draws))
+    many = board[torch.zeros(draws, dtype=torch.int64)]
     wide = Scores(*(one.expand(draws, *one.shape[1:]) for one in scores))
     actions, _ = choose(many, begin(many), wide, rules, 1.0, torch.Generator().manual_seed(7))
     seen = Counter(tuple(action for action in row if action >= 0) for row in actions.tolist())
