@@ -15,6 +15,7 @@ from alloc.problems.game import (
     observe_agents,
     observe_pairs,
     observe_tasks,
+    sum_by_place,
     tasks_of,
 )
 
@@ -111,11 +112,8 @@ class ActorCritic(nn.Module):
         heads, width = self.size.heads, self.size.task_width
         seen = self.member(observe_agents(board, state))
         weight = (8 * torch.tanh(seen[..., :heads] / 8)).exp() * (board.ability > 0)[..., None]
-        task = tasks_of(board, state)[..., None]
         heard = torch.relu(seen[..., heads:]).unflatten(-1, (heads, width // heads)) * weight[..., None]
-        empty = seen.new_zeros(len(task), board.places, heads + width)
-        both = torch.cat([weight, heard.flatten(2)], -1)
-        total = empty.scatter_add(1, task.expand(-1, -1, heads + width), both)
+        total = sum_by_place(torch.cat([weight, heard.flatten(2)], -1), tasks_of(board, state), board.places)
         shares = total[..., heads:].unflatten(-1, (heads, width // heads)) / (total[..., :heads, None] + 1e-6)
         mean: Tensor = shares.flatten(2)
         return mean

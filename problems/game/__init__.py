@@ -43,6 +43,7 @@ from alloc.problems.game.rules import (
     open_bids,
     pick,
     step,
+    sum_by_place,
     tasks_of,
 )
 
@@ -76,6 +77,7 @@ __all__ = [
     "pick",
     "potential",
     "step",
+    "sum_by_place",
     "tasks_of",
     "time_over_reference",
     "worth",

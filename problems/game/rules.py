@@ -119,8 +119,19 @@ def tasks_of(board: Board, state: State) -> Tensor:
 
 def group_ability(board: Board, slot: Tensor) -> Tensor:
     """Return the ability at each place, shape (B, m + 1)."""
-    empty = torch.zeros_like(board.need)
-    return empty.scatter_add_(1, pick(board.goal, slot), pick(board.contribution, slot))
+    return sum_by_place(pick(board.contribution, slot)[..., None], pick(board.goal, slot), board.places)[..., 0]
+
+
+def sum_by_place(values: Tensor, place: Tensor, places: int) -> Tensor:
+    """Add up what agents have, by their place: (B, n, k) and (B, n) to (B, places, k).
+
+    Always the same to the last bit: on a GPU, `scatter_add` adds in any order, and a product of matrices does not.
+    """
+    if values.device.type == "cpu":
+        empty = values.new_zeros(len(values), places, values.shape[2])
+        return empty.scatter_add(1, place[..., None].expand_as(values), values)
+    here = place[:, None] == torch.arange(places, device=place.device)[:, None]
+    return here.to(values.dtype) @ values
 
 
 def open_bids(board: Board, state: State, rules: Rules = PLANNING) -> Tensor:

@@ -23,6 +23,7 @@ from alloc.problems.game import (
     moved,
     open_bids,
     step,
+    sum_by_place,
     tasks_of,
 )
 from alloc.problems.game.rules import TOLERANCE
@@ -129,6 +130,13 @@ def test_one_move_at_a_time(board: Board) -> None:
     bids[0, 2, 1], bids[0, 0, 2] = 2.0, 1.0
     assert grant(board, begin(board), bids, torch.tensor([0.0]), 1).tolist() == [[7]]
     assert grant(board, begin(board), bids, torch.tensor([3.0]), 1).tolist() == [[9]]
+
+
+def test_sums_by_place_by_hand() -> None:
+    """Two games of three agents with two figures each: who is at a place adds up there, and nobody is 0."""
+    values = torch.tensor([[[1.0, 10.0], [2.0, 20.0], [4.0, 40.0]], [[1.0, 0.5], [1.0, 0.5], [1.0, 0.5]]])
+    sums = sum_by_place(values, torch.tensor([[0, 2, 0], [1, 1, 1]]), 3)
+    assert sums.tolist() == [[[5.0, 50.0], [0.0, 0.0], [2.0, 20.0]], [[0.0, 0.0], [3.0, 1.5], [0.0, 0.0]]]
 
 
 def test_step_moves_ability(board: Board) -> None:
