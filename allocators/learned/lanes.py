@@ -96,8 +96,10 @@ def play_games(
     device = network.embed.weight.device
     if device.type == "cpu":
         return _play_compiled(network, board, games, rounds, seed, temperature, total, should_stop)
-    price, start = torch.from_numpy(games.price.astype(np.float32)), torch.from_numpy(games.start)
-    lanes = replace(board[torch.from_numpy(games.row)], price=price, start=start).to(device)
+    row, price, start = (
+        torch.from_numpy(array).to(device) for array in (games.row, games.price.astype(np.float32), games.start)
+    )
+    lanes = replace(board.to(device)[row], price=price, start=start)
     generator = torch.Generator(device).manual_seed(seed)
     best = play(
         network,
@@ -150,7 +152,7 @@ def _play_compiled(
 
 
 def warm_up(network: ActorCritic) -> None:
-    """Call every compiled loop once, so that no run waits for the compiler."""
+    """Call every compiled loop once, so that no run waits for the compiler, or for a GPU to load its kernels."""
     instance = Instance(ability=[1.0, 2.0], workload=[1.0, 1.0], task_position=np.eye(2), start_task=[0, 1])
     board = make_board([instance], [1.0], [1.0], np.random.default_rng(0))
     games = Games(np.zeros(1, dtype=np.int64), np.ones(1), board.start.numpy())

@@ -8,7 +8,7 @@ import torch
 from alloc.allocators.base import Allocator, Proposal
 from alloc.allocators.learned.fine_tuning import FineTuning
 from alloc.allocators.learned.hyperparameters import DqnParameters
-from alloc.allocators.learned.lanes import warm_up as compile_games
+from alloc.allocators.learned.lanes import warm_up as play_once
 from alloc.allocators.learned.limits import too_large
 from alloc.allocators.learned.planner import Planner, PlannerParameters
 from alloc.allocators.learned.policy_file import load_policy
@@ -46,8 +46,7 @@ class PolicyAllocator(Allocator):
         else:
             with as_file(files("alloc.allocators.learned") / "policies" / f"{self.trained_by}.safetensors") as shipped:
                 self.networks = load_policy(shipped, self.trained_by, self.device)
-        if self.device.type == "cpu":
-            compile_games(self.networks[0])
+        play_once(self.networks[0])
 
     def refusal(self, instance: Instance, objective: Objective, budget: Budget) -> str | None:
         """Refuse where not even one game would end in time."""
