@@ -30,9 +30,6 @@ Ints = NDArray[np.int64]
 STREAMS = 2
 """Batches of games that are played side by side, in as many threads if the run may have them."""
 
-MOST_LANES = 64
-"""Games on one part in a stream."""
-
 WHOLE_ROUNDS = 16
 """Most rounds of a game on the whole instance, besides two for every agent that a task has in the mean, or one for each
 that the largest task needs."""
@@ -51,6 +48,8 @@ class PlannerParameters:
         Candidates per agent in games on the whole instance.
     lane_pairs : int
         Pairs of agent and candidate in the games of a stream.
+    most_lanes : int
+        Games on one part in a stream, at the most.
     part_tasks : (int, int)
         Least and most tasks of a part.
     larger_parts, far_share : int, float
@@ -78,6 +77,7 @@ class PlannerParameters:
 
     near: int = NEAR
     lane_pairs: int = 4_000
+    most_lanes: int = 64
     part_tasks: tuple[int, int] = (2, 5)
     larger_parts: int = 3
     far_share: float = 0.5
@@ -241,7 +241,7 @@ class Planner:
         """Lay out several games on every part, from various beginnings and at various prices."""
         parameters, rng, board, count = self.parameters, self.rng, parts.board, len(parts.tasks)
         pairs = board.shape[1] * board.shape[2]
-        lanes = count * int(np.clip(parameters.lane_pairs // (count * pairs), 1, MOST_LANES))
+        lanes = count * int(np.clip(parameters.lane_pairs // (count * pairs), 1, parameters.most_lanes))
         row = np.arange(count).repeat(lanes // count)
         ruined = rng.uniform(*parameters.ruined, lanes)
         ruined[rng.random(lanes) < parameters.fresh_share] = 1.0

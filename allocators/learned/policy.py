@@ -1,5 +1,6 @@
 """Trained policies as allocators: the networks of a policy file, put to use by the planner."""
 
+from dataclasses import replace
 from importlib.resources import as_file, files
 from pathlib import Path
 
@@ -15,6 +16,9 @@ from alloc.allocators.learned.policy_file import load_policy
 from alloc.allocators.registry import BUILT_IN
 from alloc.allocators.search import Budget, Search
 from alloc.problems import Allocation, InputError, Instance, Objective
+
+GPU_LANES = {"lane_pairs": 40_000, "most_lanes": 512}
+"""How many games are played at once on a GPU: ten times as many take no longer there."""
 
 LOCAL_PRICE = 2.0
 """Weight of energy in the game that local search goes on from."""
@@ -46,6 +50,8 @@ class PolicyAllocator(Allocator):
         else:
             with as_file(files("alloc.allocators.learned") / "policies" / f"{self.trained_by}.safetensors") as shipped:
                 self.networks = load_policy(shipped, self.trained_by, self.device)
+        if self.device.type != "cpu":
+            self.parameters = replace(self.parameters, **GPU_LANES)
         play_once(self.networks[0])
 
     def refusal(self, instance: Instance, objective: Objective, budget: Budget) -> str | None:

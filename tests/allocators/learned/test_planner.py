@@ -295,6 +295,19 @@ def test_a_task_that_needs_most_agents_gets_them_in_the_first_game(network: Acto
     assert asked == [16 + 48]
 
 
+@pytest.mark.parametrize(("pairs", "most", "lanes"), [(1, 9, 1), (10**9, 9, 9)])
+def test_lanes_are_bounded(network: ActorCritic, pairs: int, most: int, lanes: int) -> None:
+    """Each part is played once at least, and no more often than is allowed, however many pairs may be."""
+    instance = paper_like(12, 4, 50, 3)
+    one = Planner(
+        Search(instance, ENERGY, Budget(None, 1)), [network], PlannerParameters(lane_pairs=pairs, most_lanes=most)
+    )
+    one.play_whole(1.0)
+    parts = lay_out_parts(instance, 1.0, one.plan, np.array([[0, 1], [2, 3]]), [np.arange(6), np.arange(6, 12)])
+    games = one._games(parts, (0.2, 0.8))
+    assert np.bincount(games.row).tolist() == [lanes, lanes]
+
+
 def test_slow_aims_are_given_up(network: ActorCritic) -> None:
     """An aim that most of the lack still separates from after its share of the budget is halved to what was reached."""
     instance = paper_like(40, 8, 170, 0)
