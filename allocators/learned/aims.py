@@ -22,9 +22,12 @@ ROUNDING = 1e-9
 CHECK_SHARE, CHECK_SWEEPS = 0.1, 5
 """Share of the budget, and sweeps, after which it is asked how much of what was lacking still is."""
 
-TOO_SLOW, NEARLY = 0.5, 0.002
-"""Share of what was lacking at the last check that must be gone by the next, or the aim is given up; and share of all
-that is needed below which what is lacking is so little that only patience counts, as it does below a mean ability."""
+TOO_SLOW = 0.5
+"""Share of what was lacking at the last check that must be gone by the next, or the aim is given up."""
+
+LITTLE, FEW = 0.002, 0.1
+"""What is lacking is a rest, for which only patience counts, if it is no more than this share of all that is needed, or
+one mean ability, and no more than this share of the tasks lack it, or two."""
 
 UNCONCERNED = 5
 """Sweeps without success that mean nothing."""
@@ -79,7 +82,7 @@ class Aims:
     def _aim_at(self, hours: float) -> None:
         self.hours, self.stale = hours, 0
         self.least_shortfall = self._shortfall_then = np.inf
-        self._checked, self._sweeps = self.spent, 0
+        self._checked, self._sweeps, self._lacking = self.spent, 0, 0
 
     def set(self, plan: Ints) -> bool:
         """Decide on the aim; return whether it is all about energy from here on."""
@@ -97,7 +100,7 @@ class Aims:
             self.failed = self.hours
             self._aim_at((self.hours + reached) / 2)
         elif self.hours < (balanced := self._balanced(plan)) * (1 - ROUNDING):
-            self._aim_at(min(balanced, (self.hours + reached) / 2))
+            self.hours = min(balanced, (self.hours + reached) / 2)
         return False
 
     def surplus(self, plan: Ints) -> NDArray[np.float64]:
@@ -114,10 +117,12 @@ class Aims:
         alone = np.bincount(plan[agent], minlength=instance.m) == 0
         return np.where(alone | (np.abs(group - need) <= ROUNDING * need), 0.0, group - need)
 
-    def note(self, shortfall: float) -> None:
-        """Note what a plan lacks in all, before a sweep."""
+    def note(self, surplus: NDArray[np.float64]) -> None:
+        """Note what a plan lacks, before a sweep."""
+        shortfall = float(-surplus[surplus < 0].sum())
         self.stale = 0 if shortfall < self.least_shortfall else self.stale + 1
         self.least_shortfall = min(shortfall, self.least_shortfall)
+        self._lacking = int((surplus < 0).sum())
         self._sweeps += 1
 
     @property
@@ -129,7 +134,9 @@ class Aims:
         """Whether most of what was lacking a while ago still is, and that is more than a rest."""
         if self._sweeps < CHECK_SWEEPS or self.spent - self._checked < CHECK_SHARE:
             return False
-        rest = max(self._mean_ability, NEARLY * float(self.instance.workload.sum()) / max(self.hours, 1e-300))
+        rest = 0.0
+        if self._lacking <= max(2, FEW * self.instance.m):
+            rest = max(self._mean_ability, LITTLE * float(self.instance.workload.sum()) / max(self.hours, 1e-300))
         slow = self.least_shortfall > max(TOO_SLOW * self._shortfall_then, rest)
         self._checked, self._sweeps, self._shortfall_then = self.spent, 0, self.least_shortfall
         return slow

@@ -13,6 +13,7 @@ import torch
 from numpy.typing import NDArray
 
 from alloc.allocators.learned.aims import Aims
+from alloc.allocators.learned.cover import cover, links_between
 from alloc.allocators.learned.fine_tuning import FineTuning
 from alloc.allocators.learned.lanes import Games, play_games
 from alloc.allocators.learned.limits import NEAR
@@ -20,7 +21,6 @@ from alloc.allocators.learned.network import ActorCritic
 from alloc.allocators.learned.rollout import Best, position
 from alloc.allocators.search import Search
 from alloc.problems import IDLE, Allocation, Instance, Objective, easiest_tasks, fewest_unserved, serve_all
-from alloc.problems.distances import unit_of
 from alloc.problems.game import Board, begin, make_board, pick
 from alloc.problems.game.candidates import Layout, near_tasks
 from alloc.problems.game.parts import Parts, lay_out_parts
@@ -170,14 +170,13 @@ class Planner:
         if aims.set(self.plan):
             self.plan = search.best.allocation.task_of_agent
         surplus = aims.surplus(self.plan)
-        shortfall = float(-surplus[surplus < 0].sum())
-        aims.note(shortfall)
+        aims.note(surplus)
         tasks, agents = self._cover(surplus)
         parts = lay_out_parts(self.instance, aims.hours, self.plan, tasks, agents)
         if self.tuning is not None and self.tuning.is_due():
             self.networks = self.tuning.learn(parts)
         network = self.networks[int(self.rng.integers(len(self.networks)))]
-        goal = Objective.MAKESPAN if shortfall > 0 else search.objective
+        goal = Objective.MAKESPAN if (surplus < 0).any() else search.objective
         accepted, slots = self._play_parts(network, parts, PRICES[goal])
         if accepted.any():
             self._go_on_from(parts.merge(self.plan, slots, accepted))
@@ -189,7 +188,9 @@ class Planner:
         in_vain = self.aims.in_vain if (surplus < 0).any() else 0.0
         high += round(self.parameters.larger_parts * in_vain)
         size = min(int(rng.integers(low, high + 1)), instance.m)
-        tasks = cover(instance.task_position, surplus, size, rng, self.parameters.far_share * in_vain)
+        bound = (surplus < 0).any() and not instance.reach.is_complete
+        links = links_between(self._near, self.plan, instance.m, rng) if bound else None
+        tasks = cover(instance.task_position, surplus, size, rng, self.parameters.far_share * in_vain, links)
         part_of = np.full(instance.m + 1, -1)
         part_of[tasks.ravel()] = np.repeat(np.arange(len(tasks)), size)
         chosen = part_of[self.plan]  # idle agents have no part yet: index -1 is the last entry
@@ -266,54 +267,3 @@ def _servable(instance: Instance) -> Instance:
 def most_helpers(board: Board) -> int:
     """Return how many mean agents the largest task needs, but not more than there are: one joins it in a round."""
     return min(board.shape[1], math.ceil(float(board.need.max())))
-
-
-def cover(
-    position: NDArray[np.float64],
-    surplus: NDArray[np.float64],
-    size: int,
-    rng: np.random.Generator,
-    far_share: float = 0.0,
-) -> Ints:
-    """Partition places into groups of neighbours, shape (groups, size); some are left over.
-
-    Each group is made of a place and of those left that are nearest to it, more or less. Where places lack something,
-    only they get a group, with the nearest that have as much to spare.
-
-    Parameters
-    ----------
-    position : ndarray, shape (m, 3)
-    surplus : ndarray, shape (m,)
-        Negative where something is lacking.
-    far_share : float
-        Share of the groups that are of places anywhere.
-    """
-    m = len(position)
-    position = np.nan_to_num(position)
-    position = position / unit_of(position, position)
-    free = np.ones(m, dtype=bool)
-    groups = []
-    lacking = np.flatnonzero(surplus < 0)
-    for centre in rng.permutation(lacking if len(lacking) else m).tolist():
-        if not free[centre]:
-            continue
-        if free.sum() < size:
-            break
-        away = np.sqrt(((position - position[centre]) ** 2).sum(1)) * rng.uniform(0.6, 1.4, m)
-        if rng.random() < far_share:
-            away = rng.random(m)
-        away[~free], away[centre] = np.inf, -2.0
-        if surplus[centre] < 0:
-            away[_helpers(away, surplus, -surplus[centre])[: size - 1]] = -1.0
-        group = np.argpartition(away, size - 1)[:size]
-        free[group] = False
-        groups.append(group)
-    return np.array(groups, dtype=np.int64).reshape(-1, size)
-
-
-def _helpers(away: NDArray[np.float64], surplus: NDArray[np.float64], lack: float) -> Ints:
-    """Return the nearest places with a surplus, as many as make up for what is lacking."""
-    able = np.flatnonzero((surplus > 0) & np.isfinite(away))
-    able = able[np.argsort(away[able])]
-    enough = np.searchsorted(np.cumsum(surplus[able]), lack) + 1
-    return able[:enough]

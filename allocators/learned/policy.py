@@ -17,8 +17,8 @@ from alloc.allocators.registry import BUILT_IN
 from alloc.allocators.search import Budget, Search
 from alloc.problems import Allocation, InputError, Instance, Objective
 
-GPU_LANES = {"lane_pairs": 40_000, "most_lanes": 512}
-"""How many games are played at once on a GPU: ten times as many take no longer there."""
+GPU_PAIRS, GPU_LANES = 40_000, 512
+"""`lane_pairs` and `most_lanes` of the planner on a GPU: ten times as many games take no longer there."""
 
 LOCAL_PRICE = 2.0
 """Weight of energy in the game that local search goes on from."""
@@ -51,7 +51,7 @@ class PolicyAllocator(Allocator):
             with as_file(files("alloc.allocators.learned") / "policies" / f"{self.trained_by}.safetensors") as shipped:
                 self.networks = load_policy(shipped, self.trained_by, self.device)
         if self.device.type != "cpu":
-            self.parameters = replace(self.parameters, **GPU_LANES)
+            self.parameters = replace(self.parameters, lane_pairs=GPU_PAIRS, most_lanes=GPU_LANES)
         play_once(self.networks[0])
 
     def refusal(self, instance: Instance, objective: Objective, budget: Budget) -> str | None:
