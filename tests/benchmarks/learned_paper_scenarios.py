@@ -1,7 +1,10 @@
-"""How good learned methods are on the paper's scenarios, on instances that no policy was trained or tuned on.
+r"""How good learned methods are on the paper's scenarios, on instances that no policy was trained or tuned on.
 
-    python tests/benchmarks/learned_paper_scenarios.py --methods gappo,gappo-ls,local-search --threads 2 --publish
-    python tests/benchmarks/learned_paper_scenarios.py --methods ppo,a2c,dqn,ddpg --scenarios 1 --time-limits 2 --jobs 2
+    python tests/benchmarks/learned_paper_scenarios.py --methods gappo --threads 2 --publish
+    python tests/benchmarks/learned_paper_scenarios.py --methods gappo-ls,local-search --time-limits 0.1 1 --seeds 25 \
+        --threads 1 --jobs 2 --publish --section hybrid
+    python tests/benchmarks/learned_paper_scenarios.py --methods ppo,a2c,dqn,ddpg --scenarios 1 --time-limits 2 \
+        --seeds 25 --threads 1 --jobs 2 --publish --section rivals
 
 The objective is the least energy at the least makespan. Energies are compared with the least known at T = 1: those in
 `local_search_best_known.json`, for seeds 0 to 99, and those that the runs themselves meet. A plan with T > 1 may take
@@ -111,6 +114,7 @@ def main() -> None:
     parser.add_argument("--scenarios", type=int, nargs="+", default=[1, 2, 3, 4], choices=[1, 2, 3, 4])
     parser.add_argument("--time-limits", type=float, nargs="+", default=[1.0], help="seconds")
     parser.add_argument("--compare", default="gappo-ls,local-search", help="two methods, one against the other")
+    parser.add_argument("--section", default="", help="of the page, to publish in")
     options = parser.parse_args()
     families = [f"paper-{number}" for number in options.scenarios]
     tasks = crossed(
@@ -121,7 +125,7 @@ def main() -> None:
     print(text)
     if options.publish:
         note = f"{options.seeds} instances per scenario, threads: {options.threads}, runs at a time: {options.jobs}."
-        publish("learned_paper_scenarios.py", f"{note}\n\n{text}")
+        publish(" ".join(["learned_paper_scenarios.py", *options.section.split()]), f"{note}\n\n{text}")
 
 
 if __name__ == "__main__":
