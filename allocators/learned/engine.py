@@ -5,13 +5,13 @@ An engine applies one function to many items. The function is pure and found by 
 same results to the last bit: they all give torch the same number of threads.
 """
 
-import contextlib
 import pickle
 import traceback
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from importlib.util import find_spec
 from typing import Any, Protocol, Self, TypeVar
 
+from alloc.allocators.learned.threads import torch_threads
 from alloc.problems import InputError
 from alloc.problems.errors import nearest
 
@@ -89,7 +89,7 @@ class SerialEngine(Engine):
     ) -> list[R] | None:
         """See `Engine.map`."""
         results = []
-        with _torch_threads(self.threads):
+        with torch_threads(self.threads):
             for item in items:
                 if should_stop():
                     return None
@@ -130,18 +130,6 @@ def result(answered: bytes) -> Any:
         return value
     value.add_note(f"In a worker process:\n{story}")
     raise value
-
-
-@contextlib.contextmanager
-def _torch_threads(threads: int) -> Iterator[None]:
-    import torch  # here, so that options are checked before the seconds that it takes
-
-    before = torch.get_num_threads()
-    torch.set_num_threads(threads)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)
 
 
 def check_engine(name: str, workers: int | None = None, address: str | None = None) -> None:

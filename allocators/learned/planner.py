@@ -185,11 +185,12 @@ class Planner:
         """Partition tasks into neighbours, and find the agents that work there, and idle ones that could."""
         instance, rng = self.instance, self.rng
         low, high = self.parameters.part_tasks
-        in_vain = self.aims.in_vain if (surplus < 0).any() else 0.0
+        lacking = bool((surplus < 0).any())
+        in_vain = self.aims.in_vain if lacking else 0.0
         high += round(self.parameters.larger_parts * in_vain)
         size = min(int(rng.integers(low, high + 1)), instance.m)
-        bound = (surplus < 0).any() and not instance.reach.is_complete
-        links = links_between(self._near, self.plan, instance.m, rng) if bound else None
+        bound_by_reach = lacking and not instance.reach.is_complete
+        links = links_between(self._near, self.plan, instance.m, rng) if bound_by_reach else None
         tasks = cover(instance.task_position, surplus, size, rng, self.parameters.far_share * in_vain, links)
         part_of = np.full(instance.m + 1, -1)
         part_of[tasks.ravel()] = np.repeat(np.arange(len(tasks)), size)

@@ -13,6 +13,7 @@ from alloc.allocators.learned.lanes import warm_up as play_once
 from alloc.allocators.learned.limits import too_large
 from alloc.allocators.learned.planner import Planner, PlannerParameters
 from alloc.allocators.learned.policy_file import load_policy
+from alloc.allocators.learned.threads import torch_threads
 from alloc.allocators.registry import BUILT_IN
 from alloc.allocators.search import Budget, Search
 from alloc.problems import Allocation, InputError, Instance, Objective
@@ -62,12 +63,8 @@ class PolicyAllocator(Allocator):
         """Play game after game and submit what is better."""
         if not (search.instance.workload > 0).any():
             return Proposal(Allocation.idle(search.instance))
-        threads = torch.get_num_threads()
-        torch.set_num_threads(1)  # the tensors are small: a second thread costs more than it brings
-        try:
+        with torch_threads(1):  # the tensors are small: a second thread costs more than it brings
             self.plan(search)
-        finally:
-            torch.set_num_threads(threads)
         return Proposal()
 
     def plan(self, search: Search) -> None:

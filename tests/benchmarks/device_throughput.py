@@ -10,9 +10,8 @@ Loops and torch on the CPU, which take as long per game whatever their number, p
 import argparse
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
@@ -21,10 +20,11 @@ import torch
 from alloc.allocators import load
 from alloc.allocators.learned.lanes import Games, play_games
 from alloc.allocators.learned.network import ActorCritic
-from alloc.allocators.learned.rollout import _Local, play, step_and_score
+from alloc.allocators.learned.rollout import play
+from alloc.allocators.learned.threads import torch_threads
 from alloc.allocators.learned.turns import choose
 from alloc.problems import paper_like
-from alloc.problems.game import Board, begin, make_board
+from alloc.problems.game import Board, begin, make_board, step
 
 INSTANCES = 64
 ROUNDS = 40
@@ -42,27 +42,18 @@ def lay_out(n: int, m: int, total: int, games: int) -> Board:
 
 @torch.no_grad()
 def decisions(network: ActorCritic, board: Board) -> int:
-    """Count the decisions in the games on a board."""
-    state, count = begin(board), 0
-    scores = _Local(network, board, state, lambda: False)
-    for _ in range(ROUNDS):
-        if bool(state.done.all()):
-            break
-        actions, slot = choose(board, state, scores.all(state))
-        count += int((actions >= 0).sum())
-        state = step_and_score(board, state, slot, scores)
+    """Count the decisions in the games on a board, so many games at once as there are instances."""
+    count = 0
+    for rows in torch.arange(len(board.price), device=board.price.device).split(INSTANCES):
+        part = board[rows]
+        state = begin(part)
+        for _ in range(ROUNDS):
+            if bool(state.done.all()):
+                break
+            actions, slot = choose(part, state, network(part, state))
+            count += int((actions >= 0).sum())
+            state = step(part, state, slot)
     return count
-
-
-@contextmanager
-def torch_threads(threads: int) -> Iterator[None]:
-    """Give torch some threads for a while."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(threads)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)
 
 
 def loops(network: ActorCritic, board: Board, threads: int) -> None:

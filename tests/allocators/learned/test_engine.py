@@ -15,6 +15,7 @@ import torch
 
 from alloc.allocators.learned.engine import Engine, EngineError, SerialEngine, make_engine
 from alloc.allocators.learned.process_engine import ProcessEngine
+from alloc.allocators.learned.threads import torch_threads
 from alloc.problems import InputError
 
 
@@ -59,9 +60,8 @@ def test_same_results_in_order(engine: Engine) -> None:
     assert engine.map(jobs.square, []) == []
     assert engine.map(jobs.threads, [0]) == [1]
     before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    expected = [jobs.step(state) for state in states(4)]
-    torch.set_num_threads(before)
+    with torch_threads(1):
+        expected = [jobs.step(state) for state in states(4)]
     got = engine.map(jobs.step, states(4))
     assert got is not None
     for a, b in zip(got, expected, strict=True):
