@@ -227,6 +227,8 @@ def _plugins() -> dict[str, EntryPoint]:
 
 def _plugin_class(name: str) -> type[Allocator]:
     plugins = _plugins()
+    if name == "auto":
+        raise InputError("'auto' is no method but picks one for an instance; call solve(instance, 'auto')", "method")
     if name not in plugins:
         raise InputError(f"there is no method {name!r}{nearest(name, [*BUILT_IN, *plugins, 'auto'])}", "method")
     try:

@@ -1,13 +1,14 @@
 """``alloc compare``."""
 
+import sys
 import threading
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from alloc.cli import options
-from alloc.cli.console import STANDARD, note, number, percent, say, table, write_json
-from alloc.cli.files import check_outputs
+from alloc.cli.console import is_terminal, note, number, percent, say, table, to_json
+from alloc.cli.files import check_outputs, save
 from alloc.cli.options import Objective, examples
 
 if TYPE_CHECKING:
@@ -52,10 +53,10 @@ def compare_command(
     from alloc.allocators import Budget, describe
     from alloc.allocators.compare import compare, share_bounds
     from alloc.allocators.interrupt import signals_set
-    from alloc.problems.formats import read_instance
+    from alloc.problems.formats import is_standard_output, read_instance
 
     check_outputs(("--csv", csv), read=[("INSTANCE", instance) for instance in instances])
-    if json and csv == STANDARD:
+    if json and csv is not None and is_standard_output(csv):
         raise typer.BadParameter("and --json cannot both be standard output", param_hint="'--csv'")
     names, numbers = _names(methods), _seeds(seeds)
     for name in names:
@@ -109,38 +110,27 @@ def _seeds(text: str) -> list[int]:
 
 def _show_done(row: "Row", count: int, total: int) -> None:
     """On a terminal, tell each row as it comes; the table follows at the end."""
-    import sys
-
-    if sys.stderr is not None and sys.stderr.isatty():
+    if is_terminal(sys.stderr):
         outcome = row.reason or f"T {number(row.makespan_mean)} h, gap {percent(row.gap_mean)}"
         say(f"[{count}/{total}] {row.instance}, {row.method}: {outcome}")
 
 
 def _print(rows: "list[Row]", csv: str | None, *, json: bool) -> None:
-    if csv is not None:
-        from alloc.problems.formats import write_text_atomically
+    from alloc.problems.formats import is_standard_output
 
-        write_text_atomically(csv, _csv(rows))
-    if json:
-        write_json({"format": "alloc-comparison/1", "rows": [row.to_dict() for row in rows]})
-    elif csv != "-":
-        header = [
-            "instance",
-            "method",
-            "T (h)",
-            "worst",
-            "gap",
-            "worst",
-            "energy",
-            "time (s)",
-            "worst",
-            "runs",
-            "status",
-        ]
-        say(table(header, [_cells(row) for row in rows], left=2))
-        for row in rows:
-            if row.reason:
-                note(f"{row.instance}: {row.reason}")
+    def document() -> str:
+        return to_json({"format": "alloc-comparison/1", "rows": [row.to_dict() for row in rows]})
+
+    is_table_wanted = not json and not (csv is not None and is_standard_output(csv))
+    save(lambda: _csv(rows), csv, document if json else None, [lambda: _tell(rows)] if is_table_wanted else [])
+
+
+def _tell(rows: "list[Row]") -> None:
+    header = ["instance", "method", "T (h)", "worst", "gap", "worst", "energy", "time (s)", "worst", "runs", "status"]
+    say(table(header, [_cells(row) for row in rows], left=2))
+    for row in rows:
+        if row.reason:
+            note(f"{row.instance}: {row.reason}")
 
 
 def _cells(row: "Row") -> list[str]:

@@ -102,6 +102,15 @@ def table(header: Sequence[str], rows: Sequence[Sequence[str]], *, left: int = 1
     return "\n".join([line(header), "  ".join("-" * width for width in widths), *map(line, rows)])
 
 
+def is_terminal(stream: TextIO | None) -> bool:
+    """Whether someone looks at `stream`; what a program puts in its place need not know."""
+    ask = getattr(stream, "isatty", None)
+    try:
+        return ask is not None and bool(ask())
+    except ValueError:  # it is closed
+        return False
+
+
 def _write(stream: TextIO | None, text: str) -> None:
     if stream is None:
         return
@@ -111,17 +120,28 @@ def _write(stream: TextIO | None, text: str) -> None:
         except UnicodeEncodeError:
             encoding = stream.encoding or "ascii"
             stream.write(text.encode(encoding, "backslashreplace").decode(encoding))
-        stream.flush()
+        flush(stream)
     except BrokenPipeError:
         _silence(stream)
-    except OSError as error:
+    except (OSError, ValueError) as error:
         _silence(stream)  # what cannot be written now must not fail once more at the exit
         if stream is sys.stdout:
-            raise OSError(error.errno, error.strerror, "standard output") from error
+            number, words = (error.errno, error.strerror) if isinstance(error, OSError) else (errno.EBADF, "is closed")
+            raise OSError(number, words, "standard output") from error
+
+
+def flush(stream: TextIO) -> None:
+    """Flush `stream`, if it is of those that can be."""
+    if hasattr(stream, "flush"):
+        stream.flush()
 
 
 def _silence(stream: TextIO) -> None:
     """Send what is still to be written nowhere, so that the run and its exit code go on undisturbed."""
+    try:
+        descriptor = stream.fileno()
+    except (AttributeError, OSError, ValueError):
+        return  # it is closed, or no file of the system's
     nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, stream.fileno())
+    os.dup2(nowhere, descriptor)
     os.close(nowhere)

@@ -2,10 +2,9 @@
 
 import os
 from collections.abc import Callable, Iterable
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from alloc.cli.console import STANDARD, note, to_json, write_out
+from alloc.cli.console import STANDARD, note, say, write_out
 
 if TYPE_CHECKING:
     from alloc.problems import Allocation, Instance
@@ -43,15 +42,57 @@ def read_known(instance: str, front: str | None, *, quiet: bool = False) -> "tup
     return problem, answers
 
 
-def save(document: Callable[[], dict[str, Any]], output: str | None, *, json: bool) -> None:
-    """Write what `document` returns as JSON to the file asked for, whole or not at all, and to standard output."""
-    text = to_json(document()) if json or output is not None else ""
-    if output is not None and output != STANDARD:
-        from alloc.problems.formats import write_text_atomically
+def save(
+    found: Callable[[], str],
+    output: str | None,
+    shown: Callable[[], str] | None = None,
+    then: Iterable[Callable[[], None]] = (),
+) -> None:
+    """Write what a run found to the file asked for, show it on standard output, and do the rest that was asked for.
 
-        write_text_atomically(output, text)
-    if json or output == STANDARD:
-        write_out(text)
+    Where a part of it fails, the others are done all the same, and what was found and is nowhere yet goes to standard
+    output, or to standard error where that fails.
+
+    Parameters
+    ----------
+    found, shown : callable
+        Return the text for `output` and that for standard output, if any; called where it is needed.
+    output : str or None
+        A file, or ``-``.
+    then : iterable of callable
+        What tells and draws it afterwards.
+
+    Raises
+    ------
+    InputError, OSError
+        The first failure, once all else is done.
+    """
+    from alloc.problems.formats import is_standard_output, write_text_atomically
+
+    to_standard_output = output is not None and is_standard_output(output)
+    steps: list[Callable[[], None]] = []
+    if output is not None and not to_standard_output:
+        steps.append(lambda: write_text_atomically(output, found()))
+    printed = found if to_standard_output else shown
+    if printed is not None:
+        steps.append(lambda: write_out(printed()))
+    failures = [_failure(step) for step in steps]
+    is_kept = None in failures
+    failures += [_failure(step) for step in then]
+    for failure in filter(None, failures):
+        # standard output that has failed once takes nothing more
+        if not is_kept and (printed is not None or _failure(lambda: write_out(found())) is not None):
+            say(found())
+        raise failure
+
+
+def _failure(step: Callable[[], None]) -> Exception | None:
+    """Take a step, and return why it failed, None where it did not."""
+    try:
+        step()
+    except Exception as error:
+        return error
+    return None
 
 
 Named = tuple[str, str | None]
@@ -67,7 +108,7 @@ def check_outputs(*written: Named, read: Iterable[Named] = ()) -> None:
 
     taken = {path: option for option, name in read if name for path in _parts(name)}
     for option, name in written:
-        check_writable(name)
+        check_output(name)
         if name is None or name == STANDARD or not _may_be_replaced(name):
             continue
         other = taken.setdefault(os.path.realpath(name), option)
@@ -86,19 +127,12 @@ def _may_be_replaced(name: str) -> bool:
     return os.path.isfile(name) or not os.path.exists(name)
 
 
-def check_writable(name: str | None) -> None:
-    """Raise an `InputError` if the file cannot be written as far as that can be told."""
-    if name is None or name == STANDARD:
-        return
+def check_output(name: str | None) -> None:
+    """Raise an `InputError` if the file cannot be written."""
     from alloc.problems import InputError
+    from alloc.problems.formats import check_writable
 
-    if not name:
+    if name == "":
         raise InputError("is no name of a file; give one", source="''")
-    path = Path(name)
-    folder = path.parent
-    if path.is_dir():
-        raise InputError("is a folder; name a file in it", source=name)
-    if not folder.is_dir():
-        raise InputError(f"there is no folder {str(folder)!r}; create it first", source=name)
-    if not os.access(path if path.exists() else folder, os.W_OK):
-        raise InputError("may not be written; choose another place", source=name)
+    if name is not None:
+        check_writable(name)

@@ -11,7 +11,7 @@ from typing import NoReturn
 import typer
 
 from alloc.cli import compare, convert, evaluate, generate, methods, pareto, solve, train, tune, validate
-from alloc.cli.console import complain, write_out
+from alloc.cli.console import complain, flush, write_out
 from alloc.cli.options import examples
 
 SERVED, UNSERVED, BAD_INPUT = 0, 1, 2
@@ -92,8 +92,8 @@ def _leave(code: int) -> NoReturn:
     """End the process without the interpreter's own end, in which a native thread that goes on would crash."""
     for stream in (sys.stdout, sys.stderr):
         if stream is not None:
-            with contextlib.suppress(OSError):
-                stream.flush()
+            with contextlib.suppress(OSError, ValueError):
+                flush(stream)
     os._exit(code)
 
 

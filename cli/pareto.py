@@ -1,11 +1,13 @@
 """``alloc pareto``."""
 
+import sys
+from functools import cache
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from alloc.cli import options
-from alloc.cli.console import note, number, percent, say, table
+from alloc.cli.console import is_terminal, note, number, percent, say, table, to_json
 from alloc.cli.files import check_outputs, read_known, save
 from alloc.cli.options import examples
 
@@ -70,24 +72,30 @@ def pareto_command(
         threads=threads,
         on_point=None if quiet else _show_point,
     )
-    save(front.to_dict, output, json=json)
-    if not quiet:
-        if not json:
-            say(_table(front))
-        for line in dict.fromkeys(line for result in front.points for line in result.notes):
-            note(line)
+    then = [] if quiet else [lambda: _tell(front, with_table=not json)]
     if plot is not None:
-        from alloc.cli.plot_front import save_front
-
-        save_front(front, plot)
+        then.append(lambda: _draw(front, plot))
+    text = cache(lambda: to_json(front.to_dict()))
+    save(text, output, text if json else None, then)
     raise typer.Exit(0 if front.points and front.points[0].makespan is not None else 1)
+
+
+def _tell(front: "Front", *, with_table: bool) -> None:
+    if with_table:
+        say(_table(front))
+    for line in dict.fromkeys(line for result in front.points for line in result.notes):
+        note(line)
+
+
+def _draw(front: "Front", path: str) -> None:
+    from alloc.cli.plot_front import save_front
+
+    save_front(front, path)
 
 
 def _show_point(result: "Result") -> None:
     """On a terminal, tell each point as it comes; the table follows at the end."""
-    import sys
-
-    if sys.stderr is not None and sys.stderr.isatty():
+    if is_terminal(sys.stderr):
         say(f"T {number(result.makespan)} h, energy {number(result.energy)}, gap {percent(result.energy_gap)}")
 
 

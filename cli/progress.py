@@ -1,5 +1,6 @@
 """The live line of a long run: seconds, best makespan, gap and energy."""
 
+import os
 import shutil
 import sys
 import threading
@@ -7,7 +8,7 @@ import time
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from alloc.cli.console import counted, number, percent
+from alloc.cli.console import counted, flush, is_terminal, number, percent
 
 if TYPE_CHECKING:
     from alloc.allocators import Improvement
@@ -23,11 +24,11 @@ class Progress:
     Parameters
     ----------
     wanted : bool
-        False, or a standard error that is no terminal, shows nothing.
+        False, or a standard error that is no terminal or one that cannot clear a line (``TERM=dumb``), shows nothing.
     """
 
     def __init__(self, wanted: bool = True) -> None:
-        self._wanted = wanted and sys.stderr is not None and sys.stderr.isatty()
+        self._wanted = wanted and is_terminal(sys.stderr) and os.environ.get("TERM") not in ("dumb", "unknown")
         self._best: Improvement | None = None
         self._end = threading.Event()
         self._thread = threading.Thread(target=self._show, daemon=True, name="alloc-progress")
@@ -75,6 +76,6 @@ def progress_line(elapsed_s: float, best: "Improvement | None") -> str:
 def _put(text: str) -> None:
     try:
         sys.stderr.write(text)
-        sys.stderr.flush()
+        flush(sys.stderr)
     except (OSError, ValueError):
         return  # the terminal has gone; the run goes on

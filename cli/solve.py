@@ -1,11 +1,12 @@
 """``alloc solve``."""
 
+from functools import cache
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from alloc.cli import options
-from alloc.cli.console import note, say
+from alloc.cli.console import note, say, to_json
 from alloc.cli.files import check_outputs, read_pair, save
 from alloc.cli.options import Objective, examples
 
@@ -91,14 +92,18 @@ def solve_command(
             policy=policy,
             device=device,
         )
-    save(result.to_dict, output, json=json)
-    if not quiet:
-        _tell(result, summary=not json)
+    then = [] if quiet else [lambda: _tell(result, summary=not json)]
     if plot is not None:
-        from alloc.cli.plot import save_plot
-
-        save_plot(result, plot)
+        then.append(lambda: _draw(result, plot))
+    text = cache(lambda: to_json(result.to_dict()))
+    save(text, output, text if json else None, then)
     raise typer.Exit(0 if result.evaluation is not None and not result.evaluation.unserved_tasks else 1)
+
+
+def _draw(result: "Result", path: str) -> None:
+    from alloc.cli.plot import save_plot
+
+    save_plot(result, path)
 
 
 def _tell(result: "Result", *, summary: bool) -> None:

@@ -11,9 +11,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from alloc.cli.console import STANDARD, complain, counted, note, number, say
-from alloc.cli.files import check_outputs, check_writable
+from alloc.cli.files import check_output, check_outputs
 from alloc.cli.options import examples
-from alloc.cli.training import check_free, learner_parameters, new_trainer, read_instances, training_parameters
+from alloc.cli.training import (
+    check_free,
+    check_suffix,
+    learner_parameters,
+    new_trainer,
+    read_instances,
+    training_parameters,
+)
 
 if TYPE_CHECKING:
     from alloc.allocators.learned.train import Limits, Report, Trainer
@@ -143,7 +150,7 @@ def train_command(
     ] = 1,
 ) -> None:
     """Train a learned method, with a checkpoint after each generation."""
-    check_writable(output)
+    check_output(output)
     kept = checkpoint or str(Path(output).with_suffix(".checkpoint"))
     lines = log or str(Path(output).with_suffix(".csv"))
     check_outputs(("--output", output), ("--checkpoint", kept), ("--log", lines), read=[("--init", init)])
@@ -164,11 +171,12 @@ def train_command(
         read_header(init)
     policy, run = Path(output), Path(kept)
     check_free(policy, run, Path(lines), resume=resume)
+    check_suffix(policy)
     from alloc.allocators.learned.train import Limits, train
-    from alloc.allocators.learned.training_log import event_writer
+    from alloc.allocators.learned.training_log import summary_writer
 
     if tensorboard is not None:
-        event_writer(Path(tensorboard)).close()
+        summary_writer()  # a writer of its own would hide what is in the folder
     parameters = training_parameters(
         method,
         learner,

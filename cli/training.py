@@ -86,6 +86,15 @@ def check_free(policy: Path, checkpoint: Path, log: Path, *, resume: bool) -> No
         raise InputError(message, source=str(log))
 
 
+def check_suffix(policy: Path) -> None:
+    """Raise an `InputError` where the name of a policy file says that it is of another kind."""
+    from alloc.problems import InputError
+
+    if policy.suffix.lower() not in ("", ".safetensors"):
+        message = f"has the suffix {policy.suffix!r}, but policies are safetensors; end it in .safetensors"
+        raise InputError(message, source=str(policy))
+
+
 def _is_filled(path: Path) -> bool:
     return path.is_file() and path.stat().st_size > 0
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from alloc.cli.console import note, number, say
-from alloc.cli.files import check_writable
+from alloc.cli.files import check_output
 from alloc.cli.options import examples
 from alloc.cli.training import learner_parameters, training_parameters
 
@@ -40,7 +40,7 @@ def tune_command(
     seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, help="Source of all randomness.")] = 0,
 ) -> None:
     """Tune the hyperparameters of a learned method by validation."""
-    check_writable(study)
+    check_output(study)
     families = family or ["mixed"]
     learner = learner_parameters(method, families)
     parameters = training_parameters(method, learner, families=families, lesson=max(1, min(20_000, steps // 5)))

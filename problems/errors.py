@@ -33,6 +33,9 @@ def nearest(name: str, known: Sequence[str]) -> str:
     """Return a hint such as `` (did you mean 'speed'?)``, or of the known names if none is near."""
     options = [option for option in islice(known, MOST_COMPARED) if len(option) <= LONGEST_COMPARED]
     close = difflib.get_close_matches(name[:LONGEST_COMPARED], options, n=1)
+    if not close:  # capital letters alone make no other name
+        folded = {option.casefold(): option for option in reversed(options)}
+        close = [folded[key] for key in difflib.get_close_matches(name[:LONGEST_COMPARED].casefold(), folded, n=1)]
     if close:
         return f" (did you mean {close[0]!r}?)"
     if not known:

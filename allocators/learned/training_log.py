@@ -39,7 +39,7 @@ class TrainingLog:
         writer = csv.writer(text)
         writer.writerow(self._columns)
         writer.writerows(asdict(report).values() for report in history)
-        self._events = None if tensorboard is None else event_writer(tensorboard, history)
+        self._events = None if tensorboard is None else _event_writer(tensorboard, history)
         write_text_atomically(path, text.getvalue())
 
     def append(self, report: Any) -> None:
@@ -62,8 +62,8 @@ class TrainingLog:
             self._events.close()
 
 
-def event_writer(folder: Path, history: Sequence[Any] = ()) -> Any:
-    """Return TensorBoard's writer; what an interrupted run wrote after the end of `history` is hidden.
+def summary_writer() -> Any:
+    """Return TensorBoard's class of writers, one of which hides what is in its folder from its first step on.
 
     Raises
     ------
@@ -75,5 +75,10 @@ def event_writer(folder: Path, history: Sequence[Any] = ()) -> Any:
     except ImportError:
         message = "needs TensorBoard, which is not installed; pip install 'alloc-mrta[train]'"
         raise InputError(message, "--tensorboard") from None
+    return SummaryWriter
+
+
+def _event_writer(folder: Path, history: Sequence[Any]) -> Any:
+    """Return a writer that hides what an interrupted run wrote after the end of `history`."""
     following = history[-1].decisions + 1 if history else 0
-    return SummaryWriter(str(folder), purge_step=following)
+    return summary_writer()(str(folder), purge_step=following)

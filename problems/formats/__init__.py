@@ -8,13 +8,22 @@ from alloc.problems.formats.allocation_file import (
     write_allocation,
 )
 from alloc.problems.formats.document import from_document, to_document
-from alloc.problems.formats.files import read_bytes, read_text, write_bytes_atomically, write_text_atomically
+from alloc.problems.formats.files import (
+    check_writable,
+    is_standard_output,
+    read_bytes,
+    read_text,
+    write_bytes_atomically,
+    write_text_atomically,
+)
 from alloc.problems.formats.instance_file import read_instance, write_instance
 
 __all__ = [
     "allocation_from_document",
     "allocation_to_document",
+    "check_writable",
     "from_document",
+    "is_standard_output",
     "read_allocation",
     "read_allocations",
     "read_bytes",

@@ -188,7 +188,7 @@ def _read_table(path: Path, known: Sequence[str], required: Sequence[str]) -> Ta
     lines: list[int] = []
     try:
         for row in reader:
-            if row:  # a blank line gives no cells
+            if any(map(str.strip, row)):  # a spreadsheet writes an empty row as commas alone
                 rows.append(row)
                 lines.append(reader.line_num)
     except csv.Error as error:

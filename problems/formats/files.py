@@ -1,5 +1,6 @@
 """Bytes and text from files and standard input, and to files and standard output."""
 
+import errno
 import os
 import secrets
 import stat
@@ -13,6 +14,20 @@ STANDARD_STREAM = "-"
 
 PathLike = str | os.PathLike[str]
 
+_MOST_LINKS = 40
+"""Links that are followed one after the other, as the kernel does."""
+
+_NO_MOVE = {
+    errno.EACCES,
+    errno.EBUSY,
+    errno.ENAMETOOLONG,
+    errno.ENOTSUP,
+    errno.EPERM,
+    errno.EROFS,
+    errno.EXDEV,
+}
+"""Why nothing can be made beside a file, or moved there: its folder is read-only, or it is mounted by itself."""
+
 
 def named(path: PathLike, *, output: bool = False) -> str:
     """Return what messages call `path`."""
@@ -24,8 +39,29 @@ def named(path: PathLike, *, output: bool = False) -> str:
 
 def is_stream(path: PathLike) -> bool:
     """Whether `path` is open already: ``-``, ``/dev/stdin``, or what a shell makes of ``<(command)``."""
+    return os.fspath(path) == STANDARD_STREAM or open_descriptor(path) is not None
+
+
+def open_descriptor(path: PathLike) -> int | None:
+    """Return N of ``/dev/fd/N`` or ``/proc/self/fd/N``, or of a link to one, as ``/dev/stdout`` is; else None."""
     text = os.fspath(path)
-    return text in (STANDARD_STREAM, "/dev/stdin") or text.startswith("/dev/fd/")
+    own = {os.path.realpath(folder) for folder in ("/dev/fd", "/proc/self/fd", "/proc/thread-self/fd")}
+    try:
+        for _ in range(_MOST_LINKS):
+            folder, name = os.path.split(text)
+            if name.isdecimal() and os.path.realpath(folder) in own:
+                return int(name)
+            if not os.path.islink(text):
+                break
+            text = os.path.join(folder, os.readlink(text))
+    except (OSError, ValueError):
+        pass  # a NUL in the path
+    return None
+
+
+def is_standard_output(path: PathLike) -> bool:
+    """Whether `path` is ``-``, or names the descriptor of standard output."""
+    return os.fspath(path) == STANDARD_STREAM or open_descriptor(path) == 1
 
 
 def read_bytes(path: PathLike) -> bytes:
@@ -86,7 +122,8 @@ def write_bytes_atomically(path: PathLike, data: bytes) -> None:
     """Write a file whole or not at all; ``-`` is standard output.
 
     The file is written beside its place and then moved there, so that an existing file is either replaced or left as
-    it was. It keeps the permissions of the file that it replaces. Devices and pipes are written directly.
+    it was. It keeps the permissions of the file that it replaces. Where its folder does not allow that, it is written
+    in place, once there is room for all of it. Devices, pipes and open descriptors are written to directly.
 
     Raises
     ------
@@ -95,19 +132,47 @@ def write_bytes_atomically(path: PathLike, data: bytes) -> None:
     """
     source = named(path, output=True)
     try:
+        descriptor = open_descriptor(path)
         if os.fspath(path) == STANDARD_STREAM:
             _write_standard_output(data)
+        elif descriptor is not None:
+            _write_descriptor(descriptor, data)
         else:
-            _replace(Path(os.path.realpath(path)), data)
-    except BrokenPipeError:
-        raise  # whoever read has left: no fault of the input
-    except FileNotFoundError:
-        folder = one_line(os.path.dirname(os.fspath(path)) or ".")
-        raise InputError(f"cannot be written: there is no folder {folder!r}; create it first", source=source) from None
+            _write_file(Path(os.path.realpath(path)), data)
     except (OSError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"cannot be written: {reason(error)}", source=source) from error
+        if isinstance(error, BrokenPipeError) and is_standard_output(path):
+            raise  # whoever read has left: no fault of the input
+        raise _unwritable(error, path, source) from error
+
+
+def check_writable(path: PathLike) -> None:
+    """Raise an `InputError` where `write_bytes_atomically` could not write, found by the same steps but for the data.
+
+    A file that is there is not touched; one that is not is made and removed again.
+    """
+    source = named(path, output=True)
+    try:
+        descriptor = open_descriptor(path)
+        if descriptor is not None:
+            _check_descriptor(descriptor)
+        elif os.fspath(path) == STANDARD_STREAM:
+            _require_standard_output()
+        else:
+            target = Path(os.path.realpath(path))
+            if _mode(target) is None:
+                os.close(os.open(target, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
+                target.unlink()
+    except (OSError, ValueError) as error:
+        raise _unwritable(error, path, source) from error
+
+
+def _unwritable(error: OSError | ValueError, path: PathLike, source: str) -> InputError:
+    if isinstance(error, InputError):
+        return error
+    if isinstance(error, FileNotFoundError):
+        folder = one_line(os.path.dirname(os.fspath(path)) or ".")
+        return InputError(f"cannot be written: there is no folder {folder!r}; create it first", source=source)
+    return InputError(f"cannot be written: {reason(error)}", source=source)
 
 
 def _refuse_unless_regular(mode: int, source: str) -> None:
@@ -125,31 +190,74 @@ def _standard_input() -> bytes:
     return data if isinstance(data, bytes) else data.encode("utf-8", "surrogatepass")
 
 
-def _write_standard_output(data: bytes) -> None:
+def _require_standard_output() -> None:
     if sys.stdout is None:
         raise InputError("is closed", source="standard output")
-    sys.stdout.flush()
+
+
+def _write_standard_output(data: bytes) -> None:
+    _require_standard_output()
+    _flush(sys.stdout)
     raw = getattr(sys.stdout, "buffer", None)
     if raw is not None:
         raw.write(data)
         raw.flush()
     else:
         sys.stdout.write(data.decode("utf-8"))
+        _flush(sys.stdout)
 
 
-def _replace(target: Path, data: bytes) -> None:
-    """Write beside `target` and move; mode 0666 less the umask is what open() would give a new file."""
+def _flush(stream: object) -> None:
+    flush = getattr(stream, "flush", None)  # which not all that is put in the place of a stream has
+    if flush is not None:
+        flush()
+
+
+def _write_descriptor(descriptor: int, data: bytes) -> None:
+    """Write where the descriptor stands, or at the end if it appends: what it is of belongs to whoever opened it."""
+    _check_descriptor(descriptor)
+    for stream in (sys.stdout, sys.stderr):
+        _flush(stream)  # what was said before stands before
+    left = memoryview(data)
+    while left:
+        left = left[os.write(descriptor, left) :]
+
+
+def _check_descriptor(descriptor: int) -> None:
+    import fcntl  # where descriptors have names, there is fcntl
+
+    if fcntl.fcntl(descriptor, fcntl.F_GETFL) & os.O_ACCMODE == os.O_RDONLY:
+        raise OSError(errno.EBADF, "it is open for reading alone")
+
+
+def _mode(target: Path) -> int | None:
+    """Return the mode of what is to be written, None if it is not there; raise an error if it may not be written."""
     try:
         mode = target.stat().st_mode
     except FileNotFoundError:
-        mode = None
-    if mode is not None and stat.S_ISDIR(mode):
-        raise IsADirectoryError(21, "it is a folder")
+        return None
+    if stat.S_ISDIR(mode):
+        raise IsADirectoryError(errno.EISDIR, "it is a folder")
+    if not os.access(target, os.W_OK):
+        raise PermissionError(errno.EACCES, "it is write-protected")
+    return mode
+
+
+def _write_file(target: Path, data: bytes) -> None:
+    mode = _mode(target)
     if mode is not None and not stat.S_ISREG(mode):
         target.write_bytes(data)
         return
-    if mode is not None and not os.access(target, os.W_OK):
-        raise PermissionError(13, "it is write-protected")
+    try:
+        _replace(target, data, mode)
+    except OSError as error:
+        if mode is None or error.errno not in _NO_MOVE:
+            raise
+        _overwrite(target, data)
+
+
+def _replace(target: Path, data: bytes, mode: int | None) -> None:
+    """Write beside `target` and move; 0666 less the umask is what open() would give a new file."""
     beside = target.parent / f".alloc-{secrets.token_hex(8)}.tmp"
     try:
         with os.fdopen(os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666), "wb") as file:
@@ -160,6 +268,21 @@ def _replace(target: Path, data: bytes) -> None:
     except BaseException:
         beside.unlink(missing_ok=True)
         raise
+
+
+def _overwrite(target: Path, data: bytes) -> None:
+    """Write into the file that is there; a full disk is met before the old content is touched."""
+    with os.fdopen(os.open(target, os.O_WRONLY), "wb") as file:
+        size = os.fstat(file.fileno()).st_size
+        if data and hasattr(os, "posix_fallocate"):
+            try:
+                os.posix_fallocate(file.fileno(), 0, len(data))
+            except OSError as error:
+                file.truncate(size)
+                if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
+                    raise
+        file.write(data)
+        file.truncate(len(data))
 
 
 def reason(error: Exception) -> str:

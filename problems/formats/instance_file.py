@@ -8,7 +8,6 @@ from alloc.problems.formats import json_text
 from alloc.problems.formats.csv_folder import read_folder, write_folder
 from alloc.problems.formats.document import from_document, to_document
 from alloc.problems.formats.files import (
-    STANDARD_STREAM,
     PathLike,
     is_stream,
     named,
@@ -42,7 +41,7 @@ def read_instance(path: PathLike) -> Instance:
             return from_document(json_text.parse(read_text(path)))
         file = Path(path)
         suffix = file.suffix.lower()
-        name = file.stem if suffix in (".json", ".npz") else Path(os.path.abspath(file)).name
+        name = _name(file.stem if suffix in (".json", ".npz") else Path(os.path.abspath(file)).name)
         if suffix == ".json":
             return from_document(json_text.parse(read_text(file)), default_name=name)
         if suffix == ".npz":
@@ -55,6 +54,11 @@ def read_instance(path: PathLike) -> Instance:
         raise told(error, source) from error.__cause__
 
 
+def _name(stem: str) -> str:
+    """Return the name of a file as Unicode; bytes of it that are no UTF-8 become U+FFFD."""
+    return os.fsencode(stem).decode("utf-8", "replace")
+
+
 def write_instance(instance: Instance, path: PathLike) -> None:
     """Write an instance, such that `read_instance` gives back the same.
 
@@ -63,7 +67,8 @@ def write_instance(instance: Instance, path: PathLike) -> None:
     instance : Instance
     path : str or path
         ``*.json``, ``*.npz``, a folder (a path without suffix, or one that exists) for CSV files, or ``-`` for JSON to
-        standard output. A file that exists is replaced whole or not at all.
+        standard output; JSON too to pipes, devices and names of open descriptors such as ``/dev/stdout``. A file that
+        exists is replaced whole or not at all.
 
     Raises
     ------
@@ -81,7 +86,7 @@ def _write(instance: Instance, path: PathLike) -> None:
     suffix = file.suffix.lower()
     if not os.fspath(path):
         raise InputError("is no name of a file; give one")  # Path("") would be the working folder
-    if os.fspath(path) == STANDARD_STREAM or suffix == ".json":
+    if is_stream(path) or suffix == ".json" or _is_device(path):
         write_text_atomically(path, json_text.lines(to_document(instance)))
     elif suffix == ".npz":
         from alloc.problems.formats.npz import to_npz
@@ -93,6 +98,14 @@ def _write(instance: Instance, path: PathLike) -> None:
         raise InputError(f"is a file of no known format; {KNOWN_SUFFIXES}")
     else:
         raise InputError(f"no format has the suffix {suffix!r}; {KNOWN_SUFFIXES}")
+
+
+def _is_device(path: PathLike) -> bool:
+    """Whether it is there and neither a file nor a folder, but a pipe or a device, which has no suffix to go by."""
+    try:
+        return os.path.exists(path) and not os.path.isfile(path) and not os.path.isdir(path)
+    except ValueError:  # a NUL in the path
+        return False
 
 
 def _is_folder(path: PathLike) -> bool:

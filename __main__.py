@@ -1,0 +1,7 @@
+"""``python -m alloc`` is ``alloc``; the package stays a namespace, which may have a module of this name."""
+
+import sys
+
+from alloc.cli.main import main
+
+sys.exit(main())
