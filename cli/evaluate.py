@@ -1,5 +1,8 @@
 """``alloc evaluate``."""
 
+import math
+import sys
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -17,7 +20,8 @@ EXAMPLES = examples(
     "alloc evaluate demo.json best.json",
     "alloc evaluate demo.json best.json --json",
     "alloc solve demo.json --json | alloc evaluate demo.json -",
-    closing="Exit code 1 if a task is unserved or an agent is sent where it cannot go.",
+    closing="The bounds in a result hold for the instance that it was found on: they are shown where agents and scores "
+    "are the same. Exit code 1 if a task is unserved or an agent is sent where it cannot go.",
 )
 
 SCORES = (
@@ -51,9 +55,14 @@ def evaluate_command(
     json: options.JsonOption = False,
 ) -> None:
     """Score an allocation, whoever made it."""
-    problem, answer = read_pair(instance, allocation)
+    problem, answer, claims = read_pair(instance, allocation)
     assert answer is not None
     result = _scored(problem, answer)
+    if claims and result.lower_bound is not None:
+        if _is_of(result, claims):
+            result = _bounded(result, claims)
+        else:
+            note(f"{allocation}: its scores are not those on this instance, so that its bounds are left out")
     score = result.evaluation
     assert score is not None
     if json:
@@ -84,6 +93,38 @@ def _scored(problem: "Instance", allocation: "Allocation") -> "Result":
         runtime_s=0.0,
         trace=(),
     )
+
+
+def _is_of(result: "Result", claims: dict[str, Any]) -> bool:
+    """Whether `claims` can be of a result of this very instance: the same agents, and the same figures of the whole."""
+    found = result.to_dict()
+    same = ("makespan", "energy", "distance", "battery_remaining_percent", "reward")
+    return (
+        claims.get("instance") == found["instance"]
+        and claims["assignment"].keys() == found["assignment"].keys()
+        and all(_is_close(claims.get(name), found[name]) for name in same)
+    )
+
+
+def _is_close(one: Any, other: float | None) -> bool:
+    number = _number(one)
+    return one is other if number is None or other is None else math.isclose(number, other, rel_tol=1e-9)
+
+
+def _number(value: Any) -> float | None:
+    is_number = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
+    return float(value) if is_number else None
+
+
+def _bounded(result: "Result", claims: dict[str, Any]) -> "Result":
+    """Return `result` with the bounds that the run proved, but for those above what they are to bound."""
+    bounds = {name: _number(claims.get(name)) for name in ("lower_bound", "energy_lower_bound", "makespan_limit")}
+    least, energy = bounds["lower_bound"], bounds["energy_lower_bound"]
+    if least is not None and result.makespan is not None and least <= result.makespan * (1 + 1e-9):
+        result = replace(result, lower_bound=max(least, result.lower_bound or 0.0))
+    if energy is not None and result.energy is not None and energy <= result.energy * (1 + 1e-9):
+        result = replace(result, energy_lower_bound=energy, makespan_limit=bounds["makespan_limit"])
+    return result
 
 
 def _scores(result: "Result") -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from alloc.cli.console import STANDARD, note, say, write_out
 
@@ -10,20 +10,25 @@ if TYPE_CHECKING:
     from alloc.problems import Allocation, Instance
 
 
-def read_pair(instance: str, allocation: str | None, *, quiet: bool = False) -> "tuple[Instance, Allocation | None]":
-    """Read an instance, and an allocation of it if there is one; another instance's name is worth a note."""
+def read_pair(
+    instance: str, allocation: str | None, *, quiet: bool = False
+) -> "tuple[Instance, Allocation | None, dict[str, Any]]":
+    """Read an instance, and an allocation of it if there is one; another instance's name is worth a note.
+
+    The third is what a result says of its allocation, as `read_claims` returns it.
+    """
     from alloc.problems import InputError
-    from alloc.problems.formats import read_allocation, read_instance
+    from alloc.problems.formats import read_claims, read_instance
 
     if instance == allocation == STANDARD:
         raise InputError("cannot be the instance and the allocation at once", source="standard input")
     problem = read_instance(instance)
     if allocation is None:
-        return problem, None
-    answer, warning = read_allocation(allocation, problem)
+        return problem, None, {}
+    answer, warning, claims = read_claims(allocation, problem)
     if warning is not None and not quiet:
         note(warning)
-    return problem, answer
+    return problem, answer, claims
 
 
 def read_known(instance: str, front: str | None, *, quiet: bool = False) -> "tuple[Instance, list[Allocation]]":

@@ -57,7 +57,7 @@ def pareto_command(
     read = [("INSTANCE", instance)]
     check_outputs(("--output", output), ("--plot", plot), read=read)
     if plot is not None:
-        from alloc.cli.plot import check_plot
+        from alloc.cli.figures import check_plot
 
         check_plot(plot)
     problem, starts = read_known(instance, start, quiet=quiet)

@@ -1,62 +1,35 @@
 """Drawing an answer into a file."""
 
-import io
-import warnings
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from alloc.cli.console import counted, number, percent
+from alloc.cli.figures import drawing, new_figure, save_figure
 from alloc.cli.plot_sites import draw_sites, name_sites, plain_text, shortened
 from alloc.cli.plot_times import MOST_ROWS, draw_times
-from alloc.problems import InputError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from alloc.allocators import Result
 
-SUFFIXES = (".png", ".svg")
-
-
-def check_plot(path: str) -> None:
-    """Raise an `InputError` if no drawing is written under that name."""
-    if Path(path).suffix.lower() not in SUFFIXES:
-        raise InputError(f"must end in {' or '.join(SUFFIXES)}", source=path)
-
 
 def save_plot(result: "Result", path: str) -> None:
     """Draw `result` into a .png or .svg file, which is written whole or not at all."""
-    save_figure(draw(result), path)
-
-
-def save_figure(figure: "Figure", path: str) -> None:
-    """Write `figure` into a .png or .svg file, whole or not at all."""
-    from alloc.problems.formats import write_bytes_atomically
-
-    kind = Path(path).suffix.lower().removeprefix(".")
-    picture = io.BytesIO()
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Glyph .* missing")  # it draws a box instead
-        figure.savefig(picture, format=kind, dpi=150, metadata={"Date": None} if kind == "svg" else None)
-    write_bytes_atomically(path, picture.getvalue())
+    with drawing():
+        save_figure(draw(result), path)
 
 
 def draw(result: "Result") -> "Figure":
     """Return the drawing of `result`, on a canvas of its own; without positions it shows completion times alone."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     if np.isnan(result.instance.task_position[:, 0]).all():
         rows = min(result.instance.m, MOST_ROWS)
-        figure = Figure(figsize=(7.5, float(np.clip(2.0 + 0.25 * rows, 3.0, 6.2))), layout="constrained")
-        FigureCanvasAgg(figure)
+        figure = new_figure(7.5, float(np.clip(2.0 + 0.25 * rows, 3.0, 6.2)))
         draw_times(figure.subplots(), result)
         figure.suptitle(_title(result), fontsize=12)
         return figure
-    figure = Figure(figsize=(13, 6.2), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(13, 6.2)
     figure.suptitle(_title(result), fontsize=12)
     left, right = figure.subplots(1, 2, width_ratios=[1.25, 1])
     sites, radius = draw_sites(left, result)

@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from alloc.cli.console import counted, number
-from alloc.cli.plot import save_figure
+from alloc.cli.figures import drawing, new_figure, save_figure
 from alloc.cli.plot_colours import LIMIT, MAKESPAN
 from alloc.cli.plot_sites import plain_text, shortened
 
@@ -19,16 +19,13 @@ WIDE = 3.0
 
 def save_front(front: "Front", path: str) -> None:
     """Draw `front` into a .png or .svg file, which is written whole or not at all."""
-    save_figure(draw_front(front), path)
+    with drawing():
+        save_figure(draw_front(front), path)
 
 
 def draw_front(front: "Front") -> "Figure":
     """Return the drawing: the least energy found and the proven bound on it, as steps over the makespan."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(8, 5.2), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(8, 5.2)
     axes = figure.subplots()
     hours = [result.makespan or 0.0 for result in front.points]
     energy = [result.energy or 0.0 for result in front.points]

@@ -71,10 +71,10 @@ def solve_command(
     read = [("INSTANCE", instance), ("--policy", policy)]
     check_outputs(("--output", output), ("--plot", plot), read=read)
     if plot is not None:
-        from alloc.cli.plot import check_plot
+        from alloc.cli.figures import check_plot
 
         check_plot(plot)
-    problem, first = read_pair(instance, start, quiet=quiet)
+    problem, first, _ = read_pair(instance, start, quiet=quiet)
     with Progress(wanted=not quiet) as progress:
         result = solve(
             problem,

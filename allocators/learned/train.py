@@ -402,8 +402,10 @@ def train(
             report = trainer.advance(limits, engine, should_stop)
             if report is None:
                 return
-            trainer.save(checkpoint)
-            if report.generation == trainer.best_generation:
-                trainer.write_policy(output)
+            try:
+                trainer.save(checkpoint)
+            finally:  # one of the two may have room
+                if report.generation == trainer.best_generation:
+                    trainer.write_policy(output)
             lines.append(report)
             on_report(report)

@@ -5,6 +5,7 @@ from alloc.problems.formats.allocation_file import (
     allocation_to_document,
     read_allocation,
     read_allocations,
+    read_claims,
     write_allocation,
 )
 from alloc.problems.formats.document import from_document, to_document
@@ -27,6 +28,7 @@ __all__ = [
     "read_allocation",
     "read_allocations",
     "read_bytes",
+    "read_claims",
     "read_instance",
     "read_text",
     "to_document",

@@ -41,13 +41,28 @@ def read_allocation(path: PathLike, instance: Instance) -> tuple[Allocation, str
     InputError
         If it cannot be read, breaks the rules of its format, or names an unknown agent or task.
     """
+    allocation, warning, _ = read_claims(path, instance)
+    return allocation, warning
+
+
+def read_claims(path: PathLike, instance: Instance) -> tuple[Allocation, str | None, dict[str, Any]]:
+    """Read an allocation as `read_allocation` does, and the other fields of the file where it is a result.
+
+    Returns
+    -------
+    allocation, warning
+        As `read_allocation` returns them.
+    claims : dict
+        What the result says of itself, which nobody has checked; empty for an allocation alone.
+    """
     source = named(path)
     try:
         document = json_text.parse(read_text(path))
         allocation, name = allocation_from_document(document, instance)
     except InputError as error:
         raise told(error, source) from error.__cause__
-    return allocation, _other_instance(source, name, instance)
+    claims = document if document["format"] == RESULT_FORMAT else {}
+    return allocation, _other_instance(source, name, instance), claims
 
 
 def read_allocations(path: PathLike, instance: Instance) -> tuple[list[Allocation], str | None]:

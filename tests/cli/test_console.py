@@ -4,8 +4,9 @@ import sys
 
 import pytest
 
-from alloc.cli.console import one_line, percent, say, table, to_json
-from alloc.cli.files import check_writable
+from alloc.cli.console import is_terminal, one_line, percent, say, table, to_json
+from alloc.cli.files import check_output
+from alloc.cli.main import main
 from alloc.problems import InputError
 
 
@@ -36,10 +37,41 @@ def test_streams_without_unicode(monkeypatch):
 
 
 def test_write_protected_places_are_told(tmp_path, monkeypatch):
-    """A place that may not be written is found before the run."""
+    """A file that may not be written is found before the run, as the writing itself would find it."""
+    (tmp_path / "x.json").touch()
     monkeypatch.setattr("os.access", lambda path, mode: False)
-    with pytest.raises(InputError, match="may not be written"):
-        check_writable(str(tmp_path / "x.json"))
+    with pytest.raises(InputError, match="cannot be written: it is write-protected"):
+        check_output(str(tmp_path / "x.json"))
+
+
+class Bare:
+    """What a program may put in the place of a stream: it takes text, and has nothing else."""
+
+    def __init__(self) -> None:
+        self.text = ""
+
+    def write(self, text: str) -> None:
+        self.text += text
+
+
+def test_streams_that_can_only_be_written_to(alloc, small, monkeypatch):
+    """Neither `isatty` nor `flush` is needed, whatever the command; a closed stream is no terminal."""
+    for arguments in (
+        ("solve", "small.json", "--method", "greedy"),
+        ("compare", "small.json", "--methods", "greedy"),
+        ("pareto", "small.json", "--points", "1", "--iterations", "1", "--method", "local-search"),
+    ):
+        error, out = Bare(), Bare()
+        with monkeypatch.context() as patch:
+            patch.setattr(sys, "stderr", error)
+            patch.setattr(sys, "stdout", out)
+            assert main([*arguments, "--json"]) == 0
+            assert main(arguments) == 0
+        assert json.loads(out.text)
+        assert "T" in error.text or "makespan" in error.text
+    closed = io.StringIO()
+    closed.close()
+    assert not is_terminal(closed)
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,8 @@ from pathlib import Path
 
 import pytest
 
-from alloc.problems import Allocation, evaluate
+from alloc.problems import Allocation, Instance, evaluate, makespan_lower_bound
+from alloc.problems.formats import write_instance
 
 
 def write(assignment, name="small"):
@@ -56,3 +57,55 @@ def test_result_from_standard_input(alloc, small):
     result = alloc("solve", "small.json", "--method", "greedy", "--json")
     ran = alloc("evaluate", "small.json", "-", "--json", stdin=result.out)
     assert ran.json["makespan"] == result.json["makespan"]
+
+
+def test_the_bound_of_a_result_is_that_of_its_run(alloc, small):
+    """What `solve` proves is what `evaluate` shows, as JSON and for people: neither contradicts the other."""
+    solved = alloc("solve", "small.json", "--method", "cpsat", "--objective", "makespan-energy", "--output", "r.json")
+    result = json.loads(Path("r.json").read_text())
+    shown = alloc("evaluate", "small.json", "r.json", "--json").json
+    assert result["lower_bound"] > makespan_lower_bound(small) + 1e-3
+    assert (shown["lower_bound"], shown["gap"]) == (result["lower_bound"], result["gap"])
+    ran = alloc("evaluate", "small.json", "r.json")
+    for line in solved.err.splitlines():
+        if "makespan" in line or "energy  " in line or "at work until then" in line:
+            assert line in ran.err
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"workload": [3, 13, 5]},
+        {"ability": [5, 2, 1, 8, 4]},
+        {"battery": [30] * 5},
+        {"energy_per_distance": 7},
+        {"name": "other"},
+        {"agent_ids": ["a1", "a2", "a3", "a4", "b"]},
+        {"ability": [5, 2, 1, 8, 3, 9], "start_task": [0, 0, 1, 1, 2, 0], "battery": [20] * 6},
+    ],
+)
+def test_the_bound_of_another_instance_is_left_out(alloc, small, change):
+    """A bound holds for the instance that it was proved on: with other agents or scores there is a note instead."""
+    assert alloc("solve", "small.json", "--method", "cpsat", "--output", "r.json").code == 0
+    own = {"task_position": small.task_position, "start_task": small.start_task, "battery": small.battery}
+    ground = {"name": "small", "ability": small.ability, "workload": small.workload, "energy_per_distance": 6, **own}
+    other = Instance(**{**ground, **change})
+    write_instance(other, "other.json")
+    if "agent_ids" in change:
+        document = json.loads(Path("r.json").read_text())
+        document["assignment"]["b"] = document["assignment"].pop("a5")
+        document["energy"] += 1
+        Path("r.json").write_text(json.dumps(document))
+    ran = alloc("evaluate", "other.json", "r.json", "--json")
+    assert "r.json: its scores are not those on this instance, so that its bounds are left out" in ran.err
+    assert ran.json["lower_bound"] == makespan_lower_bound(other)
+
+
+@pytest.mark.parametrize("bound", ["high", None, True, 1e9, [], 0])
+def test_bounds_that_cannot_be_are_left_out(alloc, small, bound):
+    """What is no number, or above the makespan that it is to bound, changes nothing; a weaker bound neither."""
+    assert alloc("solve", "small.json", "--method", "greedy", "--output", "r.json").code == 0
+    document = json.loads(Path("r.json").read_text())
+    Path("r.json").write_text(json.dumps({**document, "lower_bound": bound}))
+    ran = alloc("evaluate", "small.json", "r.json", "--json")
+    assert (ran.code, ran.json["lower_bound"]) == (0, makespan_lower_bound(small))

@@ -2,6 +2,8 @@ import io
 import sys
 import time
 
+import pytest
+
 from alloc.allocators import Improvement
 from alloc.cli import progress
 from alloc.cli.progress import CLEAR, Progress, progress_line
@@ -30,6 +32,7 @@ def test_shown_on_terminals_and_cleared(small, monkeypatch):
     """On a terminal the line appears after a while, and is gone at the end."""
     monkeypatch.setattr(progress, "FIRST_AFTER_S", 0.01)
     monkeypatch.setattr(progress, "EVERY_S", 0.01)
+    monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setattr(sys, "stderr", Terminal())
     with Progress() as shown:
         shown.update(improvement(small, [0, 0, 0, 1, 2]))
@@ -37,6 +40,17 @@ def test_shown_on_terminals_and_cleared(small, monkeypatch):
     text = sys.stderr.getvalue()  # type: ignore[attr-defined]
     assert "T 1.625 h" in text
     assert text.endswith(CLEAR)
+
+
+@pytest.mark.parametrize(("terminal", "shown"), [("dumb", False), ("unknown", False), ("xterm", True)])
+def test_terminals_that_cannot_clear_a_line_get_no_escape_codes(monkeypatch, terminal, shown):
+    """Editors and build logs that call themselves dumb are spared the codes that others move the cursor by."""
+    monkeypatch.setenv("TERM", terminal)
+    monkeypatch.setattr(progress, "FIRST_AFTER_S", 0.0)
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    with Progress():
+        time.sleep(0.05)
+    assert ("\x1b" in sys.stderr.getvalue()) == shown  # type: ignore[attr-defined]
 
 
 def test_short_runs_and_files_see_nothing(monkeypatch):

@@ -1,16 +1,18 @@
 """Files are written whole or not at all, and failing to write is told on one line."""
 
+import errno
 import io
 import os
 import stat
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from alloc.problems import InputError, Instance, paper, read_instance, write_allocation, write_instance
 from alloc.problems.allocation import Allocation
-from alloc.problems.formats import write_bytes_atomically, write_text_atomically
+from alloc.problems.formats import check_writable, write_bytes_atomically, write_text_atomically
 
 
 def leftovers(folder: Path) -> list[str]:
@@ -173,3 +175,103 @@ def test_a_reader_that_left_is_not_the_inputs_fault(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(Closed()))
     with pytest.raises(BrokenPipeError):
         write_text_atomically("-", "text")
+
+
+@pytest.mark.parametrize("step", ["open", "replace"])
+@pytest.mark.parametrize("number", [errno.EBUSY, errno.EACCES, errno.EROFS, errno.EXDEV, errno.EPERM])
+def test_where_nothing_can_be_moved_it_is_written_in_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: str, number: int
+) -> None:
+    """A file that is mounted by itself, or lies in a read-only folder, is overwritten, and longer content is gone."""
+    path, real = tmp_path / "x", os.open
+    path.write_text("what was there before")
+    inode = path.stat().st_ino
+
+    def fail(name: object, *arguments: Any) -> int:
+        if step == "replace" or ".alloc-" in str(name):
+            raise OSError(number, os.strerror(number))
+        return real(name, *arguments)  # type: ignore[arg-type]
+
+    check_writable(path)
+    monkeypatch.setattr(os, step, fail)
+    write_text_atomically(path, "new")
+    assert (path.read_text(), path.stat().st_ino) == ("new", inode)
+    assert leftovers(tmp_path) == []
+
+
+def test_a_full_disk_leaves_what_is_overwritten_in_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where there is no room for all of it, the old content stays, also where nothing can be moved."""
+
+    def fail(number: int) -> None:
+        raise OSError(number, os.strerror(number))
+
+    path = tmp_path / "x"
+    path.write_text("old")
+    monkeypatch.setattr(os, "replace", lambda *_: fail(errno.EBUSY))
+    monkeypatch.setattr(os, "posix_fallocate", lambda *_: fail(errno.ENOSPC))
+    with pytest.raises(InputError, match="no space left on device"):
+        write_text_atomically(path, "new and longer")
+    assert path.read_text() == "old"
+
+
+@pytest.mark.parametrize("name", ["/dev/fd/{}", "/proc/self/fd/{}", "link", "link.json"])
+@pytest.mark.parametrize("mode", ["ab", "wb"])
+def test_open_descriptors_are_written_to_where_they_stand(tmp_path: Path, name: str, mode: str) -> None:
+    """What a file has been given stays, whether it is appended to or not, and the file is the same one."""
+    (tmp_path / "log").write_text("before\n")
+    with (tmp_path / "log").open(mode) as log:
+        log.write(b"earlier\n")
+        log.flush()
+        if "link" in name:
+            (tmp_path / name).symlink_to(f"/dev/fd/{log.fileno()}")
+        path = tmp_path / name.format(log.fileno())
+        check_writable(path)
+        write_text_atomically(path, "one\n")
+        write_instance(paper(1, 0), path)
+        log.write(b"later\n")
+    lines = (tmp_path / "log").read_text().splitlines()
+    first = ["before"] if mode == "ab" else []
+    assert lines[: len(first) + 2] == [*first, "earlier", "one"]
+    assert lines[-1] == "later"
+    assert '"format": "alloc-instance/1"' in "".join(lines)
+
+
+def test_pipes_take_instances_without_a_suffix(tmp_path: Path) -> None:
+    """What a shell makes of ``>(command)`` and a named pipe get JSON, as standard output does."""
+    begin, end = os.pipe()
+    write_instance(Instance(ability=[1], workload=[1]), f"/dev/fd/{end}")
+    os.mkfifo(tmp_path / "pipe")
+    reader = os.open(tmp_path / "pipe", os.O_RDONLY | os.O_NONBLOCK)
+    write_instance(Instance(ability=[1], workload=[1]), tmp_path / "pipe")
+    assert os.read(begin, 10_000) == os.read(reader, 10_000) != b""
+    write_instance(Instance(ability=[1], workload=[1]), f"/dev/fd/{end}")
+    os.close(end)
+    assert read_instance(f"/proc/self/fd/{begin}").n == 1
+    for descriptor in (begin, reader):
+        os.close(descriptor)
+
+
+def test_descriptors_that_take_nothing_are_found_before(tmp_path: Path) -> None:
+    """A descriptor that is closed, or open for reading alone, is told by the check and by the write alike."""
+    begin, end = os.pipe()
+    os.close(end)
+    for number in (begin, end):
+        for attempt in (check_writable, lambda path: write_text_atomically(path, "text")):
+            with pytest.raises(InputError, match="cannot be written: "):
+                attempt(f"/dev/fd/{number}")
+    os.close(begin)
+
+
+@pytest.mark.parametrize("path", ["absent/x.json", "folder.json", "file/x.json", "nul\0.json", "x" * 300 + ".json"])
+def test_the_check_finds_what_the_write_would(tmp_path: Path, path: str) -> None:
+    """Before a run each place is told in the same words as after it, and nothing is left there."""
+    (tmp_path / "file").write_text("")
+    (tmp_path / "folder.json").mkdir()
+    told = []
+    for attempt in (check_writable, lambda path: write_text_atomically(path, "text")):
+        with pytest.raises(InputError) as caught:
+            attempt(f"{tmp_path}/{path}")
+        told.append(str(caught.value))
+    assert told[0] == told[1]
+    check_writable(tmp_path / "new")
+    assert sorted(os.listdir(tmp_path)) == ["file", "folder.json"]
