@@ -7,14 +7,13 @@ from importlib.metadata import version
 from pathlib import Path
 
 import torch
-from safetensors import safe_open
-from safetensors.torch import save
+from safetensors.torch import load, save
 
 from alloc.allocators.learned.methods import METHODS
 from alloc.allocators.learned.network import ActorCritic, NetworkSize
 from alloc.allocators.learned.policy_header import read_header
 from alloc.problems import InputError
-from alloc.problems.formats import write_bytes_atomically
+from alloc.problems.formats import read_bytes, write_bytes_atomically
 from alloc.problems.game import AGENT_FEATURES, FEATURE_SET, PAIR_FEATURES, TASK_FEATURES, Turn
 
 POLICY_FORMAT = "alloc-policy/1"
@@ -85,8 +84,7 @@ def load_policy(path: Path | str, method: str | None, device: torch.device | Non
         or holds weights that are not finite.
     """
     source, said = str(path), read_header(path)
-    with safe_open(source, framework="pt") as file:
-        tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
+    tensors = load(read_bytes(path))  # opened by Python, to which every name of a file is one
     try:
         size, count = NetworkSize(**json.loads(said["size"])), int(said["networks"])
     except (KeyError, TypeError, ValueError):

@@ -22,6 +22,9 @@ def test_unknown_names() -> None:
         load("gredy")
     with pytest.raises(InputError, match="did you mean 'policy'"):
         load("gappo", polcy="x")
+    for ask in (load, describe):
+        with pytest.raises(InputError, match=r"picks one for an instance; call solve\(instance, 'auto'\)$"):
+            ask("auto")
 
 
 def test_options_of_other_methods() -> None:

@@ -37,9 +37,10 @@ def test_each_help_has_examples(alloc, command):
     assert f"alloc {command}" in ran.out.split("Examples:")[1]
 
 
-def test_module_and_version():
-    """`python -m alloc.cli --version` prints the version."""
-    ran = python("-m", "alloc.cli", "--version")
+@pytest.mark.parametrize("module", ["alloc", "alloc.cli"])
+def test_module_and_version(module):
+    """`python -m alloc --version` prints the version, and so does the older `python -m alloc.cli`."""
+    ran = python("-m", module, "--version")
     assert (ran.returncode, ran.stderr) == (0, "")
     assert ran.stdout.startswith("alloc 0.")
 

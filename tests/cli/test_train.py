@@ -16,6 +16,7 @@ import torch
 from safetensors import safe_open
 from safetensors.torch import save_file
 
+from alloc.allocators.learned import train as module_of_training
 from alloc.allocators.learned.engine import ENGINES, EngineError, SerialEngine
 from alloc.allocators.learned.families import FAMILIES
 from alloc.allocators.learned.network import ActorCritic, NetworkSize
@@ -184,6 +185,8 @@ def test_what_is_wrong_in_any_case_comes_first(alloc, more, message):
         (("--output", "new", "--checkpoint", "small.json"), "small.json: is there already, and no checkpoint"),
         (("--output", "new", "--log", "small.json"), "small.json: is there already, and no log of a training"),
         (("--output", "new", "--log", "new"), "new: is --output and --log at once"),
+        (("--output", "q.pt"), "q.pt: has the suffix '.pt', but policies are safetensors; end it in .safetensors"),
+        (("--output", "q.safetensors.gz"), "q.safetensors.gz: has the suffix '.gz', but policies are safetensors"),
         (("--output", ""), "'': is no name of a file"),
         (("--output", "-"), "policy, checkpoint and log must be files"),
     ],
@@ -330,3 +333,32 @@ def test_options_are_those_of_the_library():
     assert {engine.value for engine in module.Engine} == set(ENGINES)
     for name in FAMILIES:
         assert name in inspect.getsource(module.train_command)
+
+
+def test_a_resumed_run_keeps_its_events(alloc, mine):
+    """TensorBoard shows the generations before --resume beside those after it, each once."""
+    pytest.importorskip("tensorboard")
+    from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+    run = ("train", "ppo", "--output", "p.safetensors", *QUICK, "--tensorboard", "events")
+    assert alloc(*run, "--iterations", "2").code == 0
+    assert alloc(*run, "--iterations", "3", "--resume").code == 0
+    steps = [event.step for event in EventAccumulator("events").Reload().Scalars("training/cost")]
+    with Path("p.csv").open(newline="") as file:
+        assert steps == [int(row["decisions"]) for row in csv.DictReader(file)]
+    assert len(steps) == 3
+
+
+def test_a_checkpoint_that_cannot_be_written_costs_no_policy(alloc, mine, monkeypatch):
+    """Where the disk has no room for the whole run, the networks of its last generation are still stored."""
+    save = module_of_training.Trainer.save
+
+    def fail(self, path):
+        if self.generation:
+            raise OSError(28, "No space left on device", str(path))
+        save(self, path)
+
+    monkeypatch.setattr(module_of_training.Trainer, "save", fail)
+    ran = alloc("train", "ppo", "--output", "p.safetensors", *QUICK, "--iterations", "1")
+    assert (ran.code, ran.err.splitlines()[-1]) == (2, "alloc: p.checkpoint: No space left on device")
+    assert weights(Path("p.safetensors"))

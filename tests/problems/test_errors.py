@@ -8,6 +8,9 @@ def test_nearest_name_is_offered() -> None:
     assert nearest("spede", ["speed", "range"]) == " (did you mean 'speed'?)"
     assert nearest("xyz", ["speed", "range"]) == " (known: speed, range)"
     assert nearest("xyz", []) == ""
+    assert nearest("ID", ["id", "ability"]) == " (did you mean 'id'?)"
+    assert nearest("BATERY", ["id", "battery"]) == " (did you mean 'battery'?)"
+    assert nearest("A", ["a", "A1"]) == " (did you mean 'A1'?)"
 
 
 def test_long_lists_are_cut() -> None:

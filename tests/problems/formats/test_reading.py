@@ -141,3 +141,12 @@ def test_another_instance_is_a_warning(tmp_path: Path) -> None:
     assert "plan.json" in warning
     assert r"'one\nline'" in warning
     assert "'other'" in warning
+
+
+@pytest.mark.parametrize("empty", [",", ",,,,,", " , ", '"",""', "\t,\t"])
+def test_empty_rows_of_spreadsheets_are_skipped(tmp_path: Path, empty: str) -> None:
+    """Rows that a spreadsheet has emptied are commas alone, before, between and after the others, of any number."""
+    (tmp_path / "agents.csv").write_text(f"{empty}\nid,ability\na,1\n{empty}\n{empty}\nb,2\n{empty}\n")
+    (tmp_path / "tasks.csv").write_text(f"id,workload\n{empty}\nt,3\n{empty}")
+    instance = read_instance(tmp_path)
+    assert (instance.agent_ids, instance.ability.tolist(), instance.task_ids) == (("a", "b"), [1, 2], ("t",))
