@@ -1,8 +1,11 @@
 """Random instances small enough for brute force, over everything that an instance can have."""
 
+from collections.abc import Callable
+from itertools import count, islice
+
 import numpy as np
 
-from alloc.problems import Instance
+from alloc.problems import Instance, fewest_unserved
 
 
 def tiny_instance(seed: int) -> Instance:
@@ -32,3 +35,13 @@ def tiny_instance(seed: int) -> Instance:
         speed=np.where(rng.random(n) < 0.7, rng.uniform(0.2, 3, n), np.inf) if coin[8] else None,
         energy_per_distance=float(rng.choice([1.0, 6.0])),
     )
+
+
+def seeds_where(holds: Callable[[Instance], bool], number: int) -> list[int]:
+    """Return the first seeds whose instances a test is about, so that it says something of each."""
+    return list(islice((seed for seed in count() if holds(tiny_instance(seed))), number))
+
+
+def all_can_be_served(instance: Instance) -> bool:
+    """Whether there is work, and a plan that does all of it."""
+    return bool((instance.workload > 0).any()) and fewest_unserved(instance) == 0

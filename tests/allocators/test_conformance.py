@@ -12,7 +12,7 @@ from alloc.allocators.conformance.cases import CASES
 from alloc.allocators.registry import BUILT_IN
 from alloc.allocators.search import Deadline
 from alloc.allocators.solve import refuse
-from alloc.problems import Objective
+from alloc.problems import InputError, Objective
 
 
 class TestGreedy(AllocatorConformance):
@@ -109,5 +109,5 @@ def test_who_refuses_what():
 
 def test_a_subclass_must_say_what_it_tests():
     """A subclass without a name and without an allocator fails, rather than testing nothing."""
-    with pytest.raises(Exception, match="no method ''"):
+    with pytest.raises(InputError, match="no method ''"):
         AllocatorConformance().allocator()

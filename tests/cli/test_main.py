@@ -4,6 +4,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from command_line import COMMANDS, USAGE_ERROR, understand
 
 from alloc.allocators import RefusedError
 from alloc.allocators.registry import BUILT_IN, ENTRY_POINT_GROUP
@@ -11,7 +12,8 @@ from alloc.cli import options
 from alloc.cli import solve as solve_module
 from alloc.problems import Objective
 
-COMMANDS = ("solve", "compare", "evaluate", "generate", "validate", "convert", "methods", "train", "tune")
+READERS = [name for name, one in COMMANDS.items() if one.params[0].name in ("instance", "instances", "source")]
+"""Commands whose first argument is an instance."""
 
 
 def python(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -28,13 +30,55 @@ def test_help_names_every_command_and_loads_no_numpy():
     assert all(f"\n  {command} " in ran.stdout for command in COMMANDS)
 
 
+def test_commands_are_found():
+    """The checks of every command go through the commands there are, and those of readers through the readers."""
+    assert {"solve", "train"} < set(COMMANDS)
+    assert {"solve", "compare", "convert"} < set(READERS) < set(COMMANDS)
+
+
 @pytest.mark.parametrize("command", COMMANDS)
 def test_each_help_has_examples(alloc, command):
-    """Every command's help shows how it is called."""
+    """Every command's help shows how it is called, in lines that the command line takes."""
     ran = alloc(command, "--help")
     assert ran.code == 0
-    assert "Examples:" in ran.out
-    assert f"alloc {command}" in ran.out.split("Examples:")[1]
+    examples = [line for line in ran.out.split("Examples:")[1].splitlines() if line.strip().startswith("alloc ")]
+    assert any(f"alloc {command}" in line for line in examples)
+    for line in examples:
+        understand(line)
+
+
+@pytest.mark.parametrize(
+    "line", ["alloc sulve x.json", "alloc solve x.json --nonsense", "cat | alloc solve x --seed a"]
+)
+def test_examples_that_are_wrong_are_noticed(line):
+    """A command, an option or a value that is not there does not pass for an example."""
+    with pytest.raises(USAGE_ERROR):
+        understand(line)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_option_is_explained(command):
+    """Every argument and option of every command has words of its own in the help."""
+    assert [one.name for one in COMMANDS[command].params if not getattr(one, "help", None)] == []
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_options_that_are_not_there_are_one_line(alloc, command):
+    """Every command refuses an option that it does not have, with one line, and does nothing."""
+    ran = alloc(command, "--nonsense")
+    assert (ran.code, ran.out) == (2, "")
+    assert ran.err.startswith("alloc: ")
+    assert "--nonsense" in ran.err
+    assert ran.err.count("\n") == 1
+
+
+@pytest.mark.parametrize("command", [name for name, one in COMMANDS.items() if one.params[0].required])
+def test_a_missing_argument_is_one_line(alloc, command):
+    """Every command that needs an argument says so in one line."""
+    ran = alloc(command)
+    assert (ran.code, ran.out) == (2, "")
+    assert ran.err.startswith("alloc: ")
+    assert ran.err.count("\n") == 1
 
 
 @pytest.mark.parametrize("module", ["alloc", "alloc.cli"])
@@ -51,7 +95,6 @@ def test_module_and_version(module):
         (),
         ("nonsense",),
         ("solve",),
-        ("solve", "small.json", "--nonsense"),
         ("solve", "small.json", "--seed", "x"),
         ("solve", "small.json", "--objective", "cost"),
         ("solve", "small.json", "--time-limit", "-1"),
@@ -119,7 +162,7 @@ def instance_of(agent: bytes, task: bytes = b'"workload": 1') -> bytes:
         instance_of(b'"ability": 1, "id": "b"'),
     ],
 )
-@pytest.mark.parametrize("command", ["solve", "validate", "convert", "evaluate", "compare"])
+@pytest.mark.parametrize("command", READERS)
 def test_malformed_files_are_one_line_with_the_file(alloc, tmp_path, command, content):
     """A malformed instance gives exit code 2 and one line that names the file, whatever the command."""
     Path("bad.json").write_bytes(content)

@@ -1,4 +1,4 @@
-"""What the documents show runs: their Python blocks, and their `alloc` commands."""
+"""What the documents show runs: their Python blocks, and their `alloc` commands; what takes too long is understood."""
 
 import os
 import re
@@ -9,12 +9,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from command_line import USAGE_ERROR, understand
 
 ROOT = Path(__file__).parents[2]
 DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 FENCE = re.compile(r"^```(\w*)[^\n]*\n(.*?)^```\s*$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\(([^)#\s]+)(?:#[^)]*)?\)")
 NOT_RUN = re.compile(r"<!--\s*not run:\s*\S.*?-->\s*\Z", re.DOTALL)
+INDENTED = re.compile(r"^(?: {4})+(?=\S)(.*)$", re.MULTILINE)
+SCRIPT = re.compile(r"python (\S+\.py)")
 COMMAND_LANGUAGES = ("console", "bash", "sh", "shell")
 
 
@@ -25,15 +28,27 @@ class Block:
     language: str
     code: str
     line: int
+    is_run: bool
 
 
 def blocks(text):
-    """Return the blocks of a document but those with ``<!-- not run: reason -->`` right before them."""
+    """Return the blocks of a document; not run are those with ``<!-- not run: reason -->`` right before them."""
     return [
-        Block(match[1], match[2], text.count("\n", 0, match.start()) + 2)
+        Block(
+            match[1],
+            match[2],
+            text.count("\n", 0, match.start()) + 2,
+            not NOT_RUN.search(text[: match.start()]),
+        )
         for match in FENCE.finditer(text)
-        if not NOT_RUN.search(text[: match.start()])
     ]
+
+
+def runs(block):
+    """Whether there is something in the block that a test of its document runs."""
+    return block.is_run and (
+        block.language == "python" or (block.language in COMMAND_LANGUAGES and bool(commands(block.code)))
+    )
 
 
 def commands(code):
@@ -43,14 +58,43 @@ def commands(code):
     return [line for line in lines if line.startswith("alloc ")]
 
 
+def shown(text):
+    """Return the commands that a document shows without a test that runs them: indented, or in a block not run."""
+    indented = "\n".join(match[1] for match in INDENTED.finditer(FENCE.sub("", text)))
+    code = [
+        indented,
+        *(block.code for block in blocks(text) if block.language in COMMAND_LANGUAGES and not runs(block)),
+    ]
+    lines = "\n".join(code).replace("\\\n", " ").splitlines()
+    return [line for line in lines if line.startswith(("alloc ", "python ", "make ")) or "| alloc " in line]
+
+
+def fault(line):
+    """Return what is wrong with a command, or nothing where the parser, the script or the Makefile knows all of it."""
+    try:
+        understand(line)
+    except USAGE_ERROR as error:
+        return str(error)
+    if script := SCRIPT.match(line):
+        if not (ROOT / script[1]).is_file():
+            return "no such script"
+        source = (ROOT / script[1]).read_text("utf-8")
+        return next((option for option in re.findall(r"--[a-z-]+", line) if f'"{option}"' not in source), None)
+    if line.startswith("make ") and not re.search(
+        rf"^{line.split()[1]}:", (ROOT / "Makefile").read_text(), re.MULTILINE
+    ):
+        return "no such target"
+    return None
+
+
 def run_document(text, name, folder):
     """Run all blocks of a document in order, in one namespace and one folder."""
     namespace = {"__name__": "document"}
     environment = os.environ | {"PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
-    for block in blocks(text):
+    for block in filter(runs, blocks(text)):
         if block.language == "python":
             exec(compile("\n" * (block.line - 1) + block.code, name, "exec"), namespace)
-        elif block.language in COMMAND_LANGUAGES:
+        else:
             for command in commands(block.code):
                 done = subprocess.run(
                     ["bash", "-o", "pipefail", "-c", command],
@@ -72,17 +116,68 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
+TEXTS = {path: path.read_text(encoding="utf-8") for path in DOCUMENTS}
+RUN = [path for path, text in TEXTS.items() if any(map(runs, blocks(text)))]
+SHOWN = [(path, line) for path, text in TEXTS.items() for line in shown(text)]
+WITHOUT_CODE = {"exact.md", "learned_methods.md", "paper.md"}
+"""Documents that show neither code nor commands: nothing of them is tested here but their links."""
+
+
+def name(path):
+    return path.name if isinstance(path, Path) else None
+
+
+def test_every_document_is_tested_or_has_nothing_to_run():
+    """What is run and what is parsed, with the documents that are known to have neither, is all of docs/ and README."""
+    tested = {path.name for path in RUN} | {path.name for path, _ in SHOWN}
+    assert {path.name for path in DOCUMENTS} == tested | WITHOUT_CODE
+    assert not tested & WITHOUT_CODE
+    assert {"README.md", "cli.md"} < tested
+
+
+@pytest.mark.parametrize("document", RUN, ids=name)
 def test_document_runs(document, folder):
     """Every block of the document runs to its end."""
-    run_document(document.read_text(encoding="utf-8"), document.name, folder)
+    run_document(TEXTS[document], document.name, folder)
+
+
+@pytest.mark.parametrize(("document", "line"), SHOWN, ids=name)
+def test_what_is_not_run_is_understood(document, line):
+    """What takes too long for a test has a command with its options and values, a script or a target that are there."""
+    assert fault(line) is None, f"{document.name}: {line}"
 
 
 @pytest.mark.parametrize("document", [*DOCUMENTS, *sorted((ROOT / "examples").rglob("README.md"))], ids=str)
 def test_links_lead_somewhere(document):
     """Every relative link of the document names a file or folder of the checkout."""
-    targets = [target for target in LINK.findall(document.read_text(encoding="utf-8")) if ":" not in target]
-    assert [target for target in targets if not (document.parent / target).exists()] == []
+    assert broken_links(document.read_text(encoding="utf-8"), document.parent) == []
+
+
+def broken_links(text, folder):
+    return [target for target in LINK.findall(text) if ":" not in target and not (folder / target).exists()]
+
+
+def test_broken_links_are_noticed():
+    """A link to a file that is not there is told; one to a file, a place in it or another host is not."""
+    text = "[a](absent.md) [b](test_docs.py) [c](test_docs.py#links) [d](https://example.org/absent.md)"
+    assert broken_links(text, Path(__file__).parent) == ["absent.md"]
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "    alloc solve x.json --nonsense",
+        "    alloc generate paper-1 --output - | alloc sulve -",
+        "    python tests/benchmarks/absent.py",
+        "    python tests/benchmarks/growth.py --nonsense",
+        "<!-- not run: takes an hour -->\n```console\nalloc train gappo --nonsense\n```\n",
+        "```console\nmake nonsense\n```\n",
+    ],
+)
+def test_wrong_lines_that_are_not_run_are_noticed(line):
+    """A command, option, script or target that is not there is told, indented or in a block that is not run."""
+    (found,) = shown(f"# Title\n\n{line}\n")
+    assert fault(found) is not None
 
 
 def test_wrong_python_is_noticed(folder):

@@ -15,7 +15,9 @@ pytestmark = pytest.mark.skipif(not TABLE.exists(), reason="the tests run withou
 
 def rows() -> list[dict[str, str]]:
     with TABLE.open(newline="") as text:
-        return list(csv.DictReader(text))
+        found = list(csv.DictReader(text))
+    assert {row["workloads"] for row in found} == {"equal", "unequal"}
+    return found
 
 
 def test_every_plan_has_the_published_makespan_and_no_bound_is_above_it() -> None:

@@ -11,12 +11,12 @@ from oracle import brute_force
 from tiny_instances import tiny_instance
 
 from alloc.allocators import Budget, Deadline, Search
-from alloc.allocators.learned.lanes import play_games
+from alloc.allocators.learned.lanes import Games, play_games
 from alloc.allocators.learned.network import ActorCritic, NetworkSize
 from alloc.allocators.learned.planner import Planner, PlannerParameters, most_helpers
 from alloc.allocators.learned.rollout import Best
 from alloc.problems import IDLE, Allocation, Family, Instance, Objective, evaluate, random_instance
-from alloc.problems.game import make_board
+from alloc.problems.game import Board, make_board
 from alloc.problems.game.parts import lay_out_parts
 from alloc.problems.generate import paper_like
 
@@ -238,16 +238,25 @@ def test_a_task_that_needs_most_agents_gets_them_in_the_first_game(network: Acto
 
 
 @pytest.mark.parametrize(("pairs", "most", "lanes"), [(1, 9, 1), (10**9, 9, 9)])
-def test_lanes_are_bounded(network: ActorCritic, pairs: int, most: int, lanes: int) -> None:
+def test_lanes_are_bounded(
+    network: ActorCritic, monkeypatch: pytest.MonkeyPatch, pairs: int, most: int, lanes: int
+) -> None:
     """Each part is played once at least, and no more often than is allowed, however many pairs may be."""
-    instance = paper_like(12, 4, 50, 3)
+    instance = paper_like(60, 20, 330, 3)
     one = Planner(
-        Search(instance, ENERGY, Budget(None, 1)), [network], PlannerParameters(lane_pairs=pairs, most_lanes=most)
+        Search(instance, ENERGY, Budget(None, 4)), [network], PlannerParameters(lane_pairs=pairs, most_lanes=most)
     )
-    one.play_whole(1.0)
-    parts = lay_out_parts(instance, 1.0, one.plan, np.array([[0, 1], [2, 3]]), [np.arange(6), np.arange(6, 12)])
-    games = one._games(parts, (0.2, 0.8))
-    assert np.bincount(games.row).tolist() == [lanes, lanes]
+    played: list[list[int]] = []
+
+    def spy(network: ActorCritic, board: Board, games: Games, **settings: object) -> Best:
+        played.append(np.bincount(games.row, minlength=len(board.price)).tolist())
+        return play_games(network, board, games, **settings)  # type: ignore[arg-type]
+
+    monkeypatch.setattr("alloc.allocators.learned.planner.play_games", spy)
+    one.run()
+    on_parts = [games for games in played if len(games) > 1]
+    assert len(on_parts) > 0
+    assert {count for games in on_parts for count in games} == {lanes}
 
 
 def test_slow_aims_are_given_up(network: ActorCritic) -> None:
@@ -259,10 +268,12 @@ def test_slow_aims_are_given_up(network: ActorCritic) -> None:
     for shortfall in (50.0, 49.0, 48.0, 47.0, 46.0):
         aims.note(np.array([-shortfall, 1.0]))
     one.search.iteration = 20
-    assert not aims._is_too_slow(), "the first check has nothing to compare with"
+    aims.set(one.plan)
+    assert aims.hours == first, "the first check has nothing to compare with"
     for _ in range(5):
         aims.note(np.array([-30.0, 1.0]))
-    assert not aims._is_too_slow(), "no share of the budget has gone by"
+    aims.set(one.plan)
+    assert aims.hours == first, "no share of the budget has gone by"
     one.search.iteration = 40
     aims.set(one.plan)
     assert aims.failed == first
@@ -271,12 +282,15 @@ def test_slow_aims_are_given_up(network: ActorCritic) -> None:
 
 def test_little_that_is_lacking_is_worth_the_patience(network: ActorCritic) -> None:
     """Less than a mean agent's ability in all does not end an aim, and parts get larger only after a while in vain."""
-    aims = planner(network, paper_like(40, 8, 170, 0), iterations=100).aims
+    one = planner(network, paper_like(40, 8, 170, 0), iterations=100)
+    one.play_whole(1.0)
+    aims, first = one.aims, one.aims.hours
     for iteration in (20, 40, 60):
         for _ in range(5):
             aims.note(np.array([-2.0, -1.0, 5.0]))
         aims.search.iteration = iteration
-        assert not aims._is_too_slow()
+        aims.set(one.plan)
+        assert aims.hours == first
     assert aims.stale == 14
     assert aims.in_vain == pytest.approx((14 - 5) / (20 - 5))
     aims.note(np.array([-2.0]))
@@ -285,13 +299,16 @@ def test_little_that_is_lacking_is_worth_the_patience(network: ActorCritic) -> N
 
 def test_a_little_of_everything_is_no_rest(network: ActorCritic) -> None:
     """Where many tasks lack a little, a slow aim is given up however little that is in all: it may be out of reach."""
-    aims = planner(network, paper_like(40, 8, 170, 0), iterations=100).aims
-    slow = []
+    one = planner(network, paper_like(40, 8, 170, 0), iterations=100)
+    one.play_whole(1.0)
+    aims, slow = one.aims, []
     for iteration in (20, 40):
         for _ in range(5):
             aims.note(np.full(8, -0.1))
         aims.search.iteration = iteration
-        slow.append(aims._is_too_slow())
+        before = aims.hours
+        aims.set(one.plan)
+        slow.append(aims.hours > before)
     assert slow == [False, True]
 
 
@@ -388,6 +405,9 @@ def test_with_finite_speeds_the_aim_allows_for_the_flights() -> None:
         speed=[1.0, 1.0],
     )
     planner = Planner(Search(instance, Objective.MAKESPAN, Budget(1.0)), [ActorCritic()])
-    assert planner.aims._balanced(planner.plan) == 0.0
-    planner.plan = np.array([0, 1])
-    assert planner.aims._balanced(planner.plan) == pytest.approx((2 + 1 + 3) / 2)
+    planner.search.submit(Allocation([0, 1]))  # done after 2 h and 4 h
+    planner.aims.hours = 2.9
+    planner.aims.set(np.array([IDLE, IDLE]))
+    assert planner.aims.hours == 2.9, "where nobody works there is no work to share out"
+    planner.aims.set(np.array([0, 1]))
+    assert planner.aims.hours == pytest.approx(((1 + 1) + (1 + 3)) / 2)

@@ -1,0 +1,188 @@
+"""Every kind of picture looks as it did when somebody looked at it: compared with small ones that are kept here.
+
+Where a picture is meant to change, the failure names the new one, reduced. Look at it, and then put it in the place of
+the old one.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.testing.compare import compare_images
+from PIL import Image
+
+from alloc.allocators import Result, StopReason
+from alloc.allocators.pareto import Front
+from alloc.cli.plot import save_plot
+from alloc.cli.plot_front import save_front
+from alloc.problems import Allocation, Instance, Objective, evaluate
+
+KEPT = Path(__file__).parent / "pictures"
+
+TOLERANCE = 4.0
+"""Most root mean square of the differences, of 255: smoother edges are less, a wedge or bar elsewhere more."""
+
+SMALLER = 4
+"""What pictures are reduced by, each way: what is kept is of some kilobytes, and the shapes of letters hardly count."""
+
+
+def planned(instance: Instance, plan: list[int], **fields: object) -> Result:
+    """Return the result of a method that knows one plan."""
+    allocation = Allocation(plan)
+    result = Result(
+        instance=instance,
+        method="by hand",
+        objective=Objective.MAKESPAN_ENERGY,
+        seed=0,
+        allocation=allocation,
+        evaluation=evaluate(instance, allocation),
+        lower_bound=None,
+        energy_lower_bound=None,
+        stop_reason=StopReason.ITERATIONS,
+        runtime_s=1.0,
+        trace=(),
+    )
+    return replace(result, **fields)  # type: ignore[arg-type]
+
+
+def moves() -> Result:
+    """Agents at tasks and on their own, some that move, one idle; a task that is not served."""
+    instance = Instance(
+        name="moves",
+        ability=[5, 2, 1, 8, 3, 2],
+        workload=[3, 13, 4, 5],
+        task_position=[[0, 0], [2, 0.5], [0, 2], [2, 2]],
+        agent_position=[[np.nan] * 2] * 3 + [[1, 1], [1.5, 1.2], [0.5, 0.3]],
+        start_task=[0, 0, 1, -1, -1, -1],
+        energy_per_distance=6,
+    )
+    return planned(instance, [1, 0, 0, 1, 2, -1], lower_bound=1.0)
+
+
+def times() -> Result:
+    """No positions: bars alone, one task without work, and one that is not served."""
+    instance = Instance(name="times", ability=[1, 2, 4], workload=[3, 0, 5, 8])
+    return planned(instance, [0, 2, 2], lower_bound=0.5)
+
+
+def many() -> Result:
+    """More tasks than are named: circles in four rows, bars that stand."""
+    j = np.arange(80)
+    instance = Instance(
+        name="many",
+        ability=1 + j % 3,
+        workload=1 + j % 7,
+        task_position=np.column_stack([j % 20, j // 20]),
+        start_task=(j + 1) % 80,
+    )
+    return planned(instance, j.tolist(), lower_bound=2.0)
+
+
+def lines() -> Result:
+    """So many tasks that lines stand for them, and some that are not served."""
+    j = np.arange(1200)
+    instance = Instance(name="lines", ability=np.ones(1200), workload=1 + j / 100)
+    return planned(instance, np.where(j < 1000, j, 0).tolist())
+
+
+def two_sites() -> Instance:
+    return Instance(
+        name="front",
+        ability=[2, 2, 2],
+        workload=[2, 4],
+        task_position=[[0, 0], [1, 0]],
+        start_task=[0, 0, 0],
+        energy_per_distance=5,
+    )
+
+
+def front(*slow: float) -> Front:
+    """Return a front of a plan in an hour, and of more that take these hours for less energy."""
+    instance = two_sites()
+    fastest = planned(instance, [0, 1, 1], lower_bound=0.8, energy_lower_bound=9.0, makespan_limit=1.0)
+    assert fastest.evaluation is not None
+    later = [
+        replace(
+            fastest,
+            evaluation=replace(fastest.evaluation, makespan=hours, energy=10.0 / hours),
+            energy_lower_bound=8.0 / hours,
+            makespan_limit=1.1 * hours,
+        )
+        for hours in slow
+    ]
+    return Front(instance, (fastest, *later), True)
+
+
+DRAWN: dict[str, Callable[[str], None]] = {
+    "moves": lambda path: save_plot(moves(), path),
+    "times": lambda path: save_plot(times(), path),
+    "many": lambda path: save_plot(many(), path),
+    "lines": lambda path: save_plot(lines(), path),
+    "nothing": lambda path: save_plot(replace(moves(), allocation=None, evaluation=None), path),
+    "front": lambda path: save_front(front(1.3, 2.0), path),
+    "wide-front": lambda path: save_front(front(2.0, 5.0, 20.0), path),
+    "one-point": lambda path: save_front(front(), path),
+}
+
+
+def reduced(path: Path) -> Path:
+    """Reduce a picture in place, to few colours."""
+    with Image.open(path) as picture:
+        small = picture.convert("RGB").reduce(SMALLER)
+    small.quantize(256, dither=Image.Dither.NONE).save(path, optimize=True)
+    return path
+
+
+def difference(name: str, path: Path) -> str | None:
+    """Return what is wrong with a picture that has been reduced; nothing where it is the one that is kept."""
+    return compare_images(str(KEPT / f"{name}.png"), str(path), TOLERANCE)
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_picture_is_the_one_that_was_looked_at(tmp_path: Path, name: str) -> None:
+    """The picture differs from the kept one by less than a wrong one does."""
+    DRAWN[name](str(tmp_path / f"{name}.png"))
+    wrong = difference(name, reduced(tmp_path / f"{name}.png"))
+    assert wrong is None, wrong
+
+
+def test_every_kept_picture_is_drawn() -> None:
+    """No picture is kept that nothing is compared with."""
+    assert {path.stem for path in KEPT.glob("*.png")} == set(DRAWN)
+
+
+def one_elsewhere(result: Result, agent: int, task: int) -> Result:
+    """Send one agent to another task."""
+    assert result.allocation is not None
+    plan = result.allocation.task_of_agent.copy()
+    plan[agent] = task
+    allocation = Allocation(plan)
+    return replace(result, allocation=allocation, evaluation=evaluate(result.instance, allocation))
+
+
+WRONG: dict[str, tuple[str, Callable[[str], None]]] = {
+    "one agent goes elsewhere": ("moves", lambda path: save_plot(one_elsewhere(moves(), 4, 3), path)),
+    "the idle one goes too": ("moves", lambda path: save_plot(one_elsewhere(moves(), 5, 2), path)),
+    "another task takes longer": ("times", lambda path: save_plot(one_elsewhere(times(), 2, 0), path)),
+    "another bound": ("times", lambda path: save_plot(replace(times(), lower_bound=1.5), path)),
+    "all stay where they are": (
+        "many",
+        lambda path: save_plot(planned(many().instance, ((np.arange(80) + 1) % 80).tolist(), lower_bound=2.0), path),
+    ),
+    "all on one task": ("lines", lambda path: save_plot(planned(lines().instance, [0] * 1200), path)),
+    "a plan after all": ("nothing", lambda path: save_plot(moves(), path)),
+    "a point is missing": ("front", lambda path: save_front(front(2.0), path)),
+    "a point elsewhere": ("front", lambda path: save_front(front(1.5, 2.0), path)),
+    "the scale": ("wide-front", lambda path: save_front(front(1.3, 2.0), path)),
+    "more than one point": ("one-point", lambda path: save_front(front(1.3), path)),
+}
+
+
+@pytest.mark.parametrize("what", WRONG)
+def test_a_wrong_picture_is_noticed(tmp_path: Path, what: str) -> None:
+    """A picture of another plan, bound or front is not taken for the one that is kept."""
+    name, draw = WRONG[what]
+    draw(str(tmp_path / "wrong.png"))
+    assert difference(name, reduced(tmp_path / "wrong.png")) is not None

@@ -1,0 +1,25 @@
+"""What the command line takes, without running it: lines of documents and of help are held against its own parser."""
+
+import re
+import shlex
+
+import typer
+
+from alloc.cli.main import app
+
+COMMANDS = typer.main.get_command(app).commands  # type: ignore[attr-defined]
+"""All commands there are, by name."""
+
+USAGE_ERROR: type[Exception] = typer.BadParameter.__mro__[1]
+"""What is raised for a line that is not understood; its base has moved between versions of typer."""
+
+
+def understand(line: str) -> int:
+    """Parse every `alloc` command of a line of a shell; return how many they are, or raise a `USAGE_ERROR`."""
+    calls = [part.split(">")[0].removesuffix(" 2") for part in re.split(r"[|;]|&&", line)]
+    found = [words for words in (shlex.split(call, comments=True) for call in calls) if words and words[0] == "alloc"]
+    for _, name, *words in found:
+        if name not in COMMANDS:
+            raise USAGE_ERROR(f"there is no command {name!r}")
+        COMMANDS[name].make_context(name, words)
+    return len(found)
