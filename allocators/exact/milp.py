@@ -192,8 +192,8 @@ def _safe_bound(dual_bound: float, question: Question) -> float:
     """Lower what HiGHS proves by its tolerances, which count for each agent, and undo the scale of the costs."""
     if question.cost is None or not np.isfinite(dual_bound):
         return 0.0
-    slack = TOLERANCE * max(10 * dual_bound, float(question.demand.count.sum()))
-    return max(0.0, dual_bound - slack) / scaled_costs(question)[1]
+    least = min(dual_bound * (1 - 10 * TOLERANCE), dual_bound - TOLERANCE * float(question.demand.count.sum()))
+    return max(0.0, least) / scaled_costs(question)[1]
 
 
 def _agents(solution: Sequence[float], programme: Programme) -> IntArray:
