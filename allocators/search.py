@@ -18,7 +18,7 @@ from alloc.problems import (
     makespan_lower_bound,
     serve_all,
 )
-from alloc.problems.evaluation import RELATIVE_TOLERANCE
+from alloc.problems.evaluation import RELATIVE_TOLERANCE, last_equal
 
 PROVEN = 1e-6
 """Relative gap at which a stage of the objective counts as proven."""
@@ -207,7 +207,7 @@ class Search:
         """Whether `one` is better, where makespans up to the limit are equal if energy counts."""
         if self.objective is Objective.MAKESPAN or len(one.unserved_tasks) != len(other.unserved_tasks):
             return one.is_better_than(other, self.objective)
-        limit = self.makespan_limit * (1 + RELATIVE_TOLERANCE)
+        limit = last_equal(self.makespan_limit)
         in_time = [score.served_makespan <= limit for score in (one, other)]
         if not all(in_time):
             return in_time[0] or (not any(in_time) and one.is_better_than(other, self.objective))
@@ -263,7 +263,7 @@ def _undominated(found: list[Improvement], limit: float) -> list[Improvement]:
     fewest = min(len(one.evaluation.unserved_tasks) for one in found)
     for one in sorted(found, key=lambda one: (one.evaluation.served_makespan, one.evaluation.energy)):
         score = one.evaluation
-        in_time = score.served_makespan <= limit * (1 + RELATIVE_TOLERANCE)
+        in_time = score.served_makespan <= last_equal(limit)
         if in_time and len(score.unserved_tasks) == fewest and (not kept or score.energy < kept[-1].evaluation.energy):
             kept.append(one)
     return kept

@@ -4,13 +4,14 @@ Those of linear programmes are taken from the multipliers that the solver return
 >= 0 give a bound, so that no tolerance of the solver enters it.
 """
 
+import math
 import sys
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from alloc.problems.classes import agent_classes, count_classes
-from alloc.problems.evaluation import RELATIVE_TOLERANCE, completion_time
+from alloc.problems.evaluation import completion_time, last_equal
 from alloc.problems.instance import FloatArray, Instance, IntArray
 from alloc.problems.neighbours import nearest_distance
 
@@ -19,6 +20,15 @@ if TYPE_CHECKING:
 
 ROUNDING = 1e-12
 """Relative amount by which a bound is lowered for what sums of floats may be off."""
+
+ORDINARY = (2.0**-7, 2.0**20)
+"""Costs between which solvers get them as they are."""
+
+DEAREST = 2.0**40
+"""Scaled costs above this are cut to it, which keeps bounds valid; solvers take much larger ones for infinite."""
+
+MOST_DOUBLINGS = 1000
+"""A scale of 2 to this is a float still, and so is one over it."""
 
 SCARCE = 32
 """Tasks whose agents are counted where the table of who reaches what is too large for all."""
@@ -168,20 +178,37 @@ def energy_lower_bound(instance: Instance, makespan: float, time_limit_s: float 
     if not len(kind) or instance.energy_per_distance == 0:
         return 0.0
     distance = classes.distance[kind, task]
+    scale = scale_to_one(typical_distance(distance))
     with np.errstate(over="ignore"):
-        latest = min(makespan * (1 + RELATIVE_TOLERANCE), sys.float_info.max)
-        hours = np.maximum(0.0, latest - distance / classes.speed[kind])
+        cost = np.minimum(distance * scale, DEAREST)
+        hours = np.maximum(0.0, last_equal(makespan) - distance / classes.speed[kind])
         share = np.minimum(1.0, classes.ability[kind] * hours / work[task])
     constraints = vstack([_rows(task, -share, instance.m), _rows(kind, np.ones(len(kind)), classes.size)])
     limits = np.append(np.where(work > 0, -1.0, 0.0), classes.count)
-    price = _multipliers(distance, constraints, limits, time_limit_s)
+    price = _multipliers(cost, constraints, limits, time_limit_s)
     if price is None:
         return None
-    # an agent of class k that does its share saves at most max_j price_j share_kj - distance_kj, 0 if it stays idle
+    # an agent of class k that does its share saves at most max_j price_j share_kj - cost_kj, 0 if it stays idle
     price = price[: instance.m] * (work > 0)
-    saved = float(classes.count @ _largest(kind, price[task] * share - distance, classes.size))
+    saved = float(classes.count @ _largest(kind, price[task] * share - cost, classes.size))
     least = max(0.0, float(price.sum()) * (1 - ROUNDING) - saved)
-    return min(least * instance.energy_per_distance, sys.float_info.max)
+    return min(least / scale * instance.energy_per_distance, sys.float_info.max)
+
+
+def typical_distance(distance: FloatArray) -> float:
+    """Return the median of the finite distances above 0, 1 if there is none."""
+    away = distance[(distance > 0) & (distance < np.inf)]
+    return float(np.median(away)) if len(away) else 1.0
+
+
+def scale_to_one(typical: float) -> float:
+    """Return the power of two, exact in floats, by which costs like `typical` > 0 become about 1.
+
+    The tolerances of solvers are absolute: costs far below 1 drown in them. It is 1 for costs of an `ORDINARY` order.
+    """
+    if ORDINARY[0] <= typical <= ORDINARY[1]:
+        return 1.0
+    return math.ldexp(1.0, max(-MOST_DOUBLINGS, min(MOST_DOUBLINGS, -math.frexp(typical)[1])))
 
 
 def _is_too_large(instance: Instance, time_limit_s: float, *, by_place: bool) -> bool:

@@ -15,6 +15,11 @@ RELATIVE_TOLERANCE = 1e-9
 """Makespans and energies this close, relatively, are equal."""
 
 
+def last_equal(hours: float) -> float:
+    """Return the largest makespan that counts as equal to `hours`, for all who ask whether a plan is in time."""
+    return min(hours * (1 + RELATIVE_TOLERANCE), sys.float_info.max)
+
+
 class Objective(StrEnum):
     """What is optimised, in this order, after the number of unserved tasks."""
 

@@ -45,3 +45,26 @@ def seeds_where(holds: Callable[[Instance], bool], number: int) -> list[int]:
 def all_can_be_served(instance: Instance) -> bool:
     """Whether there is work, and a plan that does all of it."""
     return bool((instance.workload > 0).any()) and fewest_unserved(instance) == 0
+
+
+def scaled_instance(seed: int) -> Instance:
+    """Return instance number `seed` in units of its own: places and workloads from 1e-9 to 1e9, abilities far apart."""
+    rng = np.random.default_rng([1901, seed])
+    n, m = int(rng.integers(2, 6)), int(rng.integers(1, 4))
+    far, much = 10.0 ** rng.integers(-9, 10), 10.0 ** rng.integers(-9, 10)
+    coin = rng.random(6) < (0.5, 0.3, 0.5, 0.3, 0.3, 0.5)
+    position = rng.integers(0, 8, (n + m, 2)) * 1.0 if coin[0] else rng.random((n + m, 2))
+    if coin[1]:
+        position *= 10.0 ** rng.integers(-6, 1, (n + m, 1))
+    ability = rng.integers(1, 4, n) * 1.0 if coin[2] else rng.uniform(0.5, 4, n)
+    if coin[3]:
+        ability *= 10.0 ** rng.integers(-10, 1, n)
+    return Instance(
+        name=f"scaled-{seed}",
+        ability=ability,
+        workload=rng.integers(1, 12, m) * much,
+        agent_position=position[:n] * far,
+        task_position=position[n:] * far,
+        speed=np.where(rng.random(n) < 0.7, rng.uniform(0.2, 3, n) * far / much, np.inf) if coin[4] else None,
+        energy_per_distance=6.0 if coin[5] else 1.0,
+    )

@@ -1,5 +1,6 @@
 """Exact by constraint programming: OR-Tools CP-SAT over classes of agents."""
 
+import sys
 from collections.abc import Callable, Iterable
 from itertools import islice
 
@@ -135,9 +136,10 @@ def whole_costs(question: Question) -> tuple[WholeArray, float]:
     A pair that alone costs more than the plan at hand is cut to that cost, which no bound can exceed anyway.
     """
     assert question.cost is not None
-    known = float(question.cost.sum() if question.hint is None else question.cost @ question.hint)
-    scale = FINE_COST / known if known > 0 else 1.0
-    return np.floor(np.minimum(question.cost, max(known, 1.0)) * scale).astype(np.int64), scale
+    known = 0.0 if question.hint is None else float(question.cost @ question.hint)
+    known = known or float(question.cost.sum()) or 1.0
+    scale = min(FINE_COST / known, sys.float_info.max)
+    return np.floor(np.minimum(question.cost, known) * scale).astype(np.int64), scale
 
 
 def _by(group: IntArray, groups: int) -> list[IntArray]:

@@ -13,6 +13,7 @@ from alloc.allocators.exact.narrowing import MOST_TASKS, REPEATABLE_SLICES, Narr
 from alloc.allocators.exact.question import Answer, Question, Watch, is_over
 from alloc.allocators.search import Search
 from alloc.problems import IDLE, Allocation, Instance, agent_classes
+from alloc.problems.evaluation import last_equal
 from alloc.problems.instance import IntArray
 
 MOST_MATCHED = 400
@@ -45,7 +46,7 @@ def least_energy(search: Search, ask: Callable[[Question, Watch], Answer], serve
         Energy that every plan with at most this makespan needs; None if nothing is known.
     """
     assert search.best is not None
-    time = search.makespan_limit
+    time = last_equal(search.makespan_limit)
     if search.best.evaluation.energy == 0:
         return 0.0
     if is_over(search):

@@ -14,6 +14,7 @@ from scipy.sparse import csc_array, csr_array, diags_array
 from alloc.allocators.exact.question import UNKNOWN, Answer, Question, Watch
 from alloc.allocators.exact.stages import ExactAllocator
 from alloc.allocators.registry import BUILT_IN
+from alloc.problems.bounds import scale_to_one
 from alloc.problems.instance import FloatArray, IntArray
 
 TOLERANCE = 1e-9
@@ -21,6 +22,15 @@ TOLERANCE = 1e-9
 
 SMALL_WHOLE = 100_000
 """Needs up to this are left in whole numbers, which HiGHS makes use of; rows with larger ones are scaled to 1."""
+
+DEAREST = 2.0**20
+"""Scaled cost to which pairs are cut that are dearer than the plan at hand, lest they blur the others."""
+
+FAINT, FINE = 1e-6, 2.0**10
+"""Part of a need below which an agent is told from nobody only if rows are scaled by so much against the tolerance."""
+
+SMALLEST = 1e-12
+"""Coefficients below this count as 0, as little as HiGHS can be told."""
 
 REPEATABLE_NODES = 5_000
 """Limit of one call in nodes of the search tree where runs must be repeatable."""
@@ -83,6 +93,8 @@ def state(question: Question) -> tuple[cp.Problem, cp.Variable]:
     demand, pairs = question.demand, np.arange(len(question.demand.kind))
     x = cp.Variable(len(pairs), integer=True, bounds=[np.zeros(len(pairs)), demand.most.astype(float)])
     scale = 1.0 if demand.need.max() <= SMALL_WHOLE else 1 / demand.need
+    if not demand.whole and demand.weight.min(initial=1.0) < FAINT:
+        scale = FINE * scale
     need = demand.need * scale
     weight = demand.weight * (need / demand.need)[demand.goal]
     done = csr_array((weight, (demand.goal, pairs)), shape=(len(need), len(pairs))) @ x
@@ -95,8 +107,22 @@ def state(question: Question) -> tuple[cp.Problem, cp.Variable]:
         rows += [done >= need]
     if np.isfinite(demand.spare):
         rows += [done <= demand.enough * scale, used >= demand.least_used]
-    cost = np.zeros(len(pairs)) if question.cost is None else question.cost
+    cost = np.zeros(len(pairs)) if question.cost is None else scaled_costs(question)[0]
     return cp.Problem(cp.Minimize(cost @ x), rows), x
+
+
+def scaled_costs(question: Question) -> tuple[FloatArray, float]:
+    """Return costs such that the plan at hand costs about 1 for each agent there is, and their scale, a power of two.
+
+    A pair that alone costs more than the plan at hand, and much more than agents do, is cut: it is in no better plan.
+    """
+    assert question.cost is not None
+    agents = float(question.demand.count.sum())
+    known = np.zeros(0) if question.hint is None else question.cost / agents * question.hint
+    typical = float(known.sum()) or float(question.cost.max(initial=0.0)) or 1.0
+    scale = scale_to_one(typical)
+    with np.errstate(over="ignore"):
+        return np.minimum(question.cost * scale, max(DEAREST, typical * agents * scale)), scale
 
 
 def compile_programme(question: Question) -> Programme:
@@ -137,6 +163,7 @@ def _options(question: Question) -> dict[str, bool | int | float | str]:
         "output_flag": False,
         "parallel": "off",
         "random_seed": question.seed % 2**31,
+        "small_matrix_value": SMALLEST,
         "mip_rel_gap": 1e-8,
         "mip_abs_gap": 0.0,
         "mip_feasibility_tolerance": TOLERANCE,
@@ -155,12 +182,18 @@ def _read(highs: highspy.Highs, programme: Programme, question: Question) -> Ans
     status, info = highs.getModelStatus(), highs.getInfo()
     if status in (highspy.HighsModelStatus.kInfeasible, highspy.HighsModelStatus.kUnboundedOrInfeasible):
         return Answer(impossible=True)
-    bound = 0.0
-    if question.cost is not None and np.isfinite(info.mip_dual_bound):
-        bound = max(0.0, info.mip_dual_bound * (1 - 10 * TOLERANCE))
+    bound = _safe_bound(info.mip_dual_bound, question)
     if info.primal_solution_status != highspy.SolutionStatus.kSolutionStatusFeasible:
         return Answer(bound=bound)
     return Answer(_agents(highs.getSolution().col_value, programme), bound=bound)
+
+
+def _safe_bound(dual_bound: float, question: Question) -> float:
+    """Lower what HiGHS proves by its tolerances, which count for each agent, and undo the scale of the costs."""
+    if question.cost is None or not np.isfinite(dual_bound):
+        return 0.0
+    least = min(dual_bound * (1 - 10 * TOLERANCE), dual_bound - TOLERANCE * float(question.demand.count.sum()))
+    return max(0.0, least) / scaled_costs(question)[1]
 
 
 def _agents(solution: Sequence[float], programme: Programme) -> IntArray:

@@ -9,6 +9,7 @@ from scipy.sparse import csr_array, hstack, vstack
 
 from alloc.allocators.exact.demand import Demand, Model
 from alloc.allocators.interrupt import run_native
+from alloc.problems.instance import FloatArray
 
 MOST_PAIRS = 100_000
 """Pairs of class and task beyond which a linear programme takes too long to be worth it."""
@@ -57,7 +58,8 @@ def _falls_short(demand: Demand, seconds: float, should_stop: Callable[[], bool]
         return True
     pairs, tasks, kinds = len(demand.kind), len(demand.need), len(demand.count)
     columns = np.arange(pairs)
-    share = csr_array((demand.weight / demand.need[demand.goal], (demand.goal, columns)), shape=(tasks, pairs))
+    part = demand.weight / demand.need[demand.goal]
+    share = csr_array((part, (demand.goal, columns)), shape=(tasks, pairs))
     used = csr_array((np.ones(pairs), (demand.kind, columns)), shape=(kinds, pairs))
     least = csr_array(np.ones((tasks, 1)))
     matrix = vstack([hstack([-share, least]), hstack([used, csr_array((kinds, 1))])])
@@ -69,4 +71,17 @@ def _falls_short(demand: Demand, seconds: float, should_stop: Callable[[], bool]
         return linprog(cost, matrix, limits, bounds=bounds, method="highs", options={"time_limit": seconds})
 
     answer = run_native(work, should_stop, lambda: None)
-    return bool(-answer.fun < 1 - SAFETY) if answer is not None and answer.status == 0 else None
+    if answer is None or answer.status != 0:
+        return None
+    price = np.maximum(0.0, -answer.ineqlin.marginals[:tasks])  # any will do for the proof: weak duality
+    return bool(_most_worth(demand, price[demand.goal] * part) < price.sum() * (1 - SAFETY))
+
+
+def _most_worth(demand: Demand, worth: FloatArray) -> float:
+    """Return the most that all agents together can be worth, given what one agent of each pair is."""
+    order = np.lexsort((-worth, demand.kind))
+    kind, most = demand.kind[order], demand.most[order]
+    before = np.cumsum(most) - most
+    first = np.searchsorted(kind, kind)  # where the pairs of each class begin
+    taken = np.clip(demand.count[kind] - (before - before[first]), 0, most)
+    return float(taken @ worth[order])

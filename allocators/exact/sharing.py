@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from alloc.allocators.compiled import compiled
 from alloc.allocators.exact.patterns import WholeArray
+from alloc.problems.bounds import scale_to_one, typical_distance
 from alloc.problems.instance import FloatArray, IntArray
 
 Mask = NDArray[np.bool_]
@@ -232,7 +233,8 @@ class Sharing:
         self._shaking, self._rng = shaking, np.random.default_rng(seed)
         self._task = task.astype(np.int64)
         self._weight = weight.astype(np.int64)
-        self._distance = np.ascontiguousarray(np.hstack([distance, idle]))
+        self._scale = scale_to_one(typical_distance(distance))
+        self._distance = np.ascontiguousarray(np.hstack([distance * self._scale, idle]))
         self._need = np.append(need, 0).astype(np.int64)
         order = np.argsort(apart, axis=1, kind="stable").astype(np.int64)
         self._near = np.ascontiguousarray(order[:, : shaking.around])
@@ -244,7 +246,7 @@ class Sharing:
     @property
     def cost(self) -> float:
         """Sum of distances of the best plan."""
-        return float(flown(self.best, self._distance))
+        return float(flown(self.best, self._distance)) / self._scale
 
     def descend(self) -> bool:
         """Go through all pairs of tasks once; whether none can be shared out better any more."""
@@ -256,7 +258,7 @@ class Sharing:
 
     def walk(self, rounds: int, cooled: float) -> None:
         """Shake and descend `rounds` times, `cooled` being how far annealing is, from 0 to 1."""
-        unit = self.cost / len(self._task) + 1e-300
+        unit = self.cost * self._scale / len(self._task) + 1e-300
         shake(
             self._task,
             self.best,

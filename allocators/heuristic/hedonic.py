@@ -10,7 +10,7 @@ from alloc.allocators.heuristic.hedonic_game import Minds, World, play
 from alloc.allocators.registry import BUILT_IN
 from alloc.allocators.search import Budget, Search
 from alloc.problems import IDLE, Allocation, Instance, Objective
-from alloc.problems.evaluation import RELATIVE_TOLERANCE
+from alloc.problems.evaluation import last_equal
 from alloc.problems.instance import FloatArray, IntArray
 
 MOST_CELLS = 30_000_000
@@ -176,7 +176,7 @@ class Game:
         self.games += 1
         stable = self._play(self.aim, False, jitter)
         score, limit = self.search.submit(self.allocation), self.search.makespan_limit
-        close = not score.unserved_tasks and 0 < score.served_makespan <= limit * (1 + RELATIVE_TOLERANCE)
+        close = not score.unserved_tasks and 0 < score.served_makespan <= last_equal(limit)
         if stable and self.economical and close:
             self.minds.settled[:] = False
             floor = np.full_like(self.aim, 1 / limit) if self.graph.parts == 1 else self.aim

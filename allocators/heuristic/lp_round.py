@@ -18,7 +18,7 @@ from alloc.allocators.interrupt import run_native
 from alloc.allocators.registry import BUILT_IN
 from alloc.allocators.search import Budget, Search
 from alloc.problems import Allocation, Instance, Objective, agent_classes, serve_all
-from alloc.problems.bounds import LP_PAIRS_PER_SECOND, LP_SIZE_LIMIT
+from alloc.problems.bounds import LP_PAIRS_PER_SECOND, LP_SIZE_LIMIT, scale_to_one, typical_distance
 from alloc.problems.instance import FloatArray
 
 SAFETY = 1e-9
@@ -180,7 +180,8 @@ class Programme:
         """Return a fractional plan that takes `hours` and flies least, made whole; None where it is not at hand."""
         share = self.share(hours)
         rng = np.random.default_rng(search.seed)
-        cost = self.distance if self.by_place else rng.random(len(share))  # any corner is as good as another
+        by_distance = self.distance * scale_to_one(typical_distance(self.distance))
+        cost = by_distance if self.by_place else rng.random(len(share))  # any corner is as good as another
         matrix = vstack([-self._cover(share), self.used])
         limits = np.concatenate([np.full(len(self.work), SAFETY - 1), self.classes.count])
         answer = _solve(search, cost, matrix, limits)
