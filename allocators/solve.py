@@ -13,7 +13,7 @@ import numpy as np
 
 from alloc.allocators.auto import choose
 from alloc.allocators.base import Allocator, Proposal, RefusedError
-from alloc.allocators.interrupt import run_native, signals_set
+from alloc.allocators.interrupt import ended_with_process, run_native, signals_set
 from alloc.allocators.registry import BUILT_IN, load
 from alloc.allocators.result import Result
 from alloc.allocators.search import PROVEN, STRICT, Budget, Deadline, Improvement, Search, StopReason, relative_gap
@@ -117,7 +117,7 @@ def solve(
     if target_gap is not None:
         importlib.import_module("scipy.optimize")  # for the bound below; loading counts for no method
     stop = stop or threading.Event()
-    with signals_set(stop) if handle_signals else nullcontext():
+    with ended_with_process(stop.set), signals_set(stop) if handle_signals else nullcontext():
         search = Search(
             instance,
             goal,

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import astuple, dataclass, fields, replace
 from functools import cached_property
 
@@ -19,6 +18,7 @@ from alloc.allocators.learned.lanes import Games, play_games
 from alloc.allocators.learned.limits import NEAR
 from alloc.allocators.learned.network import ActorCritic
 from alloc.allocators.learned.rollout import Best, position
+from alloc.allocators.pool import Pool
 from alloc.allocators.search import Search
 from alloc.problems import IDLE, Allocation, Instance, Objective, easiest_tasks, fewest_unserved, serve_all
 from alloc.problems.game import Board, begin, make_board, pick
@@ -133,7 +133,7 @@ class Planner:
             return
         if self.search.objective is Objective.MAKESPAN_ENERGY and self.aims.spent < SECOND_GAME:
             self.play_whole(self.parameters.second_price)
-        with ThreadPoolExecutor(STREAMS) as pool:
+        with Pool(STREAMS) as pool:
             self.run_all = pool.map if self.search.threads > 1 else map
             while not self.search.should_stop():
                 self._sweep()
