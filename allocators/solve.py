@@ -193,7 +193,10 @@ def _conclude(
     infeasible = best is not None and bool(best.evaluation.unserved_tasks)
     if infeasible:
         notes.append(_contest(instance))
-    energy_bound = None if infeasible or best is None else _tighten(search, proposal)
+    energy_bound = None
+    if best is not None and not infeasible:
+        with search.improving("proving a bound"):
+            energy_bound = _tighten(search, proposal)
     proven = search.fast_enough and (
         search.objective is Objective.MAKESPAN
         or (
@@ -214,7 +217,7 @@ def _conclude(
         stop_reason=stop_reason or (StopReason.PROVEN if proven else StopReason.FINISHED),
         runtime_s=runtime_s,
         trace=tuple(search.trace),
-        notes=tuple(notes),
+        notes=(*notes, *search.notes),
         makespan_limit=None if infeasible or search.deadline == STRICT else search.makespan_limit,
         deadline=search.deadline,
     )
