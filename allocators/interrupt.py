@@ -17,7 +17,7 @@ GRACE_S = 0.3
 """How long a native solver may take to obey before its thread is left behind."""
 
 EXIT_GRACE_S = 10.0
-"""How long the end of the process waits for what still runs: native code that calls back into Python after it, crashes."""
+"""How long the end of the process waits for what still runs: native code that then calls back into Python, crashes."""
 
 THREAD_NAME = "alloc-native-solver"
 
