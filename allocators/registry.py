@@ -5,6 +5,7 @@ from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 from alloc.allocators.base import Allocator
+from alloc.allocators.interrupt import ended_with_process
 from alloc.allocators.method import Kind, Method
 from alloc.problems import InputError
 from alloc.problems.errors import nearest
@@ -207,7 +208,8 @@ def load(name: str, **options: Any) -> Allocator:
 
         read_header(given["policy"])  # what is no policy is told before the seconds that torch takes
     module, _, attribute = _TARGETS[name].partition(":")
-    allocator = getattr(importlib.import_module(module), attribute)(**given)
+    with ended_with_process(lambda: None):  # the import of a large library can only be awaited
+        allocator = getattr(importlib.import_module(module), attribute)(**given)
     assert isinstance(allocator, Allocator)
     return allocator
 

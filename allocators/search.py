@@ -1,10 +1,12 @@
 """One run of one method on one instance: budget, clock, best so far, and the will to stop."""
 
+import logging
 import math
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -22,6 +24,12 @@ from alloc.problems.evaluation import RELATIVE_TOLERANCE, last_equal
 
 PROVEN = 1e-6
 """Relative gap at which a stage of the objective counts as proven."""
+
+STANDS = "the best plan up to then stands"
+"""What a note says of a failure that cost no plan."""
+
+_log = logging.getLogger("alloc")
+_log.addHandler(logging.NullHandler())  # a program that wants to see it sets up its own
 
 
 @dataclass(frozen=True)
@@ -132,6 +140,8 @@ class Search:
         That with the least makespan, of those with the fewest unserved tasks; the same as `best` but for energy.
     deadline : Deadline
         How much slower than the fastest the best may be.
+    notes : list of str
+        What the user should know of the run, in plain words.
     """
 
     def __init__(
@@ -158,6 +168,8 @@ class Search:
         self.fastest: Improvement | None = None
         self._front: list[Improvement] = []  # candidates for `best` should the fastest become faster
         self.trace: list[Improvement] = []
+        self.notes: list[str] = []
+        self._refused = False  # whether `on_improvement` ended the run
         self.lower_bound = makespan_lower_bound(instance)
         if start is not None:
             evaluate(instance, start)  # says what is wrong with a start of another size
@@ -200,8 +212,25 @@ class Search:
         if self.best is not None and (not self.trace or self.trace[-1] is not self.best):
             self.trace.append(self.best)
             if self._on_improvement is not None:
+                self._refused = True
                 self._on_improvement(self.best)
+                self._refused = False
         return evaluation
+
+    @contextmanager
+    def improving(self, stage: str) -> Iterator[None]:
+        """Let an exception in the block end no more than the block: it is logged, and a note says so.
+
+        For stages that a run can do without, once there is a plan; without one, the exception is passed on. So is what
+        `on_improvement` raises.
+        """
+        try:
+            yield
+        except Exception as error:
+            if self.best is None or self._refused:
+                raise
+            _log.exception("%s failed", stage)
+            self.notes.append(f"{stage} failed ({type(error).__name__}: {error}); {STANDS}")
 
     def _is_better(self, one: Evaluation, other: Evaluation) -> bool:
         """Whether `one` is better, where makespans up to the limit are equal if energy counts."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from alloc.allocators.auto import choose
 from alloc.allocators.base import Allocator, Proposal, RefusedError
-from alloc.allocators.interrupt import run_native, signals_set
+from alloc.allocators.interrupt import ended_with_process, run_native, signals_set
 from alloc.allocators.registry import BUILT_IN, load
 from alloc.allocators.result import Result
 from alloc.allocators.search import PROVEN, STRICT, Budget, Deadline, Improvement, Search, StopReason, relative_gap
@@ -117,7 +117,7 @@ def solve(
     if target_gap is not None:
         importlib.import_module("scipy.optimize")  # for the bound below; loading counts for no method
     stop = stop or threading.Event()
-    with signals_set(stop) if handle_signals else nullcontext():
+    with ended_with_process(stop.set), signals_set(stop) if handle_signals else nullcontext():
         search = Search(
             instance,
             goal,
@@ -193,7 +193,10 @@ def _conclude(
     infeasible = best is not None and bool(best.evaluation.unserved_tasks)
     if infeasible:
         notes.append(_contest(instance))
-    energy_bound = None if infeasible or best is None else _tighten(search, proposal)
+    energy_bound = None
+    if best is not None and not infeasible:
+        with search.improving("proving a bound"):
+            energy_bound = _tighten(search, proposal)
     proven = search.fast_enough and (
         search.objective is Objective.MAKESPAN
         or (
@@ -214,7 +217,7 @@ def _conclude(
         stop_reason=stop_reason or (StopReason.PROVEN if proven else StopReason.FINISHED),
         runtime_s=runtime_s,
         trace=tuple(search.trace),
-        notes=tuple(notes),
+        notes=(*notes, *search.notes),
         makespan_limit=None if infeasible or search.deadline == STRICT else search.makespan_limit,
         deadline=search.deadline,
     )

@@ -17,7 +17,7 @@ from alloc.allocators.conformance.cases import CASES, large_case, least_energy, 
 from alloc.allocators.conformance.surroundings import instance_state, process_state
 from alloc.allocators.registry import load
 from alloc.allocators.result import Result, Status
-from alloc.allocators.search import PROVEN, Budget, Deadline, Improvement, Search
+from alloc.allocators.search import PROVEN, STANDS, Budget, Deadline, Improvement, Search
 from alloc.allocators.solve import refuse, solve
 from alloc.problems import Allocation, Instance, Objective, evaluate, fewest_unserved
 
@@ -73,7 +73,9 @@ class AllocatorConformance:
                 solve(instance, subject, objective=objective, **settings)
             pytest.skip(f"{subject.method.name}: {str(refused).partition(': ')[2]}")
         with self.guard(settings.setdefault("stop", threading.Event())):
-            return solve(instance, subject, objective=objective, **settings)
+            result = solve(instance, subject, objective=objective, **settings)
+        assert not [note for note in result.notes if STANDS in note], "a stage failed; the log tells where"
+        return result
 
     def answer(self, subject: Allocator, case: str, objective: Objective) -> Result:
         """Return what `subject` answers to a case, solved once for all checks that ask."""
@@ -273,17 +275,28 @@ class AllocatorConformance:
         # the certificate after the run included; one more try, for a busy machine
         assert late_s() <= 1.5 or late_s() <= 1.5
 
-    def test_threads_do_not_meet(self, subject: Allocator) -> None:
-        """One object, used by several threads at once, answers each as it would alone."""
+    @pytest.mark.parametrize("threads", [2, 8])
+    def test_threads_do_not_meet(self, subject: Allocator, threads: int) -> None:
+        """One object, used by several threads at once, answers each as it would alone.
+
+        What the process has but once is as before all the while, not only afterwards: others use it, and of two runs
+        that overlap, each of which puts back what it met, one puts back what the other had set.
+        """
         instances = (CASES["ranges"], CASES["start tasks"], medium_case())
-        jobs = [(instance, seed) for instance in instances for seed in (1, 2)]
+        jobs = [(instance, seed) for instance in instances for seed in (1, 2, 3)]
 
         def run(job: tuple[Instance, int]) -> Allocation | None:
             return self.solve(subject, job[0], seed=job[1]).allocation
 
         alone = [run(job) for job in jobs]
-        with ThreadPoolExecutor(4) as pool:
-            assert list(pool.map(run, jobs)) == alone
+        before = process_state()
+        with ThreadPoolExecutor(threads) as pool:
+            runs = [pool.submit(run, job) for job in jobs]
+            while not all(one.done() for one in runs):
+                assert changed(before, process_state()) == [], "state of the process changed for a while"
+                time.sleep(0.002)
+        assert [one.result() for one in runs] == alone
+        assert changed(before, process_state()) == [], "state of the process changed"
 
     @pytest.mark.parametrize("case", ["integer", "batteries", "zero workloads", "contested agent", "some travel times"])
     def test_nothing_else_changes(self, subject: Allocator, case: str, capfd: pytest.CaptureFixture[str]) -> None:

@@ -5,6 +5,8 @@ import pickle
 import random
 import signal
 import sys
+import threading
+from collections.abc import Callable
 from dataclasses import fields
 
 import numpy as np
@@ -36,6 +38,18 @@ def process_state() -> dict[str, object]:
         state["torch.random"] = torch.get_rng_state().numpy().tobytes()
         state["torch.dtype"] = torch.get_default_dtype()
         state["torch.grad"] = torch.is_grad_enabled()
+        state["torch.inference"] = torch.is_inference_mode_enabled()
+        state["torch.device"] = str(torch.get_default_device())
         state["torch.threads"] = torch.get_num_threads()
+        state["torch.threads elsewhere"] = _in_a_new_thread(torch.get_num_threads)
         state["torch.deterministic"] = torch.are_deterministic_algorithms_enabled()
     return state
+
+
+def _in_a_new_thread(ask: Callable[[], object]) -> object:
+    """Ask in a thread that has settings of its own yet to get."""
+    answers: list[object] = []
+    thread = threading.Thread(target=lambda: answers.append(ask()))
+    thread.start()
+    thread.join()
+    return answers[0]

@@ -2,7 +2,6 @@
 
 import sys
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +10,7 @@ from scipy.optimize import linear_sum_assignment
 from alloc.allocators.exact.demand import FEW_PAIRS, ROUNDING, Demand, Model
 from alloc.allocators.exact.narrowing import MOST_TASKS, REPEATABLE_SLICES, Narrowing
 from alloc.allocators.exact.question import Answer, Question, Watch, is_over
+from alloc.allocators.pool import Pool
 from alloc.allocators.search import Search
 from alloc.problems import IDLE, Allocation, Instance, agent_classes
 from alloc.problems.evaluation import last_equal
@@ -115,7 +115,7 @@ class _Energy:
                     return
                 self._submit(sides.repeat(number))
             return
-        with ThreadPoolExecutor(1) as pool:
+        with Pool(1) as pool:
             while not (is_over(self._search) or sides.closed):
                 share = (self._search.elapsed_s - self._begin_s) / self._hurry_s if self._hurry_s > 0 else 1.0
                 if share >= 1 or (sides.settled and share >= PART_ALONE):

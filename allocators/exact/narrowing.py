@@ -2,13 +2,13 @@
 
 import time
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
 from alloc.allocators.exact.demand import ROUNDING, Demand, Model
 from alloc.allocators.exact.prices import Offer, Prices
 from alloc.allocators.exact.sharing import Shaking, Sharing
+from alloc.allocators.pool import Pool
 from alloc.problems import IDLE, Allocation, Instance
 from alloc.problems.instance import FloatArray, IntArray
 
@@ -92,14 +92,14 @@ class Narrowing:
             return np.arange(len(self._demand.kind))
         return np.sort(self._order[self._usable][self._prices.kept])
 
-    def run(self, cooled: float, pool: ThreadPoolExecutor | None) -> Allocation | None:
+    def run(self, cooled: float, pool: Pool | None) -> Allocation | None:
         """Work on both sides for some 20 ms each, at once if there is a `pool`; return a plan if a better one was met.
 
         Parameters
         ----------
         cooled : float
             How much of the time has passed, from 0 to 1.
-        pool : ThreadPoolExecutor or None
+        pool : Pool or None
         """
         if not self._descended:
             return self._descend()

@@ -69,9 +69,11 @@ class ExactAllocator(Allocator):
         bound: float | None = None
         while True:  # again where the energy was settled early, and the makespan had not had all its time
             in_vain = self._lessen_makespan(search, serve, MAKESPAN_SHARE)
-            found = least_energy(search, self.ask, serve)
+            found = None
+            with search.improving("the search for the least energy"):
+                found = least_energy(search, self.ask, serve)
             bound = max((known for known in (bound, found) if known is not None), default=None)
-            if in_vain or search.fast_enough or is_over(search):
+            if found is None or in_vain or search.fast_enough or is_over(search):
                 return Proposal(energy_lower_bound=bound)  # what holds within a makespan holds within a lesser one
 
     def _lessen_makespan(self, search: Search, serve: int, share: float) -> bool:

@@ -17,7 +17,7 @@ from torch import Tensor, nn
 
 from alloc.allocators.learned.hyperparameters import A2cParameters
 from alloc.allocators.learned.learner import Lesson, LessonReport
-from alloc.allocators.learned.network import ActorCritic, NetworkSize
+from alloc.allocators.learned.network import ActorCritic, NetworkSize, fresh
 from alloc.allocators.learned.trajectories import Trajectories, collect
 from alloc.allocators.learned.turns import log_probabilities
 from alloc.problems.game import Rules, begin, moved, step
@@ -55,9 +55,7 @@ class A2c:
 
     def __init__(self, size: NetworkSize | None = None, parameters: A2cParameters | None = None, seed: int = 0) -> None:
         self.parameters = parameters or A2cParameters()
-        with torch.random.fork_rng(devices=[]):
-            torch.manual_seed(seed)
-            self.network = ActorCritic(size)
+        (self.network,) = fresh(size, seed, 1)
         self.optimiser = torch.optim.Adam(self.network.parameters(), self.parameters.learning_rate)
 
     @property

@@ -26,7 +26,7 @@ from torch import Tensor, nn
 
 from alloc.allocators.learned.hyperparameters import DdpgParameters
 from alloc.allocators.learned.learner import Lesson, LessonReport
-from alloc.allocators.learned.network import ActorCritic, NetworkSize
+from alloc.allocators.learned.network import ActorCritic, NetworkSize, fresh
 from alloc.allocators.learned.transitions import Memory, after, gains, play
 from alloc.problems.game import Board, Rules, State
 
@@ -74,10 +74,9 @@ class Ddpg:
         self, size: NetworkSize | None = None, parameters: DdpgParameters | None = None, seed: int = 0
     ) -> None:
         self.parameters = parameters or DdpgParameters()
-        with torch.random.fork_rng(devices=[]):
-            torch.manual_seed(seed)
-            self.networks = nn.ModuleDict({name: ActorCritic(size) for name in ("actor", "critic")})
-            self.targets = nn.ModuleDict({name: ActorCritic(size) for name in ("actor", "critic")})
+        actor, critic, *targets = fresh(size, seed, 4)
+        self.networks = nn.ModuleDict({"actor": actor, "critic": critic})
+        self.targets = nn.ModuleDict(dict(zip(self.networks, targets, strict=True)))
         self.targets.load_state_dict(self.networks.state_dict())
         self.optimisers = {name: torch.optim.Adam(one.parameters()) for name, one in self.networks.items()}
         self.memory = Memory(self.parameters.capacity)

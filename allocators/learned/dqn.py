@@ -22,7 +22,7 @@ from torch import Tensor, nn
 
 from alloc.allocators.learned.hyperparameters import DqnParameters
 from alloc.allocators.learned.learner import Lesson, LessonReport
-from alloc.allocators.learned.network import ActorCritic, NetworkSize
+from alloc.allocators.learned.network import ActorCritic, NetworkSize, fresh
 from alloc.allocators.learned.transitions import Memory, after, gains, play
 from alloc.problems.game import Board, Rules, State
 
@@ -50,9 +50,7 @@ class Dqn:
 
     def __init__(self, size: NetworkSize | None = None, parameters: DqnParameters | None = None, seed: int = 0) -> None:
         self.parameters = parameters or DqnParameters()
-        with torch.random.fork_rng(devices=[]):
-            torch.manual_seed(seed)
-            self.network, self.target = ActorCritic(size), ActorCritic(size)
+        self.network, self.target = fresh(size, seed, 2)
         self.target.load_state_dict(self.network.state_dict())
         self.optimiser = torch.optim.Adam(self.network.parameters(), self.parameters.learning_rate)
         self.memory = Memory(self.parameters.capacity)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from importlib.util import find_spec
 from typing import Any, Protocol, Self, TypeVar
 
-from alloc.allocators.learned.threads import torch_threads
+from alloc.allocators.learned.torch_state import plain_torch, torch_threads
 from alloc.problems import InputError
 from alloc.problems.errors import nearest
 
@@ -89,7 +89,7 @@ class SerialEngine(Engine):
     ) -> list[R] | None:
         """See `Engine.map`."""
         results = []
-        with torch_threads(self.threads):
+        with plain_torch(), torch_threads(self.threads):
             for item in items:
                 if should_stop():
                     return None

@@ -9,8 +9,8 @@ alternate here, as in population-based training (Jaderberg et al. 2017, arXiv:17
 
 import copy
 import random
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
+from types import FunctionType
 from typing import Any
 
 import numpy as np
@@ -77,22 +77,53 @@ def breed(
     unchanged = min(parameters.elite, max(1, len(genomes) - 1))  # of two or more, one at least is a child
     elite = tools.selBest(genomes, unchanged)
     following = [members[genome.number] for genome in elite]
-    with _seeded(seed):
-        while len(following) < len(members):
-            mother, father = tools.selTournament(genomes, 2, parameters.tournament)
-            following.append(_child(members[mother.number], mother, father, parameters))
+    rng = random.Random(seed)
+    toolbox = _toolbox(parameters, rng)
+    while len(following) < len(members):
+        mother, father = toolbox.select(genomes, 2)
+        following.append(_child(members[mother.number], mother, father, parameters, toolbox, rng))
     return following
 
 
-def _child(parent: Member, mother: _Genome, father: _Genome, parameters: BreedingParameters) -> Member:
+def _toolbox(parameters: BreedingParameters, rng: random.Random) -> base.Toolbox:
+    """Return DEAP's tournament, blend and Gaussian mutation, which draw from `rng`."""
+    toolbox = base.Toolbox()
+    toolbox.register("select", _drawing_from(rng, tools.selTournament), tournsize=parameters.tournament)
+    toolbox.register("mate", _drawing_from(rng, tools.cxBlend), alpha=0.0)
+    mutation = _drawing_from(rng, tools.mutGaussian)
+    toolbox.register("mutate", mutation, mu=0.0, sigma=parameters.mutation_size, indpb=parameters.mutated_share)
+    return toolbox
+
+
+def _drawing_from(rng: random.Random, operator: FunctionType) -> Callable[..., Any]:
+    """Return an operator of DEAP over a copy of its module, where `random` is `rng` and not the global generator.
+
+    That generator is shared by all threads of the process, and with the program that this is part of.
+    """
+    module: dict[str, Any] = {**operator.__globals__, "random": rng}
+    for name, thing in operator.__globals__.items():
+        if isinstance(thing, FunctionType) and thing.__globals__ is operator.__globals__:
+            module[name] = FunctionType(thing.__code__, module, name, thing.__defaults__, thing.__closure__)
+    own: Callable[..., Any] = module[operator.__name__]
+    return own
+
+
+def _child(
+    parent: Member,
+    mother: _Genome,
+    father: _Genome,
+    parameters: BreedingParameters,
+    toolbox: base.Toolbox,
+    rng: random.Random,
+) -> Member:
     """Return a child with the optimiser and the replay buffer of its mother, the parent."""
     genome = copy.deepcopy(mother)
-    if random.random() < parameters.crossover_probability:
-        genome, _ = tools.cxBlend(genome, copy.deepcopy(father), alpha=0.0)
+    if rng.random() < parameters.crossover_probability:
+        genome, _ = toolbox.mate(genome, copy.deepcopy(father))
     factor = 1.0
-    if random.random() < parameters.mutation_probability:
-        (genome,) = tools.mutGaussian(genome, 0.0, parameters.mutation_size, parameters.mutated_share)
-        factor = random.choice((0.8, 1.25))
+    if rng.random() < parameters.mutation_probability:
+        (genome,) = toolbox.mutate(genome)
+        factor = rng.choice((0.8, 1.25))
     child = copy.deepcopy(parent)
     for group in child["optimiser"]["param_groups"]:
         group["lr"] *= factor
@@ -109,14 +140,3 @@ def _named(weights: torch.Tensor, like: dict[str, torch.Tensor]) -> dict[str, to
     """Undo `_weights`, with the names and shapes of `like`; each tensor has memory of its own."""
     rows = weights.split([weight.numel() for weight in like.values()])
     return {name: row.view_as(old).clone() for (name, old), row in zip(like.items(), rows, strict=True)}
-
-
-@contextmanager
-def _seeded(seed: int) -> Iterator[None]:
-    """DEAP draws from the global generator: seed it, and give it back as it was."""
-    before = random.getstate()
-    random.seed(seed)
-    try:
-        yield
-    finally:
-        random.setstate(before)

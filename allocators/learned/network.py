@@ -1,5 +1,6 @@
 """The body that all five methods share: attention over groups and tasks, and a small network that scores each bid."""
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -18,6 +19,9 @@ from alloc.problems.game import (
     sum_by_place,
     tasks_of,
 )
+
+SLOPES = (-2.0, 1.0)
+"""Between which the heads' parameters of nearness lie at first."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +86,7 @@ class ActorCritic(nn.Module):
             self.gather = nn.Linear(width, width)
             self.attend = nn.Linear(width, 3 * width)
             self.spread = nn.Linear(width, width)
-            self.nearness = nn.Parameter(torch.linspace(-2.0, 1.0, heads))
+            self.nearness = nn.Parameter(torch.linspace(*SLOPES, heads))
         self.mix = nn.Sequential(nn.Linear(width, 2 * width), nn.ReLU(), nn.Linear(2 * width, width))
         self.query, self.key = nn.Linear(width + 1, width), nn.Linear(width, width)
         self.reserve = nn.Sequential(nn.Linear(2 * width, width), nn.ReLU(), nn.Linear(width, 1))
@@ -142,3 +146,30 @@ class ActorCritic(nn.Module):
         """Return the score of granting nothing and the value of the state, both of shape (B,)."""
         pooled = torch.cat([token.mean(1), token.amax(1)], -1)
         return self.reserve(pooled)[:, 0], self.critic(pooled)[:, 0]
+
+
+def unfilled(size: NetworkSize | None = None) -> ActorCritic:
+    """Return a network in main memory whose weights are yet to be set; nothing is drawn for them."""
+    with torch.device("meta"):
+        network = ActorCritic(size)
+    return network.to(torch.float32).to_empty(device="cpu")
+
+
+def fresh(size: NetworkSize | None, seed: int, count: int) -> list[ActorCritic]:
+    """Return networks with first weights, one after the other from the same stream of random numbers.
+
+    They are those that the layers of torch draw for themselves after `torch.manual_seed`, but no generator that is
+    shared by the process is touched.
+    """
+    generator = torch.Generator().manual_seed(seed)
+    networks = [unfilled(size) for _ in range(count)]
+    for network in networks:
+        for layer in network.modules():
+            if isinstance(layer, nn.Linear):
+                nn.init.kaiming_uniform_(layer.weight, a=math.sqrt(5), generator=generator)
+                bound = 1 / math.sqrt(layer.in_features)
+                nn.init.uniform_(layer.bias, -bound, bound, generator=generator)
+        if network.size.attention:
+            slopes = torch.linspace(*SLOPES, network.size.heads, dtype=torch.float32, device="cpu")
+            network.nearness.data.copy_(slopes)
+    return networks

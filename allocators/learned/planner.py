@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import astuple, dataclass, fields, replace
 from functools import cached_property
 
@@ -19,6 +18,7 @@ from alloc.allocators.learned.lanes import Games, play_games
 from alloc.allocators.learned.limits import NEAR
 from alloc.allocators.learned.network import ActorCritic
 from alloc.allocators.learned.rollout import Best, position
+from alloc.allocators.pool import Pool
 from alloc.allocators.search import Search
 from alloc.problems import IDLE, Allocation, Instance, Objective, easiest_tasks, fewest_unserved, serve_all
 from alloc.problems.game import Board, begin, make_board, pick
@@ -133,7 +133,7 @@ class Planner:
             return
         if self.search.objective is Objective.MAKESPAN_ENERGY and self.aims.spent < SECOND_GAME:
             self.play_whole(self.parameters.second_price)
-        with ThreadPoolExecutor(STREAMS) as pool:
+        with self.search.improving("playing on parts"), Pool(STREAMS) as pool:
             self.run_all = pool.map if self.search.threads > 1 else map
             while not self.search.should_stop():
                 self._sweep()
@@ -174,12 +174,18 @@ class Planner:
         tasks, agents = self._cover(surplus)
         parts = lay_out_parts(self.instance, aims.hours, self.plan, tasks, agents)
         if self.tuning is not None and self.tuning.is_due():
-            self.networks = self.tuning.learn(parts)
+            self._learn(self.tuning, parts)
         network = self.networks[int(self.rng.integers(len(self.networks)))]
         goal = Objective.MAKESPAN if (surplus < 0).any() else search.objective
         accepted, slots = self._play_parts(network, parts, PRICES[goal])
         if accepted.any():
             self._go_on_from(parts.merge(self.plan, slots, accepted))
+
+    def _learn(self, tuning: FineTuning, parts: Parts) -> None:
+        """Play on with what is learned; should that fail, with the policy as it was, and learn no more."""
+        self.networks, self.tuning = tuning.shipped, None
+        with self.search.improving("learning on"):
+            self.networks, self.tuning = tuning.learn(parts), tuning
 
     def _cover(self, surplus: NDArray[np.float64]) -> tuple[Ints, list[Ints]]:
         """Partition tasks into neighbours, and find the agents that work there, and idle ones that could."""

@@ -11,9 +11,10 @@ from alloc.allocators.learned.fine_tuning import FineTuning
 from alloc.allocators.learned.hyperparameters import DqnParameters
 from alloc.allocators.learned.lanes import warm_up as play_once
 from alloc.allocators.learned.limits import too_large
+from alloc.allocators.learned.network import ActorCritic
 from alloc.allocators.learned.planner import Planner, PlannerParameters
 from alloc.allocators.learned.policy_file import load_policy
-from alloc.allocators.learned.threads import torch_threads
+from alloc.allocators.learned.torch_state import plain_torch, torch_threads
 from alloc.allocators.registry import BUILT_IN
 from alloc.allocators.search import Budget, Search
 from alloc.problems import Allocation, InputError, Instance, Objective
@@ -46,14 +47,17 @@ class PolicyAllocator(Allocator):
 
     def __init__(self, policy: Path | str | None = None, device: str = "cpu") -> None:
         self.device = usable(device)
-        if policy is not None:
-            self.networks = load_policy(policy, self.trained_by, self.device)
-        else:
-            with as_file(files("alloc.allocators.learned") / "policies" / f"{self.trained_by}.safetensors") as shipped:
-                self.networks = load_policy(shipped, self.trained_by, self.device)
         if self.device.type != "cpu":
             self.parameters = replace(self.parameters, lane_pairs=GPU_PAIRS, most_lanes=GPU_LANES)
-        play_once(self.networks[0])
+        with plain_torch():
+            self.networks = self._read(policy)
+            play_once(self.networks[0])
+
+    def _read(self, policy: Path | str | None) -> list[ActorCritic]:
+        if policy is not None:
+            return load_policy(policy, self.trained_by, self.device)
+        with as_file(files("alloc.allocators.learned") / "policies" / f"{self.trained_by}.safetensors") as shipped:
+            return load_policy(shipped, self.trained_by, self.device)
 
     def refusal(self, instance: Instance, objective: Objective, budget: Budget) -> str | None:
         """Refuse where not even one game would end in time."""
@@ -63,7 +67,7 @@ class PolicyAllocator(Allocator):
         """Play game after game and submit what is better."""
         if not (search.instance.workload > 0).any():
             return Proposal(Allocation.idle(search.instance))
-        with torch_threads(1):  # the tensors are small: a second thread costs more than it brings
+        with plain_torch(), torch_threads(1):  # the tensors are small: a second thread costs more than it brings
             self.plan(search)
         return Proposal()
 
@@ -129,7 +133,8 @@ class GappoLs(Gappo):
         from alloc.allocators.heuristic.local.improve import improve
 
         Planner(search, self.networks, self.parameters).play_whole(LOCAL_PRICE)
-        improve(search)
+        with search.improving("local search"):
+            improve(search)
 
 
 def usable(device: str) -> torch.device:

@@ -10,7 +10,7 @@ import torch
 from safetensors.torch import load, save
 
 from alloc.allocators.learned.methods import METHODS
-from alloc.allocators.learned.network import ActorCritic, NetworkSize
+from alloc.allocators.learned.network import ActorCritic, NetworkSize, unfilled
 from alloc.allocators.learned.policy_header import read_header
 from alloc.problems import InputError
 from alloc.problems.formats import read_bytes, write_bytes_atomically
@@ -119,7 +119,7 @@ def _turn(said: Mapping[str, str], source: str) -> str:
 def _network(
     size: NetworkSize, tensors: dict[str, torch.Tensor], number: int, device: torch.device | None
 ) -> ActorCritic:
-    network = ActorCritic(size)
+    network = unfilled(size)
     prefix = f"{number}."
     network.load_state_dict({name.removeprefix(prefix): t for name, t in tensors.items() if name.startswith(prefix)})
     return network.to(device).eval().requires_grad_(False)

@@ -15,7 +15,7 @@ from torch import Tensor, nn
 
 from alloc.allocators.learned.hyperparameters import PpoParameters
 from alloc.allocators.learned.learner import Lesson, LessonReport
-from alloc.allocators.learned.network import ActorCritic, NetworkSize
+from alloc.allocators.learned.network import ActorCritic, NetworkSize, fresh
 from alloc.allocators.learned.replay import Replay
 from alloc.allocators.learned.trajectories import Trajectories, advantages, collect
 from alloc.allocators.learned.turns import log_probabilities
@@ -93,9 +93,7 @@ class Ppo:
 
     def __init__(self, size: NetworkSize | None = None, parameters: PpoParameters | None = None, seed: int = 0) -> None:
         self.parameters = parameters or PpoParameters()
-        with torch.random.fork_rng(devices=[]):
-            torch.manual_seed(seed)
-            self.network = ActorCritic(size)
+        (self.network,) = fresh(size, seed, 1)
         self.optimiser = torch.optim.Adam(self.network.parameters(), self.parameters.learning_rate)
         self.replay = Replay(self.parameters.capacity)
 

@@ -22,7 +22,7 @@ from alloc.allocators.learned.gappo import breed, fitness
 from alloc.allocators.learned.hyperparameters import BreedingParameters, GappoParameters
 from alloc.allocators.learned.learner import Lesson, LessonReport
 from alloc.allocators.learned.methods import new_learner
-from alloc.allocators.learned.network import ActorCritic, NetworkSize
+from alloc.allocators.learned.network import NetworkSize, unfilled
 from alloc.allocators.learned.policy_file import save_policy
 from alloc.allocators.learned.training_log import TrainingLog
 from alloc.allocators.learned.validation import Validation, validate, validation_boards
@@ -336,7 +336,7 @@ class Trainer:
         """Write the best networks up to now."""
         networks = []
         for weights in self.best:
-            network = ActorCritic(self.parameters.network)
+            network = unfilled(self.parameters.network)
             network.load_state_dict(weights)
             networks.append(network)
         figures = self.history[self.best_generation - 1]

@@ -187,6 +187,55 @@ class Shared(Sound):
         return super().draw(instance, self.rng)
 
 
+class SeedsForAWhile(Sound):
+    """Seeds the global generator, and puts it back as it was."""
+
+    def allocate(self, search):
+        before = random.getstate()
+        random.seed(search.seed)
+        try:
+            time.sleep(0.01)
+            return super().allocate(search)
+        finally:
+            random.setstate(before)
+
+
+class SetsTorchThreadsForAWhile(Sound):
+    """Gives torch another number of threads, and then the one that it met."""
+
+    def allocate(self, search):
+        import torch
+
+        before = torch.get_num_threads()
+        torch.set_num_threads(before + 1)
+        try:
+            time.sleep(0.01)
+            return super().allocate(search)
+        finally:
+            torch.set_num_threads(before)
+
+
+class SetsEnvironmentForAWhile(Sound):
+    """Sets a variable of the environment, and removes it."""
+
+    def allocate(self, search):
+        os.environ["ALLOC_RUNS"] = "1"
+        try:
+            time.sleep(0.01)
+            return super().allocate(search)
+        finally:
+            os.environ.pop("ALLOC_RUNS", None)
+
+
+class FailsAtTheEnd(Sound):
+    """Fails where `improving` saves the plan at hand."""
+
+    def conclude(self, search):
+        with search.improving("polishing"):
+            raise ZeroDivisionError
+        return Proposal()
+
+
 class Meddler(Sound):
     """Writes into the instance."""
 
@@ -262,7 +311,12 @@ DEFECTS = [
     (LazyWithoutBudget, "test_empty_budget_gives_an_answer", ({"iterations": 0},)),
     (CountsNothing, "test_empty_budget_gives_an_answer", ({"iterations": 0},)),
     (Deaf, "test_stop_event_ends_the_run", (0.0,)),
-    (Shared, "test_threads_do_not_meet", ()),
+    (FailsAtTheEnd, "test_answer_is_sound", ("integer", MAKESPAN)),
+    (Shared, "test_threads_do_not_meet", (2,)),
+    (Shared, "test_threads_do_not_meet", (8,)),
+    (SeedsForAWhile, "test_threads_do_not_meet", (2,)),
+    (SetsTorchThreadsForAWhile, "test_threads_do_not_meet", (2,)),
+    (SetsEnvironmentForAWhile, "test_threads_do_not_meet", (2,)),
     (Meddler, "test_nothing_else_changes", ("integer",)),
     (DrawsGlobally, "test_nothing_else_changes", ("integer",)),
     (SeedsGlobally, "test_nothing_else_changes", ("integer",)),
@@ -298,7 +352,17 @@ def clean_instances(monkeypatch):
     os.environ.pop("ALLOC_RUNS", None)
 
 
-@pytest.mark.usefixtures("clean_instances")
+@pytest.fixture
+def torch_threads():
+    """Put back what a defect leaves torch with."""
+    import torch
+
+    before = torch.get_num_threads()
+    yield
+    torch.set_num_threads(before)
+
+
+@pytest.mark.usefixtures("clean_instances", "torch_threads")
 @pytest.mark.parametrize(("defect", "check", "arguments"), DEFECTS, ids=[f"{d.__name__}-{c}" for d, c, _ in DEFECTS])
 def test_defect_is_caught(defect, check, arguments, capfd):
     """An allocator with this defect fails the check."""

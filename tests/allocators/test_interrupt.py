@@ -84,6 +84,19 @@ def test_native_work_that_does_not_obey_is_left_behind() -> None:
     assert not left_behind()
 
 
+def test_native_work_is_halted_by_what_a_handler_raises() -> None:
+    """A KeyboardInterrupt in the calling thread leaves no solver at work."""
+    halted = threading.Event()
+
+    def interrupted() -> bool:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_native(lambda: halted.wait(10), interrupted, halted.set)
+    assert halted.is_set()
+    assert not left_behind()
+
+
 PROGRAM = """
 import time
 from alloc.allocators.interrupt import run_native

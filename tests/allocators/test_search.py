@@ -6,6 +6,7 @@ import time
 import pytest
 
 from alloc.allocators import Budget, Deadline, Improvement, Search, StopReason
+from alloc.allocators.search import STANDS
 from alloc.problems import Allocation, InputError, Instance, Objective
 
 
@@ -143,3 +144,28 @@ def test_deadlines_are_checked(wrong: dict[str, float]) -> None:
     """Slack is finite and not negative, a limit finite and positive."""
     with pytest.raises(InputError):
         Deadline(**wrong)
+
+
+def test_a_stage_that_fails_costs_no_plan(instance: Instance, caplog: pytest.LogCaptureFixture) -> None:
+    """With a plan at hand, its exception is logged and noted; without one it is raised."""
+    run = Search(instance, Objective.MAKESPAN, Budget())
+    with pytest.raises(ZeroDivisionError), run.improving("polishing"):
+        raise ZeroDivisionError
+    run.submit(Allocation.idle(instance))
+    with run.improving("polishing"):
+        raise ZeroDivisionError("by nought")
+    assert run.notes == [f"polishing failed (ZeroDivisionError: by nought); {STANDS}"]
+    assert [record.name for record in caplog.records] == ["alloc"]
+
+
+def test_what_a_callback_raises_passes_every_stage(instance: Instance) -> None:
+    """It ends the run, though it is raised where failures are met."""
+
+    def enough(_: object) -> None:
+        raise ZeroDivisionError
+
+    run = Search(instance, Objective.MAKESPAN, Budget(), on_improvement=enough)
+    with pytest.raises(ZeroDivisionError), run.improving("polishing"):
+        run.submit(Allocation.idle(instance))
+    with pytest.raises(KeyboardInterrupt), Search(instance, Objective.MAKESPAN, Budget()).improving("polishing"):
+        raise KeyboardInterrupt

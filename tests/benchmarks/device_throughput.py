@@ -21,7 +21,7 @@ from alloc.allocators import load
 from alloc.allocators.learned.lanes import Games, play_games
 from alloc.allocators.learned.network import ActorCritic
 from alloc.allocators.learned.rollout import play
-from alloc.allocators.learned.threads import torch_threads
+from alloc.allocators.learned.torch_state import torch_threads
 from alloc.allocators.learned.turns import choose
 from alloc.problems import paper_like
 from alloc.problems.game import Board, begin, make_board, step
@@ -60,11 +60,12 @@ def loops(network: ActorCritic, board: Board, threads: int) -> None:
     """Play in compiled loops, a share of the games in each thread."""
 
     def share(rows: np.ndarray) -> None:
-        part = board[torch.from_numpy(rows)]
-        games = Games(np.arange(len(rows)), part.price.numpy().astype(float), part.start.numpy())
-        play_games(network, part, games, rounds=ROUNDS)
+        with torch_threads(1):
+            part = board[torch.from_numpy(rows)]
+            games = Games(np.arange(len(rows)), part.price.numpy().astype(float), part.start.numpy())
+            play_games(network, part, games, rounds=ROUNDS)
 
-    with ThreadPoolExecutor(threads) as pool, torch_threads(1):
+    with ThreadPoolExecutor(threads) as pool:
         list(pool.map(share, np.array_split(np.arange(len(board.price)), threads)))
 
 

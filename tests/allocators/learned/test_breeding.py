@@ -1,11 +1,15 @@
 """The population: fitness (12), and breeding by DEAP's operators."""
 
+import copy
 import random
+from collections.abc import Callable
+from typing import Any
 
 import pytest
 import torch
+from deap import tools
 
-from alloc.allocators.learned.gappo import BreedingParameters, Member, breed, fitness
+from alloc.allocators.learned.gappo import BreedingParameters, Member, _drawing_from, _Genome, breed, fitness
 from alloc.allocators.learned.network import NetworkSize
 from alloc.allocators.learned.ppo import Ppo, PpoParameters
 
@@ -97,3 +101,20 @@ def test_breeding_is_seeded_and_leaves_the_global_generator_alone() -> None:
     other = breed(members(4), [1.0, 2.0, 3.0, 4.0], BreedingParameters(), seed=7)
     assert all(torch.equal(weights(a), weights(b)) for a, b in zip(one, other, strict=True))
     assert random.random() == expected
+
+
+def test_operators_draw_as_deaps_do_but_from_their_own_generator(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Given the same seed, the outcome is that of DEAP's own; the generator that all threads share is not asked."""
+    parents = [_Genome([float(number), -1.0, 2.5], number, float(number % 3)) for number in range(5)]
+
+    def bred(select: Callable[..., Any], mate: Callable[..., Any], mutate: Callable[..., Any]) -> list[list[float]]:
+        one, other = mate(*(copy.deepcopy(genome) for genome in select(parents, 2, tournsize=2)), alpha=0.0)
+        return [list(mutate(genome, 0.0, 1.0, 0.5)[0]) for genome in (one, other)]
+
+    operators = (tools.selTournament, tools.cxBlend, tools.mutGaussian)
+    random.seed(7)
+    expected = bred(*operators)
+    for name in ("random", "choice", "gauss"):
+        monkeypatch.setattr(random, name, None)
+    rng = random.Random(7)
+    assert bred(*(_drawing_from(rng, operator) for operator in operators)) == expected

@@ -15,7 +15,7 @@ import torch
 
 from alloc.allocators.learned.engine import Engine, EngineError, SerialEngine, make_engine
 from alloc.allocators.learned.process_engine import ProcessEngine
-from alloc.allocators.learned.threads import torch_threads
+from alloc.allocators.learned.torch_state import torch_threads
 from alloc.problems import InputError
 
 

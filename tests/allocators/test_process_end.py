@@ -1,0 +1,84 @@
+"""The program ends, or gets Ctrl-C, while another of its threads solves: nothing crashes, and no answer is lost."""
+
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from alloc.allocators.pool import Pool
+
+PROGRAM = """
+import os, sys, threading, time
+from alloc.allocators import load, solve
+from alloc.problems.generate import paper
+
+instance, method, after_s = paper(1, seed=3), load(sys.argv[1]), float(sys.argv[2])
+
+def work():
+    for _ in range(int(sys.argv[4])):
+        result = solve(instance, method, objective="makespan-energy", time_limit_s=4, threads=2)
+        print(result.stop_reason, result.allocation is not None, flush=True)
+
+thread = threading.Thread(target=work, daemon=sys.argv[3] == "daemon")
+thread.start()
+if sys.argv[3] == "interrupted":
+    threading.Timer(after_s, lambda: os.kill(os.getpid(), 2)).start()
+    thread.join()
+time.sleep(after_s)
+"""
+
+
+def run(method: str, after_s: float, how: str, times: int = 1) -> subprocess.CompletedProcess[str]:
+    """Solve in a thread, and end the main thread after so many seconds."""
+    command = [sys.executable, "-c", PROGRAM, method, str(after_s), how, str(times)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60)
+
+
+@pytest.mark.parametrize("method", ["milp", "cpsat", "gappo", "local-search"])
+def test_a_daemon_thread_is_stopped_and_awaited(method: str) -> None:
+    """However often it solves, its run is ended as by a stop event, the next is none, and nothing crashes."""
+    ran = run(method, 2.5, "daemon", 1000)
+    assert (ran.returncode, ran.stderr) == (0, "")
+    assert set(ran.stdout.split("\n")) <= {"interrupted True", "proven True", "finished True", ""}
+
+
+def test_an_interrupt_of_the_main_thread_crashes_nothing() -> None:
+    """Ctrl-C in `join`, after which some versions of Python take the other thread for ended: no abort."""
+    ran = run("milp", 2.5, "interrupted")
+    assert ran.returncode in (-signal.SIGINT, 130), ran.stderr
+    assert ran.stderr.rstrip().endswith("KeyboardInterrupt")
+
+
+@pytest.mark.parametrize(("method", "after_s"), [("gappo", 0.0), ("gappo", 1.0), ("milp", 0.0), ("milp", 1.0)])
+def test_a_thread_that_is_joined_has_its_whole_time(method: str, after_s: float) -> None:
+    """The end of the program waits for it; that pools take no work by then costs no answer."""
+    ran = run(method, after_s, "joined")
+    assert (ran.returncode, ran.stderr) == (0, "")
+    assert ran.stdout == "time_limit True\n"
+
+
+def test_a_run_may_begin_at_exit() -> None:
+    """A handler of `atexit`, registered before or after, may still solve."""
+    program = """
+import atexit
+from alloc.problems import Instance
+def late():
+    from alloc.allocators import solve
+    print(solve(Instance(ability=[1, 2, 3], workload=[3, 2]), "milp", time_limit_s=2, threads=2).status)
+atexit.register(late)
+from alloc.allocators import solve
+solve(Instance(ability=[1, 2], workload=[3, 2]), "milp", time_limit_s=2)
+atexit.register(late)
+"""
+    ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
+    assert (ran.returncode, ran.stdout, ran.stderr) == (0, "optimal\noptimal\n", "")
+
+
+def test_a_pool_that_gets_no_threads_works_all_the_same() -> None:
+    """Once it is shut down, work is done in the calling thread, and what that raises is raised by the future."""
+    pool = Pool(2)
+    pool.shutdown()
+    assert list(pool.map(lambda number: number + 1, [1, 2])) == [2, 3]
+    with pytest.raises(ZeroDivisionError):
+        pool.submit(lambda: 1 / 0).result()
