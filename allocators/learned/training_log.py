@@ -8,7 +8,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from alloc.problems import InputError
+from alloc.problems import MissingPackageError
 from alloc.problems.formats import write_text_atomically
 
 
@@ -72,8 +72,8 @@ def event_writer(folder: Path, history: Sequence[Any] = ()) -> Any:
     """
     try:
         from torch.utils.tensorboard import SummaryWriter
-    except ImportError:
+    except ImportError as error:
         message = "needs TensorBoard, which is not installed; pip install 'alloc-mrta[train]'"
-        raise InputError(message, "--tensorboard") from None
+        raise MissingPackageError(message, "tensorboard") from error
     following = history[-1].decisions + 1 if history else 0
     return SummaryWriter(str(folder), purge_step=following)
