@@ -1,4 +1,4 @@
-"""What arguments may be: checked at the public door, so that an error names the parameter and nothing fails deep inside.
+"""What arguments may be: checked at the public door, so that errors name the parameter and nothing fails deep inside.
 
 Values of other types that mean the same are taken: numpy's numbers, strings for enumerations.
 """

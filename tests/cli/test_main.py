@@ -109,7 +109,6 @@ def test_bad_usage_is_one_line(alloc, small, arguments):
         (("solve", "small.json", "--method", "greedy", "--policy", "x"), "--policy: method 'greedy' takes no option"),
         (("pareto", "small.json", "--time-limit", "inf"), "--time-limit: must be a finite number"),
         (("compare", "small.json", "--methods", "gredy"), "--methods: there is no method 'gredy'"),
-        (("compare", "small.json", "--methods", "greedy", "--seeds", f"{10**18},"), ""),
         (("generate", "random", "--range", "5:3"), "--range: must not end"),
         (("generate", "covering", "--ability-min", "0"), "--ability-min: must be a whole number >= 1"),
         (("generate", "random", "--tau", "2"), "--tau: must lie strictly between 0 and 1"),
@@ -122,8 +121,8 @@ def test_bad_usage_is_one_line(alloc, small, arguments):
 def test_the_parameters_of_the_library_are_told_as_options(alloc, small, arguments, begin):
     """What the library says of a parameter, the command line says of its own option or argument."""
     ran = alloc(*arguments)
-    assert ran.code == (2 if begin else 0)
-    assert ran.err.startswith(f"alloc: {begin}") or not begin
+    assert ran.code == 2
+    assert ran.err.startswith(f"alloc: {begin}")
 
 
 def test_places_in_a_file_are_no_options(alloc):
