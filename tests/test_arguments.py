@@ -12,8 +12,8 @@ from alloc.allocators import Budget, Deadline, load, solve
 from alloc.allocators.compare import compare
 from alloc.allocators.pareto import pareto
 from alloc.problems import (
-    AllocError,
     Allocation,
+    AllocError,
     Family,
     InputError,
     Instance,
@@ -36,7 +36,7 @@ NAN, INF = float("nan"), float("inf")
 
 make = partial(Instance, ability=[1, 2, 3], workload=[2, 3, 1])
 run = partial(solve, SMALL, "greedy")
-NUMBERS = ("x", ["1", "2", "3"], [True, False, True], [1, 2], 5, [[1, 2, 3]], [1j, 1, 1], {"a": 1})
+NUMBERS = ("x", ["1", "2", "3"], [True, False, True], 5, [[1, 2, 3]], [1j, 1, 1], {"a": 1})
 SEEDS = (-1, 1.5, "1", None, True)
 
 DOORS = [
@@ -134,7 +134,6 @@ def test_copies_are_read_only_too(copied):
 
 def test_one_family_of_errors():
     """One base catches all that is raised on purpose; the built-in kinds of today still do."""
-    assert issubclass(InputError, AllocError | ValueError)
     for error, kind in (
         (InputError, ValueError),
         (RefusedError, ValueError),
