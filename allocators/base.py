@@ -6,11 +6,9 @@ from typing import ClassVar
 
 from alloc.allocators.method import Method
 from alloc.allocators.search import Budget, Search
-from alloc.problems import Allocation, Instance, Objective
+from alloc.problems import Allocation, Instance, Objective, RefusedError
 
-
-class RefusedError(ValueError):
-    """A method says beforehand that it cannot handle an instance, and why."""
+__all__ = ["Allocator", "Proposal", "RefusedError"]
 
 
 @dataclass(frozen=True)

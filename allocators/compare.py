@@ -1,5 +1,6 @@
 """Several methods on several instances and seeds: one row for each method and instance."""
 
+import logging
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -11,9 +12,12 @@ import numpy as np
 from alloc.allocators.base import Allocator, RefusedError
 from alloc.allocators.registry import load
 from alloc.allocators.result import Result
-from alloc.allocators.search import StopReason, relative_gap
-from alloc.allocators.solve import solve
+from alloc.allocators.search import Budget, StopReason, relative_gap
+from alloc.allocators.solve import LARGEST_SEED, MOST_THREADS, solve
 from alloc.problems import InputError, Instance, Objective
+from alloc.problems.arguments import choice, event, listed, of_type, text, whole
+
+LOG = logging.getLogger("alloc.compare")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,25 +103,45 @@ def compare(
     stop : threading.Event, optional
         Setting it ends the comparison; the run in progress is dropped.
 
-    Yields
+    Returns
+    -------
+    iterator of Row
+        Each as soon as all its runs are done. A method that refuses an instance, is not installed, or fails gives a
+        row with the reason; the traceback of a failure goes to the logger ``alloc``.
+
+    Raises
     ------
-    Row
-        As soon as all its runs are done. A method that refuses an instance, is not installed, or fails gives a row
-        with the reason.
+    InputError
+        If an argument is not what it should be; its place is the parameter.
     """
-    stop = stop or threading.Event()
+    names = [text(name, "methods") for name in listed(methods, "methods", "names of methods")]
+    numbers = [whole(seed, "seeds", 0, LARGEST_SEED) for seed in listed(seeds, "seeds", "whole numbers")]
+    problems = instances if isinstance(instances, Iterator) else listed(instances, "instances", "instances")
+    Budget(time_limit_s, iterations, target_gap)
+    stop = event(stop, "stop") or threading.Event()
     run = partial(
         solve,
-        objective=objective,
+        objective=choice(Objective, objective, "objective"),
         time_limit_s=time_limit_s,
         iterations=iterations,
         target_gap=target_gap,
-        threads=threads,
+        threads=None if threads is None else whole(threads, "threads", 1, MOST_THREADS),
         stop=stop,
         handle_signals=False,
     )
+    return _rows(run, problems, names, numbers, stop)
+
+
+def _rows(
+    run: Callable[..., Result],
+    instances: Iterable[Instance],
+    methods: Sequence[str],
+    seeds: Sequence[int],
+    stop: threading.Event,
+) -> Iterator[Row]:
     loaded = {name: _load(name) for name in methods}
     for number, instance in enumerate(instances, 1):
+        of_type(instance, Instance, "instances")
         for name, method in loaded.items():
             results: list[Result] = []
             reason = ""
@@ -140,6 +164,7 @@ def _run_seeds(run: Callable[..., Result], seeds: Sequence[int]) -> tuple[list[R
         except RefusedError as error:
             return [], str(error)
         except Exception as error:  # one faulty plugin must not cost the figures of all others
+            LOG.warning("a run failed with seed %s", seed, exc_info=error)
             return [], f"failed with seed {seed}: {type(error).__name__}: {error}"
         if result.stop_reason is StopReason.INTERRUPTED:
             break
@@ -209,7 +234,8 @@ def _load(name: str) -> str | Allocator | Exception:
         return load(name)
     except InputError as error:
         return error
-    except Exception as error:
+    except Exception as error:  # a faulty plugin again
+        LOG.warning("method %r cannot be loaded", name, exc_info=error)
         return ImportError(f"cannot be loaded: {type(error).__name__}: {error}")
 
 

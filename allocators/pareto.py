@@ -16,8 +16,9 @@ from alloc.allocators.interrupt import signals_set
 from alloc.allocators.registry import load
 from alloc.allocators.result import Result
 from alloc.allocators.search import PROVEN, Budget
-from alloc.allocators.solve import solve
-from alloc.problems import Allocation, Evaluation, InputError, Instance, Objective, evaluate
+from alloc.allocators.solve import as_allocation, solve
+from alloc.problems import Allocation, Evaluation, Instance, Objective, evaluate
+from alloc.problems.arguments import event, flag, function, listed, of_type, whole
 
 PARETO_FORMAT = "alloc-pareto/1"
 
@@ -69,7 +70,7 @@ def pareto(
     time_limit_s: float | None = 10.0,
     iterations: int | None = None,
     seed: int = 0,
-    starts: Sequence[Allocation] = (),
+    starts: Sequence[Allocation | Result] = (),
     threads: int | None = None,
     on_point: Callable[[Result], None] | None = None,
     stop: threading.Event | None = None,
@@ -92,7 +93,7 @@ def pareto(
         limits have the same best allocation.
     time_limit_s, iterations, seed, threads
         Of each single run, as in `solve`.
-    starts : sequence of Allocation
+    starts : sequence of Allocation or Result
         Allocations to begin with, such as those of an earlier front: their makespans are the first limits.
     on_point : callable, optional
         Called with the result of every run.
@@ -106,12 +107,17 @@ def pareto(
     InputError, RefusedError
         As `solve` does.
     """
-    if points < 1:
-        raise InputError(f"must be at least 1, got {points}", "points")
+    of_type(instance, Instance, "instance")
+    of_type(method, (str, Allocator), "method")
+    points = whole(points, "points", 1)
     Budget(time_limit_s, iterations)
+    plans = [as_allocation(instance, start, "starts") for start in listed(starts, "starts", "allocations")]
+    function(on_point, "on_point")
+    event(stop, "stop")
+    handle_signals = flag(handle_signals, "handle_signals")
     allocator = load(method) if isinstance(method, str) and method != "auto" else method
     stop = stop or threading.Event()
-    known = [(start, evaluate(instance, start)) for start in starts]
+    known = [(start, evaluate(instance, start)) for start in plans]
     wanted = sorted((score.served_makespan, score.energy) for _, score in known if score.makespan)
     points = max(points, len(wanted))
     results: list[Result] = []

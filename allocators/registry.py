@@ -7,7 +7,8 @@ from typing import Any
 from alloc.allocators.base import Allocator
 from alloc.allocators.interrupt import ended_with_process
 from alloc.allocators.method import Kind, Method
-from alloc.problems import InputError
+from alloc.problems import InputError, MissingPackageError
+from alloc.problems.arguments import text
 from alloc.problems.errors import nearest
 
 ENTRY_POINT_GROUP = "alloc.allocators"
@@ -175,6 +176,7 @@ def describe(name: str) -> Method:
     InputError
         If there is no such method, or its plugin cannot be imported.
     """
+    text(name, "name")
     return BUILT_IN[name] if name in BUILT_IN else _plugin_class(name).method
 
 
@@ -200,7 +202,7 @@ def load(name: str, **options: Any) -> Allocator:
             raise InputError(f"method {name!r} takes no option {key!r}{_hint(key, method)}", key)
     if method.missing:
         modules = " ".join(method.missing)
-        raise InputError(f"method {name!r} needs {modules}; install with: pip install {modules}", "method")
+        raise MissingPackageError(f"method {name!r} needs {modules}; install with: pip install {modules}", "method")
     if name not in BUILT_IN:
         return _plugin_class(name)(**given)
     if "policy" in given:

@@ -13,13 +13,13 @@ from enum import StrEnum
 from alloc.problems import (
     Allocation,
     Evaluation,
-    InputError,
     Instance,
     Objective,
     evaluate,
     makespan_lower_bound,
     serve_all,
 )
+from alloc.problems.arguments import real, whole
 from alloc.problems.evaluation import RELATIVE_TOLERANCE, last_equal
 
 PROVEN = 1e-6
@@ -51,11 +51,10 @@ class Budget:
     target_gap: float | None = None
 
     def __post_init__(self) -> None:
-        for name in ("time_limit_s", "iterations", "target_gap"):
+        for name, check in (("time_limit_s", real), ("iterations", whole), ("target_gap", real)):
             value = getattr(self, name)
-            if value is not None and not 0 <= value < math.inf:
-                option = name.removesuffix("_s").replace("_", "-")
-                raise InputError(f"must be a finite number >= 0, got {value}", option)
+            if value is not None:
+                object.__setattr__(self, name, check(value, name))
 
 
 @dataclass(frozen=True)
@@ -74,10 +73,9 @@ class Deadline:
     limit: float | None = None
 
     def __post_init__(self) -> None:
-        if not 0 <= self.slack < math.inf:
-            raise InputError(f"must be a finite number >= 0, got {self.slack}", "makespan-slack")
-        if self.limit is not None and not 0 < self.limit < math.inf:
-            raise InputError(f"must be a finite number of hours > 0, got {self.limit}", "makespan-limit")
+        object.__setattr__(self, "slack", real(self.slack, "slack"))
+        if self.limit is not None:
+            object.__setattr__(self, "limit", real(self.limit, "limit", above=True, unit="of hours "))
 
     def hours(self, fastest: float) -> float:
         """Return the makespan up to which allocations are equally fast, where the fastest takes `fastest` hours."""

@@ -5,7 +5,7 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from typing import Any
 
@@ -27,6 +27,8 @@ from alloc.problems import (
     lp_makespan_lower_bound,
     serve_all,
 )
+from alloc.problems.allocation import require_fit
+from alloc.problems.arguments import choice, event, flag, function, of_type, real, whole
 
 UNHURRIED_S = 30.0
 """Limit of the linear programme before a run that counts iterations: no clock should decide where it ends."""
@@ -44,7 +46,7 @@ def solve(
     iterations: int | None = None,
     target_gap: float | None = None,
     seed: int = 0,
-    start: Allocation | None = None,
+    start: Allocation | Result | Mapping[str, str | None] | None = None,
     threads: int | None = None,
     makespan_slack: float = 0.0,
     makespan_limit: float | None = None,
@@ -66,8 +68,8 @@ def solve(
         The budget; see `Budget`.
     seed : int
         Source of all randomness.
-    start : Allocation, optional
-        A warm start; the answer is never worse.
+    start : Allocation, Result or dict, optional
+        A warm start; the answer is never worse. A dict gives the task id of each agent id, None for idle.
     threads : int, optional
         Threads that the method may use; as many as there are processors by default.
     makespan_slack, makespan_limit : float
@@ -89,15 +91,22 @@ def solve(
     Raises
     ------
     InputError
-        If the method or an option is unknown, or the budget, the seed or the threads are out of range.
+        If the method or an option is unknown, or another argument is not what it should be; its place is the parameter.
     RefusedError
         If the method cannot handle this instance within this budget; the message says why.
     """
-    goal, budget = Objective(objective), Budget(time_limit_s, iterations, target_gap)
-    deadline = Deadline(makespan_slack, makespan_limit)
-    _check_numbers(seed, threads)
+    of_type(instance, Instance, "instance")
+    of_type(method, (str, Allocator), "method")
+    goal, budget = choice(Objective, objective, "objective"), Budget(time_limit_s, iterations, target_gap)
+    deadline = _deadline(makespan_slack, makespan_limit)
+    seed = whole(seed, "seed", 0, LARGEST_SEED)
+    threads = None if threads is None else whole(threads, "threads", 1, MOST_THREADS)
+    begun = None if start is None else as_allocation(instance, start, "start")
+    function(on_improvement, "on_improvement")
+    event(stop, "stop")
+    handle_signals = flag(handle_signals, "handle_signals")
     if goal is Objective.MAKESPAN and deadline != STRICT:
-        option = "makespan-slack" if makespan_slack else "makespan-limit"
+        option = "makespan_slack" if makespan_slack else "makespan_limit"
         raise InputError(f"leaves room for less energy; it is for the objective {Objective.MAKESPAN_ENERGY}", option)
     notes: list[str] = []
     begin = time.monotonic()
@@ -123,7 +132,7 @@ def solve(
             goal,
             budget,
             seed=seed,
-            start=start,
+            start=begun,
             threads=threads or available_threads(),
             deadline=deadline,
             on_improvement=on_improvement,
@@ -144,12 +153,40 @@ def solve(
         return _conclude(search, allocator.method.name, proposal, stop_reason, runtime_s, notes)
 
 
-def _check_numbers(seed: int, threads: int | None) -> None:
-    """Raise an `InputError` for what some solver or generator of random numbers would not take."""
-    if not 0 <= seed <= LARGEST_SEED:
-        raise InputError(f"must be a whole number from 0 to {LARGEST_SEED}, got {seed}", "seed")
-    if threads is not None and not 1 <= threads <= MOST_THREADS:
-        raise InputError(f"must be a whole number from 1 to {MOST_THREADS}, got {threads}", "threads")
+def _deadline(makespan_slack: float, makespan_limit: float | None) -> Deadline:
+    slack = real(makespan_slack, "makespan_slack")
+    limit = None if makespan_limit is None else real(makespan_limit, "makespan_limit", above=True, unit="of hours ")
+    return Deadline(slack, limit)
+
+
+def as_allocation(instance: Instance, given: Allocation | Result | Mapping[str, str | None], name: str) -> Allocation:
+    """Return an allocation of `instance`, which is that of a result, or ids of tasks by ids of agents.
+
+    Raises
+    ------
+    InputError
+        If it is none of these, or does not belong to `instance`; its place is `name`.
+    """
+    try:
+        if isinstance(given, Mapping):
+            return Allocation.from_ids(instance, given)
+        if isinstance(given, Result):
+            return _allocation_of(given, instance)
+        allocation = of_type(given, (Allocation, Result), name)
+        assert isinstance(allocation, Allocation)
+        require_fit(instance, allocation)
+        return allocation
+    except InputError as error:
+        raise InputError(error.message, name) from error
+
+
+def _allocation_of(result: Result, instance: Instance) -> Allocation:
+    if result.allocation is None:
+        raise InputError("is a result without an allocation")
+    theirs = result.instance
+    if (theirs.agent_ids, theirs.task_ids) == (instance.agent_ids, instance.task_ids):
+        return result.allocation
+    return Allocation.from_ids(instance, result.allocation.to_ids(theirs))
 
 
 def available_threads() -> int:

@@ -134,19 +134,14 @@ FIXED = ("family", "seed", "count", "output")
 
 def _instance(family: Family, wanted: dict[str, Any], seed: int) -> "Instance":
     from alloc.problems import Family as Parameters
-    from alloc.problems import InputError, paper, random_instance
+    from alloc.problems import paper, random_instance
 
     if family is Family.COVERING:
         return _covering(seed=seed, **wanted)
     if family is not Family.RANDOM:
         return paper(int(family.removeprefix("paper-")), seed)
-    try:
-        values: dict[str, Any] = {
-            name: _spread(value, name) if name in SPREADS else value for name, value in wanted.items()
-        }
-        return random_instance(Parameters(**values), seed)
-    except InputError as error:
-        raise InputError(error.message, _flag(error.place) if error.place in wanted else error.place) from None
+    values = {name: _spread(value, name) if name in SPREADS else value for name, value in wanted.items()}
+    return random_instance(Parameters(**values), seed)
 
 
 def _covering(
@@ -161,16 +156,12 @@ def _covering(
     from alloc.problems import InputError, machine_covering
 
     if workload not in (Distribution.EQUAL, Distribution.UNIFORM):
-        raise InputError("must be equal or uniform here", "--workload")
-    for flag, value in (("--ability-min", ability_min), ("--ability-max", ability_max)):
+        raise InputError("must be equal or uniform here", "workload")
+    for name, value in (("ability_min", ability_min), ("ability_max", ability_max)):
         if value != int(value):
-            raise InputError(f"must be a whole number here, got {value}", flag)
-    flags = {"agents": "--agents", "tasks": "--tasks", "low": "--ability-min", "high": "--ability-max"}
+            raise InputError(f"must be a whole number here, got {value}", name)
     equal, ends = workload is Distribution.EQUAL, (int(ability_min), int(ability_max))
-    try:
-        return machine_covering(agents, tasks, *ends, seed, equal=equal, whole=integer)
-    except InputError as error:
-        raise InputError(error.message, flags.get(error.place, error.place)) from None
+    return machine_covering(agents, tasks, *ends, seed, equal=equal, whole=integer)
 
 
 def _write(instance: "Instance", output: str, *, into_folder: bool) -> None:
@@ -183,8 +174,8 @@ def _write(instance: "Instance", output: str, *, into_folder: bool) -> None:
     folder = Path(output)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-    except FileExistsError:
-        raise InputError("is a file; several instances need a folder", source=output) from None
+    except FileExistsError as error:
+        raise InputError("is a file; several instances need a folder", source=output) from error
     write_instance(instance, str(folder / f"{instance.name}.json"))
 
 
@@ -200,6 +191,6 @@ def _spread(text: str, name: str) -> float | tuple[float, ...] | None:
         return None
     try:
         ends = tuple(float(part) for part in text.split(":"))
-    except ValueError:
-        raise InputError(f"must be a number, LOW:HIGH or none, got {text!r}", name) from None
+    except ValueError as error:
+        raise InputError(f"must be a number, LOW:HIGH or none, got {text!r}", name) from error
     return ends[0] if len(ends) == 1 else ends

@@ -6,13 +6,13 @@ import os
 import sys
 import threading
 from collections.abc import Sequence
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import typer
 
 from alloc.cli import compare, convert, evaluate, generate, methods, pareto, solve, train, tune, validate
 from alloc.cli.console import complain, flush, write_out
-from alloc.cli.options import examples
+from alloc.cli.options import examples, option_of
 
 SERVED, UNSERVED, BAD_INPUT = 0, 1, 2
 """Exit codes: every task is served; one is not; bad usage or bad input."""
@@ -79,8 +79,15 @@ def _run(arguments: Sequence[str] | None) -> int:
     except Exception as error:
         if os.environ.get("ALLOC_TRACEBACK"):
             raise
-        return _explain(error)
+        return _explain(error, sys.argv[1:] if arguments is None else arguments)
     return code if isinstance(code, int) else SERVED
+
+
+def _parameters(arguments: Sequence[str]) -> list[Any]:
+    """Return arguments and options of the command that was called; the program itself has none with a value."""
+    commands = typer.main.get_command(app).commands  # type: ignore[attr-defined]
+    name = next((argument for argument in arguments if argument in commands), None)
+    return [] if name is None else commands[name].params
 
 
 def _is_solver_left() -> bool:
@@ -97,17 +104,21 @@ def _leave(code: int) -> NoReturn:
     os._exit(code)
 
 
-def _explain(error: Exception) -> int:
+def _explain(error: Exception, arguments: Sequence[str]) -> int:
     """Turn `error` into one line on standard error and an exit code."""
     if isinstance(error, _USAGE_ERROR):
         command = error.ctx.command_path if error.ctx else "alloc"  # type: ignore[attr-defined]
         complain(f"{error.format_message().rstrip('.')}; see {command!r} --help".replace("'" + " --help", " --help'"))  # type: ignore[attr-defined]
         return BAD_INPUT
-    from alloc.allocators import RefusedError
-    from alloc.problems import InputError
+    from alloc.problems import AllocError, InputError
 
-    if isinstance(error, InputError | RefusedError):
+    if isinstance(error, InputError):
+        place = error.place if error.source else option_of(error.place, _parameters(arguments))
+        complain(str(InputError(error.message, place, error.source)))
+    elif isinstance(error, AllocError):
         complain(str(error))
+    elif isinstance(error, MemoryError):
+        complain("there is not enough memory for this")
     elif isinstance(error, OSError):
         complain(f"{error.filename or 'a file'}: {error.strerror or error}")
     else:

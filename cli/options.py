@@ -1,9 +1,11 @@
 """Arguments and options that several commands share."""
 
+from collections.abc import Sequence
 from enum import StrEnum
 from typing import Annotated
 
 import typer
+import typer.core
 
 BUILT_IN_METHODS = (
     "auto",
@@ -66,6 +68,29 @@ TargetGapOption = Annotated[
     float | None, typer.Option(min=0, help="Stop at this relative gap of the makespan; 0.01 is 1 %.")
 ]
 ThreadsOption = Annotated[int | None, typer.Option(min=1, max=1024, help="Threads.", show_default="all processors")]
+
+
+RENAMED = {
+    "time_limit_s": "time_limit",
+    "scenario": "family",
+    "low": "ability_min",
+    "high": "ability_max",
+}
+"""Parameters of the library whose option has another name than themselves."""
+
+
+def option_of(place: str, parameters: Sequence[typer.core.TyperArgument | typer.core.TyperOption]) -> str:
+    """Return what a command calls the parameter that the library names: an option, an argument, or `place` itself.
+
+    A command that takes several of them has the plural: ``seed`` of `solve` is ``--seeds`` of ``alloc compare``.
+    """
+    name = RENAMED.get(place, place)
+    for known in (name, f"{name}s"):
+        for parameter in parameters:
+            if parameter.name == known:
+                is_option = isinstance(parameter, typer.core.TyperOption)
+                return parameter.opts[0] if is_option else parameter.metavar or known.upper()
+    return place
 
 
 def time_limit(given: float | None, iterations: int | None) -> float | None:

@@ -34,7 +34,7 @@ def learner_parameters(method: str, families: Sequence[str], settings: Sequence[
     parameters = method_parameters(method, _pairs(settings))
     for name in families:
         if name not in FAMILIES:
-            raise InputError(f"no such family: {name!r}{nearest(name, FAMILIES)}", "--family")
+            raise InputError(f"no such family: {name!r}{nearest(name, FAMILIES)}", "family")
     return parameters
 
 

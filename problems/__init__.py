@@ -1,9 +1,11 @@
 """What is to be solved, and how good an answer is; knows nothing of allocators."""
 
+import logging
+
 from alloc.problems.allocation import Allocation
 from alloc.problems.bounds import energy_lower_bound, lp_makespan_lower_bound, makespan_lower_bound
 from alloc.problems.classes import AgentClasses, agent_classes, count_classes
-from alloc.problems.errors import InputError
+from alloc.problems.errors import AllocError, InputError, MissingPackageError, RefusedError, TrainingError
 from alloc.problems.evaluation import Evaluation, Objective, Violation, evaluate
 from alloc.problems.formats import read_allocation, read_instance, write_allocation, write_instance
 from alloc.problems.generate import paper, paper_like, random_instance
@@ -16,13 +18,17 @@ from alloc.problems.reach import Reach
 __all__ = [
     "IDLE",
     "AgentClasses",
+    "AllocError",
     "Allocation",
     "Evaluation",
     "Family",
     "InputError",
     "Instance",
+    "MissingPackageError",
     "Objective",
     "Reach",
+    "RefusedError",
+    "TrainingError",
     "Violation",
     "agent_classes",
     "contested_tasks",
@@ -43,3 +49,5 @@ __all__ = [
     "write_allocation",
     "write_instance",
 ]
+
+logging.getLogger("alloc").addHandler(logging.NullHandler())  # silent, unless the program that uses us says otherwise

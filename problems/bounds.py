@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from alloc.problems.arguments import of_type, real
 from alloc.problems.classes import agent_classes, count_classes
 from alloc.problems.evaluation import completion_time, last_equal
 from alloc.problems.instance import FloatArray, Instance, IntArray
@@ -48,6 +49,7 @@ def makespan_lower_bound(instance: Instance) -> float:
     abilities are integers, the least T at which the demands rounded up, ceil(h_j / T), fit into the sum of abilities.
     Takes O(n log n + origins * m) time.
     """
+    of_type(instance, Instance, "instance")
     work = np.sort(instance.workload[instance.workload > 0])
     if not len(work):
         return 0.0
@@ -131,6 +133,7 @@ def lp_makespan_lower_bound(instance: Instance, time_limit_s: float = 10.0) -> f
     The linear programme gives fractions of agents, per class and task, to the tasks that they can reach. Not for
     instances with travel times, nor where it would take more than `time_limit_s` or `LP_SIZE_LIMIT` pairs.
     """
+    _check(instance, time_limit_s)
     work = instance.workload
     if instance.has_travel_time or not (work > 0).any() or _is_too_large(instance, time_limit_s, by_place=False):
         return None
@@ -168,6 +171,8 @@ def energy_lower_bound(instance: Instance, makespan: float, time_limit_s: float 
     makespan : float
         In hours; every task with workload must be done by then.
     """
+    _check(instance, time_limit_s)
+    real(makespan, "makespan")
     work = instance.workload
     if _is_too_large(instance, time_limit_s, by_place=True):
         return None
@@ -209,6 +214,11 @@ def scale_to_one(typical: float) -> float:
     if ORDINARY[0] <= typical <= ORDINARY[1]:
         return 1.0
     return math.ldexp(1.0, max(-MOST_DOUBLINGS, min(MOST_DOUBLINGS, -math.frexp(typical)[1])))
+
+
+def _check(instance: Instance, time_limit_s: float) -> None:
+    of_type(instance, Instance, "instance")
+    real(time_limit_s, "time_limit_s")
 
 
 def _is_too_large(instance: Instance, time_limit_s: float, *, by_place: bool) -> bool:

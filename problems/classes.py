@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from alloc.problems.allocation import Allocation
+from alloc.problems.arguments import flag, of_type
 from alloc.problems.instance import IDLE, FloatArray, Instance, IntArray
 from alloc.problems.origins import group_rows
 
@@ -98,8 +99,8 @@ def count_classes(instance: Instance, *, by_place: bool) -> int:
 
 def _group(instance: Instance, *, by_place: bool) -> tuple[IntArray, IntArray]:
     """Return one member of each class, and the class of each agent."""
-    reach = instance.reach
-    if by_place or instance.has_travel_time:
+    reach = of_type(instance, Instance, "instance").reach
+    if flag(by_place, "by_place") or instance.has_travel_time:
         row = np.arange(len(reach.place))
     elif reach.is_complete:
         row = np.zeros(len(reach.place), dtype=np.intp)

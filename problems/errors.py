@@ -1,4 +1,4 @@
-"""Errors about input, phrased so that one line tells what to mend."""
+"""The family of errors, phrased so that one line tells what to mend."""
 
 import difflib
 from collections.abc import Sequence
@@ -11,15 +11,19 @@ MOST_COMPARED, LONGEST_COMPARED = 1000, 60
 """Known names that are compared with an unknown one, and characters of each: beyond, it would take seconds."""
 
 
-class InputError(ValueError):
-    """Input that breaks the rules of the problem or of a file format.
+class AllocError(Exception):
+    """Base of all errors that are raised on purpose; anything else is a defect, or comes from a plugin."""
+
+
+class InputError(AllocError, ValueError):
+    """Input that breaks the rules of the problem, of a file format or of a parameter.
 
     Parameters
     ----------
     message : str
         What is wrong and what to do, without the source.
     place : str, optional
-        Where in the source, such as ``agents[3].ability``.
+        The parameter, such as ``time_limit_s``, or where in the data, such as ``agents[3].ability``.
     source : str, optional
         The file, or ``standard input``; filled in by the readers.
     """
@@ -27,6 +31,18 @@ class InputError(ValueError):
     def __init__(self, message: str, place: str = "", source: str = "") -> None:
         self.message, self.place, self.source = message, place, source
         super().__init__(": ".join(part for part in (source, place, message) if part))
+
+
+class MissingPackageError(InputError, ImportError):
+    """What is asked for needs a package that is not installed; the message says which."""
+
+
+class RefusedError(AllocError, ValueError):
+    """A method says beforehand that it cannot handle an instance, and why."""
+
+
+class TrainingError(AllocError, RuntimeError):
+    """A training cannot go on, through no fault of its input."""
 
 
 def nearest(name: str, known: Sequence[str]) -> str:

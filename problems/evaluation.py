@@ -6,8 +6,8 @@ from enum import StrEnum
 
 import numpy as np
 
-from alloc.problems.allocation import Allocation
-from alloc.problems.errors import InputError
+from alloc.problems.allocation import Allocation, require_fit
+from alloc.problems.fields import ReadOnly
 from alloc.problems.instance import IDLE, FloatArray, Instance, IntArray
 from alloc.problems.reach import TOLERANCE
 
@@ -37,7 +37,7 @@ class Violation:
 
 
 @dataclass(frozen=True, eq=False)
-class Evaluation:
+class Evaluation(ReadOnly):
     """Scores of one allocation; see `evaluate`.
 
     Attributes
@@ -108,7 +108,7 @@ def evaluate(instance: Instance, allocation: Allocation) -> Evaluation:
     ----------
     Fang et al. (2025), equations (1)-(4) and (19), doi:10.20944/preprints202502.0192.v1.
     """
-    task = _checked_tasks(instance, allocation)
+    task = require_fit(instance, allocation)
     sent = np.flatnonzero(task != IDLE)
     allowed = instance.reach.allows(sent, task[sent])
     agent, goal = sent[allowed], task[sent[allowed]]
@@ -138,15 +138,6 @@ def evaluate(instance: Instance, allocation: Allocation) -> Evaluation:
         unserved_tasks=tuple(np.flatnonzero(unserved).tolist()),
         violations=tuple(_violations(instance, sent[~allowed], task)),
     )
-
-
-def _checked_tasks(instance: Instance, allocation: Allocation) -> IntArray:
-    task = allocation.task_of_agent
-    if len(task) != instance.n:
-        raise InputError(f"the allocation has {len(task)} agents, instance {instance.name!r} has {instance.n}")
-    if task.min() < IDLE or task.max() >= instance.m:
-        raise InputError(f"task indices must lie between -1 and {instance.m - 1}")
-    return task
 
 
 def _completion_times(

@@ -1,11 +1,15 @@
 """The fields of an instance as arrays: what they may hold."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Set
+from decimal import Decimal
 from itertools import pairwise
+from numbers import Real
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from alloc.problems.arguments import listed
 from alloc.problems.errors import InputError
 
 FloatArray = NDArray[np.float64]
@@ -14,16 +18,59 @@ IntArray = NDArray[np.intp]
 IDLE = -1
 """The task index of an agent without a task."""
 
+LARGEST_INDEX = 2**62
+"""Beyond, numbers are no indices on any machine."""
+
+MATRIX = "a matrix of who may do what, not lists of task indices; give those, as numpy.flatnonzero(row) does"
+
+
+class ReadOnly:
+    """Keeps the arrays of an object read-only through pickling and deep copies, which forget that they are."""
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        for value in state.values():
+            for array in value if isinstance(value, tuple) else (value,):
+                if isinstance(array, np.ndarray):
+                    array.setflags(write=False)
+        self.__dict__.update(state)
+
+
+def numbers(values: ArrayLike, field_name: str, message: str = "must be a list of numbers") -> FloatArray:
+    """Return an array of numbers, copied; None, and what pandas has for it, become NaN. Texts are no numbers."""
+    try:
+        array = np.asarray(values)
+        if array.dtype.kind == "O":
+            array = np.array([_number(value) for value in array.flat], dtype=np.float64).reshape(array.shape)
+        if array.dtype.kind in "fiu":
+            return np.array(array, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(message, field_name) from error
+    raise InputError(message, field_name)
+
+
+def _number(value: object) -> float:
+    if value is None or type(value).__name__ == "NAType":  # pandas.NA, known without pandas
+        return float("nan")
+    if isinstance(value, Real | Decimal) and not isinstance(value, bool):
+        return float(value)
+    raise TypeError(f"{value!r} is no number")
+
 
 def vector(values: ArrayLike, field_name: str, length: int | None = None) -> FloatArray:
     """Return numbers in one row, copied."""
-    try:
-        array = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise InputError("must be a list of numbers", field_name) from error
+    array = numbers(values, field_name)
     if array.ndim != 1 or (length is not None and len(array) != length):
         expected = "a list" if length is None else f"a list of {length} numbers"
         raise InputError(f"must be {expected}, got shape {array.shape}", field_name)
+    return array
+
+
+def limits(values: ArrayLike | None, field_name: str, length: int) -> FloatArray:
+    """Return a limit for each agent; ``inf`` where there is none, which None and NaN stand for."""
+    if values is None:
+        return np.full(length, np.inf)
+    array = vector(values, field_name, length)
+    array[np.isnan(array)] = np.inf
     return array
 
 
@@ -31,7 +78,7 @@ def ids(names: Iterable[str] | None, count: int, prefix: str, kind: str) -> tupl
     """Return names that are unique; `prefix` and a number where none are given."""
     if names is None:
         return tuple(f"{prefix}{index}" for index in range(1, count + 1))
-    unique = tuple(names)
+    unique = tuple(listed(names, f"{kind}_ids", "strings"))
     if len(unique) != count:
         raise InputError(f"needs {count} ids, got {len(unique)}", f"{kind}_ids")
     seen: set[str] = set()
@@ -48,10 +95,7 @@ def positions(values: ArrayLike | None, count: int, kind: str) -> FloatArray:
     """Return three coordinates per row: z = 0 where only x and y are given, a row of NaN where unknown."""
     if values is None:
         return np.full((count, 3), np.nan)
-    try:
-        array = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise InputError("must hold 2 or 3 numbers per row", f"{kind}_position") from error
+    array = numbers(values, f"{kind}_position", "must hold 2 or 3 numbers per row")
     if array.ndim != 2 or array.shape[0] != count or array.shape[1] not in (2, 3):
         raise InputError(f"must have shape ({count}, 2) or ({count}, 3), got {array.shape}", f"{kind}_position")
     if array.shape[1] == 2:
@@ -64,31 +108,56 @@ def positions(values: ArrayLike | None, count: int, kind: str) -> FloatArray:
     return array
 
 
+def indices(values: ArrayLike, field_name: str, message: str = "must be a list of task indices") -> IntArray:
+    """Return whole numbers as indices, copied; floats will do where they are whole, and nothing is cut off or wraps."""
+    try:
+        array = np.asarray(values)
+    except ValueError as error:  # rows of unequal length
+        raise InputError(message, field_name) from error
+    if array.dtype.kind not in "iu":
+        array = numbers(array, field_name, message)
+        if not (np.isfinite(array) & (array == np.round(array))).all():
+            raise InputError(message, field_name)
+    if array.size and (array.min() < -LARGEST_INDEX or array.max() > LARGEST_INDEX):
+        raise InputError(f"{message}, got {array.flat[np.argmax(np.abs(array.astype(np.float64)))]}", field_name)
+    return array.astype(np.intp)
+
+
 def starts(values: ArrayLike | None, n: int, m: int) -> IntArray:
-    """Return the index of the task where each agent begins, -1 for none."""
+    """Return the index of the task where each agent begins; -1 for none, which None and NaN stand for."""
     if values is None:
         return np.full(n, IDLE, dtype=np.intp)
-    array = np.array(values)
-    if array.shape != (n,) or not np.issubdtype(array.dtype, np.integer):
-        raise InputError(f"must be a list of {n} task indices, -1 for none", "start_task")
+    message = f"must be a list of {n} task indices, -1 for none"
+    given = np.asarray(values)
+    if given.dtype.kind not in "iu":  # missing values make floats or objects of a column of whole numbers
+        given = numbers(given, "start_task", message)
+        given[np.isnan(given)] = IDLE
+    array = indices(given, "start_task", message)
+    if array.shape != (n,):
+        raise InputError(message, "start_task")
     wrong = (array < IDLE) | (array >= m)
     if wrong.any():
         row = int(np.argmax(wrong))
         raise InputError(f"is {array[row]}, but tasks run from 0 to {m - 1}", f"agents[{row}].start_task")
-    return array.astype(np.intp)
+    return array
 
 
-def allowed(lists: Sequence[Iterable[int] | None] | None, n: int, m: int) -> tuple[IntArray | None, ...] | None:
+def allowed(lists: Iterable[Iterable[int] | None] | None, n: int, m: int) -> tuple[IntArray | None, ...] | None:
     """Return the tasks that each agent may do, sorted and without repetitions; None where all agents may do all."""
     if lists is None:
         return None
-    if len(lists) != n:
-        raise InputError(f"needs {n} entries, got {len(lists)}", "allowed_tasks")
-    if all(entry is None for entry in lists):
+    if isinstance(lists, np.ndarray) and lists.dtype.kind == "b":
+        raise InputError(f"is {MATRIX}", "allowed_tasks")
+    entries = [_unless_missing(entry) for entry in listed(lists, "allowed_tasks", "lists of task indices, or None")]
+    if len(entries) != n:
+        raise InputError(f"needs {n} entries, got {len(entries)}", "allowed_tasks")
+    if all(entry is None for entry in entries):
         return None
-    listed = [row for row, entry in enumerate(lists) if entry is not None]
-    arrays = [_indices(entry, row) for row, entry in enumerate(lists) if entry is not None]
-    owner, task = np.repeat(listed, list(map(len, arrays))), np.concatenate(arrays)
+    rows = [row for row, entry in enumerate(entries) if entry is not None]
+    arrays = [_indices(entry, row) for row, entry in enumerate(entries) if entry is not None]
+    if _is_matrix(arrays, n, m, always=isinstance(lists, np.ndarray)):
+        raise InputError(f"is {MATRIX}", "allowed_tasks")
+    owner, task = np.repeat(rows, list(map(len, arrays))), np.concatenate(arrays)
     wrong = (task < 0) | (task >= m)
     if wrong.any():
         raise InputError(f"names a task outside 0 to {m - 1}", f"agents[{owner[np.argmax(wrong)]}].tasks")
@@ -96,17 +165,38 @@ def allowed(lists: Sequence[Iterable[int] | None] | None, n: int, m: int) -> tup
     owner, task = np.divmod(pairs[np.diff(pairs, prepend=-1) > 0], m)
     task.setflags(write=False)
     result: list[IntArray | None] = [None] * n
-    bounds = np.searchsorted(owner, [*listed, n]).tolist()
-    for row, (first, end) in zip(listed, pairwise(bounds), strict=True):
+    bounds = np.searchsorted(owner, [*rows, n]).tolist()
+    for row, (first, end) in zip(rows, pairwise(bounds), strict=True):
         result[row] = task[first:end]
     return tuple(result)
 
 
-def _indices(entry: Iterable[int], row: int) -> IntArray:
-    array = np.asarray(entry if isinstance(entry, np.ndarray | list | tuple) else list(entry))
+def _unless_missing(entry: Any) -> Any:
+    """Return None for the NaN that pandas puts where there is no list."""
+    return None if isinstance(entry, float) and np.isnan(entry) else entry
+
+
+def _is_matrix(arrays: list[IntArray], n: int, m: int, *, always: bool) -> bool:
+    """Whether these look like n rows of m zeros and ones: as indices, some row names a task again, or all name all.
+
+    `always`: whether rows that name all are taken for that as well.
+    """
+    if m < 2 or len(arrays) != n or any(len(array) != m or array.max() > 1 or array.min() < 0 for array in arrays):
+        return False
+    return always or m > 2 or any(array[0] == array[1] for array in arrays)
+
+
+def _indices(entry: Any, row: int) -> IntArray:
+    """Return one list of tasks; a set has no order, and needs none here."""
+    place, message = f"agents[{row}].tasks", "must be a list of task indices, or None for all"
+    if not isinstance(entry, np.ndarray | list | tuple):
+        entry = listed(list(entry) if isinstance(entry, Set) else entry, place, "task indices, or None for all")
+    array = np.asarray(entry)
+    if array.dtype.kind == "b":
+        raise InputError(f"is {MATRIX}", place)
     if array.ndim != 1 or (len(array) and array.dtype.kind not in "iu"):
-        raise InputError("must be a list of task indices, or None for all", f"agents[{row}].tasks")
-    return array.astype(np.intp)
+        raise InputError(message, place)
+    return indices(array, place, message)
 
 
 def require(

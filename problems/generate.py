@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from alloc.problems.arguments import of_type, real, shown, whole
 from alloc.problems.errors import InputError
 from alloc.problems.generate_family import Distribution, Family, Sites, Spread, Starts
 from alloc.problems.instance import FloatArray, Instance, IntArray
@@ -47,8 +48,8 @@ def paper(scenario: int, seed: int) -> Instance:
     Fang et al. (2025), section 5, doi:10.20944/preprints202502.0192.v1. Sizes and totals are the paper's; the unit
     cube, the spread of the workloads, 6 units of energy per unit of distance, the batteries and tau are ours.
     """
-    if scenario not in SCENARIOS:
-        raise InputError(f"must be 1, 2, 3 or 4, got {scenario!r}", "scenario")
+    if isinstance(scenario, bool) or not isinstance(scenario, int | np.integer) or scenario not in SCENARIOS:
+        raise InputError(f"must be 1, 2, 3 or 4, got {shown(scenario)}", "scenario")
     sizes = SCENARIOS[scenario]
     return paper_like(
         sizes.agents, sizes.tasks, sizes.total, seed, battery=sizes.battery, name=f"paper-{scenario}-seed-{seed}"
@@ -75,13 +76,15 @@ def paper_like(
     InputError
         If no such abilities or workloads exist.
     """
-    if not 0 < agents <= total <= 10 * agents:
+    agents, tasks, total = whole(agents, "agents", 1), whole(tasks, "tasks", 1), whole(total, "total")
+    real(battery, "battery")
+    if not agents <= total <= 10 * agents:
         raise InputError(f"must lie from 1 to 10 per agent, got {total} for {agents} agents", "total")
-    if not 0 < tasks * (tasks + 1) // 2 <= total:
+    if tasks * (tasks + 1) // 2 > total:
         raise InputError(f"must be at least {tasks * (tasks + 1) // 2} for {tasks} distinct workloads", "total")
     rng = _generator(seed)
     return Instance(
-        name=name or f"paper-like-{agents}x{tasks}-seed-{seed}",
+        name=name if name is not None else f"paper-like-{agents}x{tasks}-seed-{seed}",
         ability=_abilities_summing_to(total, agents, rng),
         workload=_distinct_workloads(total, tasks, rng),
         task_position=rng.random((tasks, 3)),
@@ -94,6 +97,7 @@ def paper_like(
 
 def random_instance(family: Family, seed: int, *, name: str | None = None) -> Instance:
     """Return a random instance of `family`; the same seed gives the same instance."""
+    of_type(family, Family, "family")
     rng = _generator(seed)
     n, m = family.agents, family.tasks
     ability = _abilities(family, rng)
@@ -108,7 +112,7 @@ def random_instance(family: Family, seed: int, *, name: str | None = None) -> In
     elif family.starts is Starts.DEPOTS:
         own = _places(family, family.depots, centres, rng)[rng.integers(0, family.depots, n)]
     return Instance(
-        name=name or f"random-{n}x{m}-seed-{seed}",
+        name=name if name is not None else f"random-{n}x{m}-seed-{seed}",
         ability=ability,
         workload=workload,
         agent_position=own,
@@ -125,9 +129,7 @@ def random_instance(family: Family, seed: int, *, name: str | None = None) -> In
 
 
 def _generator(seed: int) -> np.random.Generator:
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
-        raise InputError(f"must be a whole number >= 0, got {seed!r}", "seed")
-    return np.random.default_rng(seed)
+    return np.random.default_rng(whole(seed, "seed"))
 
 
 def _abilities_summing_to(total: int, agents: int, rng: np.random.Generator) -> IntArray:

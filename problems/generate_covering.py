@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from alloc.problems.errors import InputError
+from alloc.problems import arguments
 from alloc.problems.instance import Instance
 
 EQUAL_WORKLOAD = 1000
@@ -44,11 +44,10 @@ def machine_covering(
     Families of abilities as in Haouari and Jemmali (2008), doi:10.1007/s10288-007-0053-5, and Walter, Wirth and
     Lawrinenko (2017), doi:10.1007/s10951-016-0477-x, for equal workloads; the unequal ones are ours.
     """
-    for name, value, least in (("agents", agents, 1), ("tasks", tasks, 1), ("low", low, 1), ("high", high, low)):
-        if value < least:
-            raise InputError(f"must be at least {least}, got {value}", name)
-    if seed < 0:
-        raise InputError(f"must be a whole number >= 0, got {seed}", "seed")
+    agents, tasks = arguments.whole(agents, "agents", 1), arguments.whole(tasks, "tasks", 1)
+    low = arguments.whole(low, "low", 1)
+    high, seed = arguments.whole(high, "high", low), arguments.whole(seed, "seed")
+    equal, whole = arguments.flag(equal, "equal"), arguments.flag(whole, "whole")
     rng = np.random.default_rng([agents, tasks, low, high, seed])
     ability = rng.integers(low, high, agents, endpoint=True) if whole else rng.uniform(low, high, agents)
     unequal = rng.integers(*WORKLOADS, tasks, endpoint=True)

@@ -3,8 +3,7 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
-import numpy as np
-
+from alloc.problems.arguments import choice, flag, real, whole
 from alloc.problems.errors import InputError
 
 LARGEST = 1e12
@@ -112,49 +111,39 @@ class Family:
 
     def __post_init__(self) -> None:
         for name in ("agents", "tasks", "clusters", "depots"):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 1 <= value <= MOST:
-                raise InputError(f"must be a whole number from 1 to {MOST}, got {value!r}", name)
+            self._set(name, whole(getattr(self, name), name, 1, MOST))
         for name in ("ability_min", "ability_max", "load", "world_size", "allowed_fraction"):
-            _number(getattr(self, name), name, positive=True)
+            self._set(name, real(getattr(self, name), name, 0, LARGEST, above=True))
         if self.ability_max < self.ability_min:
             raise InputError(
                 f"must be at least ability_min = {self.ability_min:g}, got {self.ability_max:g}", "ability_max"
             )
         if self.allowed_fraction > 1:
             raise InputError(f"must be > 0 and at most 1, got {self.allowed_fraction:g}", "allowed_fraction")
-        if self.dimensions not in (2, 3):
-            raise InputError(f"must be 2 or 3, got {self.dimensions!r}", "dimensions")
+        self._set("dimensions", whole(self.dimensions, "dimensions", 2, 3))
+        self._set("integer", flag(self.integer, "integer"))
+        real(self.energy_per_distance, "energy_per_distance")
+        real(self.tau, "tau")
         for name in ("communication_range", "battery", "speed", "priority"):
-            _spread(getattr(self, name), name)
+            self._set(name, _spread(getattr(self, name), name))
         choices = {"ability": Distribution, "workload": Distribution, "sites": Sites, "starts": Starts}
         for name, kind in choices.items():
-            object.__setattr__(self, name, _choice(kind, getattr(self, name), name))
+            self._set(name, choice(kind, getattr(self, name), name))
         if self.ability is Distribution.DIRICHLET:
             raise InputError("dirichlet shares a total out, and is for workloads alone", "ability")
 
-
-def _number(value: object, name: str, *, positive: bool) -> None:
-    is_number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
-    if is_number and 0 <= value <= LARGEST and (value > 0 or not positive):  # type: ignore[operator]
-        return
-    raise InputError(f"must be a number {'> 0' if positive else '>= 0'} and at most {LARGEST:g}, got {value!r}", name)
+    def _set(self, name: str, value: object) -> None:
+        object.__setattr__(self, name, value)
 
 
-def _spread(spread: object, name: str) -> None:
+def _spread(spread: Spread, name: str) -> Spread:
     if spread is None and name != "priority":
-        return
-    ends = spread if isinstance(spread, tuple) else (spread, spread)
+        return None
+    pair = tuple(spread) if isinstance(spread, list | tuple) else None
+    ends = (spread, spread) if pair is None else pair
     if len(ends) != 2:
         raise InputError(f"must be one number, or the two ends of a range, got {spread!r}", name)
-    for end in ends:
-        _number(end, name, positive=name == "speed")
-    if ends[0] > ends[1]:
-        raise InputError(f"must not end ({ends[1]:g}) below its beginning ({ends[0]:g})", name)
-
-
-def _choice(kind: type[StrEnum], value: object, name: str) -> StrEnum:
-    try:
-        return kind(value)  # type: ignore[arg-type]
-    except ValueError:
-        raise InputError(f"must be one of {', '.join(kind)}; got {value!r}", name) from None
+    low, high = (real(end, name, 0, LARGEST, above=name == "speed") for end in ends)
+    if low > high:
+        raise InputError(f"must not end ({high:g}) below its beginning ({low:g})", name)
+    return low if pair is None else (low, high)

@@ -1,14 +1,16 @@
 """What is to be solved: agents with abilities, tasks with workloads, and who can reach what."""
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Sequence, Set
 from dataclasses import dataclass, replace
 from functools import cached_property
+from numbers import Real
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from alloc.problems import fields
+from alloc.problems.arguments import listed, real, shown, text
 from alloc.problems.errors import InputError, nearest
 from alloc.problems.fields import IDLE, FloatArray, IntArray
 from alloc.problems.reach import Reach, build_reach
@@ -20,12 +22,13 @@ AGENT_ARRAYS = ("ability", "agent_position", "start_task", "battery", "communica
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
-class Instance:
+class Instance(fields.ReadOnly):
     """A task allocation problem, validated once and read-only from then on.
 
     Unknown or unlimited values (``null`` in files) are ``inf`` for `battery`, `communication_range` and `speed`,
-    NaN rows for positions and -1 for `start_task`. Units are the user's own, but must agree: with distances in km and
-    times in hours, speeds are km/h, and an ability is work per hour.
+    NaN rows for positions and -1 for `start_task`; None and NaN, as in columns of pandas, are taken for them.
+    Units are the user's own, but must agree: with distances in km and times in hours, speeds are km/h, and an ability
+    is work per hour.
 
     Parameters
     ----------
@@ -48,7 +51,7 @@ class Instance:
     speed : array_like, shape (n,), optional
         Distance per hour, > 0; ``inf`` means that travel takes no time, which is (4) of the paper.
     allowed_tasks : sequence of (sequence of int, or None), optional
-        Task indices that each agent may do; None for all.
+        Task indices that each agent may do; None for all. No matrix of who may do what.
     priority : array_like, shape (m,), optional
         Weight of each task in the game and in missions, >= 0; no part of the objective.
     tau : float
@@ -105,25 +108,22 @@ class Instance:
         n, m = len(w), len(h)
         if n == 0 or m == 0:
             raise InputError("an instance needs at least one agent and one task", "tasks" if n else "agents")
-        infinite = np.full(n, np.inf)
         values: dict[str, Any] = {
             "ability": w,
             "workload": h,
-            "name": str(name),
+            "name": text(name, "name"),
             "agent_ids": fields.ids(agent_ids, n, "a", "agent"),
             "task_ids": fields.ids(task_ids, m, "t", "task"),
             "agent_position": fields.positions(agent_position, n, "agent"),
             "task_position": fields.positions(task_position, m, "task"),
             "start_task": fields.starts(start_task, n, m),
-            "battery": infinite if battery is None else fields.vector(battery, "battery", n),
-            "communication_range": infinite
-            if communication_range is None
-            else fields.vector(communication_range, "range", n),
-            "speed": infinite if speed is None else fields.vector(speed, "speed", n),
+            "battery": fields.limits(battery, "battery", n),
+            "communication_range": fields.limits(communication_range, "communication_range", n),
+            "speed": fields.limits(speed, "speed", n),
             "allowed_tasks": fields.allowed(allowed_tasks, n, m),
             "priority": np.ones(m) if priority is None else fields.vector(priority, "priority", m),
-            "tau": float(tau),
-            "energy_per_distance": float(energy_per_distance),
+            "tau": _unit_share(tau),
+            "energy_per_distance": float(real(energy_per_distance, "energy_per_distance")),
         }
         for key, value in values.items():
             if isinstance(value, np.ndarray):
@@ -147,10 +147,6 @@ class Instance:
             self.communication_range >= 0, self.communication_range, "range", "a number >= 0, or null", agents
         )
         fields.require(self.speed > 0, self.speed, "speed", "a number > 0, or null", agents)
-        if not 0 < self.tau < 1:
-            raise InputError(f"must lie strictly between 0 and 1, got {self.tau:g}", "tau")
-        if not (np.isfinite(self.energy_per_distance) and self.energy_per_distance >= 0):
-            raise InputError(f"must be a finite number >= 0, got {self.energy_per_distance:g}", "energy_per_distance")
         with np.errstate(over="ignore"):
             if not (np.isfinite(self.ability.sum()) and np.isfinite(self.workload.sum())):
                 raise InputError("the sum of all abilities and of all workloads must be finite; use smaller units")
@@ -197,18 +193,26 @@ class Instance:
         """Index of each task id."""
         return {name: index for index, name in enumerate(self.task_ids)}
 
-    def without_agents(self, gone: Collection[str]) -> "Instance":
+    def without_agents(self, gone: Iterable[str]) -> "Instance":
         """Return the same problem without these agents, as when they drop out.
+
+        Parameters
+        ----------
+        gone : iterable of str
+            Their ids.
 
         Raises
         ------
         InputError
             If an id is unknown, or no agent is left.
         """
-        for name in gone:
+        ids = gone if isinstance(gone, Set) else listed(gone, "gone", "ids of agents")
+        for name in ids:
+            if not isinstance(name, str):
+                raise InputError(f"must be ids of agents, got {shown(name)}", "gone")
             if name not in self.agent_index:
-                raise InputError(f"no agent {name!r} in instance {self.name!r}{nearest(name, self.agent_ids)}")
-        dropped = set(gone)
+                raise InputError(f"no agent {name!r} in instance {self.name!r}{nearest(name, self.agent_ids)}", "gone")
+        dropped = set(ids)
         left = [index for index, name in enumerate(self.agent_ids) if name not in dropped]
         lists = self.allowed_tasks
         return replace(
@@ -217,3 +221,9 @@ class Instance:
             allowed_tasks=None if lists is None else tuple(lists[index] for index in left),
             **{name: getattr(self, name)[left] for name in AGENT_ARRAYS},
         )
+
+
+def _unit_share(tau: float) -> float:
+    if isinstance(tau, Real) and not isinstance(tau, bool) and 0 < tau < 1:
+        return float(tau)
+    raise InputError(f"must lie strictly between 0 and 1, got {shown(tau)}", "tau")

@@ -5,7 +5,8 @@ from collections import deque
 import numpy as np
 from numpy.typing import NDArray
 
-from alloc.problems.allocation import Allocation
+from alloc.problems.allocation import Allocation, require_fit
+from alloc.problems.arguments import of_type
 from alloc.problems.instance import IDLE, Instance, IntArray
 
 SPENT = -1
@@ -87,7 +88,7 @@ class _Matching:
 
 
 def _needs_agent(instance: Instance) -> IntArray:
-    return np.flatnonzero(instance.workload > 0)
+    return np.flatnonzero(of_type(instance, Instance, "instance").workload > 0)
 
 
 def serve_all(instance: Instance, allocation: Allocation) -> Allocation:
@@ -96,7 +97,7 @@ def serve_all(instance: Instance, allocation: Allocation) -> Allocation:
     Agents sent where they cannot go are idle in the answer. A task that is served stays served. Agents change places
     along augmenting paths alone, each with the fewest moves, at whose end an idle agent is preferred, then the nearest.
     """
-    task = allocation.task_of_agent.copy()
+    task = require_fit(instance, allocation).copy()
     working = np.flatnonzero(task != IDLE)
     task[working[~instance.reach.allows(working, task[working])]] = IDLE
     served = np.zeros(instance.m, dtype=bool)

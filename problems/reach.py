@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from alloc.problems.distances import distance_table, distances, unit_of
+from alloc.problems.fields import ReadOnly
 from alloc.problems.neighbours import Neighbours, estimated_pairs, find_neighbours
 from alloc.problems.origins import group_rows, number_lists
 
@@ -35,7 +36,7 @@ Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
-class Reach:
+class Reach(ReadOnly):
     """Reachable tasks and distances per origin.
 
     Attributes
@@ -74,8 +75,8 @@ class Reach:
 
     @property
     def has_table(self) -> bool:
-        """Whether `distance` and `mask` are at hand, or small enough to be made without a thought."""
-        return self.pairs <= TABLE_LIMIT or "mask" in self.__dict__
+        """Whether `distance` and `mask` are small enough to be made without a thought, whatever was asked before."""
+        return self.pairs <= TABLE_LIMIT
 
     @cached_property
     def distance(self) -> Floats:
@@ -109,8 +110,6 @@ class Reach:
     @cached_property
     def is_complete(self) -> bool:
         """Whether every agent can take every task."""
-        if "mask" in self.__dict__:
-            return bool(self.mask.all())
         if any(len(tasks) < len(self.goal) for tasks in self.lists):
             return False
         return self._is_complete_by_place()

@@ -42,7 +42,7 @@ class Parameters:
         First and last noise of the mending, as of `local-search`; far below its own, so that what the programme chose
         stands where it can.
     hot : float
-        First noise of the exchanges that use what is left of the budget.
+        First noise of the exchanges that use what is left of the budget, where energy counts.
     share : float
         Most of the time left that a programme may take.
     """
@@ -94,7 +94,7 @@ class LpRound(Allocator):
         if search.should_stop():
             return Proposal()
         economical = search.objective is Objective.MAKESPAN_ENERGY
-        programme = Programme(instance, by_place=economical)
+        programme = Programme(instance, by_place=economical, time_share=self.parameters.share)
         hours = programme.least_hours(search)
         if hours is not None and (economical or not search.fast_enough):
             chain = Chain(instance, search.seed, local.Parameters().near)
@@ -135,10 +135,12 @@ class Programme:
     instance : Instance
     by_place : bool
         Whether agents are told apart by place, as energy asks for.
+    time_share : float
+        Most of the time left that a programme may take.
     """
 
-    def __init__(self, instance: Instance, *, by_place: bool) -> None:
-        self.instance, self.by_place = instance, by_place
+    def __init__(self, instance: Instance, *, by_place: bool, time_share: float) -> None:
+        self.instance, self.by_place, self.time_share = instance, by_place, time_share
         self.classes = agent_classes(instance, by_place=by_place)
         self.kind, goal = np.nonzero(self.classes.mask[:, instance.workload > 0])
         self.work = np.flatnonzero(instance.workload > 0)
@@ -167,7 +169,7 @@ class Programme:
                 ]
             )
             limits = np.concatenate([np.zeros(len(self.work)), self.classes.count])
-            answer = _solve(search, np.append(np.zeros(len(self.kind)), -1.0), matrix, limits)
+            answer = _solve(search, np.append(np.zeros(len(self.kind)), -1.0), matrix, limits, self.time_share)
             part = 0.0 if answer is None else float(-answer.fun)
             if part <= 0:
                 return None  # some task is out of reach, or there was no time
@@ -184,7 +186,7 @@ class Programme:
         cost = by_distance if self.by_place else rng.random(len(share))  # any corner is as good as another
         matrix = vstack([-self._cover(share), self.used])
         limits = np.concatenate([np.full(len(self.work), SAFETY - 1), self.classes.count])
-        answer = _solve(search, cost, matrix, limits)
+        answer = _solve(search, cost, matrix, limits, self.time_share)
         if answer is None:
             return None
         amount = np.maximum(0.0, answer.x)
@@ -197,9 +199,11 @@ class Programme:
         return csr_array((share, (self.goal, np.arange(len(share)))), shape=(len(self.work), len(share)))
 
 
-def _solve(search: Search, cost: FloatArray, matrix: csr_array, limits: FloatArray) -> OptimizeResult | None:
+def _solve(
+    search: Search, cost: FloatArray, matrix: csr_array, limits: FloatArray, share: float
+) -> OptimizeResult | None:
     """Minimise ``cost @ x`` with ``matrix @ x <= limits`` and x >= 0; None where time does not allow it."""
-    seconds = Parameters.share * search.remaining_s
+    seconds = share * search.remaining_s
     options = {} if seconds == math.inf else {"time_limit": seconds}
 
     def work() -> OptimizeResult:

@@ -5,7 +5,7 @@ import io
 import zipfile
 from dataclasses import asdict, fields, is_dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import torch
 
@@ -13,6 +13,7 @@ from alloc.allocators.learned.validation import VALIDATION
 from alloc.problems import Instance
 from alloc.problems.errors import InputError
 from alloc.problems.formats import write_bytes_atomically
+from alloc.problems.formats.files import reason
 from alloc.problems.game import FEATURE_SET
 
 if TYPE_CHECKING:
@@ -69,17 +70,37 @@ def generations_in(path: Path) -> int:
 
 
 def _stored(path: Path) -> dict[str, Any]:
+    """Read a checkpoint of any version; only of a file whose content is wrong it is said that it may be removed."""
     source = str(path)
     try:
-        if zipfile.is_zipfile(path):
-            state: dict[str, Any] = torch.load(path, weights_only=True)
-            if {"format", "description", "history"} <= state.keys():
-                return state
-    except Exception:  # torch's own words are about pickles
-        pass
-    if not path.exists():
-        raise InputError("no such checkpoint; leave --resume out to begin one", "", source)
-    raise InputError("is no checkpoint, or is damaged; name another by --checkpoint, or remove it", "", source)
+        with path.open("rb") as file:
+            return _unpacked(file, source)
+    except FileNotFoundError as error:
+        raise InputError("no such checkpoint; begin a run without one", "", source) from error
+    except PermissionError as error:
+        raise InputError("may not be read; change its permissions", "", source) from error
+    except OSError as error:
+        raise InputError(f"cannot be read: {reason(error)}", "", source) from error
+    except MemoryError as error:
+        raise InputError("does not fit into memory", "", source) from error
+
+
+def _unpacked(file: BinaryIO, source: str) -> dict[str, Any]:
+    message = "is no checkpoint, or is damaged; name another checkpoint, or remove it"
+    if not zipfile.is_zipfile(file):
+        raise InputError(message, "", source)
+    file.seek(0)
+    try:
+        state: dict[str, Any] = torch.load(file, weights_only=True)
+    except (OSError, MemoryError, torch.OutOfMemoryError):
+        raise
+    except Exception as error:  # torch's own words are about pickles, and its kinds of errors are many
+        if "allocate memory" in str(error):  # what torch raises where the CPU has none left is a RuntimeError
+            raise MemoryError(str(error)) from error
+        raise InputError(message, "", source) from error
+    if not isinstance(state, dict) or not {"format", "description", "history"} <= state.keys():
+        raise InputError(message, "", source)
+    return state
 
 
 def read_checkpoint(path: Path, description: dict[str, str]) -> dict[str, Any]:
@@ -98,6 +119,6 @@ def read_checkpoint(path: Path, description: dict[str, str]) -> dict[str, Any]:
     for name in sorted(stored.keys() | description.keys(), key=lambda name: (name != "method", name)):
         ours, theirs = description.get(name), stored.get(name)
         if ours != theirs:
-            message = f"is a run with {name} {theirs}, not {ours}; use the same, or another --checkpoint"
+            message = f"is a run with {name} {theirs}, not {ours}; use the same, or another checkpoint"
             raise InputError(message, "", source)
     return state

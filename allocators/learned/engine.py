@@ -12,7 +12,7 @@ from importlib.util import find_spec
 from typing import Any, Protocol, Self, TypeVar
 
 from alloc.allocators.learned.torch_state import plain_torch, torch_threads
-from alloc.problems import InputError
+from alloc.problems import InputError, MissingPackageError, TrainingError
 from alloc.problems.errors import nearest
 
 T = TypeVar("T")
@@ -23,7 +23,7 @@ PATIENCE_S = 0.05
 """Time between two questions whether to stop."""
 
 
-class EngineError(RuntimeError):
+class EngineError(TrainingError):
     """An item was given up, as every process that worked on it died."""
 
 
@@ -114,11 +114,11 @@ def answer(asked: bytes) -> bytes:
     try:
         function, item = pickle.loads(asked)
         return pickle.dumps((function(item), None))
-    except Exception as error:
+    except Exception as error:  # raised again where the work was asked for
         story = traceback.format_exc()
         try:
             pickle.loads(pickle.dumps(error))
-        except Exception:
+        except Exception:  # an exception of somebody else that does not travel
             error = RuntimeError(f"{type(error).__name__}: {error}")
         return pickle.dumps((error, story))
 
@@ -135,19 +135,19 @@ def result(answered: bytes) -> Any:
 def check_engine(name: str, workers: int | None = None, address: str | None = None) -> None:
     """Raise an `InputError` for options that `make_engine` would refuse, as far as that can be told at once."""
     if name not in ENGINES:
-        raise InputError(f"no such engine: {name!r}{nearest(name, ENGINES)}", "--engine")
+        raise InputError(f"no such engine: {name!r}{nearest(name, ENGINES)}", "engine")
     if workers is not None and name != "processes":
-        raise InputError("belongs to --engine processes", "--workers")
+        raise InputError("belongs to the engine processes", "workers")
     if address is not None and name != "ray":
-        raise InputError("belongs to --engine ray", "--address")
+        raise InputError("belongs to the engine ray", "address")
     if name == "ray" and find_spec("ray") is None:
-        raise InputError("Ray is not installed: pip install 'alloc-mrta[cluster]'", "--engine")
+        raise MissingPackageError("Ray is not installed: pip install 'alloc-mrta[cluster]'", "engine")
 
 
 def make_engine(
     name: str = "serial", workers: int | None = None, address: str | None = None, threads: int = 1
 ) -> Engine:
-    """Return the engine of the options ``--engine``, ``--workers`` and ``--address``.
+    """Return an engine.
 
     Parameters
     ----------

@@ -25,7 +25,7 @@ METHODS = {
 
 def _names(method: str) -> tuple[str, str, str]:
     if method not in METHODS:
-        raise InputError(f"{method!r} learns nothing{nearest(method, tuple(METHODS))}", "METHOD")
+        raise InputError(f"{method!r} learns nothing{nearest(method, tuple(METHODS))}", "method")
     return METHODS[method]
 
 
@@ -62,12 +62,12 @@ def method_parameters(method: str, settings: dict[str, str] | None = None) -> An
     for name, text in (settings or {}).items():
         if name not in known:
             defaults = ", ".join(f"{one}={_text(getattr(default, one))}" for one in known)
-            raise InputError(f"{method} has no parameter {name!r}; its parameters and defaults: {defaults}", "--set")
+            raise InputError(f"{method} has no parameter {name!r}; its parameters and defaults: {defaults}", "settings")
         values[name] = _read(name, text, getattr(default, name))
     try:
         return kind(**values)
     except InputError as error:
-        raise InputError(f"{error.place} {error.message}", "--set") from None
+        raise InputError(f"{error.place} {error.message}", "settings") from error
 
 
 def _text(value: Any) -> str:
@@ -83,5 +83,5 @@ def _read(name: str, text: str, default: Any) -> Any:
         if text.lower() == "none" and None in RANGES[name]:
             return None
         return int(text) if isinstance(default, int) else float(text)
-    except (KeyError, ValueError):
-        raise InputError(f"{name} must be like {_text(default)}, got {text!r}", "--set") from None
+    except (KeyError, ValueError) as error:
+        raise InputError(f"{name} must be like {_text(default)}, got {text!r}", "settings") from error

@@ -18,6 +18,7 @@ from alloc.allocators.learned.torch_state import plain_torch, torch_threads
 from alloc.allocators.registry import BUILT_IN
 from alloc.allocators.search import Budget, Search
 from alloc.problems import Allocation, InputError, Instance, Objective
+from alloc.problems.arguments import text
 
 GPU_PAIRS, GPU_LANES = 40_000, 512
 """`lane_pairs` and `most_lanes` of the planner on a GPU: ten times as many games take no longer there."""
@@ -146,8 +147,10 @@ def usable(device: str) -> torch.device:
         If it cannot be used here.
     """
     try:
-        torch.zeros(1, device=device).item()
+        torch.zeros(1, device=text(device, "device")).item()
         return torch.device(device)
-    except (RuntimeError, AssertionError, ImportError):  # torch's own words are about its insides
+    except torch.OutOfMemoryError as error:
+        raise InputError(f"{device!r} has no memory left", "device") from error
+    except (RuntimeError, AssertionError, ImportError) as error:  # torch's own words are about its insides
         able = "cpu or cuda" if torch.cuda.is_available() else "cpu"
-        raise InputError(f"{device!r} cannot be used here; use {able}", "device") from None
+        raise InputError(f"{device!r} cannot be used here; use {able}", "device") from error

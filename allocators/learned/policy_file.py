@@ -87,11 +87,11 @@ def load_policy(path: Path | str, method: str | None, device: torch.device | Non
     tensors = load(read_bytes(path))  # opened by Python, to which every name of a file is one
     try:
         size, count = NetworkSize(**json.loads(said["size"])), int(said["networks"])
-    except (KeyError, TypeError, ValueError):
-        raise InputError("does not describe its networks; use a file by `alloc train`", "metadata", source) from None
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError("does not describe its networks; use a file by `alloc train`", "metadata", source) from error
     theirs = said.get("method", "")
     if method not in (None, theirs) and theirs in METHODS:
-        raise InputError(f"holds a policy of {theirs}; use it with --method {theirs}", "", source)
+        raise InputError(f"holds a policy of {theirs}; use it with the method {theirs}", "", source)
     expected = _description(size, count, theirs if method is None else method)
     for key in ("format", "method", "features", "feature_counts"):
         if said.get(key) != expected[key]:
@@ -105,14 +105,14 @@ def load_policy(path: Path | str, method: str | None, device: torch.device | Non
         return [_network(size, tensors, number, device) for number in range(count)]
     except (RuntimeError, ValueError) as error:
         reason = next(iter(str(error).splitlines()), type(error).__name__)
-        raise InputError(f"holds other weights than its size says ({reason})", "size", source) from None
+        raise InputError(f"holds other weights than its size says ({reason})", "size", source) from error
 
 
 def _turn(said: Mapping[str, str], source: str) -> str:
     try:
         turn: str = json.loads(said.get("training", "{}")).get("turn", Turn.BIDDING)
-    except (AttributeError, ValueError):
-        raise InputError("does not describe its training; use a file by `alloc train`", "training", source) from None
+    except (AttributeError, ValueError) as error:
+        raise InputError("does not describe its training; use a file by `alloc train`", "training", source) from error
     return turn
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import torch
 
 from alloc.allocators.learned.engine import PATIENCE_S, Engine, EngineError, R, T, answer, never, request, result
-from alloc.problems import InputError
+from alloc.problems import InputError, MissingPackageError
 
 TRIES = 5
 """Times that an item is begun at the most; more than in processes, as whole machines come and go."""
@@ -43,8 +43,8 @@ class RayEngine(Engine):
     def __init__(self, address: str | None = None, threads: int = 1, tries: int = TRIES) -> None:
         try:
             import ray
-        except ImportError:
-            raise InputError("Ray is not installed: pip install 'alloc-mrta[cluster]'", "--engine") from None
+        except ImportError as error:
+            raise MissingPackageError("Ray is not installed: pip install 'alloc-mrta[cluster]'", "engine") from error
         self._ray: Any = ray
         self._ours = not ray.is_initialized()
         if self._ours:
@@ -62,14 +62,14 @@ class RayEngine(Engine):
         try:
             with _terminations_kept():
                 self._ray.init(address=address, log_to_driver=False, logging_level="ERROR")
-        except Exception as error:
-            raise InputError(f"no Ray cluster at {address!r}: {_reason(error)}", "--address") from None
+        except Exception as error:  # of whatever kind the versions of Ray raise
+            raise InputError(f"no Ray cluster at {address!r}: {_reason(error)}", "address") from error
 
     def _check_processors(self, threads: int) -> None:
         """Raise an `InputError` where Ray would wait forever, without a word, for a machine that is large enough."""
         most = max((int(node["Resources"].get("CPU", 0)) for node in self._ray.nodes() if node["Alive"]), default=0)
         if 0 < most < threads:  # a cluster without any may grow with the work
-            raise InputError(f"no machine of the cluster has {threads} processors; the largest has {most}", "--threads")
+            raise InputError(f"no machine of the cluster has {threads} processors; the largest has {most}", "threads")
 
     def map(
         self, function: Callable[[T], R], items: Sequence[T], should_stop: Callable[[], bool] = never
@@ -116,7 +116,7 @@ def _check_reachable(address: str) -> None:
     try:
         socket.create_connection((host.strip("[]"), int(port)), timeout=CONNECT_S).close()
     except (OSError, OverflowError, UnicodeError) as error:
-        raise InputError(f"no Ray cluster at {address!r}: {error}", "--address") from None
+        raise InputError(f"no Ray cluster at {address!r}: {error}", "address") from error
 
 
 @contextlib.contextmanager

@@ -26,6 +26,8 @@ from alloc.allocators.learned.network import NetworkSize, unfilled
 from alloc.allocators.learned.policy_file import save_policy
 from alloc.allocators.learned.training_log import TrainingLog
 from alloc.allocators.learned.validation import Validation, validate, validation_boards
+from alloc.problems import InputError
+from alloc.problems.arguments import whole
 from alloc.problems.game import PLANNING, Board, Rules
 
 Weights = dict[str, torch.Tensor]
@@ -59,6 +61,10 @@ class TrainingParameters:
     breeding: BreedingParameters = field(default_factory=BreedingParameters)
     curriculum: Curriculum = field(default_factory=Curriculum)
     rules: Rules = PLANNING
+
+    def __post_init__(self) -> None:
+        if whole(self.population, "population", 1) > 1 and self.method == "ddpg":
+            raise InputError("breeding crosses single networks, ddpg has an actor and a critic; use 1", "population")
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from alloc.problems import InputError
+from alloc.problems import MissingPackageError
 from alloc.problems.formats import write_text_atomically
 
 
@@ -72,9 +72,9 @@ def summary_writer() -> Any:
     """
     try:
         from torch.utils.tensorboard import SummaryWriter
-    except ImportError:
+    except ImportError as error:
         message = "needs TensorBoard, which is not installed; pip install 'alloc-mrta[train]'"
-        raise InputError(message, "--tensorboard") from None
+        raise MissingPackageError(message, "tensorboard") from error
     return SummaryWriter
 
 

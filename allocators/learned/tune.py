@@ -6,13 +6,14 @@ Akiba et al. (2019), arXiv:1907.10902 (Optuna), whose tree-structured Parzen est
 median rule ends trials.
 """
 
+import os
 from collections.abc import Callable
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from alloc.allocators.learned.train import Limits, Trainer, TrainingParameters
-from alloc.problems import InputError
+from alloc.problems import InputError, MissingPackageError
 from alloc.problems.game import Board
 
 if TYPE_CHECKING:
@@ -63,8 +64,11 @@ def open_study(path: Path, method: str, seed: int) -> "optuna.Study":
     """
     try:
         import optuna
-    except ImportError:
-        raise InputError("needs Optuna, which is not installed; pip install 'alloc-mrta[tune]'", "alloc tune") from None
+    except ImportError as error:
+        message = "needs Optuna, which is not installed; pip install 'alloc-mrta[tune]'"
+        raise MissingPackageError(message, "alloc tune") from error
+    if path.exists() and not os.access(path, os.R_OK | os.W_OK):
+        raise InputError("may not be read and written; change its permissions", source=str(path))
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     try:
         study = optuna.create_study(
@@ -75,9 +79,11 @@ def open_study(path: Path, method: str, seed: int) -> "optuna.Study":
         )
         study.sampler = optuna.samplers.TPESampler(seed=seed + len(study.trials))  # nothing is drawn twice
         return study
-    except Exception as error:
+    except MemoryError:
+        raise
+    except Exception as error:  # of Optuna, SQLAlchemy, Alembic or sqlite3: of what is in the file
         reason = next(iter(str(error).splitlines()), type(error).__name__)[:100]
-        raise InputError(f"is not a file of studies ({reason})", source=str(path)) from None
+        raise InputError(f"is not a file of studies ({reason})", source=str(path)) from error
 
 
 def tune(

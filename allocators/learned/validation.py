@@ -83,7 +83,7 @@ def hold_out(instances: Sequence[Instance]) -> tuple[list[Instance], list[Instan
     """
     busy = [instance for instance in instances if (instance.workload > 0).any()]
     if not busy:
-        raise InputError("there is no work to do in any instance; nothing can be learned", "--instances")
+        raise InputError("there is no work to do in any instance; nothing can be learned", "instances")
     count = min(MOST_OWN, len(busy) // 5)
     if not count:
         return busy, busy

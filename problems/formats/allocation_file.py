@@ -3,6 +3,7 @@
 from typing import Any
 
 from alloc.problems.allocation import Allocation
+from alloc.problems.arguments import of_type
 from alloc.problems.errors import InputError
 from alloc.problems.formats import json_text
 from alloc.problems.formats.columns import check_names, require_format
@@ -56,6 +57,7 @@ def read_claims(path: PathLike, instance: Instance) -> tuple[Allocation, str | N
         What the result says of itself, which nobody has checked; empty for an allocation alone.
     """
     source = named(path)
+    of_type(instance, Instance, "instance")
     try:
         document = json_text.parse(read_text(path))
         allocation, name = allocation_from_document(document, instance)
@@ -121,10 +123,13 @@ def write_allocation(allocation: Allocation, instance: Instance, path: PathLike)
     InputError
         If it cannot be written.
     """
+    source = named(path, output=True)
+    of_type(instance, Instance, "instance")
+    of_type(allocation, Allocation, "allocation")
     try:
         write_text_atomically(path, json_text.lines(allocation_to_document(allocation, instance)))
     except InputError as error:
-        raise told(error, named(path, output=True)) from error.__cause__
+        raise told(error, source) from error.__cause__
 
 
 def allocation_to_document(allocation: Allocation, instance: Instance) -> dict[str, Any]:

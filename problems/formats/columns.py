@@ -162,9 +162,11 @@ def _allowed(lists: Sequence[Sequence[str] | None] | None, index: dict[str, int]
     allowed: list[list[int] | None] = []
     for row, names in enumerate(lists):
         try:
-            allowed.append(None if names is None else [index[name] for name in names])
+            tasks = None if names is None else [index[name] for name in names]
+            # what is named twice counts once; as long a list with repetitions would pass for a row of a matrix
+            allowed.append(sorted(set(tasks)) if tasks is not None and len(tasks) == len(index) else tasks)
         except KeyError as error:
-            raise _unknown_task(error.args[0], index, f"agents[{row}].tasks") from None
+            raise _unknown_task(error.args[0], index, f"agents[{row}].tasks") from error
     return allowed
 
 

@@ -54,9 +54,9 @@ class Table:
         given = list(map(bool, cells))
         try:
             return self._parse(cells, given)
-        except ValueError:
+        except ValueError as error:
             row = next(row for row, cell in enumerate(cells) if cell and not _is_number(cell))
-            raise InputError(f"must be a number, got {quoted(cells[row])}", self.place(row, column)) from None
+            raise InputError(f"must be a number, got {quoted(cells[row])}", self.place(row, column)) from error
 
     def _parse(self, cells: list[str], given: list[bool]) -> FloatArray:
         values = np.full(len(cells), np.nan)
@@ -114,7 +114,7 @@ def read_folder(folder: Path, default_name: str) -> Instance:
     try:
         return columns.build()
     except InputError as error:
-        raise InputError(error.message, _translated(error.place, agents, tasks)) from None
+        raise InputError(error.message, _translated(error.place, agents, tasks)) from error
 
 
 def write_folder(instance: Instance, folder: Path) -> None:
@@ -175,14 +175,14 @@ def _read_header(path: Path, default_name: str) -> dict[str, Any]:
         return header_values(header, default_name)
     except InputError as error:
         place = f"{path.name} {error.place}" if error.place.startswith("line") else f"{path.name}, {error.place}"
-        raise InputError(error.message, place.removesuffix(", ")) from None
+        raise InputError(error.message, place.removesuffix(", ")) from error
 
 
 def _read_table(path: Path, known: Sequence[str], required: Sequence[str]) -> Table:
     try:
         text = read_text(path)
     except InputError as error:
-        raise InputError(error.message, f"{path.name} {error.place}".rstrip()) from None
+        raise InputError(error.message, f"{path.name} {error.place}".rstrip()) from error
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
     rows: list[list[str]] = []
     lines: list[int] = []
@@ -192,7 +192,7 @@ def _read_table(path: Path, known: Sequence[str], required: Sequence[str]) -> Ta
                 rows.append(row)
                 lines.append(reader.line_num)
     except csv.Error as error:
-        raise InputError(f"is not CSV: {error}", f"{path.name} line {reader.line_num}") from None
+        raise InputError(f"is not CSV: {error}", f"{path.name} line {reader.line_num}") from error
     if not rows:
         raise InputError(f"is empty; its first line must name the columns: {','.join(known)}", path.name)
     names = [name.strip() for name in rows[0]]

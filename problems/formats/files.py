@@ -7,6 +7,7 @@ import stat
 import sys
 from pathlib import Path
 
+from alloc.problems.arguments import of_type
 from alloc.problems.errors import InputError
 from alloc.problems.formats.messages import one_line
 
@@ -31,7 +32,7 @@ _NO_MOVE = {
 
 def named(path: PathLike, *, output: bool = False) -> str:
     """Return what messages call `path`."""
-    text = os.fspath(path)
+    text = os.fspath(of_type(path, (str, os.PathLike), "path"))
     if text == STANDARD_STREAM:
         return "standard output" if output else "standard input"
     return one_line(text, 4096) or "''"
@@ -79,16 +80,16 @@ def read_bytes(path: PathLike) -> bytes:
         if not is_stream(path):
             _refuse_unless_regular(os.stat(path).st_mode, source)
         return Path(path).read_bytes()
-    except FileNotFoundError:
-        raise InputError("there is no such file; check the path", source=source) from None
-    except PermissionError:
-        raise InputError("may not be read; change its permissions", source=source) from None
+    except FileNotFoundError as error:
+        raise InputError("there is no such file; check the path", source=source) from error
+    except PermissionError as error:
+        raise InputError("may not be read; change its permissions", source=source) from error
     except (OSError, ValueError) as error:
         if isinstance(error, InputError):
             raise
         raise InputError(f"cannot be read: {reason(error)}", source=source) from error
-    except MemoryError:
-        raise InputError("does not fit into memory", source=source) from None
+    except MemoryError as error:
+        raise InputError("does not fit into memory", source=source) from error
 
 
 def read_text(path: PathLike) -> str:
@@ -105,7 +106,7 @@ def read_text(path: PathLike) -> str:
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         message = f"is not UTF-8 (byte 0x{data[error.start]:02x}); save it as UTF-8"
-        raise InputError(message, f"line {line}", named(path)) from None
+        raise InputError(message, f"line {line}", named(path)) from error
 
 
 def write_text_atomically(path: PathLike, text: str) -> None:
@@ -114,7 +115,7 @@ def write_text_atomically(path: PathLike, text: str) -> None:
         data = text.encode("utf-8")
     except UnicodeEncodeError as error:
         message = f"cannot be written: {text[error.start]!r} is half a character, and no UTF-8"
-        raise InputError(message, source=named(path, output=True)) from None
+        raise InputError(message, source=named(path, output=True)) from error
     write_bytes_atomically(path, data)
 
 

@@ -3,6 +3,7 @@
 import os
 from pathlib import Path
 
+from alloc.problems.arguments import of_type
 from alloc.problems.errors import InputError
 from alloc.problems.formats import json_text
 from alloc.problems.formats.csv_folder import read_folder, write_folder
@@ -75,10 +76,12 @@ def write_instance(instance: Instance, path: PathLike) -> None:
     InputError
         If it cannot be written.
     """
+    source = named(path, output=True)
+    of_type(instance, Instance, "instance")
     try:
         _write(instance, path)
     except InputError as error:
-        raise told(error, named(path, output=True)) from error.__cause__
+        raise told(error, source) from error.__cause__
 
 
 def _write(instance: Instance, path: PathLike) -> None:

@@ -33,9 +33,9 @@ def parse(text: str) -> Any:
     except JSONDecodeError as error:
         end = " (the file ends here; is it cut off?)" if not text[error.pos :].strip() else ""
         message = f"is not JSON: {error.msg[0].lower()}{error.msg[1:]}{end}"
-        raise InputError(message, f"line {error.lineno} column {error.colno}") from None
-    except RecursionError:
-        raise InputError("is nested too deeply; the formats need no more than four levels") from None
+        raise InputError(message, f"line {error.lineno} column {error.colno}") from error
+    except RecursionError as error:
+        raise InputError("is nested too deeply; the formats need no more than four levels") from error
 
 
 def require_object(value: Any, place: str = "") -> dict[str, Any]:

@@ -1,6 +1,7 @@
 """An instance as a columnar .npz file: one array per field, for up to millions of agents."""
 
 import io
+import math
 import zipfile
 from collections.abc import Mapping
 from typing import Any
@@ -89,7 +90,7 @@ def from_npz(data: bytes, default_name: str) -> Instance:
     try:
         return columns.build()
     except InputError as error:
-        raise InputError(error.message, _translated(error.place)) from None
+        raise InputError(error.message, _translated(error.place)) from error
 
 
 def to_npz(instance: Instance) -> bytes:
@@ -157,6 +158,8 @@ def _load(data: bytes) -> dict[str, NDArray[Any]]:
             return {_field(member.filename): _read(archive, member) for member in members}
     except InputError:
         raise
+    except MemoryError as error:
+        raise InputError("does not fit into memory") from error
     except Exception as error:  # zipfile raises half a dozen kinds for damaged archives
         raise InputError(f"is no .npz file, or damaged: {_words(error)}") from error
 
@@ -186,7 +189,10 @@ def _read(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> NDArray[Any]:
         if len(content) != member.file_size or file.read(1):
             raise InputError("is cut off", f"array {name}")
     try:
+        _check_promise(content, name)
         array: NDArray[Any] = npy.read_array(io.BytesIO(content), allow_pickle=False)
+    except (InputError, MemoryError):
+        raise
     except Exception as error:  # numpy parses the header as Python text, and passes on what that raises
         raise InputError(f"cannot be read: {_words(error)}", f"array {name}") from error
     if array.dtype.kind not in KINDS[kind]:
@@ -195,6 +201,17 @@ def _read(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> NDArray[Any]:
     if array.ndim != dimensions or (dimensions == 2 and array.shape[1] not in (2, 3)):
         raise InputError(f"must have shape ({shape}), got {array.shape}", f"array {name}")
     return array
+
+
+def _check_promise(content: bytes, name: str) -> None:
+    """Raise an `InputError` where a header promises more than there is: room for it is not even asked for."""
+    file = io.BytesIO(content)
+    headers = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
+    read_header = headers.get(npy.read_magic(file))
+    if read_header is not None:
+        shape, _, dtype = read_header(file)
+        if math.prod(shape) * dtype.itemsize > len(content):
+            raise InputError("cannot be read: its header promises more than there is", f"array {name}")
 
 
 def _check_lengths(arrays: Arrays) -> None:

@@ -85,3 +85,16 @@ def test_gaps_share_the_best_bound():
     assert greedy.gap_mean == pytest.approx(1 - 13 / 11 / greedy.makespan_mean)
     assert cpsat.gap_worst == pytest.approx(0, abs=1e-6)
     assert [(row.lower_bound, row.number) for row in others] == [(0.5, 2), (0.5, 2)]
+
+
+def test_tracebacks_of_failures_are_logged(caplog, monkeypatch):
+    """A run that fails is a row; what failed where is in the log of `alloc`."""
+
+    def fail(*arguments, **options):
+        raise ZeroDivisionError("in a plugin")
+
+    monkeypatch.setattr("alloc.allocators.heuristic.greedy.Greedy.allocate", fail)
+    (row,) = compare([Instance(ability=[1], workload=[1])], ["greedy"])
+    assert "ZeroDivisionError" in row.reason
+    assert caplog.records[0].exc_info[0] is ZeroDivisionError
+    assert caplog.records[0].name.startswith("alloc")

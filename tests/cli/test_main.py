@@ -117,6 +117,15 @@ def test_module_and_version(module):
         ("compare", "small.json", "--methods", ","),
         ("compare", "small.json", "--methods", "greedy", "--seeds", "1,x"),
         ("compare", "small.json", "--methods", "greedy", "--seeds", "0"),
+        ("pareto",),
+        ("pareto", "nowhere.json", "--json"),
+        ("pareto", "small.json", "--points", "0"),
+        ("pareto", "small.json", "--method", "gredy"),
+        ("pareto", "small.json", "--method", "greedy"),
+        ("pareto", "small.json", "--time-limit", "nan"),
+        ("pareto", "small.json", "--start", "small.json"),
+        ("pareto", "small.json", "--plot", "picture.gif"),
+        ("pareto", "small.json", "--output", "nowhere/front.json"),
         ("generate", "paper-5"),
         ("generate", "paper-1", "--agents", "3"),
         ("generate", "random", "--battery", "1:x"),
@@ -133,6 +142,48 @@ def test_bad_usage_is_one_line(alloc, small, arguments):
     assert (ran.code, ran.out) == (2, "")
     assert ran.err.startswith("alloc: ")
     assert ran.err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "begin"),
+    [
+        (("solve", "small.json", "--time-limit", "inf"), "--time-limit: must be a finite number"),
+        (("solve", "small.json", "--makespan-slack", "0.1"), "--makespan-slack: leaves room for less energy"),
+        (("solve", "small.json", "--method", "gredy"), "--method: there is no method 'gredy'"),
+        (("solve", "small.json", "--method", "greedy", "--policy", "x"), "--policy: method 'greedy' takes no option"),
+        (("pareto", "small.json", "--time-limit", "inf"), "--time-limit: must be a finite number"),
+        (("compare", "small.json", "--methods", "gredy"), "--methods: there is no method 'gredy'"),
+        (("generate", "random", "--range", "5:3"), "--range: must not end"),
+        (("generate", "covering", "--ability-min", "0"), "--ability-min: must be a whole number >= 1"),
+        (("generate", "random", "--tau", "2"), "--tau: must lie strictly between 0 and 1"),
+        (("train", "ga", "--output", "p"), "METHOD: 'ga' learns nothing"),
+        (("train", "ppo", "--output", "p", "--set", "clip=x"), "--set: clip must be like"),
+        (("train", "ppo", "--output", "p", "--workers", "2"), "--workers: belongs to the engine processes"),
+        (("train", "ppo", "--output", "p", "--family", "x"), "--family: no such family"),
+    ],
+)
+def test_the_parameters_of_the_library_are_told_as_options(alloc, small, arguments, begin):
+    """What the library says of a parameter, the command line says of its own option or argument."""
+    ran = alloc(*arguments)
+    assert ran.code == 2
+    assert ran.err.startswith(f"alloc: {begin}")
+
+
+def test_places_in_a_file_are_no_options(alloc):
+    """A field of a file that is called as an option is stays the field that it is."""
+    Path("bad.json").write_bytes(instance_of(b'"ability": 1').replace(b"{", b'{"tau": 2, ', 1))
+    assert alloc("solve", "bad.json").err.startswith("alloc: bad.json: tau: must lie")
+
+
+def test_no_memory_is_bad_input(alloc, small, monkeypatch):
+    """An instance that is too large for this machine is no defect."""
+
+    def fail(*arguments, **options):
+        raise MemoryError
+
+    monkeypatch.setattr("alloc.allocators.solve", fail)
+    ran = alloc("solve", "small.json")
+    assert (ran.code, ran.err) == (2, "alloc: there is not enough memory for this\n")
 
 
 def instance_of(agent: bytes, task: bytes = b'"workload": 1') -> bytes:

@@ -33,7 +33,7 @@ def test_defaults() -> None:
         ({"workload": [1, NAN]}, "tasks[1].workload"),
         ({"priority": [1, -2]}, "tasks[1].priority"),
         ({"battery": [-1, 1]}, "agents[0].battery"),
-        ({"battery": [NAN, 1]}, "agents[0].battery"),
+        ({"priority": [NAN, 1]}, "tasks[0].priority"),
         ({"communication_range": [1, -1]}, "agents[1].range"),
         ({"speed": [0, 1]}, "agents[0].speed"),
         ({"tau": 1.0}, "tau"),

@@ -187,9 +187,9 @@ def test_make_engine_refuses_what_does_not_fit() -> None:
     assert isinstance(make_engine(), SerialEngine)
     with make_engine("processes", workers=2) as engine:
         assert isinstance(engine, ProcessEngine)
-    with pytest.raises(InputError, match=r"--engine: no such engine: 'process' \(did you mean 'processes'\?\)"):
+    with pytest.raises(InputError, match=r"engine: no such engine: 'process' \(did you mean 'processes'\?\)"):
         make_engine("process")
-    with pytest.raises(InputError, match="--workers: belongs to --engine processes"):
+    with pytest.raises(InputError, match="workers: belongs to the engine processes"):
         make_engine("serial", workers=2)
-    with pytest.raises(InputError, match="--address: belongs to --engine ray"):
+    with pytest.raises(InputError, match="address: belongs to the engine ray"):
         make_engine("processes", address="auto")

@@ -130,7 +130,7 @@ def test_a_policy_of_ones_own(tmp_path: Path) -> None:
     instance = paper_like(12, 4, 50, 0)
     result = solve(instance, "ppo", policy=tmp_path / "own.safetensors", iterations=2, time_limit_s=None)
     assert result.makespan is not None
-    with pytest.raises(InputError, match=r"own\.safetensors: holds a policy of ppo; use it with --method ppo"):
+    with pytest.raises(InputError, match=r"own\.safetensors: holds a policy of ppo; use it with the method ppo"):
         load("gappo", policy=tmp_path / "own.safetensors")
 
 

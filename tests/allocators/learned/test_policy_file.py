@@ -58,7 +58,7 @@ def test_a_folder_is_no_policy(tmp_path: Path) -> None:
 def test_policy_of_another_method(tmp_path: Path, networks: list[ActorCritic]) -> None:
     """A policy that another method trained is not used by mistake."""
     save_policy(tmp_path / "p.safetensors", networks, "dqn")
-    with pytest.raises(InputError, match="holds a policy of dqn; use it with --method dqn"):
+    with pytest.raises(InputError, match="holds a policy of dqn; use it with the method dqn"):
         load_policy(tmp_path / "p.safetensors", "gappo")
     save_policy(tmp_path / "p.safetensors", networks, "newer")
     with pytest.raises(InputError, match="method: is 'newer', this version needs 'gappo'"):

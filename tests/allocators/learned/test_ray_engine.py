@@ -27,7 +27,7 @@ from alloc.problems.generate import paper_like
 def test_without_ray_the_mend_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     """One line says what to install."""
     monkeypatch.setitem(sys.modules, "ray", None)
-    with pytest.raises(InputError, match=r"--engine: Ray is not installed: pip install 'alloc-mrta\[cluster\]'"):
+    with pytest.raises(InputError, match=r"engine: Ray is not installed: pip install 'alloc-mrta\[cluster\]'"):
         make_engine("ray")
 
 
@@ -36,7 +36,7 @@ def test_nobody_there(address: str) -> None:
     """An address where no cluster is, is told at once, where Ray itself tries for minutes."""
     pytest.importorskip("ray")
     began = time.monotonic()
-    with pytest.raises(InputError, match=f"--address: no Ray cluster at '{address}': "):
+    with pytest.raises(InputError, match=f"address: no Ray cluster at '{address}': "):
         make_engine("ray", address=address)
     assert time.monotonic() - began < 30
 
@@ -48,7 +48,7 @@ def test_a_cluster_that_cannot_be_joined(monkeypatch: pytest.MonkeyPatch) -> Non
         raise RuntimeError("Version mismatch: The cluster was started with:\n    Ray: 2.9.0\n    Python: 3.9.1")
 
     monkeypatch.setattr(pytest.importorskip("ray"), "init", refuse)
-    with pytest.raises(InputError, match=r"--address: no Ray cluster at 'x': Version .* with: Ray: 2\.9\.0 Python: 3"):
+    with pytest.raises(InputError, match=r"address: no Ray cluster at 'x': Version .* with: Ray: 2\.9\.0 Python: 3"):
         make_engine("ray", address="x")
 
 
@@ -85,7 +85,7 @@ def test_same_results_in_order(engine: Engine) -> None:
 @pytest.mark.slow
 def test_more_threads_than_processors(cluster: Any, engine: Engine) -> None:
     """What no machine can ever do is told at once, where Ray waits forever; the connection is still there."""
-    with pytest.raises(InputError, match=r"--threads: no machine of the cluster has 2 processors; the largest has 1"):
+    with pytest.raises(InputError, match=r"threads: no machine of the cluster has 2 processors; the largest has 1"):
         make_engine("ray", address=cluster.address, threads=2)
     assert engine.map(jobs.square, [3]) == [9]
 

@@ -280,3 +280,33 @@ def test_checkpoints_of_other_runs_are_refused(tmp_path: Path, changes: dict[str
     trainer().save(tmp_path / "checkpoint")
     with pytest.raises(InputError, match=message):
         trainer(**changes).resume(tmp_path / "checkpoint")
+
+
+def test_files_that_cannot_be_read_are_not_called_damaged(tmp_path, monkeypatch):
+    """No memory, no permission and a damaged file are three things: only the last is advised to be removed."""
+    path = tmp_path / "run.checkpoint"
+    trainer().save(path)
+    for error, words in (
+        (MemoryError(), "does not fit into memory"),
+        (RuntimeError("DefaultCPUAllocator: can't allocate memory"), "does not fit into memory"),
+        (PermissionError(13, "Permission denied"), "may not be read"),
+        (RuntimeError("invalid header"), "or remove it"),
+    ):
+        with monkeypatch.context() as patch, pytest.raises(InputError, match=words) as caught:
+            patch.setattr("torch.load", _raising(error))
+            trainer().resume(path)
+        assert caught.value.__cause__ is not None
+        assert ("remove" in str(caught.value)) == (words == "or remove it")
+
+
+def _raising(error):
+    def fail(*arguments, **options):
+        raise error
+
+    return fail
+
+
+def test_ddpg_is_not_bred():
+    """Breeding needs single networks, which is told before anything is trained."""
+    with pytest.raises(InputError, match="population: breeding"):
+        TrainingParameters(method="ddpg", population=2)

@@ -1,0 +1,105 @@
+"""What arguments may be: checked at the public door, so that errors name the parameter and nothing fails deep inside.
+
+Values of other types that mean the same are taken: numpy's numbers, strings for enumerations.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Set
+from enum import StrEnum
+from numbers import Integral, Real
+from typing import Any, TypeVar
+
+import numpy as np
+
+from alloc.problems.errors import InputError
+
+Kind = TypeVar("Kind")
+Choice = TypeVar("Choice", bound=StrEnum)
+
+
+def whole(value: object, name: str, low: int = 0, high: int | None = None) -> int:
+    """Return a whole number from `low` to `high` as an int."""
+    if isinstance(value, Integral) and not isinstance(value, bool):
+        number = int(value)
+        if low <= number and (high is None or number <= high):
+            return number
+    ends = f">= {low}" if high is None else f"from {low} to {high}"
+    raise InputError(f"must be a whole number {ends}, got {shown(value)}", name)
+
+
+def real(
+    value: object, name: str, low: float = 0.0, high: float = math.inf, *, above: bool = False, unit: str = ""
+) -> float:
+    """Return a finite number from `low` to `high`, as Python's own; `above`: `low` itself is out."""
+    if isinstance(value, Real) and not isinstance(value, bool | np.bool_):
+        number = value.item() if isinstance(value, np.generic) else value
+        if (low < number if above else low <= number) and number <= high and number < math.inf:
+            return number if isinstance(number, int | float) else float(number)
+    ends = f"{'>' if above else '>='} {low:g}" + (f" and at most {high:g}" if high < math.inf else "")
+    raise InputError(f"must be a finite number {unit}{ends}, got {shown(value)}", name)
+
+
+def flag(value: object, name: str) -> bool:
+    """Return True or False, numpy's as well."""
+    if isinstance(value, bool | np.bool_):
+        return bool(value)
+    raise InputError(f"must be True or False, got {shown(value)}", name)
+
+
+def text(value: object, name: str) -> str:
+    """Return a string as Python's own."""
+    if isinstance(value, str):
+        return str(value)
+    raise InputError(f"must be a string, got {shown(value)}", name)
+
+
+def choice(kind: type[Choice], value: object, name: str) -> Choice:
+    """Return the member of an enumeration that `value` is, or is called."""
+    try:
+        return kind(value)
+    except ValueError as error:
+        raise InputError(f"must be one of {', '.join(kind)}; got {shown(value)}", name) from error
+
+
+def of_type(value: object, kind: type[Kind] | tuple[type[Kind], ...], name: str) -> Kind:
+    """Return `value` if it is of this type, or of one of these."""
+    if isinstance(value, kind):
+        return value
+    kinds = kind if isinstance(kind, tuple) else (kind,)
+    expected = " or ".join(("an " if one.__name__[0] in "AEIO" else "a ") + one.__name__ for one in kinds)
+    raise InputError(f"must be {expected}, got {shown(value)}", name)
+
+
+def function(value: object, name: str) -> Callable[..., Any] | None:
+    """Return what can be called, or None."""
+    if value is None or callable(value):
+        return value
+    raise InputError(f"must be a function, got {shown(value)}", name)
+
+
+def event(value: Any, name: str) -> Any:
+    """Return None, or what can be set and asked as a `threading.Event` can."""
+    if value is None or all(callable(getattr(value, method, None)) for method in ("is_set", "set")):
+        return value
+    raise InputError(f"must be a threading.Event, got {shown(value)}", name)
+
+
+def listed(values: Iterable[Any], name: str, what: str) -> list[Any]:
+    """Return the entries of a list, an array or a generator; `what` they should be.
+
+    A string is one value, not its letters, and a set has no order.
+    """
+    if not isinstance(values, str | bytes | Mapping | Set):
+        try:
+            return list(values)
+        except TypeError as error:
+            raise InputError(f"must be a list of {what}, got {shown(values)}", name) from error
+    raise InputError(f"must be a list of {what}, got {shown(values)}", name)
+
+
+def shown(value: object) -> str:
+    """Return a value for a message: itself if it is short, else its type."""
+    if value is None or isinstance(value, str | int | float | np.number | np.bool_):
+        words = str(value) if isinstance(value, np.generic) and not isinstance(value, str) else repr(value)
+        return words if len(words) <= 60 else f"{words[:57]}..."
+    return f"a {type(value).__name__}"
