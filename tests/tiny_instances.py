@@ -32,3 +32,18 @@ def tiny_instance(seed: int) -> Instance:
         speed=np.where(rng.random(n) < 0.7, rng.uniform(0.2, 3, n), np.inf) if coin[8] else None,
         energy_per_distance=float(rng.choice([1.0, 6.0])),
     )
+
+
+def long_travel(seed: int) -> Instance:
+    """Return 160 equal agents for whom a flight to one of 5 equal tasks takes about as long as the work there."""
+    rng = np.random.default_rng(seed)
+    world = [1400, 1000]
+    return Instance(
+        ability=np.ones(160),
+        workload=np.full(5, 1000.0),
+        agent_position=rng.uniform(0, 1, (160, 2)) * world,
+        task_position=rng.uniform(0, 1, (5, 2)) * world,
+        battery=rng.uniform(30, 100, 160),
+        speed=np.full(160, 10.0),
+        energy_per_distance=0.05,
+    )
