@@ -56,6 +56,10 @@ def _number(value: object) -> float:
     raise TypeError(f"{value!r} is no number")
 
 
+LEAST, MOST = 1e-60, 1e60
+"""Magnitudes between which quotients and products of a few numbers neither under- nor overflow."""
+
+
 def vector(values: ArrayLike, field_name: str, length: int | None = None) -> FloatArray:
     """Return numbers in one row, copied."""
     array = numbers(values, field_name)
@@ -101,10 +105,13 @@ def positions(values: ArrayLike | None, count: int, kind: str) -> FloatArray:
     if array.shape[1] == 2:
         array = np.column_stack([array, np.where(np.isnan(array[:, 0]), np.nan, 0.0)])
     blank = np.isnan(array).all(axis=1)
-    wrong = ~blank & ~np.isfinite(array).all(axis=1)
-    if wrong.any():
-        row = int(np.argmax(wrong))
-        raise InputError(f"must be finite numbers, got {array[row].tolist()}", f"{kind}s[{row}].position")
+    for wrong, rule in (
+        (~blank & ~np.isfinite(array).all(axis=1), "finite numbers"),
+        (~blank & (np.abs(array) > MOST).any(axis=1), f"numbers from {-MOST:g} to {MOST:g}; use larger units"),
+    ):
+        if wrong.any():
+            row = int(np.argmax(wrong))
+            raise InputError(f"must be {rule}, got {array[row].tolist()}", f"{kind}s[{row}].position")
     return array
 
 
@@ -207,3 +214,12 @@ def require(
         row = int(np.argmin(good))
         kind, ids = owner
         raise InputError(f"must be {rule}, got {values[row]:g} ({kind} {ids[row]!r})", f"{kind}s[{row}].{field_name}")
+
+
+def require_magnitude(
+    values: FloatArray, field_name: str, owner: tuple[str, tuple[str, ...]], most: float = MOST
+) -> None:
+    """Raise `InputError` for the first value > 0 that is below `LEAST` or beyond `most`; `owner` as in `require`."""
+    good = (values == 0) | ((values >= LEAST) & (values <= most))
+    bounds = f">= {LEAST:g}" if most == np.inf else f"from {LEAST:g} to {most:g}"
+    require(good, values, field_name, f"{bounds}, in smaller units or larger ones", owner)

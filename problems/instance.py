@@ -33,15 +33,15 @@ class Instance(fields.ReadOnly):
     Parameters
     ----------
     ability : array_like, shape (n,)
-        Work per hour of each agent, > 0 (w_i of the paper).
+        Work per hour of each agent, > 0, from 1e-60 to 1e60 (w_i of the paper).
     workload : array_like, shape (m,)
-        Work that each task needs, >= 0 (h_j).
+        Work that each task needs, 0 or from 1e-60 to 1e60 (h_j).
     name : str
         Name of the instance.
     agent_ids, task_ids : sequence of str, optional
         Unique names; a1, a2, ... and t1, t2, ... by default.
     agent_position, task_position : array_like, shape (n, 2), (n, 3), (m, 2) or (m, 3), optional
-        Cartesian coordinates in units of distance; NaN rows where unknown.
+        Cartesian coordinates in units of distance, from -1e60 to 1e60; NaN rows where unknown.
     start_task : array_like of int, shape (n,), optional
         Index of the task where an agent begins, -1 for none; gives its position where `agent_position` is unknown.
     battery : array_like, shape (n,), optional
@@ -49,7 +49,7 @@ class Instance(fields.ReadOnly):
     communication_range : array_like, shape (n,), optional
         Farthest task that an agent can take, in units of distance, >= 0.
     speed : array_like, shape (n,), optional
-        Distance per hour, > 0; ``inf`` means that travel takes no time, which is (4) of the paper.
+        Distance per hour, >= 1e-60; ``inf`` means that travel takes no time, which is (4) of the paper.
     allowed_tasks : sequence of (sequence of int, or None), optional
         Task indices that each agent may do; None for all. No matrix of who may do what.
     priority : array_like, shape (m,), optional
@@ -57,7 +57,7 @@ class Instance(fields.ReadOnly):
     tau : float
         Base of the reward (3), 0 < tau < 1.
     energy_per_distance : float
-        Energy per unit of distance, >= 0 (k of (19)).
+        Energy per unit of distance, 0 or from 1e-60 to 1e60 (k of (19)).
 
     Raises
     ------
@@ -147,9 +147,12 @@ class Instance(fields.ReadOnly):
             self.communication_range >= 0, self.communication_range, "range", "a number >= 0, or null", agents
         )
         fields.require(self.speed > 0, self.speed, "speed", "a number > 0, or null", agents)
-        with np.errstate(over="ignore"):
-            if not (np.isfinite(self.ability.sum()) and np.isfinite(self.workload.sum())):
-                raise InputError("the sum of all abilities and of all workloads must be finite; use smaller units")
+        fields.require_magnitude(self.ability, "ability", agents)
+        fields.require_magnitude(self.workload, "workload", tasks)
+        fields.require_magnitude(self.speed, "speed", agents, most=np.inf)
+        if self.energy_per_distance and not fields.LEAST <= self.energy_per_distance <= fields.MOST:
+            rule = f"0 or from {fields.LEAST:g} to {fields.MOST:g}"
+            raise InputError(f"must be {rule}, got {self.energy_per_distance:g}", "energy_per_distance")
 
     def __repr__(self) -> str:
         return f"Instance(name={self.name!r}, n={self.n}, m={self.m})"

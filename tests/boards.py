@@ -7,18 +7,18 @@ from alloc.problems.game import Board, State, begin, make_board, step, tasks_of
 
 EXTREMES = {
     "huge": Instance(
-        ability=[1e300, 1e307],
-        workload=[1e300, 1e-300],
-        task_position=[[1e300, 0], [-1e300, 0]],
-        agent_position=[[0, 0], [1e300, 0]],
+        ability=[1e53, 1e60],
+        workload=[1e60, 1e-60],
+        task_position=[[1e60, 0], [-1e60, 0]],
+        agent_position=[[0, 0], [1e60, 0]],
         battery=[1e300, 1e-300],
-        speed=[1e-300, 1e300],
+        speed=[1e-60, 1e300],
         priority=[1e308, 1e308],
-        energy_per_distance=1e300,
+        energy_per_distance=1e60,
     ),
     "tiny": Instance(
-        ability=[1e-300, 1e-310],
-        workload=[1e-300, 1e300],
+        ability=[1e-50, 1e-60],
+        workload=[1e-60, 1e60],
         task_position=[[1e-300, 0], [-1e-300, 0]],
         agent_position=[[0, 0], [1, 0]],
         priority=[1e-308, 0],

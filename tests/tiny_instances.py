@@ -68,3 +68,18 @@ def scaled_instance(seed: int) -> Instance:
         speed=np.where(rng.random(n) < 0.7, rng.uniform(0.2, 3, n) * far / much, np.inf) if coin[4] else None,
         energy_per_distance=6.0 if coin[5] else 1.0,
     )
+
+
+def long_travel(seed: int) -> Instance:
+    """Return 160 equal agents for whom a flight to one of 5 equal tasks takes about as long as the work there."""
+    rng = np.random.default_rng(seed)
+    world = [1400, 1000]
+    return Instance(
+        ability=np.ones(160),
+        workload=np.full(5, 1000.0),
+        agent_position=rng.uniform(0, 1, (160, 2)) * world,
+        task_position=rng.uniform(0, 1, (5, 2)) * world,
+        battery=rng.uniform(30, 100, 160),
+        speed=np.full(160, 10.0),
+        energy_per_distance=0.05,
+    )

@@ -24,7 +24,7 @@ GPU_PAIRS, GPU_LANES = 40_000, 512
 """`lane_pairs` and `most_lanes` of the planner on a GPU: ten times as many games take no longer there."""
 
 LOCAL_PRICE = 2.0
-"""Weight of energy in the game that local search goes on from."""
+"""Weight of energy in the game that local search goes on from, where travel takes no time."""
 
 
 class PolicyAllocator(Allocator):
@@ -133,7 +133,8 @@ class GappoLs(Gappo):
         """Play one game on the whole instance, then improve its plan by local search."""
         from alloc.allocators.heuristic.local.improve import improve
 
-        Planner(search, self.networks, self.parameters).play_whole(LOCAL_PRICE)
+        price = self.parameters.first_price if search.instance.has_travel_time else LOCAL_PRICE
+        Planner(search, self.networks, self.parameters).play_whole(price)
         with search.improving("local search"):
             improve(search)
 

@@ -115,11 +115,11 @@ def test_a_large_surplus_gives_no_reward_but_no_warning() -> None:
 
 
 def test_served_tasks_are_never_called_unserved() -> None:
-    """Hours beyond floats, by little ability or little speed, are the largest float and not infinite."""
-    slow = Instance(ability=[1e-300], workload=[1e300])
-    assert evaluate(slow, Allocation([0])).makespan == sys.float_info.max
-    far = Instance(ability=[1], workload=[1], agent_position=[[0, 0]], task_position=[[9, 0]], speed=[5e-324])
-    assert evaluate(far, Allocation([0])).makespan == sys.float_info.max
+    """The longest hours that numbers within their limits give, by little ability or little speed, are finite."""
+    slow = Instance(ability=[1e-60], workload=[1e60])
+    assert evaluate(slow, Allocation([0])).makespan == pytest.approx(1e120)
+    far = Instance(ability=[1], workload=[1], agent_position=[[0, 0]], task_position=[[1e60, 0]], speed=[1e-60])
+    assert evaluate(far, Allocation([0])).makespan == pytest.approx(1e120)
 
 
 @pytest.mark.parametrize("tasks", [[0], [0, 0, 0], [0, 3], [-2, 0]])
@@ -192,9 +192,9 @@ def test_scores_are_read_only(line: Instance) -> None:
 @pytest.mark.parametrize(
     "fields",
     [
-        {"agent_position": [[1e200, 0], [0, 0]], "task_position": [[-1e200, 0], [0, 1]]},
-        {"agent_position": [[1e308, 1e308], [0, 0]], "task_position": [[-1e308, 0], [0, 1]], "speed": [1e-300, 1]},
-        {"agent_position": [[100, 0], [0, 0]], "task_position": [[0, 0], [0, 1]], "energy_per_distance": 1e307},
+        {"agent_position": [[1e50, 0], [0, 0]], "task_position": [[-1e50, 0], [0, 1]]},
+        {"agent_position": [[1e60, 1e60], [0, 0]], "task_position": [[-1e60, 0], [0, 1]], "speed": [1e-60, 1]},
+        {"agent_position": [[100, 0], [0, 0]], "task_position": [[0, 0], [0, 1]], "energy_per_distance": 1e60},
     ],
 )
 def test_scores_and_bounds_stay_finite(fields: dict) -> None:

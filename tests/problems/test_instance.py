@@ -46,7 +46,13 @@ def test_defaults() -> None:
         ({"allowed_tasks": [[], [-1]]}, "agents[1].tasks"),
         ({"allowed_tasks": [None, [0.5]]}, "agents[1].tasks"),
         ({"allowed_tasks": [None]}, "allowed_tasks"),
-        ({"ability": [1e308, 1e308]}, ""),
+        ({"ability": [1e61, 1]}, "agents[0].ability"),
+        ({"ability": [1, 1e-61]}, "agents[1].ability"),
+        ({"workload": [5e-324, 0]}, "tasks[0].workload"),
+        ({"workload": [0, 1e300]}, "tasks[1].workload"),
+        ({"speed": [1, 5e-324]}, "agents[1].speed"),
+        ({"energy_per_distance": 1e61}, "energy_per_distance"),
+        ({"task_position": [[0, 0], [0, -1.7e308]]}, "tasks[1].position"),
     ],
 )
 def test_errors_name_the_place(fields: dict, place: str) -> None:

@@ -53,7 +53,7 @@ def stretched(instance: Instance, factor: float) -> Instance:
         )
 
 
-FACTORS = st.sampled_from([1.0, 0.1, 1 / 3, 1e-200, 1e120, 1e200])
+FACTORS = st.sampled_from([1.0, 0.1, 1 / 3, 1e-200, 1e30, 1e59])
 
 
 @given(instances(), FACTORS)

@@ -110,7 +110,7 @@ class Chain:
         return float(self.plan.figure[FLOWN])
 
     def longest(self) -> float:
-        """Hours that the plan takes as it is, at no speed limits; an estimate where travel takes time."""
+        """Hours that the plan takes as it is, where travel takes no time."""
         work = self.plan.need[:-1] > 0
         with np.errstate(divide="ignore"):
             return float((self.instance.workload[work] / self.plan.load[:-1][work]).max() / self.ground.unit)

@@ -42,6 +42,8 @@ class Ground(NamedTuple):
     scale, energy_per_distance, unit : float
     whole : bool
         Whether all abilities are whole numbers in `unit`, and travel takes no time.
+    instant : bool
+        Whether travel takes no time.
     """
 
     ability: FloatArray
@@ -58,6 +60,7 @@ class Ground(NamedTuple):
     energy_per_distance: float
     unit: float
     whole: bool
+    instant: bool
 
 
 def survey(instance: Instance) -> Ground:
@@ -81,6 +84,7 @@ def survey(instance: Instance) -> Ground:
         energy_per_distance=reach.energy_per_distance,
         unit=step,
         whole=unit is not None,
+        instant=not instance.has_travel_time,
     )
 
 

@@ -165,7 +165,8 @@ def _attempt(search: Search, chain: Chain, clock: Clock, hours: float, noises: F
             break
         chain.run(exchanges, Weights(0.0, noise, 0.0, 1.0, 2.0, chain.sums), 1.0)
         search.iteration += 1
-    if not chain.short or chain.longest() < search.fastest.evaluation.served_makespan:
+    # where travel takes time, only the score tells how long a plan takes
+    if not chain.short or not chain.ground.instant or chain.longest() < search.fastest.evaluation.served_makespan:
         search.submit(chain.allocation)
     return not chain.short
 

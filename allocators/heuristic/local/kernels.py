@@ -243,6 +243,8 @@ def exchange(
     most = MOST_FREE // 2 if by_sum else MOST_HALVED // 2
     if plan.size[task] + plan.size[other] <= MOST_TRIED:
         most = MOST_TRIED
+    elif not ground.instant:  # what an agent brings depends on the task: to be just enough for one is no guide
+        most = MOST_TRIED // 2
     pool: int = np.int64(0)  # type: ignore[assignment]
     for group in (task, other):
         if plan.size[group] > 0:

@@ -15,7 +15,8 @@ MOST_TRIED = 12
 """The same where every set of them is tried."""
 
 MOST_HALVED = 16
-"""The same where there are more, and only sets that are just enough are tried; halves and space must fit."""
+"""The same where there are more, travel takes no time, and only sets that are just enough are tried; halves and space
+must fit."""
 
 TABLE_SIZE = 4096
 """Random numbers that are drawn beforehand."""

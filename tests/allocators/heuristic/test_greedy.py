@@ -48,7 +48,7 @@ def test_legal_and_complete(instance: Instance) -> None:
     assert len(result.evaluation.unserved_tasks) == fewest_unserved(instance)
 
 
-@given(instances(most_agents=12, most_tasks=30), st.sampled_from([1.0, 1 / 3, 1e200]))
+@given(instances(most_agents=12, most_tasks=30), st.sampled_from([1.0, 1 / 3, 1e50]))
 def test_the_tree_does_what_the_scan_does(instance: Instance, factor: float) -> None:
     """Compiled or not, each agent gets the same task: ranges, batteries, lists, travel times and unknown places."""
     instance = replace(

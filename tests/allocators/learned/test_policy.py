@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from tiny_instances import long_travel
 
 from alloc.allocators import Budget, RefusedError, Status, load, solve
 from alloc.allocators.base import Allocator
@@ -113,6 +114,16 @@ def test_local_search_goes_on_from_the_policy() -> None:
     assert alone is not None
     assert both is not None
     assert both.is_better_than(alone, Objective.MAKESPAN_ENERGY)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_the_hybrid_is_never_behind_its_policy(gappo: Allocator, seed: int) -> None:
+    """Where travel takes long, `gappo-ls` begins with the first plan of `gappo`, and soon has a far better one."""
+    instance = long_travel(seed)
+    first = solve(instance, gappo, iterations=0, time_limit_s=None, threads=1).makespan
+    hybrid = solve(instance, "gappo-ls", iterations=30, time_limit_s=None, threads=1)
+    assert hybrid.trace[0].evaluation.served_makespan == first
+    assert hybrid.makespan < 0.98 * first
 
 
 def test_too_large_an_instance_is_refused_beforehand(gappo: Allocator) -> None:

@@ -85,7 +85,7 @@ def full() -> Instance:
         workload=[20, 0],
         agent_ids=["a1", 'Zoë; \\ or "so"', "line\r\nbreak,"],
         task_ids=["t;1", "t2\\"],
-        agent_position=[[0.1, 0.2, 0.3], [np.nan] * 3, [-0.0, 1e-300, 1e300]],
+        agent_position=[[0.1, 0.2, 0.3], [np.nan] * 3, [-0.0, 1e-300, 1e60]],
         task_position=[[0, 0, 0], [np.nan] * 3],
         start_task=[1, -1, 0],
         battery=[20, np.inf, 0],

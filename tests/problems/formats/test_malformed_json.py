@@ -165,8 +165,8 @@ def test_documents_that_break_a_rule(tmp_path: Path, document: dict[str, Any], p
     assert words in error.message
 
 
-def test_sums_that_overflow(tmp_path: Path) -> None:
-    """Abilities that are finite, but not in total, are refused."""
+def test_magnitudes_that_overflow(tmp_path: Path) -> None:
+    """Abilities that are finite, but beyond what is worked with, are refused with the limits."""
     document = changed(agents=[{"id": name, "ability": 1.7e308} for name in "ab"])
     (tmp_path / "x.json").write_text(json.dumps(document))
-    assert "use smaller units" in the_error(tmp_path / "x.json").message
+    assert "must be from 1e-60 to 1e+60" in the_error(tmp_path / "x.json").message

