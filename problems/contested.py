@@ -166,13 +166,13 @@ def contested_tasks(instance: Instance) -> IntArray | None:
 
 def _first_contested(instance: Instance, near: Neighbours, tasks: IntArray) -> IntArray | None:
     """Halve the tasks in question, again and again, for the first that cannot be served along with those before."""
-    served, end = 0, len(tasks) + 1  # so many tasks, in this order, can be served; so many cannot
+    if not (_origin_of_task(instance, near, tasks)[tasks] == IDLE).any():
+        return None
+    served, end = 0, len(tasks)  # so many tasks, in this order, can be served; so many cannot
     while end - served > 1:
-        middle = len(tasks) if end > len(tasks) else (served + end) // 2
+        middle = (served + end) // 2
         origin = _origin_of_task(instance, near, tasks[:middle])
         served, end = (served, middle) if (origin[tasks[:middle]] == IDLE).any() else (middle, end)
-        if served == len(tasks):
-            return None
     origin = _origin_of_task(instance, near, tasks[:served])
     origin[tasks[served:]] = IDLE
     return _rivals(near, origin, tasks[served:end], instance.m)[0]

@@ -35,7 +35,7 @@ def scarce(seed: int) -> Instance:
 
 
 def test_the_least_work_is_served_where_all_reach_everything(method):
-    """With n agents for more tasks the optimum is known: the n smallest workloads against the abilities, both sorted."""
+    """The optimum of n agents for more tasks: the n smallest workloads against the abilities, both sorted."""
     for seed in range(3):
         rng = np.random.default_rng(seed)
         n, m = int(rng.integers(2, 40)), int(rng.integers(41, 200))

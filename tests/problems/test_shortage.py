@@ -30,7 +30,7 @@ def test_shortage_is_that_of_brute_force(instance: Instance) -> None:
 
 
 def test_by_hand() -> None:
-    """Agent 0 leaves the task that only the slow agent 1 can take else, since the other that it could do takes longer."""
+    """Agent 0 leaves the easiest task to agent 1, which would take ten hours for the other that it can do."""
     instance = Instance(
         ability=[100, 1, 1], workload=[1, 10, 11, 5], allowed_tasks=[[0, 2], [0, 1], [3]]
     )  # the least work, tasks 0 and 1, would take agent 1 ten hours
