@@ -55,8 +55,12 @@ def match(first: IntArray, task: IntArray) -> IntArray:
 
     size = (len(first) - 1, int(task.max(initial=0)) + 1)
     graph = csr_matrix((np.ones(len(task), dtype=np.int8), task, first), size)
-    found: IntArray = maximum_bipartite_matching(graph, perm_type="column").astype(np.intp)
-    return found
+    if size[0] > len(np.unique(task)):  # fast where the side that it begins from can all be matched
+        found = maximum_bipartite_matching(graph.T.tocsr(), perm_type="row")
+    else:
+        found = maximum_bipartite_matching(graph, perm_type="column")
+    matched: IntArray = found.astype(np.intp)
+    return matched
 
 
 def bottleneck(pairs: Pairs, known: IntArray, time_left: Callable[[], float]) -> tuple[IntArray, float]:

@@ -160,19 +160,7 @@ def contested_tasks(instance: Instance) -> IntArray | None:
         return tasks[: instance.n + 1] if len(tasks) > instance.n else None
     near = reach.neighbours
     if near is not None:
-        return _first_contested(instance, near, tasks)
+        origin = _origin_of_task(instance, near, tasks)
+        left_out = tasks[origin[tasks] == IDLE]
+        return _rivals(near, origin, left_out[:1], instance.m)[0] if len(left_out) else None
     return next((rivals for rivals in serve_in_turn(instance, tasks) if rivals is not None), None)
-
-
-def _first_contested(instance: Instance, near: Neighbours, tasks: IntArray) -> IntArray | None:
-    """Halve the tasks in question, again and again, for the first that cannot be served along with those before."""
-    if not (_origin_of_task(instance, near, tasks)[tasks] == IDLE).any():
-        return None
-    served, end = 0, len(tasks)  # so many tasks, in this order, can be served; so many cannot
-    while end - served > 1:
-        middle = (served + end) // 2
-        origin = _origin_of_task(instance, near, tasks[:middle])
-        served, end = (served, middle) if (origin[tasks[:middle]] == IDLE).any() else (middle, end)
-    origin = _origin_of_task(instance, near, tasks[:served])
-    origin[tasks[served:]] = IDLE
-    return _rivals(near, origin, tasks[served:end], instance.m)[0]
