@@ -1,6 +1,7 @@
 """The recipe: load the method, run it, serve what it left unserved, score the answer, prove what can be proven."""
 
 import importlib
+import math
 import os
 import sys
 import threading
@@ -17,6 +18,7 @@ from alloc.allocators.interrupt import ended_with_process, run_native, signals_s
 from alloc.allocators.registry import BUILT_IN, load
 from alloc.allocators.result import Result
 from alloc.allocators.search import PROVEN, STRICT, Budget, Deadline, Improvement, Search, StopReason, relative_gap
+from alloc.allocators.split import Split
 from alloc.problems import (
     Allocation,
     InputError,
@@ -24,6 +26,7 @@ from alloc.problems import (
     Objective,
     contested_tasks,
     energy_lower_bound,
+    find_shortage,
     lp_makespan_lower_bound,
     serve_all,
 )
@@ -127,30 +130,44 @@ def solve(
         importlib.import_module("scipy.optimize")  # for the bound below; loading counts for no method
     stop = stop or threading.Event()
     with ended_with_process(stop.set), signals_set(stop) if handle_signals else nullcontext():
+        end = math.inf if time_limit_s is None else time.monotonic() - spent_s + time_limit_s
+        begin = time.monotonic()
+        shortage = find_shortage(instance, lambda: 0.0 if stop.is_set() else end - time.monotonic())
         search = Search(
             instance,
             goal,
             budget,
             seed=seed,
-            start=begun,
+            start=begun if shortage is None else None,
             threads=threads or available_threads(),
             deadline=deadline,
             on_improvement=on_improvement,
             stop=stop,
-            spent_s=spent_s,
+            spent_s=spent_s + time.monotonic() - begin,
         )
-        if target_gap is not None and not allocator.method.proves:
-            seconds = UNHURRIED_S if time_limit_s is None else _patience_s(search)
-            _raise_by_programme(search, time.monotonic() + seconds)
-        proposal = allocator.allocate(search)
-        stop_reason = search.stop_reason()
-        if proposal.allocation is not None:
-            search.submit(proposal.allocation)
-        if search.best is not None and search.best.evaluation.unserved_tasks:
-            search.submit(serve_all(instance, search.best.allocation))
+        split = None if shortage is None else Split(search, shortage, begun, stop)
+        part = search if split is None else split.search
+        proposal, stop_reason = (Proposal(), None) if part is None else _run(allocator, part)
+        if split is not None:
+            split.conclude()
         runtime_s = search.elapsed_s
         notes.extend(proposal.notes)
-        return _conclude(search, allocator.method.name, proposal, stop_reason, runtime_s, notes)
+        return _conclude(search, split, allocator.method.name, proposal, stop_reason, runtime_s, notes)
+
+
+def _run(allocator: Allocator, search: Search) -> tuple[Proposal, StopReason | None]:
+    """Have `allocator` solve the instance of `search`, and serve what it left unserved; say why it stopped."""
+    if search.budget.target_gap is not None and not allocator.method.proves:
+        seconds = UNHURRIED_S if search.budget.time_limit_s is None else _patience_s(search)
+        _raise_by_programme(search, time.monotonic() + seconds)
+    proposal = allocator.allocate(search)
+    stop_reason = search.stop_reason()
+    if proposal.allocation is not None:
+        search.submit(proposal.allocation)
+    if search.best is not None and search.best.evaluation.unserved_tasks:
+        search.submit(serve_all(search.instance, search.best.allocation))
+    search.raise_bound(proposal.makespan_lower_bound or 0.0)
+    return proposal, stop_reason
 
 
 def _deadline(makespan_slack: float, makespan_limit: float | None) -> Deadline:
@@ -219,6 +236,7 @@ def _either(names: list[str]) -> str:
 
 def _conclude(
     search: Search,
+    split: Split | None,
     name: str,
     proposal: Proposal,
     stop_reason: StopReason | None,
@@ -226,10 +244,13 @@ def _conclude(
     notes: list[str],
 ) -> Result:
     instance, best = search.instance, search.best
-    search.raise_bound(proposal.makespan_lower_bound or 0.0)
     infeasible = best is not None and bool(best.evaluation.unserved_tasks)
     if infeasible:
         notes.append(_contest(instance))
+    if split is not None:
+        if split.search is not None and not split.search.fast_enough:
+            _raise_by_programme(split.search, time.monotonic() + _patience_s(search))
+        notes.extend(split.notes())
     energy_bound = None
     if best is not None and not infeasible:
         with search.improving("proving a bound"):

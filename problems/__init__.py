@@ -5,6 +5,7 @@ import logging
 from alloc.problems.allocation import Allocation
 from alloc.problems.bounds import energy_lower_bound, lp_makespan_lower_bound, makespan_lower_bound
 from alloc.problems.classes import AgentClasses, agent_classes, count_classes
+from alloc.problems.contested import contested_tasks, fewest_unserved
 from alloc.problems.errors import AllocError, InputError, MissingPackageError, RefusedError, TrainingError
 from alloc.problems.evaluation import Evaluation, Objective, Violation, evaluate
 from alloc.problems.formats import read_allocation, read_instance, write_allocation, write_instance
@@ -12,8 +13,9 @@ from alloc.problems.generate import paper, paper_like, random_instance
 from alloc.problems.generate_covering import machine_covering
 from alloc.problems.generate_family import Family
 from alloc.problems.instance import IDLE, Instance
-from alloc.problems.matching import contested_tasks, easiest_tasks, fewest_unserved, serve_all
+from alloc.problems.matching import only_allowed, serve_all
 from alloc.problems.reach import Reach
+from alloc.problems.shortage import Shortage, find_shortage
 
 __all__ = [
     "IDLE",
@@ -28,18 +30,20 @@ __all__ = [
     "Objective",
     "Reach",
     "RefusedError",
+    "Shortage",
     "TrainingError",
     "Violation",
     "agent_classes",
     "contested_tasks",
     "count_classes",
-    "easiest_tasks",
     "energy_lower_bound",
     "evaluate",
     "fewest_unserved",
+    "find_shortage",
     "lp_makespan_lower_bound",
     "machine_covering",
     "makespan_lower_bound",
+    "only_allowed",
     "paper",
     "paper_like",
     "random_instance",

@@ -116,13 +116,15 @@ def _rounding_bound(work: FloatArray, total: float, bound: float) -> float:
     def demand(time: float) -> FloatArray:
         return np.ceil(work / time * (1 - ROUNDING))
 
-    if demand(bound).sum() <= total:
+    if bound == 0 or demand(bound).sum() <= total:
         return bound
     low, high = bound, float(work[-1])
     if demand(high).sum() > total:
         return bound  # fewer units of ability than tasks: nothing that rounding could add
     while high > low * (1 + 1e-9):
         middle = (low + high) / 2
+        if not low < middle < high:
+            return bound  # next to 0, neighbouring floats are too far apart to tell
         low, high = (low, middle) if demand(middle).sum() <= total else (middle, high)
     return max(bound, float((work / demand(high)).max()))
 

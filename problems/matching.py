@@ -1,9 +1,9 @@
-"""The fewest unserved tasks: a bipartite matching of tasks with agents that can take them."""
+"""Serving tasks by moving few agents: a bipartite matching of tasks with agents that can take them."""
 
 from collections import deque
+from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from alloc.problems.allocation import Allocation, require_fit
 from alloc.problems.arguments import of_type
@@ -87,8 +87,17 @@ class _Matching:
             task, agent = came_from[task]
 
 
-def _needs_agent(instance: Instance) -> IntArray:
+def needs_agent(instance: Instance) -> IntArray:
+    """Return the tasks with workload, in ascending order."""
     return np.flatnonzero(of_type(instance, Instance, "instance").workload > 0)
+
+
+def only_allowed(instance: Instance, allocation: Allocation) -> Allocation:
+    """Return `allocation` with the agents idle that are sent where they cannot go."""
+    task = require_fit(instance, allocation).copy()
+    working = np.flatnonzero(task != IDLE)
+    task[working[~instance.reach.allows(working, task[working])]] = IDLE
+    return Allocation(task)
 
 
 def serve_all(instance: Instance, allocation: Allocation) -> Allocation:
@@ -97,12 +106,10 @@ def serve_all(instance: Instance, allocation: Allocation) -> Allocation:
     Agents sent where they cannot go are idle in the answer. A task that is served stays served. Agents change places
     along augmenting paths alone, each with the fewest moves, at whose end an idle agent is preferred, then the nearest.
     """
-    task = require_fit(instance, allocation).copy()
-    working = np.flatnonzero(task != IDLE)
-    task[working[~instance.reach.allows(working, task[working])]] = IDLE
+    task = only_allowed(instance, allocation).task_of_agent
     served = np.zeros(instance.m, dtype=bool)
     served[task[task != IDLE]] = True
-    unserved = [j for j in _needs_agent(instance).tolist() if not served[j]]
+    unserved = [j for j in needs_agent(instance).tolist() if not served[j]]
     if not unserved:
         return Allocation(task)
     if instance.reach.is_complete and instance.n * len(unserved) > MANY:
@@ -164,58 +171,8 @@ def _start(instance: Instance, task_of_agent: IntArray, unserved: int) -> _Match
     return matching
 
 
-def fewest_unserved(instance: Instance) -> int:
-    """Return how many tasks with workload no allocation can serve, at the least.
-
-    By Hopcroft and Karp (1973), doi:10.1137/0202019, on origins with their number of agents as copies.
-    """
-    from scipy.sparse import csr_matrix
-    from scipy.sparse.csgraph import maximum_bipartite_matching
-
-    tasks = _needs_agent(instance)
-    reach = instance.reach
-    if reach.is_complete:
-        return max(0, len(tasks) - instance.n)
-    near = reach.neighbours
-    if near is None:
-        matching = _start(instance, np.full(instance.n, IDLE, dtype=np.intp), len(tasks))
-        return sum(matching.serve(j) is not None for j in tasks.tolist())
-    degree = np.diff(near.first)
-    table = csr_matrix((np.ones(len(near.task), dtype=np.int8), near.task, near.first), (len(degree), instance.m))
-    copies = np.minimum(np.bincount(reach.origin, minlength=len(degree)), degree)
-    graph = table[np.repeat(np.arange(len(degree)), copies)][:, tasks].T.tocsr()
-    return int((maximum_bipartite_matching(graph, perm_type="column") == IDLE).sum())
-
-
-def easiest_tasks(instance: Instance) -> NDArray[np.bool_]:
-    """Return which tasks to serve where not all can be, shape (m,): as many as possible, and of these the least work.
-
-    Tasks that can be served together are the independent sets of a matroid, so that taking them from the least
-    workload on, where they can be served along with those before, gives the least sum, and the least k-th workload for
-    each k (Edmonds 1971, doi:10.1007/BF01584082). Tasks without workload are not among them.
-    """
-    tasks = _needs_agent(instance)
-    tasks = tasks[np.argsort(instance.workload[tasks], kind="stable")]
-    served = np.zeros(instance.m, dtype=np.bool_)
-    if instance.reach.is_complete:
-        served[tasks[: instance.n]] = True
-        return served
+def serve_in_turn(instance: Instance, tasks: IntArray) -> Iterator[IntArray | None]:
+    """Serve one task after the other along with those before; yield what stands in its way, None where nothing does."""
     matching = _start(instance, np.full(instance.n, IDLE, dtype=np.intp), len(tasks))
     for j in tasks.tolist():
-        served[j] = matching.serve(j) is None
-    return served
-
-
-def contested_tasks(instance: Instance) -> IntArray | None:
-    """Return an inclusion-minimal set of tasks that too few agents can reach, or None if all tasks can be served.
-
-    Such a set has one task more than agents that can take any of them; without any one of its tasks, the rest could
-    be served (Hall 1935, doi:10.1112/jlms/s1-10.37.26).
-    """
-    tasks = _needs_agent(instance)
-    matching = _start(instance, np.full(instance.n, IDLE, dtype=np.intp), len(tasks))
-    for j in tasks.tolist():
-        rivals = matching.serve(j)
-        if rivals is not None:
-            return rivals
-    return None
+        yield matching.serve(j)

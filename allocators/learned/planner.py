@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import astuple, dataclass, fields, replace
+from dataclasses import astuple, dataclass, fields
 from functools import cached_property
 
 import numpy as np
@@ -20,7 +20,7 @@ from alloc.allocators.learned.network import ActorCritic
 from alloc.allocators.learned.rollout import Best, position
 from alloc.allocators.pool import Pool
 from alloc.allocators.search import Search
-from alloc.problems import IDLE, Allocation, Instance, Objective, easiest_tasks, fewest_unserved, serve_all
+from alloc.problems import IDLE, Allocation, Objective, serve_all
 from alloc.problems.game import Board, begin, make_board, pick
 from alloc.problems.game.candidates import Layout, near_tasks
 from alloc.problems.game.parts import Parts, lay_out_parts
@@ -122,7 +122,7 @@ class Planner:
         self.tuning = tuning
         self.run_all: Callable[..., Iterable[Best]] = map
         self.rng = np.random.default_rng(search.seed)
-        self.instance = _servable(search.instance)
+        self.instance = search.instance
         self.aims = Aims(search, self.instance, self.parameters.patience, self.parameters.makespan_share)
         self.plan = np.full(search.instance.n, IDLE)
 
@@ -261,14 +261,6 @@ class Planner:
         start = np.where(back, away, board.start.numpy()[row])
         cheap, dear = np.log(prices)
         return Games(row, np.exp(rng.uniform(cheap, dear, lanes)), start)
-
-
-def _servable(instance: Instance) -> Instance:
-    """Return the instance without the work that is left, where not all tasks can be served; no bound counts it in."""
-    everyone = instance.reach.is_complete and instance.n >= instance.m
-    if everyone or fewest_unserved(instance) == 0:
-        return instance
-    return replace(instance, workload=np.where(easiest_tasks(instance), instance.workload, 0.0))
 
 
 def most_helpers(board: Board) -> int:

@@ -12,7 +12,6 @@ from alloc.problems import (
     Allocation,
     Instance,
     contested_tasks,
-    easiest_tasks,
     evaluate,
     fewest_unserved,
     serve_all,
@@ -114,16 +113,3 @@ def test_failed_searches_mislead_no_later_one(agents: int, tasks: int, lists: in
         instance = Instance(ability=np.ones(agents), workload=np.ones(tasks), allowed_tasks=allowed)
         served = evaluate(instance, serve_all(instance, Allocation.idle(instance)))
         assert len(served.unserved_tasks) == fewest_unserved(instance) > 0
-
-
-@given(instances(most_agents=4, most_tasks=4))
-def test_easiest_tasks_are_as_many_as_can_be_and_of_the_least_work(instance: Instance) -> None:
-    """Of all sets of as many tasks that can be served together, none has less work, and the set itself can be."""
-    chosen = np.flatnonzero(easiest_tasks(instance))
-    needed = np.flatnonzero(instance.workload > 0)
-    assert len(chosen) == len(needed) - fewest_unserved(instance)
-    assert can_all_be_served(instance, tuple(chosen.tolist()))
-    least = np.sort(instance.workload[chosen])
-    for others in combinations(needed.tolist(), len(chosen)):
-        if can_all_be_served(instance, others):
-            assert (least <= np.sort(instance.workload[list(others)])).all()

@@ -292,9 +292,10 @@ def test_files_that_cannot_be_read_are_not_called_damaged(tmp_path, monkeypatch)
         (PermissionError(13, "Permission denied"), "may not be read"),
         (RuntimeError("invalid header"), "or remove it"),
     ):
-        with monkeypatch.context() as patch, pytest.raises(InputError, match=words) as caught:
+        with monkeypatch.context() as patch:
             patch.setattr("torch.load", _raising(error))
-            trainer().resume(path)
+            with pytest.raises(InputError, match=words) as caught:
+                trainer().resume(path)
         assert caught.value.__cause__ is not None
         assert ("remove" in str(caught.value)) == (words == "or remove it")
 

@@ -1,0 +1,129 @@
+"""Agents and tasks one to one: the fastest such assignment, and the cheapest."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from alloc.problems.instance import IDLE, FloatArray, IntArray
+
+SEARCH = 10_000_000_000
+"""Agents times pairs at which looking for the cheapest assignment takes about a second."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pairs:
+    """Pairs of k agents with tasks, agent by agent: those of agent i begin at ``first[i]``.
+
+    Attributes
+    ----------
+    first : ndarray of int, shape (k + 1,)
+    task : ndarray of int, shape (p,)
+    hours : ndarray, shape (p,)
+        When the agent has done the task alone.
+    distance : ndarray, shape (p,)
+    """
+
+    first: IntArray
+    task: IntArray
+    hours: FloatArray
+    distance: FloatArray
+
+    def within(self, hours: float) -> "Pairs":
+        """Return the pairs that take at most so many hours."""
+        return self.chosen(self.hours <= hours)
+
+    def chosen(self, which: NDArray[np.bool_]) -> "Pairs":
+        """Return the pairs marked in `which`, shape (p,)."""
+        first = np.concatenate([[0], np.cumsum(which)])[self.first]
+        return Pairs(first, self.task[which], self.hours[which], self.distance[which])
+
+    @property
+    def row(self) -> IntArray:
+        """The agent of each pair."""
+        return np.repeat(np.arange(len(self.first) - 1), np.diff(self.first))
+
+
+def match(first: IntArray, task: IntArray) -> IntArray:
+    """Return a task for each row of compressed pairs, `IDLE` for none, so that as many as can be have one.
+
+    By Hopcroft and Karp (1973), doi:10.1137/0202019.
+    """
+    from scipy.sparse import csr_matrix
+    from scipy.sparse.csgraph import maximum_bipartite_matching
+
+    size = (len(first) - 1, int(task.max(initial=0)) + 1)
+    graph = csr_matrix((np.ones(len(task), dtype=np.int8), task, first), size)
+    if size[0] > len(np.unique(task)):  # fast where the side that it begins from can all be matched
+        found = maximum_bipartite_matching(graph.T.tocsr(), perm_type="row")
+    else:
+        found = maximum_bipartite_matching(graph, perm_type="column")
+    matched: IntArray = found.astype(np.intp)
+    return matched
+
+
+def bottleneck(pairs: Pairs, known: IntArray, time_left: Callable[[], float]) -> tuple[IntArray, float]:
+    """Return a task for each agent so that the last is done as early as can be, and a bound on when that is.
+
+    By halving the hours in question, with a matching for each; the bound falls short where time runs out.
+
+    Parameters
+    ----------
+    pairs : Pairs
+        With a pair for each agent and its task in `known`, or k that are no slower.
+    known : ndarray of int, shape (k,)
+        Some such assignment.
+    time_left : callable
+        Seconds.
+    """
+    best, least = known, 0.0
+    bound = float(np.minimum.reduceat(pairs.hours, pairs.first[:-1]).max())  # each takes its fastest
+    low, high = bound, float(pairs.hours.max())
+    while time_left() > 0:
+        in_question = pairs.hours[(pairs.hours >= low) & (pairs.hours <= high)]
+        if not len(in_question):
+            break
+        half = (len(in_question) - 1) // 2
+        middle = float(np.partition(in_question, half)[half])
+        within = pairs.within(middle)
+        found = match(within.first, within.task)
+        if (found == IDLE).any():
+            low = float(np.nextafter(middle, np.inf))
+            bound = max(bound, low)
+        else:
+            best, high, least = found, float(np.nextafter(middle, -np.inf)), middle
+    else:
+        return best, bound
+    return best, max(bound, least)
+
+
+def cheapest(pairs: Pairs, known: IntArray, cost: FloatArray, time_left: Callable[[], float]) -> IntArray:
+    """Return the assignment with the least sum of `cost`, shape (p,) and >= 0; `known` where time does not allow it.
+
+    By shortest augmenting paths (Jonker and Volgenant 1987, doi:10.1007/BF02278710), among the cheapest pairs of each
+    agent where all would take too long.
+    """
+    from scipy.sparse import csr_matrix
+    from scipy.sparse.csgraph import min_weight_full_bipartite_matching
+
+    k = len(known)
+    work = min(1.0, 0.2 * time_left()) * SEARCH
+    most = int(work // max(1, k * k))
+    if most < 1 or not len(cost):
+        return known
+    held = pairs.task == known[pairs.row]
+    if len(cost) > most * k:
+        if held.sum() < k:
+            return known
+        order = np.lexsort((cost, pairs.row))
+        place = np.empty(len(cost), dtype=np.intp)
+        place[order] = np.arange(len(cost)) - np.repeat(pairs.first[:-1], np.diff(pairs.first))
+        few = held | (place < most)
+        pairs, cost = pairs.chosen(few), cost[few]
+    scale = float(cost.max())
+    weight = 1.0 + (cost / scale if scale > 0 else cost)  # a sparse matrix has no pairs of weight 0
+    tasks, column = np.unique(pairs.task, return_inverse=True)
+    graph = csr_matrix((weight, column, pairs.first), shape=(k, len(tasks)))
+    chosen: IntArray = tasks[min_weight_full_bipartite_matching(graph)[1]]
+    return chosen
