@@ -38,7 +38,7 @@ STEPS_ddpg := 120000
 OPTIONS_gappo := --population 3 --set highest_rate=0.001
 
 policies: $(METHODS:%=out/policies/%.safetensors)  ## train all shipped policies from nothing; `make -j 2 policies` on two cores
-	@echo "to ship them: cp out/policies/*.safetensors allocators/learned/policies/"
+	@echo "to ship them: cp out/policies/*.safetensors allocators/learned/files/policies/"
 
 out/policies/%.safetensors: | $(VENV)/.installed
 	@mkdir -p out/policies/training

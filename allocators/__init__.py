@@ -1,10 +1,10 @@
 """Methods that allocate, behind one contract; `solve` runs and scores any of them."""
 
-from alloc.allocators.base import Allocator, Proposal, RefusedError
-from alloc.allocators.method import Kind, Method
+from alloc.allocators.contract.base import Allocator, Proposal, RefusedError
+from alloc.allocators.contract.method import Kind, Method
+from alloc.allocators.contract.search import Budget, Deadline, Improvement, Search, StopReason
 from alloc.allocators.registry import describe, load, names
 from alloc.allocators.result import Result, Status
-from alloc.allocators.search import Budget, Deadline, Improvement, Search, StopReason
 from alloc.allocators.solve import solve
 
 __all__ = [

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from alloc.allocators.base import Allocator
-from alloc.allocators.interrupt import signals_set
+from alloc.allocators.contract.base import Allocator
+from alloc.allocators.contract.search import PROVEN, Budget
 from alloc.allocators.registry import load
 from alloc.allocators.result import Result
-from alloc.allocators.search import PROVEN, Budget
+from alloc.allocators.runtime.interrupts import signals_set
 from alloc.allocators.solve import as_allocation, solve
 from alloc.problems import Allocation, Evaluation, Instance, Objective, evaluate
 from alloc.problems.arguments import event, flag, function, listed, of_type, whole

@@ -4,9 +4,9 @@ import importlib
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
-from alloc.allocators.base import Allocator
-from alloc.allocators.interrupt import ended_with_process
-from alloc.allocators.method import Kind, Method
+from alloc.allocators.contract.base import Allocator
+from alloc.allocators.contract.method import Kind, Method
+from alloc.allocators.runtime.interrupts import ended_with_process
 from alloc.problems import InputError, MissingPackageError
 from alloc.problems.arguments import text
 from alloc.problems.errors import nearest
@@ -14,14 +14,14 @@ from alloc.problems.errors import nearest
 ENTRY_POINT_GROUP = "alloc.allocators"
 
 _TARGETS = {
-    "greedy": "alloc.allocators.heuristic.greedy:Greedy",
-    "local-search": "alloc.allocators.heuristic.local_search:LocalSearch",
+    "greedy": "alloc.allocators.heuristic.greedy.list_schedule:Greedy",
+    "local-search": "alloc.allocators.heuristic.local_search.allocator:LocalSearch",
     "milp": "alloc.allocators.exact.milp:Milp",
     "cpsat": "alloc.allocators.exact.cpsat:CpSat",
-    "ga": "alloc.allocators.heuristic.ga:GeneticAlgorithm",
-    "hedonic": "alloc.allocators.heuristic.hedonic:Hedonic",
-    "auction": "alloc.allocators.heuristic.auction:Auction",
-    "lp-round": "alloc.allocators.heuristic.lp_round:LpRound",
+    "ga": "alloc.allocators.heuristic.genetic.algorithm:GeneticAlgorithm",
+    "hedonic": "alloc.allocators.heuristic.decentralised.hedonic:Hedonic",
+    "auction": "alloc.allocators.heuristic.decentralised.auction:Auction",
+    "lp-round": "alloc.allocators.heuristic.lp_rounding.allocator:LpRound",
     "gappo": "alloc.allocators.learned.policy:Gappo",
     "gappo-ls": "alloc.allocators.learned.policy:GappoLs",
     "ppo": "alloc.allocators.learned.policy:Ppo",
@@ -206,7 +206,7 @@ def load(name: str, **options: Any) -> Allocator:
     if name not in BUILT_IN:
         return _plugin_class(name)(**given)
     if "policy" in given:
-        from alloc.allocators.learned.policy_header import read_header
+        from alloc.allocators.learned.files.policy_header import read_header
 
         read_header(given["policy"])  # what is no policy is told before the seconds that torch takes
     module, _, attribute = _TARGETS[name].partition(":")

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
-from alloc.allocators.search import PROVEN, STRICT, Deadline, Improvement, StopReason, relative_gap
+from alloc.allocators.contract.search import PROVEN, STRICT, Deadline, Improvement, StopReason, relative_gap
 from alloc.problems import Allocation, Evaluation, Instance, Objective
 from alloc.problems.evaluation import RELATIVE_TOLERANCE
 

@@ -13,11 +13,20 @@ from typing import Any
 import numpy as np
 
 from alloc.allocators.auto import choose
-from alloc.allocators.base import Allocator, Proposal, RefusedError
-from alloc.allocators.interrupt import ended_with_process, run_native, signals_set
+from alloc.allocators.contract.base import Allocator, Proposal, RefusedError
+from alloc.allocators.contract.search import (
+    PROVEN,
+    STRICT,
+    Budget,
+    Deadline,
+    Improvement,
+    Search,
+    StopReason,
+    relative_gap,
+)
 from alloc.allocators.registry import BUILT_IN, load
 from alloc.allocators.result import Result
-from alloc.allocators.search import PROVEN, STRICT, Budget, Deadline, Improvement, Search, StopReason, relative_gap
+from alloc.allocators.runtime.interrupts import ended_with_process, run_native, signals_set
 from alloc.allocators.split import Split
 from alloc.problems import (
     Allocation,

@@ -3,7 +3,7 @@
 import sys
 import threading
 
-from alloc.allocators.search import PROVEN, Deadline, Search, relative_gap
+from alloc.allocators.contract.search import PROVEN, Deadline, Search, relative_gap
 from alloc.problems import Allocation, Objective, Shortage, only_allowed
 
 

@@ -10,9 +10,9 @@ from typing import Any, NoReturn
 
 import typer
 
-from alloc.cli import compare, convert, evaluate, generate, methods, pareto, solve, train, tune, validate
-from alloc.cli.console import complain, flush, write_out
+from alloc.cli.commands import compare, convert, evaluate, generate, methods, pareto, solve, train, tune, validate
 from alloc.cli.options import examples, option_of
+from alloc.cli.output.console import complain, flush, write_out
 
 SERVED, UNSERVED, BAD_INPUT = 0, 1, 2
 """Exit codes: every task is served; one is not; bad usage or bad input."""

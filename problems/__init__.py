@@ -5,17 +5,17 @@ import logging
 from alloc.problems.allocation import Allocation
 from alloc.problems.bounds import energy_lower_bound, lp_makespan_lower_bound, makespan_lower_bound
 from alloc.problems.classes import AgentClasses, agent_classes, count_classes
-from alloc.problems.contested import contested_tasks, fewest_unserved
+from alloc.problems.distances.reach import Reach
 from alloc.problems.errors import AllocError, InputError, MissingPackageError, RefusedError, TrainingError
 from alloc.problems.evaluation import Evaluation, Objective, Violation, evaluate
 from alloc.problems.formats import read_allocation, read_instance, write_allocation, write_instance
 from alloc.problems.generate import paper, paper_like, random_instance
-from alloc.problems.generate_covering import machine_covering
-from alloc.problems.generate_family import Family
+from alloc.problems.generate.covering import machine_covering
+from alloc.problems.generate.family import Family
 from alloc.problems.instance import IDLE, Instance
-from alloc.problems.matching import only_allowed, serve_all
-from alloc.problems.reach import Reach
-from alloc.problems.shortage import Shortage, find_shortage
+from alloc.problems.matching.contested import contested_tasks, fewest_unserved
+from alloc.problems.matching.serving import only_allowed, serve_all
+from alloc.problems.matching.shortage import Shortage, find_shortage
 
 __all__ = [
     "IDLE",

@@ -12,9 +12,9 @@ import numpy as np
 
 from alloc.problems.arguments import of_type, real
 from alloc.problems.classes import agent_classes, count_classes
+from alloc.problems.distances.neighbours import nearest_distance
 from alloc.problems.evaluation import completion_time, last_equal
 from alloc.problems.instance import FloatArray, Instance, IntArray
-from alloc.problems.neighbours import nearest_distance
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix

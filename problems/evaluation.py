@@ -7,9 +7,9 @@ from enum import StrEnum
 import numpy as np
 
 from alloc.problems.allocation import Allocation, require_fit
+from alloc.problems.distances.reach import TOLERANCE
 from alloc.problems.fields import ReadOnly
 from alloc.problems.instance import IDLE, FloatArray, Instance, IntArray
-from alloc.problems.reach import TOLERANCE
 
 RELATIVE_TOLERANCE = 1e-9
 """Makespans and energies this close, relatively, are equal."""

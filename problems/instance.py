@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 
 from alloc.problems import fields
 from alloc.problems.arguments import listed, real, shown, text
+from alloc.problems.distances.reach import Reach, build_reach
 from alloc.problems.errors import InputError, nearest
 from alloc.problems.fields import IDLE, FloatArray, IntArray
-from alloc.problems.reach import Reach, build_reach
 
 __all__ = ["IDLE", "FloatArray", "Instance", "IntArray"]
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from alloc.allocators import Budget, Deadline, load, solve
-from alloc.allocators.compare import compare
+from alloc.allocators.experiments.compare import compare
 from alloc.allocators.pareto import pareto
 from alloc.problems import (
     Allocation,

@@ -12,12 +12,12 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-from alloc.allocators.base import Allocator, Proposal, RefusedError
 from alloc.allocators.conformance.cases import CASES, large_case, least_energy, medium_case, optimum
 from alloc.allocators.conformance.surroundings import instance_state, process_state
+from alloc.allocators.contract.base import Allocator, Proposal, RefusedError
+from alloc.allocators.contract.search import PROVEN, STANDS, Budget, Deadline, Improvement, Search
 from alloc.allocators.registry import load
 from alloc.allocators.result import Result, Status
-from alloc.allocators.search import PROVEN, STANDS, Budget, Deadline, Improvement, Search
 from alloc.allocators.solve import refuse, solve
 from alloc.problems import Allocation, Instance, Objective, evaluate, fewest_unserved
 

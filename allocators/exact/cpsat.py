@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from ortools.sat.python import cp_model
 
-from alloc.allocators.exact.demand import Demand
-from alloc.allocators.exact.question import UNKNOWN, Answer, Question, Watch
+from alloc.allocators.exact.model import Demand
+from alloc.allocators.exact.solver_model import UNKNOWN, Answer, Question, Watch
 from alloc.allocators.exact.stages import ExactAllocator
 from alloc.allocators.registry import BUILT_IN
 from alloc.problems.instance import IntArray

@@ -11,7 +11,7 @@ import highspy
 import numpy as np
 from scipy.sparse import csc_array, csr_array, diags_array
 
-from alloc.allocators.exact.question import UNKNOWN, Answer, Question, Watch
+from alloc.allocators.exact.solver_model import UNKNOWN, Answer, Question, Watch
 from alloc.allocators.exact.stages import ExactAllocator
 from alloc.allocators.registry import BUILT_IN
 from alloc.problems.bounds import scale_to_one

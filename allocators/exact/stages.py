@@ -7,13 +7,15 @@ import numpy as np
 import scipy.optimize
 import scipy.sparse.csgraph  # noqa: F401 - both are loaded with the method, so that no run waits for them
 
-from alloc.allocators.base import Allocator, Proposal
-from alloc.allocators.exact import enumeration, narrowing, wandering
-from alloc.allocators.exact.energy import least_energy
-from alloc.allocators.exact.makespan import LeastMakespan
-from alloc.allocators.exact.question import Answer, Question, Watch, is_over
-from alloc.allocators.heuristic.greedy import greedy
-from alloc.allocators.search import Budget, Search
+from alloc.allocators.contract.base import Allocator, Proposal
+from alloc.allocators.contract.search import Budget, Search
+from alloc.allocators.exact.energy import narrowing
+from alloc.allocators.exact.energy.least_energy import least_energy
+from alloc.allocators.exact.makespan import enumeration
+from alloc.allocators.exact.makespan import repartition_search as wandering
+from alloc.allocators.exact.makespan.bisection import LeastMakespan
+from alloc.allocators.exact.solver_model import Answer, Question, Watch, is_over
+from alloc.allocators.heuristic.greedy.list_schedule import greedy
 from alloc.problems import Instance, Objective, count_classes, fewest_unserved, serve_all
 
 MAKESPAN_SHARE = 0.6

@@ -6,17 +6,17 @@ from pathlib import Path
 
 import torch
 
-from alloc.allocators.base import Allocator, Proposal
-from alloc.allocators.learned.fine_tuning import FineTuning
-from alloc.allocators.learned.hyperparameters import DqnParameters
-from alloc.allocators.learned.lanes import warm_up as play_once
-from alloc.allocators.learned.limits import too_large
-from alloc.allocators.learned.network import ActorCritic
-from alloc.allocators.learned.planner import Planner, PlannerParameters
-from alloc.allocators.learned.policy_file import load_policy
-from alloc.allocators.learned.torch_state import plain_torch, torch_threads
+from alloc.allocators.contract.base import Allocator, Proposal
+from alloc.allocators.contract.search import Budget, Search
+from alloc.allocators.learned.algorithms.hyperparameters import DqnParameters
+from alloc.allocators.learned.files.policy_file import load_policy
+from alloc.allocators.learned.network.actor_critic import ActorCritic
+from alloc.allocators.learned.play.batched_games import warm_up as play_once
+from alloc.allocators.learned.search.fine_tuning import FineTuning
+from alloc.allocators.learned.search.limits import too_large
+from alloc.allocators.learned.search.planner import Planner, PlannerParameters
+from alloc.allocators.parallel.torch_state import plain_torch, torch_threads
 from alloc.allocators.registry import BUILT_IN
-from alloc.allocators.search import Budget, Search
 from alloc.problems import Allocation, InputError, Instance, Objective
 from alloc.problems.arguments import text
 
@@ -57,7 +57,7 @@ class PolicyAllocator(Allocator):
     def _read(self, policy: Path | str | None) -> list[ActorCritic]:
         if policy is not None:
             return load_policy(policy, self.trained_by, self.device)
-        with as_file(files("alloc.allocators.learned") / "policies" / f"{self.trained_by}.safetensors") as shipped:
+        with as_file(files("alloc.allocators.learned.files") / "policies" / f"{self.trained_by}.safetensors") as shipped:
             return load_policy(shipped, self.trained_by, self.device)
 
     def refusal(self, instance: Instance, objective: Objective, budget: Budget) -> str | None:
@@ -124,14 +124,14 @@ class GappoLs(Gappo):
     method = BUILT_IN["gappo-ls"]
 
     def __init__(self, policy: Path | str | None = None, device: str = "cpu") -> None:
-        from alloc.allocators.heuristic.local.warm_up import warm_up
+        from alloc.allocators.heuristic.local_search.warm_up import warm_up
 
         super().__init__(policy, device)
         warm_up()
 
     def plan(self, search: Search) -> None:
         """Play one game on the whole instance, then improve its plan by local search."""
-        from alloc.allocators.heuristic.local.improve import improve
+        from alloc.allocators.heuristic.local_search.improve import improve
 
         price = self.parameters.first_price if search.instance.has_travel_time else LOCAL_PRICE
         Planner(search, self.networks, self.parameters).play_whole(price)

@@ -11,7 +11,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from alloc.problems.distances import distance_table
+from alloc.problems.distances.metric import distance_table
 from alloc.problems.game.candidates import near_tasks
 from alloc.problems.instance import IDLE, Instance
 

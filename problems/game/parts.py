@@ -7,7 +7,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from alloc.problems.distances import distances
+from alloc.problems.distances.metric import distances
 from alloc.problems.game.board import LARGEST, LEAST, MEAN_DISTANCE, Board, scaled, single, working_share
 from alloc.problems.instance import IDLE, Instance
 

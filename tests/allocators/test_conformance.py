@@ -9,8 +9,8 @@ import pytest
 from alloc.allocators import Budget, RefusedError, load
 from alloc.allocators.conformance import AllocatorConformance
 from alloc.allocators.conformance.cases import CASES
+from alloc.allocators.contract.search import Deadline
 from alloc.allocators.registry import BUILT_IN
-from alloc.allocators.search import Deadline
 from alloc.allocators.solve import refuse
 from alloc.problems import InputError, Objective
 

@@ -11,7 +11,7 @@ import pytest
 
 from alloc.allocators import Allocator, Method, Proposal
 from alloc.allocators.conformance import AllocatorConformance
-from alloc.allocators.heuristic.greedy import greedy
+from alloc.allocators.heuristic.greedy.list_schedule import greedy
 from alloc.problems import Allocation, Objective, evaluate, serve_all
 
 PLAIN = Method(name="sound", summary="tries random allocations", finite_speeds=True, makespan_slack=True)

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from alloc.allocators.pool import Pool
+from alloc.allocators.parallel.pool import Pool
 
 PROGRAM = """
 import os, sys, threading, time

@@ -11,7 +11,7 @@ import pytest
 from alloc.allocators import Budget, RefusedError, load, solve
 from alloc.allocators.auto import choose
 from alloc.problems import Family, Instance, Objective, Reach, evaluate, random_instance
-from alloc.problems.reach import TABLE_LIMIT
+from alloc.problems.distances.reach import TABLE_LIMIT
 
 
 @pytest.fixture(autouse=True)

@@ -23,13 +23,13 @@ import numpy as np
 import torch
 from from_scratch_report import publish
 
-from alloc.allocators.learned.curriculum import Curriculum, reference_board
-from alloc.allocators.learned.methods import method_parameters, new_learner
-from alloc.allocators.learned.network import ActorCritic, NetworkSize
-from alloc.allocators.learned.rollout import position
-from alloc.allocators.learned.train import Limits, Trainer, TrainingParameters
-from alloc.allocators.learned.turns import choose
-from alloc.allocators.learned.validation import VALIDATION_SEED
+from alloc.allocators.learned.algorithms.registry import method_parameters, new_learner
+from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize
+from alloc.allocators.learned.play.action_sampling import choose
+from alloc.allocators.learned.play.rollout import position
+from alloc.allocators.learned.training.curriculum import Curriculum, reference_board
+from alloc.allocators.learned.training.trainer import Limits, Trainer, TrainingParameters
+from alloc.allocators.learned.training.validation import VALIDATION_SEED
 from alloc.problems.game import PLANNING, Board, battery_left, begin, moved, step, time_over_reference
 from alloc.problems.generate import paper, paper_like
 

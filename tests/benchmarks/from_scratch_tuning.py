@@ -22,10 +22,10 @@ import torch
 from from_scratch import GAPPO, PRICE, Variant, parameters_of
 from from_scratch_report import METHODS
 
-from alloc.allocators.learned.curriculum import reference_board
-from alloc.allocators.learned.train import Limits
-from alloc.allocators.learned.tune import open_study, tune
-from alloc.allocators.learned.validation import VALIDATION_SEED
+from alloc.allocators.learned.training.curriculum import reference_board
+from alloc.allocators.learned.training.trainer import Limits
+from alloc.allocators.learned.training.tune import open_study, tune
+from alloc.allocators.learned.training.validation import VALIDATION_SEED
 from alloc.problems.game import Board
 from alloc.problems.generate import paper
 

@@ -15,8 +15,8 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from alloc.allocators.learned.network import ActorCritic, Scores
-from alloc.allocators.learned.turns import choose
+from alloc.allocators.learned.network.actor_critic import ActorCritic, Scores
+from alloc.allocators.learned.play.action_sampling import choose
 from alloc.problems import Instance, paper_like
 from alloc.problems.environments import SimultaneousEnv
 from alloc.problems.game import PAPER, PLANNING, Board, Rules, Turn, begin, make_board, step

@@ -24,7 +24,7 @@ import numpy as np
 from learned_families import ALL
 
 from alloc.allocators import RefusedError, load, names, solve
-from alloc.allocators.base import Allocator
+from alloc.allocators.contract.base import Allocator
 from alloc.problems import Family, random_instance
 
 PAGE = Path(__file__).parents[2] / "docs" / "learned_methods.md"

@@ -9,11 +9,11 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
 from alloc.allocators import load, solve
-from alloc.allocators.exact.configuration import Configurations
-from alloc.allocators.exact.demand import Model
-from alloc.allocators.exact.enumeration import choose_groups, enumerate_groups
+from alloc.allocators.exact.makespan.configuration import Configurations
+from alloc.allocators.exact.makespan.enumeration import choose_groups, enumerate_groups
+from alloc.allocators.exact.model import Model
 from alloc.problems import Instance, agent_classes, machine_covering, makespan_lower_bound
-from alloc.problems.generate_covering import EQUAL_WORKLOAD
+from alloc.problems.generate.covering import EQUAL_WORKLOAD
 
 CLOSE = 1e-7
 """A bound is proven if T less than this part below it is impossible."""

@@ -140,7 +140,7 @@ def pygrape(instance: Instance, folder: str, radius: float | None) -> Answer:
     sys.path.insert(0, folder)
     import pyGRAPE  # type: ignore[import-not-found]
 
-    from alloc.allocators.heuristic.hearing import hearing
+    from alloc.allocators.heuristic.decentralised.communication import hearing
 
     graph, n = hearing(instance, np.inf if radius is None else radius), instance.n
     heard = np.ones((n, n), dtype=int) - np.eye(n, dtype=int)

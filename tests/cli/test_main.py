@@ -9,7 +9,7 @@ from command_line import COMMANDS, USAGE_ERROR, understand
 from alloc.allocators import RefusedError
 from alloc.allocators.registry import BUILT_IN, ENTRY_POINT_GROUP
 from alloc.cli import options
-from alloc.cli import solve as solve_module
+from alloc.cli.commands import solve as solve_module
 from alloc.problems import Objective
 
 READERS = [name for name, one in COMMANDS.items() if one.params[0].name in ("instance", "instances", "source")]

@@ -15,8 +15,8 @@ from PIL import Image
 
 from alloc.allocators import Result, StopReason
 from alloc.allocators.pareto import Front
-from alloc.cli.plot import save_plot
-from alloc.cli.plot_front import save_front
+from alloc.allocators.plotting.figure import save_plot
+from alloc.allocators.plotting.front import save_front
 from alloc.problems import Allocation, Instance, Objective, evaluate
 
 KEPT = Path(__file__).parent / "pictures"

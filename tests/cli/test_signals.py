@@ -17,7 +17,7 @@ PATIENCE_S = 2.5
 LAUNCHER = """
 import contextlib, importlib, sys
 from alloc.allocators import Allocator, Method, Proposal, registry
-from alloc.allocators.heuristic.greedy import greedy
+from alloc.allocators.heuristic.greedy.list_schedule import greedy
 
 class Slow(Allocator):
     method = Method(name="slow", summary="greedy, and then it waits")

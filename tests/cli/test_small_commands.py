@@ -67,7 +67,9 @@ def test_methods_lists_all(alloc):
 
 def test_methods_names_what_is_missing(alloc, monkeypatch):
     """A method whose packages are not there says how to install them."""
-    monkeypatch.setattr("alloc.allocators.method.find_spec", lambda name: None if name == "ortools" else object())
+    monkeypatch.setattr(
+        "alloc.allocators.contract.method.find_spec", lambda name: None if name == "ortools" else object()
+    )
     facts = {fact["name"]: fact for fact in alloc("methods", "--json").json}
     assert (facts["cpsat"]["installed"], facts["cpsat"]["missing"]) == (False, ["ortools"])
     assert "pip install ortools" in alloc("methods").err

@@ -20,10 +20,10 @@ from alloc.problems import (
     evaluate,
     fewest_unserved,
     makespan_lower_bound,
-    reach,
     serve_all,
 )
-from alloc.problems.neighbours import nearest_distance
+from alloc.problems.distances import reach
+from alloc.problems.distances.neighbours import nearest_distance
 
 
 @contextmanager
@@ -80,7 +80,7 @@ def test_neighbours_are_the_rows_of_the_table(instance: Instance, factor: float,
     """Gathered by trees, in chunks of any size, they are what the table holds; the nearest is the least of a row."""
     instance = stretched(instance, factor)
     table = instance.reach
-    with tableless(), patch("alloc.problems.neighbours.CHUNK", chunk):
+    with tableless(), patch("alloc.problems.distances.neighbours.CHUNK", chunk):
         lazy = replace(instance).reach
         near = lazy.neighbours
         wanted = instance.workload > 0
@@ -98,7 +98,7 @@ def test_same_scores_bounds_and_matchings(case: tuple[Instance, Allocation], man
     """Scores, bounds and how many tasks can be served do not depend on how reach is looked at."""
     instance, allocation = case
     with_table = _figures(instance, allocation)
-    with tableless(), patch("alloc.problems.matching.MANY", many):
+    with tableless(), patch("alloc.problems.matching.serving.MANY", many):
         assert _figures(replace(instance), allocation) == with_table
 
 

@@ -7,9 +7,9 @@ from tiny_instances import scaled_instance
 
 from alloc.allocators import Status, solve
 from alloc.allocators.exact.cpsat import whole_costs
-from alloc.allocators.exact.demand import Demand, Model
 from alloc.allocators.exact.milp import scaled_costs
-from alloc.allocators.exact.question import Question
+from alloc.allocators.exact.model import Demand, Model
+from alloc.allocators.exact.solver_model import Question
 from alloc.problems import (
     Instance,
     agent_classes,

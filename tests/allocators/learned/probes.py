@@ -8,8 +8,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from alloc.allocators.learned.learner import Learner, Lesson
-from alloc.allocators.learned.turns import choose
+from alloc.allocators.learned.algorithms.learner import Learner, Lesson
+from alloc.allocators.learned.play.action_sampling import choose
 from alloc.problems import Instance
 from alloc.problems.game import PLANNING, Board, Rules, begin, group_ability, make_board, step, worth
 

@@ -7,7 +7,7 @@ import torch
 from probes import probe
 from torch import Tensor
 
-from alloc.allocators.learned.learner import Learner, Lesson
+from alloc.allocators.learned.algorithms.learner import Learner, Lesson
 
 
 def weights(learner: Learner) -> Tensor:

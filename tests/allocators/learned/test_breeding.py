@@ -9,9 +9,9 @@ import pytest
 import torch
 from deap import tools
 
-from alloc.allocators.learned.gappo import BreedingParameters, Member, _drawing_from, _Genome, breed, fitness
-from alloc.allocators.learned.network import NetworkSize
-from alloc.allocators.learned.ppo import Ppo, PpoParameters
+from alloc.allocators.learned.algorithms.gappo import BreedingParameters, Member, _drawing_from, _Genome, breed, fitness
+from alloc.allocators.learned.algorithms.ppo import Ppo, PpoParameters
+from alloc.allocators.learned.network.actor_critic import NetworkSize
 
 SMALL = NetworkSize(pair_width=4, task_width=4, heads=1)
 

@@ -9,8 +9,8 @@ from boards import layout
 from test_rollout import BOARDS
 
 from alloc.allocators import load, solve
-from alloc.allocators.learned.lanes import Games, play_games
-from alloc.allocators.learned.network import ActorCritic
+from alloc.allocators.learned.network.actor_critic import ActorCritic
+from alloc.allocators.learned.play.batched_games import Games, play_games
 from alloc.problems import Family, Instance, random_instance
 from alloc.problems.game import Board, State, begin, step, sum_by_place
 from alloc.problems.generate import paper_like

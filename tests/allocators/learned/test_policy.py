@@ -12,9 +12,9 @@ import torch
 from tiny_instances import long_travel
 
 from alloc.allocators import Budget, RefusedError, Status, load, solve
-from alloc.allocators.base import Allocator
-from alloc.allocators.learned.network import ActorCritic, NetworkSize
-from alloc.allocators.learned.policy_file import save_policy
+from alloc.allocators.contract.base import Allocator
+from alloc.allocators.learned.files.policy_file import save_policy
+from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize
 from alloc.problems import Allocation, Family, InputError, Instance, Objective, random_instance
 from alloc.problems.generate import paper, paper_like
 
@@ -23,7 +23,7 @@ pytestmark = pytest.mark.timeout(400)  # the first game waits for the compiler, 
 SHIPPED = [
     name
     for name in ("gappo", "ppo", "a2c", "dqn", "ddpg")
-    if (files("alloc.allocators.learned") / "policies" / f"{name}.safetensors").is_file()
+    if (files("alloc.allocators.learned.files") / "policies" / f"{name}.safetensors").is_file()
 ]
 
 

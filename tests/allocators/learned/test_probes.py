@@ -5,8 +5,8 @@ import torch
 from probes import PROBES, best_worth, probe, share_learned, share_solved
 from same_lesson import assert_taken_up_elsewhere
 
-from alloc.allocators.learned.gappo import GappoParameters
-from alloc.allocators.learned.ppo import Ppo, PpoParameters
+from alloc.allocators.learned.algorithms.gappo import GappoParameters
+from alloc.allocators.learned.algorithms.ppo import Ppo, PpoParameters
 from alloc.problems.game import State, begin, group_ability, worth
 
 PARAMETERS = {"ppo": PpoParameters(), "gappo": GappoParameters()}

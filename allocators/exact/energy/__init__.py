@@ -1,0 +1,1 @@
+"""The least energy at a makespan: plans and bounds."""

@@ -1,0 +1,1 @@
+"""The least makespan: plans and bounds from bisection on T."""

@@ -1,0 +1,1 @@
+"""Experiments: several methods on several instances and seeds."""

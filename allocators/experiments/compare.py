@@ -1,0 +1,245 @@
+"""Several methods on several instances and seeds: one row for each method and instance."""
+
+import logging
+import threading
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from alloc.allocators.contract.base import Allocator, RefusedError
+from alloc.allocators.contract.search import Budget, StopReason, relative_gap
+from alloc.allocators.registry import load
+from alloc.allocators.result import Result
+from alloc.allocators.solve import LARGEST_SEED, MOST_THREADS, solve
+from alloc.problems import InputError, Instance, Objective
+from alloc.problems.arguments import choice, event, listed, of_type, text, whole
+
+LOG = logging.getLogger("alloc.compare")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Row:
+    """How one method did on one instance, over all seeds.
+
+    Attributes
+    ----------
+    instance, method : str
+    picked : str
+        What ran, where the method is ``auto``.
+    agents, tasks : int
+    runs : int
+        Runs that the figures are taken over; 0 for a refusal.
+    statuses : str
+        The status that all runs ended with, or all of them, separated by ``/``.
+    unserved : int or None
+        Most tasks left unserved in a run.
+    makespan_mean, makespan_worst : float or None
+        In hours; None if a run left a task unserved, as are the bounds and the gaps.
+    lower_bound : float or None
+        Best bound on the makespan that a run proved.
+    gap_mean, gap_worst : float or None
+        Of the makespan, each run against the bound that it proved itself; see `share_bounds`.
+    energy_mean, energy_worst : float or None
+    runtime_mean_s, runtime_worst_s : float or None
+    reason : str
+        Why there are no figures: what the method refuses, what is missing, or how it failed.
+    number : int
+        Which of the instances, from 1, as names may repeat.
+    makespans : tuple of float
+        Of each run, where all served all tasks; not in `to_dict`.
+    """
+
+    instance: str
+    method: str
+    agents: int
+    tasks: int
+    picked: str = ""
+    runs: int = 0
+    statuses: str = ""
+    unserved: int | None = None
+    makespan_mean: float | None = None
+    makespan_worst: float | None = None
+    lower_bound: float | None = None
+    gap_mean: float | None = None
+    gap_worst: float | None = None
+    energy_mean: float | None = None
+    energy_worst: float | None = None
+    runtime_mean_s: float | None = None
+    runtime_worst_s: float | None = None
+    reason: str = ""
+    number: int = 1
+    makespans: tuple[float, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the fields by name."""
+        return {name: value for name, value in asdict(self).items() if name != "makespans"}
+
+
+def compare(
+    instances: Iterable[Instance],
+    methods: Sequence[str],
+    seeds: Sequence[int] = (0,),
+    *,
+    objective: Objective | str = Objective.MAKESPAN,
+    time_limit_s: float | None = 10.0,
+    iterations: int | None = None,
+    target_gap: float | None = None,
+    threads: int | None = None,
+    stop: threading.Event | None = None,
+) -> Iterator[Row]:
+    """Run every method on every instance with every seed.
+
+    Parameters
+    ----------
+    instances : iterable of Instance
+    methods : sequence of str
+        Names; each method is loaded once.
+    seeds : sequence of int
+    objective, time_limit_s, iterations, target_gap, threads
+        As in `solve`; the budget is that of each single run.
+    stop : threading.Event, optional
+        Setting it ends the comparison; the run in progress is dropped.
+
+    Returns
+    -------
+    iterator of Row
+        Each as soon as all its runs are done. A method that refuses an instance, is not installed, or fails gives a
+        row with the reason; the traceback of a failure goes to the logger ``alloc``.
+
+    Raises
+    ------
+    InputError
+        If an argument is not what it should be; its place is the parameter.
+    """
+    names = [text(name, "methods") for name in listed(methods, "methods", "names of methods")]
+    numbers = [whole(seed, "seeds", 0, LARGEST_SEED) for seed in listed(seeds, "seeds", "whole numbers")]
+    problems = instances if isinstance(instances, Iterator) else listed(instances, "instances", "instances")
+    Budget(time_limit_s, iterations, target_gap)
+    stop = event(stop, "stop") or threading.Event()
+    run = partial(
+        solve,
+        objective=choice(Objective, objective, "objective"),
+        time_limit_s=time_limit_s,
+        iterations=iterations,
+        target_gap=target_gap,
+        threads=None if threads is None else whole(threads, "threads", 1, MOST_THREADS),
+        stop=stop,
+        handle_signals=False,
+    )
+    return _rows(run, problems, names, numbers, stop)
+
+
+def _rows(
+    run: Callable[..., Result],
+    instances: Iterable[Instance],
+    methods: Sequence[str],
+    seeds: Sequence[int],
+    stop: threading.Event,
+) -> Iterator[Row]:
+    loaded = {name: _load(name) for name in methods}
+    for number, instance in enumerate(instances, 1):
+        of_type(instance, Instance, "instances")
+        for name, method in loaded.items():
+            results: list[Result] = []
+            reason = ""
+            if isinstance(method, Exception):
+                reason = str(method)
+            else:
+                results, reason = _run_seeds(partial(run, instance, method), seeds)
+            if reason or results:
+                yield replace(summarise(instance, name, results, reason), number=number)
+            if stop.is_set():
+                return
+
+
+def _run_seeds(run: Callable[..., Result], seeds: Sequence[int]) -> tuple[list[Result], str]:
+    """Return the results of all seeds, or why there are none; a run that was interrupted is dropped."""
+    results: list[Result] = []
+    for seed in seeds:
+        try:
+            result = run(seed=seed)
+        except RefusedError as error:
+            return [], str(error)
+        except Exception as error:  # one faulty plugin must not cost the figures of all others
+            LOG.warning("a run failed with seed %s", seed, exc_info=error)
+            return [], f"failed with seed {seed}: {type(error).__name__}: {error}"
+        if result.stop_reason is StopReason.INTERRUPTED:
+            break
+        results.append(result)
+    return results, ""
+
+
+def summarise(instance: Instance, method: str, results: Sequence[Result], reason: str = "") -> Row:
+    """Return the row of one method on one instance.
+
+    Parameters
+    ----------
+    results : sequence of Result
+        One per seed.
+    reason : str
+        Why there are none.
+    """
+    first = Row(instance=instance.name, method=method, agents=instance.n, tasks=instance.m, reason=reason)
+    if not results:
+        return first
+    makespan_mean, makespan_worst = _mean_and_worst([result.makespan for result in results])
+    gap_mean, gap_worst = _mean_and_worst([result.gap for result in results])
+    energy_mean, energy_worst = _mean_and_worst([result.energy for result in results])
+    runtime_mean_s, runtime_worst_s = _mean_and_worst([result.runtime_s for result in results])
+    scores = [result.evaluation for result in results]
+    return replace(
+        first,
+        picked="/".join(sorted({result.method for result in results})) if method == "auto" else "",
+        runs=len(results),
+        statuses="/".join(sorted({str(result.status) for result in results})),
+        unserved=max(instance.m if score is None else len(score.unserved_tasks) for score in scores),
+        makespan_mean=makespan_mean,
+        makespan_worst=makespan_worst,
+        lower_bound=max((r.lower_bound for r in results if r.lower_bound is not None), default=None),
+        gap_mean=gap_mean,
+        gap_worst=gap_worst,
+        energy_mean=energy_mean,
+        energy_worst=energy_worst,
+        runtime_mean_s=runtime_mean_s,
+        runtime_worst_s=runtime_worst_s,
+        makespans=tuple(result.makespan for result in results if result.makespan is not None),
+    )
+
+
+def share_bounds(rows: Sequence[Row]) -> list[Row]:
+    """Return the rows with all gaps against the best bound that any method proved on the instance.
+
+    A bound holds for every method; against its own, a method that proves little would look worse than it is.
+    """
+    best: dict[int, float] = {}
+    for row in rows:
+        if row.lower_bound is not None:
+            best[row.number] = max(row.lower_bound, best.get(row.number, 0.0))
+    return [row if row.gap_mean is None else _against(row, best[row.number]) for row in rows]
+
+
+def _against(row: Row, bound: float) -> Row:
+    gap_mean, gap_worst = _mean_and_worst([relative_gap(makespan, bound) for makespan in row.makespans])
+    return replace(row, lower_bound=bound, gap_mean=gap_mean, gap_worst=gap_worst)
+
+
+def _load(name: str) -> str | Allocator | Exception:
+    """Load once; `auto` stays a name, and what cannot be loaded says so in its rows."""
+    if name == "auto":
+        return name
+    try:
+        return load(name)
+    except InputError as error:
+        return error
+    except Exception as error:  # a faulty plugin again
+        LOG.warning("method %r cannot be loaded", name, exc_info=error)
+        return ImportError(f"cannot be loaded: {type(error).__name__}: {error}")
+
+
+def _mean_and_worst(values: Sequence[float | None]) -> tuple[float | None, float | None]:
+    """None where one of the values is missing: a mean over the others alone would flatter."""
+    known = [value for value in values if value is not None]
+    return (float(np.mean(known)), max(known)) if len(known) == len(values) else (None, None)

@@ -1,0 +1,1 @@
+"""Decentralised methods: agents decide on what they and their neighbours know."""

@@ -1,0 +1,121 @@
+"""Greedy: largest ability first, each to the task that is worst served within its reach."""
+
+import heapq
+
+import numpy as np
+from numpy.typing import NDArray
+
+from alloc.allocators.contract.base import Allocator, Proposal
+from alloc.allocators.contract.search import Search
+from alloc.allocators.heuristic.greedy.exchange import fly_less
+from alloc.allocators.registry import BUILT_IN
+from alloc.problems import IDLE, Allocation, Instance, Objective, makespan_lower_bound
+
+CHECK_EVERY = 256
+"""Agents between two looks at the clock."""
+
+
+MOST_SCANNED = 20_000
+"""Agents up to which looking at all tasks is as quick as loading compiled code."""
+
+SLICE = 4_096
+"""Agents that compiled code places between two looks at the clock."""
+
+
+class Greedy(Allocator):
+    """List scheduling for machine covering: the task with the lowest W / h next, ties to the largest workload.
+
+    With travel times, an agent counts with what it does until the lower bound on the makespan.
+
+    References
+    ----------
+    Deuermeyer, Friesen and Langston (1982), doi:10.1137/0603019: 4/3 of the optimum where workloads are equal.
+    """
+
+    method = BUILT_IN["greedy"]
+
+    def allocate(self, search: Search) -> Proposal:
+        """Return one allocation; the agents that are left when time is up stay idle."""
+        return Proposal(greedy(search.instance, search))
+
+
+def greedy(instance: Instance, search: Search | None = None) -> Allocation:
+    """Build the greedy allocation; ends early when `search` says so.
+
+    Where energy counts, and everyone reaches everything at once, agents of equal ability then exchange tasks.
+    """
+    if instance.reach.is_complete and not instance.has_travel_time:
+        task = _by_heap(instance, search)
+        if search is not None and search.objective is Objective.MAKESPAN_ENERGY:
+            task = fly_less(instance, task, search.should_stop)
+        return Allocation(task)
+    if instance.reach.has_table and instance.n <= MOST_SCANNED:
+        return Allocation(_by_scan(instance, search))
+    return Allocation(_by_tree(instance, search))
+
+
+def _by_tree(instance: Instance, search: Search | None) -> NDArray[np.intp]:
+    """The same as by a scan, in about O(n log m): a tree over the tasks, in compiled code."""
+    from alloc.allocators.heuristic.greedy.task_tree import (
+        TreeGreedy,  # loads the compiler, which small instances do without
+    )
+
+    if not (instance.workload > 0).any():
+        return np.full(instance.n, IDLE, dtype=np.intp)
+    horizon = makespan_lower_bound(instance) if search is None else search.lower_bound
+    tree, order = TreeGreedy(instance, horizon), np.array(_order(instance))
+    for begin in range(0, instance.n, SLICE):
+        if search is not None and search.should_stop():
+            break
+        tree.place(order[begin : begin + SLICE])
+    return tree.task
+
+
+def _order(instance: Instance) -> list[int]:
+    order: list[int] = np.argsort(-instance.ability, kind="stable").tolist()
+    return order
+
+
+def _by_heap(instance: Instance, search: Search | None) -> NDArray[np.intp]:
+    """Every task is within everyone's reach: O(n log m)."""
+    work, ability = instance.workload.tolist(), instance.ability.tolist()
+    task = np.full(instance.n, IDLE, dtype=np.intp)
+    heap = [(0.0, -h, j) for j, h in enumerate(work) if h > 0]
+    heapq.heapify(heap)
+    group = [0.0] * instance.m
+    for count, agent in enumerate(_order(instance) if heap else []):
+        if count % CHECK_EVERY == 0 and search is not None and search.should_stop():
+            break
+        j = heap[0][2]
+        group[j] += ability[agent]
+        heapq.heapreplace(heap, (group[j] / work[j], heap[0][1], j))
+        task[agent] = j
+    return task
+
+
+def _by_scan(instance: Instance, search: Search | None) -> NDArray[np.intp]:
+    """O(n m), each agent looking at its own tasks only."""
+    reach, work = instance.reach, instance.workload
+    task = np.full(instance.n, IDLE, dtype=np.intp)
+    by_size = np.argsort(-work, kind="stable")
+    by_size = by_size[work[by_size] > 0]
+    if not len(by_size):
+        return task
+    group = np.zeros(instance.m)
+    horizon = makespan_lower_bound(instance) if search is None else search.lower_bound
+    options = [by_size[row[by_size]] for row in reach.mask]
+    for count, agent in enumerate(_order(instance)):
+        if count % CHECK_EVERY == 0 and search is not None and search.should_stop():
+            break
+        origin = reach.origin[agent]
+        tasks = options[origin]
+        if instance.has_travel_time:
+            tasks = tasks[reach.distance[origin, tasks] < horizon * instance.speed[agent]]
+        if len(tasks):
+            best = tasks[np.argmin(group[tasks] / work[tasks])]
+            task[agent] = best
+            share = 1.0
+            if instance.has_travel_time:
+                share -= reach.distance[origin, best] / (horizon * instance.speed[agent])
+            group[best] += instance.ability[agent] * share
+    return task

@@ -1,0 +1,63 @@
+"""How far a search is in a part of its budget."""
+
+import math
+
+from alloc.allocators.contract.search import Search
+
+LONG_S, LONG_ITERATIONS = 5.0, 1000
+"""Seconds and iterations beyond which a budget is long."""
+
+
+class Clock:
+    """How much of a part of the budget is gone, in time or iterations, whichever is further."""
+
+    def __init__(self, search: Search, until_s: float = math.inf, until_iteration: float = math.inf) -> None:
+        budget = search.budget
+        self.search = search
+        self.until_s = min(until_s, math.inf if budget.time_limit_s is None else budget.time_limit_s)
+        self.until_iteration = min(until_iteration, math.inf if budget.iterations is None else budget.iterations)
+        self.begin_s, self.begin_iteration = search.elapsed_s, search.iteration
+
+    def part(self, share: float) -> "Clock":
+        """Return a clock for the first part of what is left."""
+        search = self.search
+        seconds = search.elapsed_s + share * (self.until_s - search.elapsed_s)
+        iterations = (
+            search.iteration + math.ceil(share * (self.until_iteration - search.iteration))
+            if self.until_iteration < math.inf
+            else math.inf
+        )
+        return Clock(search, seconds, iterations)
+
+    @property
+    def is_endless(self) -> bool:
+        """Whether nothing but a stop from outside ends it."""
+        return min(self.until_s, self.until_iteration) == math.inf
+
+    @property
+    def is_long(self) -> bool:
+        """Whether there is time for a short cycle of cooling down before the real one."""
+        search = self.search
+        return self.until_s - search.elapsed_s > LONG_S and self.until_iteration - search.iteration > LONG_ITERATIONS
+
+    @property
+    def progress(self) -> float:
+        """From 0 to 1."""
+        search = self.search
+        seconds = (search.elapsed_s - self.begin_s) / max(1e-9, self.until_s - self.begin_s)
+        iterations = (search.iteration - self.begin_iteration) / max(1, self.until_iteration - self.begin_iteration)
+        return min(1.0, max(seconds, iterations))
+
+    @property
+    def left(self) -> float:
+        """Iterations that are left, if they go on as quickly as they did."""
+        search = self.search
+        pace_s = (search.elapsed_s - self.begin_s) / max(1, search.iteration - self.begin_iteration)
+        in_time = (self.until_s - search.elapsed_s) / max(pace_s, 1e-9) if self.until_s < math.inf else math.inf
+        return max(0.0, min(in_time, self.until_iteration - search.iteration))
+
+    @property
+    def is_over(self) -> bool:
+        """Whether it is time to end."""
+        search = self.search
+        return search.elapsed_s >= self.until_s or search.iteration >= self.until_iteration or search.should_stop()

@@ -1,0 +1,1 @@
+"""A linear programme over classes of agents, rounded."""

@@ -1,0 +1,125 @@
+"""Stored policies: weights in safetensors with a description that must match; a policy file never runs code."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from importlib.metadata import version
+from pathlib import Path
+
+import torch
+from safetensors.torch import load, save
+
+from alloc.allocators.learned.algorithms.registry import METHODS
+from alloc.allocators.learned.files.policy_header import read_header
+from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize, unfilled
+from alloc.problems import InputError
+from alloc.problems.formats import read_bytes, write_bytes_atomically
+from alloc.problems.game import AGENT_FEATURES, FEATURE_SET, PAIR_FEATURES, TASK_FEATURES, Turn
+
+POLICY_FORMAT = "alloc-policy/1"
+
+
+def save_policy(
+    path: Path | str, networks: Sequence[ActorCritic], method: str, figures: Mapping[str, str | float] | None = None
+) -> None:
+    """Store networks, the best first.
+
+    Parameters
+    ----------
+    path : Path or str
+    networks : sequence of ActorCritic
+        All of one size.
+    method : str
+        The method that trained them.
+    figures : mapping, optional
+        Figures of the training, for whoever looks at the file.
+    """
+    tensors = {
+        f"{number}.{name}": weight.contiguous()
+        for number, network in enumerate(networks)
+        for name, weight in network.state_dict().items()
+    }
+    said = {
+        **_description(networks[0].size, len(networks), method),
+        "version": version("alloc-mrta"),
+        "training": json.dumps(dict(figures or {})),
+    }
+    write_bytes_atomically(path, _sorted(save(tensors, metadata=said)))
+
+
+def _sorted(data: bytes) -> bytes:
+    """Return a file of safetensors with its metadata in order, else that of a hash table: another every time."""
+    end = 8 + int.from_bytes(data[:8], "little")
+    header = json.loads(data[8:end])
+    header["__metadata__"] = dict(sorted(header["__metadata__"].items()))
+    text = json.dumps(header, ensure_ascii=False, separators=(",", ":")).encode()
+    return data[:8] + text.ljust(end - 8) + data[end:]
+
+
+def _description(size: NetworkSize, count: int, method: str) -> dict[str, str]:
+    return {
+        "format": POLICY_FORMAT,
+        "method": method,
+        "features": FEATURE_SET,
+        "feature_counts": json.dumps([PAIR_FEATURES, TASK_FEATURES, AGENT_FEATURES]),
+        "networks": str(count),
+        "size": json.dumps(asdict(size)),
+    }
+
+
+def load_policy(path: Path | str, method: str | None, device: torch.device | None = None) -> list[ActorCritic]:
+    """Read networks, the best first, ready to be used.
+
+    Parameters
+    ----------
+    path : Path or str
+    method : str or None
+        The method that trained them; None for any.
+    device : torch.device, optional
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, was made by another method, or for other features or sizes than this version has,
+        or holds weights that are not finite.
+    """
+    source, said = str(path), read_header(path)
+    tensors = load(read_bytes(path))  # opened by Python, to which every name of a file is one
+    try:
+        size, count = NetworkSize(**json.loads(said["size"])), int(said["networks"])
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError("does not describe its networks; use a file by `alloc train`", "metadata", source) from error
+    theirs = said.get("method", "")
+    if method not in (None, theirs) and theirs in METHODS:
+        raise InputError(f"holds a policy of {theirs}; use it with the method {theirs}", "", source)
+    expected = _description(size, count, theirs if method is None else method)
+    for key in ("format", "method", "features", "feature_counts"):
+        if said.get(key) != expected[key]:
+            raise InputError(f"is {said.get(key)!r}, this version needs {expected[key]!r}; train anew", key, source)
+    turn = _turn(said, source)
+    if method is not None and turn != Turn.BIDDING:
+        raise InputError(f"was trained for turns by {turn}, but plans are made by {Turn.BIDDING}", "turn", source)
+    if not all(bool(tensor.isfinite().all()) for tensor in tensors.values()):
+        raise InputError("weights are not finite; train anew", "", source)
+    try:
+        return [_network(size, tensors, number, device) for number in range(count)]
+    except (RuntimeError, ValueError) as error:
+        reason = next(iter(str(error).splitlines()), type(error).__name__)
+        raise InputError(f"holds other weights than its size says ({reason})", "size", source) from error
+
+
+def _turn(said: Mapping[str, str], source: str) -> str:
+    try:
+        turn: str = json.loads(said.get("training", "{}")).get("turn", Turn.BIDDING)
+    except (AttributeError, ValueError) as error:
+        raise InputError("does not describe its training; use a file by `alloc train`", "training", source) from error
+    return turn
+
+
+def _network(
+    size: NetworkSize, tensors: dict[str, torch.Tensor], number: int, device: torch.device | None
+) -> ActorCritic:
+    network = unfilled(size)
+    prefix = f"{number}."
+    network.load_state_dict({name.removeprefix(prefix): t for name, t in tensors.items() if name.startswith(prefix)})
+    return network.to(device).eval().requires_grad_(False)

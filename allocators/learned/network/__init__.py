@@ -1,0 +1,1 @@
+"""The network that all policies share, in torch and in compiled loops."""

@@ -1,0 +1,33 @@
+"""How large an instance a learned policy can play within a budget; knows nothing of torch."""
+
+from alloc.allocators.contract.search import Budget
+from alloc.problems import Instance
+
+NEAR = 20
+"""Candidates per agent, besides being idle, in games on a whole instance."""
+
+PAIRS_PER_SECOND = 40_000
+"""Pairs of agent and candidate whose game is over after a second on one slow core."""
+
+PLACES = 12
+"""Pairs of places, which attend to each other, that take as long in a game as one pair of agent and candidate."""
+
+LARGEST = 3_000_000
+"""Pairs beyond which one game takes more than a few gigabytes."""
+
+MOST_TASKS = 4_000
+"""Tasks beyond which their attention to each other takes more than a few gigabytes."""
+
+
+def too_large(instance: Instance, budget: Budget) -> str | None:
+    """Return why a game on `instance` would not end within `budget`, or None if it would."""
+    n, m = instance.n, instance.m
+    pairs = n * (min(NEAR, m) + 1)
+    if m > MOST_TASKS:
+        return f"{m} tasks are more than the {MOST_TASKS} that it has memory for; use local-search"
+    if pairs > LARGEST:
+        return f"{n} agents are more than the {LARGEST // (NEAR + 1)} that it has memory for; use local-search"
+    seconds = (pairs + m * m // PLACES) / PAIRS_PER_SECOND
+    if budget.time_limit_s is None or seconds <= max(1.0, budget.time_limit_s):
+        return None
+    return f"a game of {n} agents and {m} tasks may take {seconds:.0f} s; give more time, or use local-search"

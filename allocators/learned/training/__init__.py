@@ -1,0 +1,1 @@
+"""Training of policies: curriculum, validation, trainer, tuning."""

@@ -1,0 +1,1 @@
+"""Pictures of results, for notebooks and the command line alike; needs matplotlib."""

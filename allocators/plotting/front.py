@@ -1,0 +1,81 @@
+"""Drawing a front of makespan against energy into a file."""
+
+from typing import TYPE_CHECKING
+
+from alloc.allocators.plotting.colours import LIMIT, MAKESPAN
+from alloc.allocators.plotting.sites import plain_text, shortened
+from alloc.allocators.plotting.style import drawing, new_figure, save_figure
+from alloc.cli.output.console import counted, number
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from alloc.allocators.pareto import Front
+
+WIDE = 3.0
+"""Ratio of the slowest to the fastest from which on makespans have a logarithmic scale."""
+
+
+def save_front(front: "Front", path: str) -> None:
+    """Draw `front` into a .png or .svg file, which is written whole or not at all."""
+    with drawing():
+        save_figure(draw_front(front), path)
+
+
+def draw_front(front: "Front") -> "Figure":
+    """Return the drawing: the least energy found and the proven bound on it, as steps over the makespan."""
+    figure = new_figure(8, 5.2)
+    axes = figure.subplots()
+    hours = [result.makespan or 0.0 for result in front.points]
+    energy = [result.energy or 0.0 for result in front.points]
+    wide = hours[0] > 0 and hours[-1] > WIDE * hours[0]
+    span = hours[-1] - hours[0] or hours[0] or 1.0  # of a front that is one point too
+    end = hours[-1] * (1.25 if wide else 1.0) + 0.05 * span
+    axes.step([*hours, end], [*energy, energy[-1]], where="post", color=MAKESPAN, linewidth=1.6, zorder=3)
+    axes.plot(hours, energy, "o", color=MAKESPAN, markersize=6, clip_on=False, zorder=4, label="best found")
+    _draw_bounds(axes, front)
+    if wide:
+        _logarithmic(axes)
+    axes.set_xlim(hours[0] / 1.1 if wide else hours[0] - 0.08 * span, end)
+    axes.set_ylim(0, max(energy) * 1.08 or 1.0)
+    axes.set_xlabel("makespan (h)")
+    axes.set_ylabel("energy")
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.legend(frameon=False)
+    axes.set_title(_title(front), fontsize=12)
+    return figure
+
+
+def _draw_bounds(axes: "Axes", front: "Front") -> None:
+    """Shade where no allocation can be: below the bound of a run, up to the limit that it had."""
+    proven = [
+        (max(result.makespan or 0.0, result.makespan_limit or 0.0), result.energy_lower_bound or 0.0)
+        for result in front.points
+    ]
+    left = front.points[0].lower_bound or 0.0
+    axes.axvspan(0, left, color=LIMIT, alpha=0.35, linewidth=0)
+    for place, (limit, bound) in enumerate(proven):
+        label = "proven impossible" if place == 0 else None
+        axes.fill_between([left, limit], 0, bound, color=LIMIT, alpha=0.35, linewidth=0, label=label)
+        left = limit
+
+
+def _logarithmic(axes: "Axes") -> None:
+    from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
+
+    axes.set_xscale("log")
+    axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axes.xaxis.set_major_formatter(FormatStrFormatter("%g"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+
+
+def _title(front: "Front") -> str:
+    instance = front.instance
+    name = plain_text(shortened(instance.name, 60))
+    fastest, cheapest = front.points[0], front.points[-1]
+    ends = (
+        f"from T = {number(fastest.makespan, 4)} h, energy {number(fastest.energy, 4)}"
+        f" to T = {number(cheapest.makespan, 4)} h, energy {number(cheapest.energy, 4)}"
+    )
+    return f"{name}: {counted(instance.n, 'agent')}, {counted(instance.m, 'task')}\n{ends}"

@@ -1,0 +1,104 @@
+"""The right half of a drawing: when each task is done."""
+
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from alloc.allocators.plotting.colours import LIMIT, MAKESPAN, UNSERVED, colours, finite_times, unserved_tasks
+from alloc.allocators.plotting.sites import plain_text, shortened
+from alloc.cli.output.console import number
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from alloc.allocators import Result
+
+MOST_ROWS = 40
+"""Tasks beyond which bars stand upright, without names."""
+
+MOST_BARS = 1_000
+"""Tasks beyond which a line stands for each."""
+
+
+def draw_times(axes: "Axes", result: "Result") -> None:
+    """Draw a bar per task, the unserved first, then the last one first, with makespan and lower bound as lines."""
+    from matplotlib.colors import to_rgba
+
+    time, unserved = finite_times(result), unserved_tasks(result)
+    order = np.lexsort((-time, ~unserved))
+    top = max(float(time.max()), result.makespan or 0.0, result.lower_bound or 0.0) or 1.0
+    height, missing = np.where(unserved, top, time)[order], unserved[order]
+    fill = colours(result)[order]
+    fill[missing] = 1.0
+    rows = result.instance.m <= MOST_ROWS
+    thick = 0.8 if result.instance.m <= 150 else 1.0
+    if result.instance.m > MOST_BARS:
+        fill[missing] = to_rgba(UNSERVED, 0.3)
+        axes.vlines(np.arange(result.instance.m), 0, height, colors=cast(Any, fill), linewidth=0.5)
+    else:
+        bars = (axes.barh if rows else axes.bar)(np.arange(result.instance.m), height, thick, color=fill)
+        for place in np.flatnonzero(missing):
+            bars[place].set(hatch="////", linewidth=0.8, edgecolor=UNSERVED)
+    lines = _lines(axes, result, rows)
+    if rows:
+        _name_rows(axes, result, order, top)
+    else:
+        _name_columns(axes, result, top)
+    _legend(axes, lines, any_missing=bool(missing.any()))
+
+
+def _lines(axes: "Axes", result: "Result", rows: bool) -> list[Any]:
+    """Makespan and lower bound, with a white edge so that they show on dark bars."""
+    from matplotlib.patheffects import withStroke
+
+    draw = axes.axvline if rows else axes.axhline
+    wanted = [("makespan", result.makespan, MAKESPAN, "-"), ("lower bound", result.lower_bound, LIMIT, "--")]
+    return [
+        draw(
+            value,
+            color=colour,
+            linestyle=style,
+            linewidth=1.8,
+            label=f"{label} {number(value, 4)} h",
+            path_effects=[withStroke(linewidth=3.2, foreground="white")],
+        )
+        for label, value, colour, style in wanted
+        if value is not None
+    ]
+
+
+def _name_rows(axes: "Axes", result: "Result", order: Any, top: float) -> None:
+    m = result.instance.m
+    names = [plain_text(shortened(result.instance.task_ids[j], 14)) for j in order]
+    axes.set_yticks(range(m), names, fontsize=8 if m <= 25 else 6.5)
+    axes.set_ylim(m - 0.4, -0.6)
+    axes.set_xlim(0, top * 1.06)
+    axes.set_xlabel("completion time (h)")
+    for row, j in enumerate(order):
+        if result.instance.workload[j] == 0:
+            axes.text(0.01 * top, row, "no work", va="center", fontsize=7, color="0.4")
+
+
+def _name_columns(axes: "Axes", result: "Result", top: float) -> None:
+    axes.set_xlim(-0.6, result.instance.m - 0.4)
+    axes.set_ylim(0, top * 1.06)
+    axes.set_xlabel("tasks, the last one first")
+    axes.set_ylabel("completion time (h)")
+
+
+def _legend(axes: "Axes", lines: list[Any], *, any_missing: bool) -> None:
+    from matplotlib.patches import Patch
+
+    entries = list(lines)
+    if any_missing:
+        entries.append(Patch(facecolor="white", edgecolor=UNSERVED, hatch="////", label="unserved"))
+    axes.spines[["top", "right"]].set_visible(False)
+    if entries:
+        axes.legend(
+            handles=entries,
+            loc="lower center",
+            bbox_to_anchor=(0.5, 1.0),
+            ncols=len(entries),
+            frameon=False,
+            fontsize=9,
+        )

@@ -1,0 +1,1 @@
+"""What compiled code needs: compilation, random numbers, and ways to stop native solvers."""

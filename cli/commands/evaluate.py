@@ -1,0 +1,179 @@
+"""``alloc evaluate``."""
+
+import math
+import sys
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from alloc.cli import options
+from alloc.cli.options import examples
+from alloc.cli.output.console import note, say, write_json
+from alloc.cli.output.files import read_pair
+
+if TYPE_CHECKING:
+    from alloc.allocators import Result
+    from alloc.problems import Allocation, Instance
+
+EXAMPLES = examples(
+    "alloc evaluate demo.json best.json",
+    "alloc evaluate demo.json best.json --json",
+    "alloc solve demo.json --json | alloc evaluate demo.json -",
+    closing="The bounds in a result hold for the instance that it was found on: they are shown where agents and scores "
+    "are the same. Exit code 1 if a task is unserved or an agent is sent where it cannot go.",
+)
+
+SCORES = (
+    "instance",
+    "makespan",
+    "served_makespan",
+    "lower_bound",
+    "gap",
+    "energy",
+    "distance",
+    "battery_remaining_percent",
+    "reward",
+    "unserved_tasks",
+    "violations",
+    "assignment",
+)
+"""Fields of a result that do not tell of a run."""
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to `app`."""
+    app.command("evaluate", epilog=EXAMPLES)(evaluate_command)
+
+
+def evaluate_command(
+    instance: options.InstanceArgument,
+    allocation: Annotated[
+        str,
+        typer.Argument(metavar="ALLOCATION", help="An allocation, or a result of `alloc solve`; - is standard input."),
+    ],
+    json: options.JsonOption = False,
+) -> None:
+    """Score an allocation, whoever made it."""
+    problem, answer, claims = read_pair(instance, allocation)
+    assert answer is not None
+    result = _scored(problem, answer)
+    if claims and result.lower_bound is not None:
+        if _is_of(result, claims):
+            result = _bounded(result, claims)
+        else:
+            note(f"{allocation}: its scores are not those on this instance, so that its bounds are left out")
+    score = result.evaluation
+    assert score is not None
+    if json:
+        write_json({"format": "alloc-evaluation/1", **_scores(result), "tasks": _tasks(result)})
+    else:
+        _tell(result)
+    if score.reward_saturated:
+        note("the reward (3) is too large for a float and stands at its most negative value")
+    raise typer.Exit(1 if score.unserved_tasks or score.violations else 0)
+
+
+def _scored(problem: "Instance", allocation: "Allocation") -> "Result":
+    """Dress an allocation from elsewhere as a result, so that its scores read the same."""
+    from alloc.allocators import Result, StopReason
+    from alloc.problems import Objective, evaluate, makespan_lower_bound
+
+    score = evaluate(problem, allocation)
+    return Result(
+        instance=problem,
+        method="evaluate",
+        objective=Objective.MAKESPAN,
+        seed=0,
+        allocation=allocation,
+        evaluation=score,
+        lower_bound=None if score.unserved_tasks else makespan_lower_bound(problem),
+        energy_lower_bound=None,
+        stop_reason=StopReason.FINISHED,
+        runtime_s=0.0,
+        trace=(),
+    )
+
+
+def _is_of(result: "Result", claims: dict[str, Any]) -> bool:
+    """Whether `claims` can be of a result of this very instance: the same agents, and the same figures of the whole."""
+    found = result.to_dict()
+    same = ("makespan", "energy", "distance", "battery_remaining_percent", "reward")
+    return (
+        claims.get("instance") == found["instance"]
+        and claims["assignment"].keys() == found["assignment"].keys()
+        and all(_is_close(claims.get(name), found[name]) for name in same)
+    )
+
+
+def _is_close(one: Any, other: float | None) -> bool:
+    number = _number(one)
+    return one is other if number is None or other is None else math.isclose(number, other, rel_tol=1e-9)
+
+
+def _number(value: Any) -> float | None:
+    is_number = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
+    return float(value) if is_number else None
+
+
+def _bounded(result: "Result", claims: dict[str, Any]) -> "Result":
+    """Return `result` with the bounds that the run proved, but for those above what they are to bound."""
+    bounds = {name: _number(claims.get(name)) for name in ("lower_bound", "energy_lower_bound", "makespan_limit")}
+    least, energy = bounds["lower_bound"], bounds["energy_lower_bound"]
+    if least is not None and result.makespan is not None and least <= result.makespan * (1 + 1e-9):
+        result = replace(result, lower_bound=max(least, result.lower_bound or 0.0))
+    if energy is not None and result.energy is not None and energy <= result.energy * (1 + 1e-9):
+        result = replace(result, energy_lower_bound=energy, makespan_limit=bounds["makespan_limit"])
+    return result
+
+
+def _scores(result: "Result") -> dict[str, Any]:
+    fields = result.to_dict()
+    return {name: fields[name] for name in SCORES}
+
+
+def _tasks(result: "Result") -> list[dict[str, Any]]:
+    """One entry per task, in the order of the instance."""
+    import numpy as np
+
+    problem, score, allocation = result.instance, result.evaluation, result.allocation
+    assert score is not None
+    assert allocation is not None
+    barred = {violation.agent for violation in score.violations}
+    sent = [task for agent, task in enumerate(allocation.task_of_agent.tolist()) if task >= 0 and agent not in barred]
+    agents = np.bincount(np.array(sent, dtype=np.intp), minlength=problem.m)
+    return [
+        {
+            "id": problem.task_ids[j],
+            "workload": float(problem.workload[j]),
+            "agents": int(agents[j]),
+            "ability": float(score.group_ability[j]),
+            "coverage": float(score.coverage[j]),
+            "completion_time": float(score.completion_time[j]) if np.isfinite(score.completion_time[j]) else None,
+        }
+        for j in range(problem.m)
+    ]
+
+
+def _tell(result: "Result") -> None:
+    from alloc.cli.output.console import number, table
+    from alloc.cli.output.report import figures, holdup
+
+    score = result.evaluation
+    assert score is not None
+    rows = [
+        [
+            entry["id"],
+            number(entry["workload"]),
+            str(entry["agents"]),
+            number(entry["ability"]),
+            number(entry["coverage"]),
+            "unserved" if entry["completion_time"] is None else number(entry["completion_time"]),
+        ]
+        for entry in _tasks(result)
+    ]
+    say(table(["task", "workload", "agents", "ability W", "W - h", "done at (h)"], rows))
+    say("\n".join(["", f"{result.instance.name}:", *figures(result), *holdup(result)]))
+    for violation in score.violations:
+        agent, task = result.instance.agent_ids[violation.agent], result.instance.task_ids[violation.task]
+        say(f"Violation: agent {agent} cannot take task {task}: {violation.reason}.")

@@ -1,0 +1,196 @@
+"""``alloc generate``."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from alloc.cli.options import examples
+from alloc.cli.output.console import STANDARD, say
+
+if TYPE_CHECKING:
+    from alloc.problems import Instance
+
+EXAMPLES = examples(
+    "alloc generate paper-1 --seed 7 --output demo.json",
+    "alloc generate random --agents 50 --tasks 12 --sites clustered --range 0.5 --seed 1 --output demo.json",
+    "alloc generate random --speed 20:60 --battery 10:30 --real --seed 3 --output demo.npz",
+    "alloc generate paper-4 --seed 100 --count 20 --output instances",
+    "alloc generate covering --agents 40 --tasks 16 --ability-max 100 --workload uniform --seed 3 --output demo.json",
+    closing="SPREAD is one value for all, LOW:HIGH for a uniform draw, or none for no limit.",
+)
+
+SEED = Annotated[int, typer.Option(min=0, help="Source of all randomness; with --count the first of several.")]
+SPREADS = ("communication_range", "battery", "speed", "priority")
+COVERING = ("agents", "tasks", "ability_min", "ability_max", "workload", "integer")
+
+
+class Family(StrEnum):
+    """What can be generated."""
+
+    PAPER_1 = "paper-1"
+    PAPER_2 = "paper-2"
+    PAPER_3 = "paper-3"
+    PAPER_4 = "paper-4"
+    RANDOM = "random"
+    COVERING = "covering"
+
+
+class Sites(StrEnum):
+    """As in `alloc.problems.generate`, without numpy; a test compares them."""
+
+    UNIFORM = "uniform"
+    CLUSTERED = "clustered"
+
+
+class Starts(StrEnum):
+    """As in `alloc.problems.generate`, without numpy."""
+
+    TASKS = "tasks"
+    OWN = "own"
+    DEPOTS = "depots"
+    UNKNOWN = "unknown"
+
+
+class Distribution(StrEnum):
+    """As in `alloc.problems.generate`, without numpy."""
+
+    EQUAL = "equal"
+    UNIFORM = "uniform"
+    LOGNORMAL = "lognormal"
+    PARETO = "pareto"
+    DIRICHLET = "dirichlet"
+
+
+def _option(text: str, default: str, *names: str, **more: Any) -> Any:
+    return typer.Option(*names, help=text, show_default=default, **more)
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to `app`."""
+    app.command("generate", epilog=EXAMPLES)(generate_command)
+
+
+def generate_command(
+    family: Annotated[
+        Family,
+        typer.Argument(
+            metavar="FAMILY",
+            help="paper-1 to paper-4, a scenario of the paper; random, with the options below; or covering, machine "
+            "covering without places: 100 agents with abilities from 1 to 1000, 25 tasks, workloads equal or uniform.",
+        ),
+    ],
+    seed: SEED = 0,
+    count: Annotated[int, typer.Option(min=1, help="How many, with the seeds that follow.")] = 1,
+    output: Annotated[
+        str,
+        typer.Option(
+            metavar="FILE|DIR", help="File to write, - for standard output; with --count a folder, a file per seed."
+        ),
+    ] = STANDARD,
+    agents: Annotated[int | None, _option("Number of agents.", "100")] = None,
+    tasks: Annotated[int | None, _option("Number of tasks.", "20")] = None,
+    ability: Annotated[Distribution | None, _option("How abilities spread; not dirichlet.", "uniform")] = None,
+    ability_min: Annotated[float | None, _option("Least ability, work per hour.", "1")] = None,
+    ability_max: Annotated[float | None, _option("Largest ability.", "10")] = None,
+    workload: Annotated[Distribution | None, _option("How workloads spread.", "dirichlet")] = None,
+    load: Annotated[float | None, _option("Total workload over total ability.", "1")] = None,
+    integer: Annotated[
+        bool | None, _option("Whole or real abilities and workloads.", "integer", "--integer/--real")
+    ] = None,
+    sites: Annotated[Sites | None, _option("How places lie.", "uniform")] = None,
+    clusters: Annotated[int | None, _option("Number of clusters.", "4")] = None,
+    dimensions: Annotated[int | None, _option("2 or 3.", "3")] = None,
+    world_size: Annotated[float | None, _option("Side of the square or cube.", "1")] = None,
+    starts: Annotated[Starts | None, _option("Where agents begin.", "tasks")] = None,
+    depots: Annotated[int | None, _option("Number of depots.", "1")] = None,
+    communication_range: Annotated[
+        str | None, _option("Farthest task, in units of distance.", "none", "--range", metavar="SPREAD")
+    ] = None,
+    battery: Annotated[str | None, _option("Energy of an agent.", "20", metavar="SPREAD")] = None,
+    speed: Annotated[str | None, _option("Distance per hour.", "none", metavar="SPREAD")] = None,
+    priority: Annotated[str | None, _option("Weight of a task in the game.", "1", metavar="SPREAD")] = None,
+    allowed_fraction: Annotated[float | None, _option("Share of the tasks that each agent may do.", "1")] = None,
+    energy_per_distance: Annotated[float | None, _option("Energy per unit of distance.", "6")] = None,
+    tau: Annotated[float | None, _option("Base of the reward (3).", "0.5")] = None,
+) -> None:
+    """Write instances like the paper's, random ones, or those of machine covering."""
+    wanted = {name: value for name, value in locals().items() if value is not None and name not in FIXED}
+    for name in wanted:
+        if family is not Family.RANDOM and not (family is Family.COVERING and name in COVERING):
+            raise typer.BadParameter(f"is for random, not for {family}", param_hint=f"'{_flag(name)}'")
+    if count > 1 and output == STANDARD:
+        raise typer.BadParameter("must name a folder for several instances", param_hint="'--output'")
+    for number in range(seed, seed + count):
+        instance = _instance(family, wanted, number)
+        _write(instance, output, into_folder=count > 1)
+    if output != STANDARD:
+        say(f"wrote {output}" if count == 1 else f"wrote {count} instances into {output}")
+
+
+FIXED = ("family", "seed", "count", "output")
+
+
+def _instance(family: Family, wanted: dict[str, Any], seed: int) -> "Instance":
+    from alloc.problems import Family as Parameters
+    from alloc.problems import paper, random_instance
+
+    if family is Family.COVERING:
+        return _covering(seed=seed, **wanted)
+    if family is not Family.RANDOM:
+        return paper(int(family.removeprefix("paper-")), seed)
+    values = {name: _spread(value, name) if name in SPREADS else value for name, value in wanted.items()}
+    return random_instance(Parameters(**values), seed)
+
+
+def _covering(
+    seed: int,
+    agents: int = 100,
+    tasks: int = 25,
+    ability_min: float = 1,
+    ability_max: float = 1000,
+    workload: Distribution = Distribution.EQUAL,
+    integer: bool = True,
+) -> "Instance":
+    from alloc.problems import InputError, machine_covering
+
+    if workload not in (Distribution.EQUAL, Distribution.UNIFORM):
+        raise InputError("must be equal or uniform here", "workload")
+    for name, value in (("ability_min", ability_min), ("ability_max", ability_max)):
+        if value != int(value):
+            raise InputError(f"must be a whole number here, got {value}", name)
+    equal, ends = workload is Distribution.EQUAL, (int(ability_min), int(ability_max))
+    return machine_covering(agents, tasks, *ends, seed, equal=equal, whole=integer)
+
+
+def _write(instance: "Instance", output: str, *, into_folder: bool) -> None:
+    from alloc.problems import InputError
+    from alloc.problems.formats import write_instance
+
+    if not into_folder:
+        write_instance(instance, output)
+        return
+    folder = Path(output)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except FileExistsError as error:
+        raise InputError("is a file; several instances need a folder", source=output) from error
+    write_instance(instance, str(folder / f"{instance.name}.json"))
+
+
+def _flag(name: str) -> str:
+    return "--" + {"communication_range": "range", "integer": "integer/--real"}.get(name, name).replace("_", "-")
+
+
+def _spread(text: str, name: str) -> float | tuple[float, ...] | None:
+    """``none``, ``VALUE`` or ``LOW:HIGH``; the family checks the values."""
+    from alloc.problems import InputError
+
+    if text == "none":
+        return None
+    try:
+        ends = tuple(float(part) for part in text.split(":"))
+    except ValueError as error:
+        raise InputError(f"must be a number, LOW:HIGH or none, got {text!r}", name) from error
+    return ends[0] if len(ends) == 1 else ends

@@ -1,0 +1,127 @@
+"""``alloc pareto``."""
+
+import sys
+from functools import cache
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from alloc.cli import options
+from alloc.cli.options import examples
+from alloc.cli.output.console import is_terminal, note, number, percent, say, table, to_json
+from alloc.cli.output.files import check_outputs, read_known, save
+
+if TYPE_CHECKING:
+    from alloc.allocators import Result
+    from alloc.allocators.pareto import Front
+
+EXAMPLES = examples(
+    "alloc pareto demo.json",
+    "alloc pareto demo.json --points 20 --time-limit 5 --plot front.png --output front.json",
+    "alloc pareto demo.json --start front.json --time-limit 60 --output front.json",
+    "alloc pareto demo.json --method milp --json",
+    closing="Ctrl-C ends the run in progress: the front so far is printed and saved.",
+)
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to `app`."""
+    app.command("pareto", epilog=EXAMPLES)(pareto_command)
+
+
+def pareto_command(
+    instance: options.InstanceArgument,
+    method: Annotated[
+        str,
+        typer.Option(autocompletion=options.complete_methods, help="A method that makes use of slack, or auto."),
+    ] = "auto",
+    points: Annotated[int, typer.Option(min=1, max=10_000, help="Runs, one for each point of the front.")] = 10,
+    time_limit: options.TimeLimitOption = None,
+    iterations: options.IterationsOption = None,
+    seed: Annotated[int, typer.Option(min=0, max=2**63 - 1, help="Source of all randomness.")] = 0,
+    start: Annotated[
+        str | None,
+        typer.Option(metavar="FILE", help="An allocation, a result or an earlier front to begin with."),
+    ] = None,
+    threads: options.ThreadsOption = None,
+    output: Annotated[
+        str | None, typer.Option(metavar="FILE", help="Write the front here as JSON; - is standard output.")
+    ] = None,
+    plot: Annotated[str | None, typer.Option(metavar="FILE", help="Draw the front as .png or .svg.")] = None,
+    json: options.JsonOption = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print no table, no notes, no progress.")] = False,
+) -> None:
+    """Trace the front of makespan against energy: what each hour saved costs."""
+    from alloc.allocators.pareto import pareto
+
+    read = [("INSTANCE", instance)]
+    check_outputs(("--output", output), ("--plot", plot), read=read)
+    if plot is not None:
+        from alloc.allocators.plotting.style import check_plot
+
+        check_plot(plot)
+    problem, starts = read_known(instance, start, quiet=quiet)
+    front = pareto(
+        problem,
+        method,
+        points=points,
+        time_limit_s=options.time_limit(time_limit, iterations),
+        iterations=iterations,
+        seed=seed,
+        starts=starts,
+        threads=threads,
+        on_point=None if quiet else _show_point,
+    )
+    then = [] if quiet else [lambda: _tell(front, with_table=not json)]
+    if plot is not None:
+        then.append(lambda: _draw(front, plot))
+    text = cache(lambda: to_json(front.to_dict()))
+    save(text, output, text if json else None, then)
+    raise typer.Exit(0 if front.points and front.points[0].makespan is not None else 1)
+
+
+def _tell(front: "Front", *, with_table: bool) -> None:
+    if with_table:
+        say(_table(front))
+    for line in dict.fromkeys(line for result in front.points for line in result.notes):
+        note(line)
+
+
+def _draw(front: "Front", path: str) -> None:
+    from alloc.allocators.plotting.front import save_front
+
+    save_front(front, path)
+
+
+def _show_point(result: "Result") -> None:
+    """On a terminal, tell each point as it comes; the table follows at the end."""
+    if is_terminal(sys.stderr):
+        say(f"T {number(result.makespan)} h, energy {number(result.energy)}, gap {percent(result.energy_gap)}")
+
+
+def _table(front: "Front") -> str:
+    header = ["T (h)", "slower", "energy", "saved", "at least", "gap", "time (s)", "method", "status"]
+    fastest = front.points[0]
+    rows = [
+        [
+            number(result.makespan, 5),
+            _change(result.makespan, fastest.makespan),
+            number(result.energy, 5),
+            _change(fastest.energy, result.energy, of=fastest.energy),
+            number(result.energy_lower_bound, 5),
+            percent(result.energy_gap),
+            number(result.runtime_s, 3),
+            result.method,
+            str(result.status),
+        ]
+        for result in front.points
+    ]
+    return table(header, rows, left=0)
+
+
+def _change(value: float | None, base: float | None, of: float | None = None) -> str:
+    """Return ``value - base`` as a part of `of`, else of `base`."""
+    whole = base if of is None else of
+    if value is None or base is None or not whole:
+        return "-"
+    return percent((value - base) / whole)

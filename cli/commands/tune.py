@@ -1,0 +1,72 @@
+"""``alloc tune``."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from alloc.cli.commands.training import learner_parameters, training_parameters
+from alloc.cli.options import examples
+from alloc.cli.output.console import note, number, say
+from alloc.cli.output.files import check_output
+
+if TYPE_CHECKING:
+    import optuna
+
+EXAMPLES = examples(
+    "alloc tune ppo --study ppo.db --trials 40 --steps 200000",
+    "alloc tune ppo --study ppo.db --trials 80 --steps 200000",
+    closing="The second line goes on from the first; several processes may work at one study. It ends with the options "
+    "that `alloc train` takes.",
+)
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to `app`."""
+    app.command("tune", epilog=EXAMPLES)(tune_command)
+
+
+def tune_command(
+    method: Annotated[str, typer.Argument(metavar="METHOD", help="What to tune: gappo, ppo, a2c, dqn or ddpg.")],
+    study: Annotated[
+        str, typer.Option(metavar="FILE", help="SQLite file of the study; one that exists is gone on with.")
+    ],
+    trials: Annotated[int, typer.Option(min=1, help="Trainings, those in the file included.")] = 40,
+    steps: Annotated[int, typer.Option(min=1, help="Decisions of agents in each.")] = 100_000,
+    family: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="As for `alloc train`; may be repeated.", show_default="mixed"),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, help="Source of all randomness.")] = 0,
+) -> None:
+    """Tune the hyperparameters of a learned method by validation."""
+    check_output(study)
+    families = family or ["mixed"]
+    learner = learner_parameters(method, families)
+    parameters = training_parameters(method, learner, families=families, lesson=max(1, min(20_000, steps // 5)))
+    import torch
+
+    torch.set_num_threads(1)
+    from alloc.allocators.learned.training.trainer import Limits
+    from alloc.allocators.learned.training.tune import open_study, tune
+
+    opened = open_study(Path(study), method, seed)
+    try:
+        tune(opened, parameters, trials, Limits(steps=steps), seed=seed, on_trial=_tell)
+    except KeyboardInterrupt:
+        note(f"interrupted; {study} holds {len(opened.trials)} trials")
+    try:
+        best = opened.best_trial
+    except ValueError:
+        raise typer.Exit(1) from None
+    say(f"best cost {number(best.value, 4)}: alloc train {method} {_settings(best.params)}")
+
+
+def _settings(values: dict[str, float]) -> str:
+    return " ".join(f"--set {name}={value:.4g}" for name, value in values.items())
+
+
+def _tell(study: "optuna.Study", trial: "optuna.trial.FrozenTrial") -> None:
+    figures = list(trial.intermediate_values.values())
+    cost = number(figures[-1], 4) if figures else "none"
+    say(f"trial {trial.number}  {trial.state.name.lower()}  cost {cost}  {_settings(trial.params)}")

@@ -1,0 +1,76 @@
+"""``alloc validate``."""
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from alloc.cli import options
+from alloc.cli.options import examples
+from alloc.cli.output.console import complain, counted, number, percent, say, write_json
+
+if TYPE_CHECKING:
+    from alloc.problems import Instance
+
+EXAMPLES = examples(
+    "alloc validate demo.json",
+    "alloc validate instances/*.json",
+    "alloc validate demo.npz --json",
+    closing="Exit code 2 if a file is no valid instance; its one line says where and how to mend it.",
+)
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to `app`."""
+    app.command("validate", epilog=EXAMPLES)(validate_command)
+
+
+def validate_command(
+    instances: Annotated[list[str], typer.Argument(metavar="INSTANCE...", help=f"Instances, each {options.READABLE}.")],
+    json: options.JsonOption = False,
+) -> None:
+    """Check instances, and say what is in them."""
+    from alloc.problems import InputError
+    from alloc.problems.formats import read_instance
+
+    facts, wrong = [], 0
+    for name in instances:
+        try:
+            facts.append({"file": name, **_facts(read_instance(name))})
+        except InputError as error:
+            wrong += 1
+            complain(str(error))
+            continue
+        if not json:
+            say(_words(facts[-1]))
+    if json and facts:
+        write_json(facts)
+    raise typer.Exit(2 if wrong else 0)
+
+
+def _facts(instance: "Instance") -> dict[str, Any]:
+    from alloc.problems import fewest_unserved, makespan_lower_bound
+
+    unserved = fewest_unserved(instance)
+    return {
+        "name": instance.name,
+        "agents": instance.n,
+        "tasks": instance.m,
+        "total_ability": float(instance.ability.sum()),
+        "total_workload": float(instance.workload.sum()),
+        "reach_density": instance.reach.density,
+        "travel_time": instance.has_travel_time,
+        "fewest_unserved": unserved,
+        "lower_bound": makespan_lower_bound(instance) if unserved == 0 else None,
+    }
+
+
+def _words(fact: dict[str, Any]) -> str:
+    served = "every task can be served"
+    if fact["fewest_unserved"]:
+        served = f"at least {fact['fewest_unserved']} of the tasks cannot be served"
+    bound = "" if fact["lower_bound"] is None else f", makespan at least {number(fact['lower_bound'])} h"
+    return (
+        f"{fact['file']}: ok, {counted(fact['agents'], 'agent')} with ability {number(fact['total_ability'])} in all,"
+        f" {counted(fact['tasks'], 'task')} with workload {number(fact['total_workload'])},"
+        f" an agent reaches {percent(fact['reach_density'])} of the tasks, {served}{bound}"
+    )

@@ -1,0 +1,143 @@
+"""Files that commands read, and those that they are to write, looked at before a long run."""
+
+import os
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, Any
+
+from alloc.cli.output.console import STANDARD, note, say, write_out
+
+if TYPE_CHECKING:
+    from alloc.problems import Allocation, Instance
+
+
+def read_pair(
+    instance: str, allocation: str | None, *, quiet: bool = False
+) -> "tuple[Instance, Allocation | None, dict[str, Any]]":
+    """Read an instance, and an allocation of it if there is one; another instance's name is worth a note.
+
+    The third is what a result says of its allocation, as `read_claims` returns it.
+    """
+    from alloc.problems import InputError
+    from alloc.problems.formats import read_claims, read_instance
+
+    if instance == allocation == STANDARD:
+        raise InputError("cannot be the instance and the allocation at once", source="standard input")
+    problem = read_instance(instance)
+    if allocation is None:
+        return problem, None, {}
+    answer, warning, claims = read_claims(allocation, problem)
+    if warning is not None and not quiet:
+        note(warning)
+    return problem, answer, claims
+
+
+def read_known(instance: str, front: str | None, *, quiet: bool = False) -> "tuple[Instance, list[Allocation]]":
+    """Read an instance, and all allocations of it in a file: one, or those of a front."""
+    from alloc.problems import InputError
+    from alloc.problems.formats import read_allocations, read_instance
+
+    if instance == front == STANDARD:
+        raise InputError("cannot be the instance and the start at once", source="standard input")
+    problem = read_instance(instance)
+    if front is None:
+        return problem, []
+    answers, warning = read_allocations(front, problem)
+    if warning is not None and not quiet:
+        note(warning)
+    return problem, answers
+
+
+def save(
+    found: Callable[[], str],
+    output: str | None,
+    shown: Callable[[], str] | None = None,
+    then: Iterable[Callable[[], None]] = (),
+) -> None:
+    """Write what a run found to the file asked for, show it on standard output, and do the rest that was asked for.
+
+    Where a part of it fails, the others are done all the same, and what was found and is nowhere yet goes to standard
+    output, or to standard error where that fails.
+
+    Parameters
+    ----------
+    found, shown : callable
+        Return the text for `output` and that for standard output, if any; called where it is needed.
+    output : str or None
+        A file, or ``-``.
+    then : iterable of callable
+        What tells and draws it afterwards.
+
+    Raises
+    ------
+    InputError, OSError
+        The first failure, once all else is done.
+    """
+    from alloc.problems.formats import is_standard_output, write_text_atomically
+
+    to_standard_output = output is not None and is_standard_output(output)
+    steps: list[Callable[[], None]] = []
+    if output is not None and not to_standard_output:
+        steps.append(lambda: write_text_atomically(output, found()))
+    printed = found if to_standard_output else shown
+    if printed is not None:
+        steps.append(lambda: write_out(printed()))
+    failures = [_failure(step) for step in steps]
+    is_kept = None in failures
+    failures += [_failure(step) for step in then]
+    for failure in filter(None, failures):
+        # standard output that has failed once takes nothing more
+        if not is_kept and (printed is not None or _failure(lambda: write_out(found())) is not None):
+            say(found())
+        raise failure
+
+
+def _failure(step: Callable[[], None]) -> Exception | None:
+    """Take a step, and return why it failed, None where it did not."""
+    try:
+        step()
+    except Exception as error:
+        return error
+    return None
+
+
+Named = tuple[str, str | None]
+"""An argument or option, and the file that it names, if any."""
+
+
+def check_outputs(*written: Named, read: Iterable[Named] = ()) -> None:
+    """Raise an `InputError` if a file cannot be written, or is one that is read or that another option writes.
+
+    What is replaced on purpose, as by ``--start FILE --output FILE``, is not to be in `read`.
+    """
+    from alloc.problems import InputError
+
+    taken = {path: option for option, name in read if name for path in _parts(name)}
+    for option, name in written:
+        check_output(name)
+        if name is None or name == STANDARD or not _may_be_replaced(name):
+            continue
+        other = taken.setdefault(os.path.realpath(name), option)
+        if other != option:
+            raise InputError(f"is {other} and {option} at once; name another file", source=name)
+
+
+def _parts(name: str) -> list[str]:
+    """Return the places of the files that an instance may be read from; all of its tables if it is a folder."""
+    tables = ("agents.csv", "tasks.csv", "instance.json") if os.path.isdir(name) else ()
+    return [os.path.realpath(name), *(os.path.realpath(os.path.join(name, table)) for table in tables)]
+
+
+def _may_be_replaced(name: str) -> bool:
+    """Whether it is a file, or will be: a device such as /dev/null may be written by many."""
+    return os.path.isfile(name) or not os.path.exists(name)
+
+
+def check_output(name: str | None) -> None:
+    """Raise an `InputError` if the file cannot be written."""
+    from alloc.problems import InputError
+    from alloc.problems.formats import check_writable
+
+    if name == "":
+        raise InputError("is no name of a file; give one", source="''")
+    if name is not None:
+        check_writable(name)

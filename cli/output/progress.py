@@ -1,0 +1,81 @@
+"""The live line of a long run: seconds, best makespan, gap and energy."""
+
+import os
+import shutil
+import sys
+import threading
+import time
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+from alloc.cli.output.console import counted, flush, is_terminal, number, percent
+
+if TYPE_CHECKING:
+    from alloc.allocators import Improvement
+
+FIRST_AFTER_S = 1.0
+EVERY_S = 0.2
+CLEAR = "\r\x1b[K"
+
+
+class Progress:
+    """Shows a line on standard error from the first second on, and clears it at the end.
+
+    Parameters
+    ----------
+    wanted : bool
+        False, or a standard error that is no terminal or one that cannot clear a line (``TERM=dumb``), shows nothing.
+    """
+
+    def __init__(self, wanted: bool = True) -> None:
+        self._wanted = wanted and is_terminal(sys.stderr) and os.environ.get("TERM") not in ("dumb", "unknown")
+        self._best: Improvement | None = None
+        self._end = threading.Event()
+        self._thread = threading.Thread(target=self._show, daemon=True, name="alloc-progress")
+
+    def __enter__(self) -> "Progress":
+        self._begin = time.monotonic()
+        if self._wanted:
+            self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._end.set()
+        if self._wanted:
+            self._thread.join()
+
+    def update(self, best: "Improvement") -> None:
+        """Take the best so far; meant for `on_improvement`."""
+        self._best = best
+
+    def _show(self) -> None:
+        if self._end.wait(FIRST_AFTER_S):
+            return
+        while True:
+            width = shutil.get_terminal_size().columns - 1
+            _put(CLEAR + progress_line(time.monotonic() - self._begin, self._best)[:width])
+            if self._end.wait(EVERY_S):
+                break
+        _put(CLEAR)
+
+
+def progress_line(elapsed_s: float, best: "Improvement | None") -> str:
+    """Return the line at this moment."""
+    if best is None:
+        return f"{elapsed_s:6.1f} s  no allocation yet; the first run of some methods compiles them"
+    score = best.evaluation
+    if score.makespan is None:
+        unserved = counted(len(score.unserved_tasks), "task")
+        return f"{elapsed_s:6.1f} s  {unserved} unserved  energy {number(score.energy)}"
+    gap = max(0.0, 1 - best.lower_bound / score.makespan) if score.makespan else 0.0
+    return f"{elapsed_s:6.1f} s  T {number(score.makespan)} h  gap {percent(gap)}  energy {number(score.energy)}"
+
+
+def _put(text: str) -> None:
+    try:
+        sys.stderr.write(text)
+        flush(sys.stderr)
+    except (OSError, ValueError):
+        return  # the terminal has gone; the run goes on

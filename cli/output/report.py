@@ -1,0 +1,141 @@
+"""Results in plain words."""
+
+import math
+
+from alloc.allocators import Result, Status, StopReason
+from alloc.allocators.explain import Bottleneck, explain
+from alloc.cli.output.console import counted, number, percent
+from alloc.problems import Instance, Objective
+
+STOPS = {
+    StopReason.PROVEN: "nothing better exists",
+    StopReason.FINISHED: "the method came to its end",
+    StopReason.TIME_LIMIT: "the time limit was reached",
+    StopReason.ITERATIONS: "all iterations were done",
+    StopReason.TARGET_GAP: "the target gap was reached",
+    StopReason.INTERRUPTED: "it was interrupted",
+}
+
+MOST_NAMES = 8
+"""Ids in a list before it is cut."""
+
+SETTLED = 1e-6 + 1e-9
+"""Relative gap up to which no allocation is sooner, as for the status `optimal`; with slack that may be far."""
+
+
+def summary(result: Result) -> str:
+    """Return the whole answer for people: how good it is, its figures, and what holds it up."""
+    return "\n".join([_headline(result), *figures(result), _ending(result), *holdup(result)])
+
+
+def _headline(result: Result) -> str:
+    size = f"{counted(result.instance.n, 'agent')}, {counted(result.instance.m, 'task')}"
+    return f"{result.instance.name} ({size}), {result.method}: {_status(result)}"
+
+
+def _status(result: Result) -> str:
+    unserved = 0 if result.evaluation is None else len(result.evaluation.unserved_tasks)
+    if result.status is Status.OPTIMAL:
+        if result.makespan_limit is not None:
+            return f"optimal, no allocation within {number(result.makespan_limit)} h takes less energy"
+        better = "is sooner" if result.objective is Objective.MAKESPAN else "is sooner, or as soon with less energy"
+        return f"optimal, no allocation {better}"
+    if result.status is Status.FEASIBLE:
+        return "every task is served; not proven to be the best"
+    if result.status is Status.INFEASIBLE:
+        return f"{unserved} of {counted(result.instance.m, 'task')} cannot be served along with the others"
+    return "no allocation found"
+
+
+def figures(result: Result) -> list[str]:
+    """Return the makespan, the energy and the battery, a line each."""
+    score = result.evaluation
+    if score is None:
+        return []
+    lines = []
+    if result.makespan is None:
+        lines.append(f"  makespan  {number(score.served_makespan)} h over the served tasks")
+    else:
+        bound = f"at least {number(result.lower_bound)} h, gap {percent(result.gap)}"
+        lines.append(f"  makespan  {number(result.makespan)} h ({bound})")
+    energy = f"  energy    {number(score.energy)}"
+    if result.energy_lower_bound is not None:
+        limit = result.makespan_limit
+        when = "at this makespan" if limit is None else f"within {number(limit)} h"
+        energy += f" (at least {number(result.energy_lower_bound)} {when}, gap {percent(result.energy_gap)})"
+    lines.append(f"{energy}, distance {number(score.distance)}")
+    if score.battery_remaining_percent is not None:
+        lines.append(f"  battery   {score.battery_remaining_percent:.1f} % left on average")
+    return lines
+
+
+def _ending(result: Result) -> str:
+    return f"  runtime   {result.runtime_s:.3g} s; it stopped because {STOPS[result.stop_reason]}"
+
+
+def holdup(result: Result) -> list[str]:
+    """Say which task is the last and what one more agent there would gain, or which tasks are unserved."""
+    if result.allocation is None or result.evaluation is None:
+        return []
+    if result.evaluation.unserved_tasks:
+        ids = [result.instance.task_ids[j] for j in result.evaluation.unserved_tasks]
+        return [f"Unserved: {_list(ids)}."]
+    found = explain(result.instance, result.allocation)
+    if found is None:
+        return ["There is no work to do."]
+    return [_last_tasks(result.instance, found), _gain(result.instance, found), _room(result, found)]
+
+
+def _last_tasks(instance: Instance, found: Bottleneck) -> str:
+    ids = [instance.task_ids[j] for j in found.last]
+    if len(ids) > 1:
+        return f"Last: {len(ids)} of {instance.m} tasks together, at {number(found.makespan)} h: {_list(ids)}."
+    j = found.last[0]
+    group = [instance.agent_ids[i] for i in found.agents]
+    ability = float(instance.ability[list(found.agents)].sum())
+    text = (
+        f"Last: task {ids[0]} at {number(found.makespan)} h, workload {number(float(instance.workload[j]))}"
+        f" on {'agent' if len(group) == 1 else f'{len(group)} agents:'} {_list(group)} (ability {number(ability)})"
+    )
+    if found.next_task is None:
+        return f"{text}."
+    return f"{text}; next is {instance.task_ids[found.next_task]} at {number(found.next_time)} h."
+
+
+def _gain(instance: Instance, found: Bottleneck) -> str:
+    if len(found.last) > 1:
+        return "One more agent on one of them gains nothing, as the others stay."
+    at_once = " that is there at once" if instance.has_travel_time else ""
+    if found.enough is None or found.next_task is None:
+        assert found.typical is not None
+        share = 1 - found.typical.makespan / found.makespan
+        return (
+            f"One more agent there{at_once} of ability {number(found.typical.ability)}, the median, gains"
+            f" {percent(share)}: {number(found.typical.makespan)} h."
+        )
+    share = 1 - found.enough.makespan / found.makespan
+    ability = rounded_up(found.enough.ability, whole=bool((instance.ability == instance.ability.round()).all()))
+    return (
+        f"One more agent there{at_once} gains {percent(share)} at most: with ability {ability} or more"
+        f" {instance.task_ids[found.next_task]} is the last, at {number(found.enough.makespan)} h."
+    )
+
+
+def _room(result: Result, found: Bottleneck) -> str:
+    used = f"{percent(found.use)} of all ability is at work until then"
+    if result.gap is None or result.gap <= SETTLED:
+        return f"{used}; the same agents cannot be done sooner."
+    return f"{used}; the same agents, allocated otherwise, gain {percent(result.gap)} at most."
+
+
+def rounded_up(ability: float, *, whole: bool) -> str:
+    """Return `ability` rounded up, so that it is enough: to three digits, or to a whole number of at most six."""
+    if whole and ability < 999_999:
+        return f"{math.ceil(ability * (1 - 1e-12))}"
+    unit = 10.0 ** (math.floor(math.log10(ability)) - 2)
+    return f"{math.ceil(ability / unit * (1 - 1e-12)) * unit:.3g}"
+
+
+def _list(ids: list[str]) -> str:
+    more = f" and {len(ids) - MOST_NAMES} more" if len(ids) > MOST_NAMES else ""
+    return ", ".join(ids[:MOST_NAMES]) + more

@@ -1,0 +1,166 @@
+"""The tasks within reach of each origin as compressed rows, for reaches too short to fill a table."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from alloc.problems.distances.reach import Reach
+
+CHUNK = 1 << 21
+"""Pairs of origin and task that are looked at together, about."""
+
+SAMPLE = 256
+"""Origins by which numbers of pairs are estimated."""
+
+MARGIN = 1e-9
+"""Relative amount by which a radius is widened before the exact rule decides."""
+
+
+Indices = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class Neighbours:
+    """Compressed sparse rows: the tasks of origin i are ``task[first[i]:first[i + 1]]``, in ascending order.
+
+    Attributes
+    ----------
+    first : ndarray of int, shape (origins + 1,)
+    task : ndarray of int32, shape (pairs,)
+    distance : ndarray, shape (pairs,)
+        As in `Reach.distance`, to the last bit.
+    """
+
+    first: NDArray[np.intp]
+    task: NDArray[np.int32]
+    distance: NDArray[np.float64]
+
+    def by_task(self, m: int) -> tuple[Indices, Indices]:
+        """Return where each task's origins begin in the second array, shape (m + 1,); and all origins by task."""
+        from scipy.sparse import csr_matrix
+
+        ones = np.ones(len(self.task), dtype=np.int8)
+        columns = csr_matrix((ones, self.task, self.first), shape=(len(self.first) - 1, m)).tocsc()
+        return columns.indptr, columns.indices
+
+    @property
+    def origin(self) -> NDArray[np.int32]:
+        """The origin of each pair, shape (pairs,)."""
+        return np.repeat(np.arange(len(self.first) - 1, dtype=np.int32), np.diff(self.first))
+
+
+Pairs = tuple[Indices, Indices]
+
+
+def find_neighbours(reach: "Reach") -> Neighbours:
+    """Gather the tasks within reach of each origin; time and memory are in proportion to their number, as a rule."""
+    origins, m = len(reach.place), len(reach.goal)
+    rows, tasks, flown = [], [], []
+    for origin, task in _candidates(reach):
+        distance = reach.distances_between(origin, task)
+        keep = np.flatnonzero(reach.is_within(origin, task, distance))
+        keep = keep[np.argsort(origin[keep] * m + task[keep])]
+        rows.append(origin[keep].astype(np.int32))
+        tasks.append(task[keep].astype(np.int32))
+        flown.append(distance[keep])
+    row, column, away = np.concatenate(rows), np.concatenate(tasks), np.concatenate(flown)
+    del rows, tasks, flown
+    if (row[1:] < row[:-1]).any():  # each origin came in one piece, but not in order
+        order = np.argsort(row, kind="stable")
+        column, away = column[order], away[order]
+    first = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=origins))]).astype(np.intp)
+    for array in (first, column, away):
+        array.setflags(write=False)
+    return Neighbours(first, column, away)
+
+
+def estimated_pairs(reach: "Reach") -> float:
+    """Return about how many pairs of origin and task are within reach, by a sample of the origins."""
+    origins = len(reach.place)
+    sample = np.unique(np.linspace(0, origins - 1, SAMPLE).astype(np.intp))
+    return float(reach.rows(sample)[1].sum(axis=1).mean() * origins)
+
+
+def nearest_distance(reach: "Reach", wanted: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Return how far the nearest of the `wanted` tasks within reach is, ``inf`` where there is none; shape (origins,).
+
+    Origins bound to a list get the nearest on it, the others the nearest of all, by a tree.
+    """
+    from scipy.spatial import cKDTree
+
+    nearest = np.full(len(reach.place), np.inf)
+    listed = np.flatnonzero(reach.list_of >= 0)
+    for origin, task in _on_lists(reach, listed):
+        distance = reach.distances_between(origin, task)
+        good = wanted[task] & reach.is_within(origin, task, distance)
+        np.minimum.at(nearest, origin[good], distance[good])
+    tasks, free = np.flatnonzero(wanted), np.flatnonzero(reach.list_of < 0)
+    unknown = np.isnan(reach.goal[tasks, 0])
+    lost = np.isnan(reach.place[free, 0]) | unknown.any()
+    nearest[free[lost]] = 0.0 if len(tasks) else np.inf
+    placed, known = free[~lost], tasks[~unknown]
+    if len(placed) and len(known):
+        _, found = cKDTree(reach.goal[known] / reach.unit).query(reach.place[placed] / reach.unit)
+        distance = reach.distances_between(placed, known[found])
+        nearest[placed] = np.where(reach.is_within(placed, known[found], distance), distance, np.inf)
+    return nearest
+
+
+def _candidates(reach: "Reach") -> Iterator[Pairs]:
+    """Pairs that may be within reach, every origin in one piece."""
+    nothing = np.zeros(0, dtype=np.intp)
+    yield nothing, nothing
+    listed = reach.list_of >= 0
+    radius = reach.radius * (1 + MARGIN)
+    near = ~listed & ~np.isnan(reach.place[:, 0]) & np.isfinite(radius)
+    yield from _on_lists(reach, np.flatnonzero(listed))
+    yield from _everywhere(reach, np.flatnonzero(~listed & ~near))
+    order = np.flatnonzero(near)
+    yield from _around(reach, order[np.argsort(radius[order], kind="stable")], radius)
+
+
+def _on_lists(reach: "Reach", origins: Indices) -> Iterator[Pairs]:
+    lengths = np.array(list(map(len, reach.lists)), dtype=np.intp)[reach.list_of[origins]] if len(origins) else origins
+    for part in np.split(origins, _cuts(lengths)):
+        if len(part):
+            lists = [reach.lists[number] for number in reach.list_of[part].tolist()]
+            yield np.repeat(part, list(map(len, lists))), np.concatenate(lists)
+
+
+def _everywhere(reach: "Reach", origins: Indices) -> Iterator[Pairs]:
+    m = len(reach.goal)
+    for part in np.split(origins, _cuts(np.full(len(origins), m))):
+        if len(part):
+            yield np.repeat(part, m), np.tile(np.arange(m), len(part))
+
+
+def _around(reach: "Reach", origins: Indices, radius: NDArray[np.float64]) -> Iterator[Pairs]:
+    """Tasks in a ball around each origin, by a tree; those without a place are within every reach."""
+    from scipy.spatial import cKDTree
+
+    known = np.flatnonzero(~np.isnan(reach.goal[:, 0]))
+    unknown = np.flatnonzero(np.isnan(reach.goal[:, 0]))
+    if len(known) and len(origins):
+        tree = cKDTree(reach.goal[known] / reach.unit)
+    while len(origins):
+        place = reach.place[origins] / reach.unit
+        sample = np.unique(np.linspace(0, len(origins) - 1, SAMPLE).astype(np.intp))
+        ball = radius[origins] / reach.unit
+        most = tree.query_ball_point(place[sample], ball[sample], return_length=True).mean() if len(known) else 0
+        size = max(1, int(CHUNK / (1 + most + len(unknown))))
+        part, ball = origins[:size], ball[:size]
+        pairs = [(np.repeat(part, len(unknown)), np.tile(unknown, len(part)))]
+        if len(known):
+            found = cKDTree(place[:size]).sparse_distance_matrix(tree, float(ball[-1]), output_type="ndarray")
+            pairs.append((part[found["i"]], known[found["j"]]))
+        yield np.concatenate([pair[0] for pair in pairs]), np.concatenate([pair[1] for pair in pairs])
+        origins = origins[size:]
+
+
+def _cuts(lengths: Indices) -> Indices:
+    """Where to cut so that the lengths in each part sum up to about `CHUNK`."""
+    return np.flatnonzero(np.diff(np.cumsum(lengths) // CHUNK)) + 1

@@ -1,0 +1,166 @@
+"""The fewest unserved tasks, and which tasks compete for too few agents."""
+
+import numpy as np
+
+from alloc.problems.distances.neighbours import Neighbours
+from alloc.problems.instance import IDLE, Instance, IntArray
+from alloc.problems.matching.assignment import match
+from alloc.problems.matching.serving import needs_agent, serve_in_turn
+
+FEW, SAMPLE = 8, 20
+"""Agents near a task that a quick try looks at, and agents for each task from which they are taken."""
+
+
+def fewest_unserved(instance: Instance) -> int:
+    """Return how many tasks with workload no allocation can serve, at the least."""
+    tasks = needs_agent(instance)
+    if instance.reach.is_complete:
+        return max(0, len(tasks) - instance.n)
+    near = instance.reach.neighbours
+    if near is None:
+        return sum(rivals is not None for rivals in serve_in_turn(instance, tasks))
+    return int((_origin_of_task(instance, near, tasks)[tasks] == IDLE).sum())
+
+
+def _origin_of_task(instance: Instance, near: Neighbours, tasks: IntArray) -> IntArray:
+    """Return the origin of an agent for each of `tasks`, no agent twice, `IDLE` where it has none; shape (m,)."""
+    degree, wanted = np.diff(near.first), np.zeros(instance.m, dtype=np.bool_)
+    wanted[tasks] = True
+    copies = np.minimum(np.bincount(instance.reach.origin, minlength=len(degree)), degree)
+    origin = np.full(instance.m, IDLE, dtype=np.intp)
+    for row in np.flatnonzero((copies == degree) & (degree > 1)).tolist():  # agents for all that it can take
+        task = near.task[near.first[row] : near.first[row + 1]]
+        origin[task] = row
+    wanted &= origin == IDLE
+    useful = wanted[near.task]
+    first = np.concatenate([[0], np.cumsum(useful)])[near.first]
+    row = np.repeat(np.arange(len(degree)), copies)
+    length = np.diff(first)[row]
+    begin = np.concatenate([[0], np.cumsum(length)])
+    entry = np.repeat(first[row] - begin[:-1], length) + np.arange(begin[-1])
+    found = match(begin, near.task[useful][entry])
+    origin[found[found != IDLE]] = row[found != IDLE]
+    return origin
+
+
+def contested_part(instance: Instance) -> tuple[IntArray, IntArray, IntArray] | None:
+    """Return what `Shortage` calls agents and contested tasks, and some task for each of these agents.
+
+    None if all tasks can be served, and where too many pairs are within reach to tell.
+    """
+    tasks, reach = needs_agent(instance), instance.reach
+    if reach.is_complete:
+        if instance.n >= len(tasks):
+            return None
+        least = tasks[np.argsort(instance.workload[tasks], kind="stable")][: instance.n]
+        return np.arange(instance.n), tasks, _by_size(instance, np.arange(instance.n), least)
+    if _are_served_simply(instance, tasks) or reach.neighbours is None:
+        return None
+    near = reach.neighbours
+    origin = _origin_of_task(instance, near, tasks)
+    left_out = tasks[origin[tasks] == IDLE]
+    if not len(left_out):
+        return None
+    contested, origins = _rivals(near, origin, left_out, instance.m)
+    first, by_origin = reach.agents_by_origin
+    held = contested[origin[contested] != IDLE]
+    held = held[np.argsort(origin[held], kind="stable")]
+    bounds = np.searchsorted(origin[held], [origins, origins + 1])
+    agents = [by_origin[first[i] : first[i + 1]] for i in origins.tolist()]
+    chosen = [
+        _by_size(instance, group, held[begin:end]) for group, begin, end in zip(agents, *bounds.tolist(), strict=True)
+    ]
+    none: list[IntArray] = [np.zeros(0, dtype=np.intp)]
+    return np.concatenate(agents + none), contested, np.concatenate(chosen + none)
+
+
+def _by_size(instance: Instance, agents: IntArray, tasks: IntArray) -> IntArray:
+    """Return one of `tasks` for each of as many agents: the more work, the more able the agent."""
+    chosen = np.empty(len(agents), dtype=np.intp)
+    chosen[np.argsort(instance.ability[agents], kind="stable")] = tasks[
+        np.argsort(instance.workload[tasks], kind="stable")
+    ]
+    return chosen
+
+
+def _rivals(near: Neighbours, origin: IntArray, tasks: IntArray, m: int) -> tuple[IntArray, IntArray]:
+    """Return all tasks that could be left out in place of one of `tasks`, and the origins of those who can take them.
+
+    `origin` is a largest matching of tasks with agents; each of `tasks` is without one.
+    """
+    first, by_task = near.by_task(m)
+    held = np.flatnonzero(origin != IDLE)
+    held = held[np.argsort(origin[held], kind="stable")]
+    bounds = np.searchsorted(origin[held], np.arange(len(near.first)))
+    is_rival, met = np.zeros(m, dtype=np.bool_), np.zeros(len(near.first) - 1, dtype=np.bool_)
+    while len(tasks):
+        is_rival[tasks] = True
+        able = np.unique(_entries(first, by_task, tasks))
+        able = able[~met[able]]
+        met[able] = True
+        tasks = _entries(bounds, held, able)
+        tasks = tasks[~is_rival[tasks]]
+    return np.flatnonzero(is_rival), np.flatnonzero(met)
+
+
+def _entries(first: IntArray, values: IntArray, rows: IntArray) -> IntArray:
+    """Return the values of these rows of compressed rows, one row after the other."""
+    length = first[rows + 1] - first[rows]
+    offset = np.arange(length.sum()) - np.repeat(np.cumsum(length) - length, length)
+    found: IntArray = values[np.repeat(first[rows], length) + offset]
+    return found
+
+
+def _are_served_simply(instance: Instance, tasks: IntArray) -> bool:
+    """Whether a quick try serves all of `tasks`; where agents abound, it does."""
+    if instance.n < len(tasks):
+        return False
+    return (_by_scarcity if instance.reach.has_table else _by_sample)(instance, tasks)
+
+
+def _by_scarcity(instance: Instance, tasks: IntArray) -> bool:
+    """The task with the fewest agents first, by an agent that can take the fewest tasks."""
+    reach = instance.reach
+    order = np.argsort(reach.mask[:, tasks].sum(axis=1), kind="stable")
+    mask, left = reach.mask[np.ix_(order, tasks)], np.bincount(reach.origin, minlength=len(order))[order]
+    for j in np.argsort(left @ mask, kind="stable").tolist():
+        able = mask[:, j] & (left > 0)
+        row = int(able.argmax())
+        if not able[row]:
+            return False
+        left[row] -= 1
+    return True
+
+
+def _by_sample(instance: Instance, tasks: IntArray) -> bool:
+    """Match the tasks with agents of a sample that begin nearby."""
+    from scipy.spatial import cKDTree
+
+    reach = instance.reach
+    sample = np.random.default_rng(0).permutation(instance.n)[: SAMPLE * len(tasks)]
+    sample = sample[~np.isnan(reach.place[reach.origin[sample], 0])]
+    if np.isnan(reach.goal[tasks, 0]).any() or len(sample) < len(tasks):
+        return False
+    tree = cKDTree(reach.place[reach.origin[sample]] / reach.unit)
+    _, near = tree.query(reach.goal[tasks] / reach.unit, k=min(FEW, len(sample)))
+    agent, task = sample[near].ravel(), np.repeat(tasks, near.size // len(tasks))
+    able = reach.allows(agent, task)
+    first = np.concatenate([[0], np.cumsum(able.reshape(len(tasks), -1).sum(axis=1))])
+    return bool((match(first, agent[able]) != IDLE).all())
+
+
+def contested_tasks(instance: Instance) -> IntArray | None:
+    """Return an inclusion-minimal set of tasks that too few agents can reach, or None if all tasks can be served.
+
+    Such a set has one task more than agents that can take any of them; without any one of its tasks, the rest could
+    be served (Hall 1935, doi:10.1112/jlms/s1-10.37.26).
+    """
+    tasks, reach = needs_agent(instance), instance.reach
+    if reach.is_complete:
+        return tasks[: instance.n + 1] if len(tasks) > instance.n else None
+    near = reach.neighbours
+    if near is not None:
+        origin = _origin_of_task(instance, near, tasks)
+        left_out = tasks[origin[tasks] == IDLE]
+        return _rivals(near, origin, left_out[:1], instance.m)[0] if len(left_out) else None
+    return next((rivals for rivals in serve_in_turn(instance, tasks) if rivals is not None), None)

@@ -1,0 +1,112 @@
+import numpy as np
+import pytest
+from oracle import brute_force
+from tiny_instances import all_can_be_served, seeds_where, tiny_instance
+
+from alloc.allocators.exact.energy.narrowing import REPEATABLE_SLICES, Narrowing
+from alloc.allocators.exact.model import Model
+from alloc.problems import Allocation, Instance, agent_classes, evaluate
+from alloc.problems.generate import paper_like
+
+
+def narrowing(instance: Instance, plan: Allocation, makespan: float, seed: int = 0) -> Narrowing:
+    """Both sides at a plan and a makespan that it holds."""
+    model = Model.build(instance, agent_classes(instance, by_place=True), int((instance.workload > 0).sum()))
+    return Narrowing(instance, model, model.at(makespan), plan, seed)
+
+
+def narrowed(sides: Narrowing, instance: Instance, plan: Allocation) -> Allocation:
+    """Work on both sides to the end."""
+    for number in range(REPEATABLE_SLICES):
+        plan = sides.repeat(number) or plan
+        sides.meet(evaluate(instance, plan).distance)
+    return plan
+
+
+def at_home(agents: int, tasks: int, seed: int) -> tuple[Instance, Allocation]:
+    """An instance of the paper's kind with a plan of T = 1 that lies far from the best."""
+    rng = np.random.default_rng(seed)
+    plan = np.concatenate([np.arange(tasks), rng.integers(0, tasks, agents - tasks)])
+    ability = rng.integers(1, 11, agents)
+    places = rng.random((tasks, 3))
+    instance = Instance(
+        ability=ability,
+        workload=np.bincount(plan, ability, tasks),
+        task_position=places,
+        start_task=rng.integers(0, tasks, agents),
+    )
+    return instance, Allocation(plan)
+
+
+@pytest.mark.parametrize("seed", seeds_where(all_can_be_served, 30))
+def test_bound_is_below_the_optimum_of_brute_force(seed):
+    """On tiny instances of every sort the bound holds, and the plans found are what they claim to be."""
+    instance = tiny_instance(seed)
+    best = brute_force(instance)
+    assert not best.unserved
+    sides = narrowing(instance, Allocation(best.plan), best.makespan)
+    for number in range(5):
+        assert sides.repeat(number) is None  # nothing is better than the best
+    assert sides.bound * instance.energy_per_distance <= best.energy * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("slack", [1.0, 1.3])
+def test_bound_and_plan_meet_or_come_close(slack):
+    """On an instance of the paper's kind, with T = 1 or more, both sides come within some percent of each other."""
+    instance, plan = at_home(40, 8, 1)
+    sides = narrowing(instance, plan, slack)
+    before = evaluate(instance, plan)
+    plan = narrowed(sides, instance, plan)
+    after = evaluate(instance, plan)
+    assert after.served_makespan <= slack * (1 + 1e-9)
+    assert not after.unserved_tasks
+    assert after.energy < 0.5 * before.energy
+    assert 0.9 * after.distance <= sides.bound <= after.distance * (1 + 1e-9)
+
+
+def test_pairs_of_the_best_plan_are_kept():
+    """What is left for the solver has the plan at hand in it, and far fewer pairs."""
+    instance, plan = at_home(60, 10, 2)
+    model = Model.build(instance, agent_classes(instance, by_place=True), instance.m)
+    demand = model.at(1.0)
+    sides = Narrowing(instance, model, demand, plan, 0)
+    plan = narrowed(sides, instance, plan)
+    used = np.flatnonzero(model.counts(demand, plan))
+    assert set(used) <= set(sides.keep.tolist())
+    assert len(sides.keep) < 0.5 * len(demand.kind)
+
+
+def test_same_seed_same_plans():
+    """Work counted in rounds gives the same plans and bounds again."""
+    instance = paper_like(60, 10, 240, 0)
+    plan = Allocation(np.arange(60) % 10)
+    limit = evaluate(instance, plan).served_makespan
+    ends = []
+    for _ in range(2):
+        sides, last = narrowing(instance, plan, limit), plan
+        for number in range(3):
+            last = sides.repeat(number) or last
+        ends.append((last.task_of_agent.tolist(), sides.bound))
+    assert ends[0] == ends[1]
+
+
+def test_limits_of_reach_are_kept():
+    """Agents are shared out only among tasks that they can take."""
+    rng = np.random.default_rng(3)
+    places = rng.random((6, 2))
+    plan = np.arange(30) % 6
+    lists = [sorted({int(plan[i]), int(rng.integers(6)), int(rng.integers(6))}) for i in range(30)]
+    instance = Instance(
+        ability=rng.integers(1, 6, 30),
+        workload=np.full(6, 10.0),
+        agent_position=rng.random((30, 2)),
+        task_position=places,
+        allowed_tasks=lists,
+    )
+    limit = evaluate(instance, Allocation(plan)).served_makespan
+    sides = narrowing(instance, Allocation(plan), limit)
+    found = sides.repeat(0)
+    assert found is not None
+    score = evaluate(instance, found)
+    assert not score.violations
+    assert score.served_makespan <= limit * (1 + 1e-9)

@@ -1,0 +1,84 @@
+from itertools import product
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from alloc.allocators.exact.makespan.patterns import cheapest_by_core, cheapest_group, fill_table, read_group
+
+classes = st.lists(st.tuples(st.integers(1, 7), st.integers(-2, 9), st.integers(0, 3)), min_size=1, max_size=4)
+
+
+def arrays(kinds):
+    """Weights, prices and copies as the kernels want them."""
+    weight, price, copies = (np.array(column, dtype=np.int64) for column in zip(*kinds, strict=True))
+    return weight, price / 4, copies
+
+
+def by_trying(weight, price, copies, need, enough):
+    """Least cost over all groups, one by one."""
+    groups = np.array(list(product(*(range(most + 1) for most in copies))))
+    total = groups @ weight
+    good = (total >= need) & (total <= enough)
+    return float((groups @ price)[good].min(initial=np.inf))
+
+
+@given(classes, st.integers(0, 12), st.one_of(st.just(-1), st.integers(0, 6)))
+def test_cheapest_group_is_that_of_brute_force(kinds, need, spare):
+    """Cost and group are right, for prices of either sign, with and without a limit on the sum."""
+    weight, price, copies = arrays(kinds)
+    enough = need + spare if spare >= 0 else -1
+    cost, group = cheapest_group(weight, price, copies, need, enough)
+    assert cost == pytest.approx(by_trying(weight, price, copies, need, enough if enough >= 0 else np.inf))
+    if np.isfinite(cost):
+        assert need <= group @ weight
+        assert enough < 0 or group @ weight <= enough
+        assert (group >= 0).all()
+        assert (group <= copies).all()
+        assert group @ price == pytest.approx(cost)
+
+
+@pytest.mark.parametrize("exact", [False, True])
+def test_one_table_answers_for_every_need(exact):
+    """The table filled for the largest need has the costs and groups of all smaller ones."""
+    rng = np.random.default_rng(0)
+    weight, price, copies = rng.integers(1, 9, 12), rng.random(12), rng.integers(1, 6, 12)
+    table = fill_table(weight, price, copies, 40, exact)
+    for need in range(41):
+        cost, _ = cheapest_group(weight, price, copies, need, need if exact else -1)
+        group = read_group(table, 12, need)
+        assert table[0][need] == pytest.approx(cost)
+        assert group @ price == pytest.approx(cost)
+        assert group @ weight >= need
+
+
+def test_weights_beyond_the_need_count_as_the_need():
+    """An agent that alone is more than enough covers any need, and meets no smaller sum."""
+    weight, price, copies = np.array([50, 2]), np.array([1.0, 0.4]), np.array([1, 9])
+    assert cheapest_group(weight, price, copies, 10, -1)[0] == 1.0
+    assert cheapest_group(weight, price, copies, 10, 10)[0] == 2.0
+
+
+def test_no_group_costs_infinity():
+    """Where all together are too few, or no sum fits, the cost is infinite and nobody is taken."""
+    weight, price, copies = np.array([2]), np.array([1.0]), np.array([3])
+    for need, enough in ((7, -1), (3, 3)):
+        cost, group = cheapest_group(weight, price, copies, need, enough)
+        assert cost == np.inf
+        assert not group.any()
+
+
+@given(st.integers(0, 2**32), st.integers(0, 3), st.integers(1, 90))
+def test_core_has_the_cheapest_group(seed, spare, classes):
+    """Settling all but the core costs nothing, for prices of either sign."""
+    rng = np.random.default_rng(seed)
+    weight, copies = rng.integers(1, 11, classes), rng.integers(1, 4, classes)
+    price = rng.normal(0, 1, classes)
+    need = int(rng.integers(0, 1 + weight @ copies))
+    cost, group = cheapest_by_core(weight, price, copies, need, need + spare)
+    assert cost == pytest.approx(cheapest_group(weight, price, copies, need, need + spare)[0])
+    if np.isfinite(cost):
+        assert group @ price == pytest.approx(cost)
+        assert need <= group @ weight <= need + spare
+        assert (group <= copies).all()

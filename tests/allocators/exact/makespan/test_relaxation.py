@@ -1,0 +1,44 @@
+"""The linear programme of single agents proves nothing that is not so."""
+
+from types import SimpleNamespace
+from unittest import mock
+
+import numpy as np
+import pytest
+from oracle import brute_force
+from tiny_instances import tiny_instance
+
+from alloc.allocators.exact.makespan.relaxation import relaxed_lower_bound
+from alloc.allocators.exact.model import Model
+from alloc.problems import Instance, agent_classes, fewest_unserved
+
+SERVED = [
+    seed for seed in range(40) if tiny_instance(seed).workload.any() and fewest_unserved(tiny_instance(seed)) == 0
+]
+
+
+def bound_of(instance: Instance, high: float) -> float:
+    """Return the bound between a hundredth of `high` and `high`."""
+    model = Model.build(instance, agent_classes(instance, by_place=False), int((instance.workload > 0).sum()))
+    return relaxed_lower_bound(model, high / 100, high, 10.0, lambda: False)
+
+
+@pytest.mark.parametrize("seed", SERVED)
+def test_whatever_the_solver_says_the_bound_holds(seed):
+    """Neither right answers nor wrong ones lead to a bound above the optimum."""
+    instance, rng = tiny_instance(seed), np.random.default_rng(seed)
+    best = brute_force(instance).makespan
+
+    def wrong(cost: np.ndarray, matrix: object, limits: np.ndarray, **_: object) -> SimpleNamespace:
+        prices = -rng.exponential(size=len(limits))
+        return SimpleNamespace(status=0, fun=0.0, ineqlin=SimpleNamespace(marginals=prices))
+
+    assert bound_of(instance, 2 * best) <= best * (1 + 1e-9)
+    with mock.patch("alloc.allocators.exact.makespan.relaxation.linprog", wrong):
+        assert bound_of(instance, 2 * best) <= best * (1 + 1e-9)
+
+
+def test_by_hand():
+    """Three agents of ability 1 share 9 hours of work, another is of no use to it: nobody is done before hour 3."""
+    instance = Instance(ability=[1, 1, 1, np.pi], workload=[4, 5, 3], allowed_tasks=[*[[0, 1]] * 3, [2]])
+    assert bound_of(instance, 4.0) == pytest.approx(3.0, rel=1e-4)

@@ -1,0 +1,53 @@
+import numpy as np
+import pytest
+from oracle import brute_force
+from tiny_instances import seeds_where, tiny_instance
+
+from alloc.allocators.exact.makespan.repartition_search import Wanderer
+from alloc.allocators.exact.model import Model
+from alloc.allocators.heuristic.greedy.list_schedule import greedy
+from alloc.problems import Instance, agent_classes, evaluate, fewest_unserved, machine_covering, serve_all
+
+
+def some_can_be_served(instance: Instance) -> bool:
+    return int((instance.workload > 0).sum()) > fewest_unserved(instance)
+
+
+@pytest.mark.parametrize("seed", seeds_where(some_can_be_served, 30))
+def test_optimum_of_tiny_instances(seed):
+    """On tiny instances of every sort the optimum is found when asked for; if some cannot be served, the others are."""
+    instance = tiny_instance(seed)
+    best = brute_force(instance)
+    start = serve_all(instance, greedy(instance))
+    serve = int((instance.workload > 0).sum()) - best.unserved
+    wanderer = Wanderer(Model.build(instance, agent_classes(instance, by_place=False), serve), seed)
+    wanderer.settle(start)
+    _, plan = wanderer.walk(best.makespan * (1 + 1e-9), lambda: False, most_steps=500)
+    score = evaluate(instance, plan)
+    assert not score.violations
+    assert len(score.unserved_tasks) == best.unserved
+    if best.unserved == 0:  # else it does not choose which tasks are left
+        assert score.makespan == pytest.approx(best.makespan, rel=1e-8)
+
+
+def test_found_plans_have_the_makespan_asked_for():
+    """Of what it says to have found, the evaluator thinks likewise."""
+    instance = machine_covering(40, 10, 1, 100, 0, equal=False)
+    model = Model.build(instance, agent_classes(instance, by_place=False), 10)
+    wanderer = Wanderer(model, 0)
+    wanderer.settle(greedy(instance))
+    time = float(instance.workload.sum() / instance.ability.sum()) * 1.01
+    found, plan = wanderer.walk(time, lambda: False, most_steps=10_000)
+    assert found
+    assert evaluate(instance, plan).makespan <= time * (1 + 1e-9)
+
+
+def test_same_seed_same_plan():
+    """The random numbers come from the seed alone."""
+    instance = machine_covering(30, 10, 100, 800, 1)
+    plans = []
+    for _ in range(2):
+        wanderer = Wanderer(Model.build(instance, agent_classes(instance, by_place=False), 10), 3)
+        wanderer.settle(greedy(instance))
+        plans.append(wanderer.walk(1e-9 + 2.0, lambda: False, most_steps=300)[1])
+    assert np.array_equal(plans[0].task_of_agent, plans[1].task_of_agent)

@@ -1,0 +1,157 @@
+"""Operators of the genetic algorithm, and the matrix that it works on."""
+
+import numpy as np
+import pytest
+
+from alloc.allocators.heuristic.genetic.operators import Mutation, _draw_homeward, cross_groups, mutate, tournament
+from alloc.allocators.heuristic.genetic.population import Landscape, list_schedules
+from alloc.problems import Allocation, Instance, evaluate
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    return np.random.default_rng(7)
+
+
+@pytest.fixture
+def instance() -> Instance:
+    """Twelve agents, six tasks of which one needs nothing, lists of tasks, places."""
+    rng = np.random.default_rng(3)
+    return Instance(
+        ability=rng.integers(1, 10, 12),
+        workload=[9, 0, 14, 5, 20, 7],
+        task_position=rng.random((6, 3)),
+        agent_position=rng.random((12, 3)),
+        allowed_tasks=[None if i % 3 else [i % 6, (i + 2) % 6, (i + 3) % 6] for i in range(12)],
+        energy_per_distance=6.0,
+    )
+
+
+def some_genes(landscape: Landscape, rows: int, rng: np.random.Generator) -> np.ndarray:
+    """Rows of a legal population, the bench included."""
+    genes = rng.integers(0, landscape.bench + 1, size=(rows, landscape.n)).astype(np.int32)
+    return np.where(landscape.allows(np.arange(landscape.n), genes), genes, landscape.bench).astype(np.int32)
+
+
+def test_figures_agree_with_the_evaluator(instance: Instance, rng: np.random.Generator) -> None:
+    """Whole-population figures are those that `evaluate` gives row by row."""
+    landscape = Landscape(instance)
+    genes = some_genes(landscape, 50, rng)
+    figures = landscape.figures(genes, aim=1.0)
+    for row, (unserved, makespan, energy) in enumerate(
+        zip(figures.unserved, figures.makespan, figures.energy, strict=True)
+    ):
+        score = evaluate(instance, landscape.decode(genes[row]))
+        assert not score.violations
+        assert (len(score.unserved_tasks), score.served_makespan, score.energy) == pytest.approx(
+            (unserved, makespan, energy)
+        )
+
+
+def test_shortfall_by_hand() -> None:
+    """Groups of 3 and 2 against workloads 6 and 2 at T = 1 lack half of the first task; at T = 2 nothing."""
+    landscape = Landscape(Instance(ability=[3, 2], workload=[6, 2]))
+    genes = np.array([[0, 1]], dtype=np.int32)
+    assert landscape.figures(genes, 1.0).shortfall == pytest.approx([0.5])
+    assert landscape.figures(genes, 2.0).shortfall == pytest.approx([0.0])
+
+
+def test_codes_invert_each_other(instance: Instance) -> None:
+    """Encoding keeps what is useful, and benches agents that are idle, not allowed, or on tasks without workload."""
+    landscape = Landscape(instance)
+    allocation = Allocation([1, 2, -1, 3, 4, 5, 2, 3, 4, 5, 0, 2])
+    back = landscape.decode(landscape.encode(allocation))
+    assert back == Allocation([-1, 2, -1, 3, 4, 5, 2, 3, 4, 5, 0, 2])
+    assert landscape.encode(Allocation([4] * 12))[0] == landscape.bench  # agent 0 may do 0, 2 and 3 alone
+
+
+def test_children_take_whole_groups(rng: np.random.Generator) -> None:
+    """Every gene of a child is that of a parent, and some of its groups are exactly those of the second parent."""
+    one, other = (rng.integers(0, 5, size=(40, 20)).astype(np.int32) for _ in range(2))
+    child = cross_groups(one, other, np.full(40, 0.4), rng)
+    assert ((child == one) | (child == other)).all()
+    whole = [[((child[r] == j) == (other[r] == j)).all() for j in range(5)] for r in range(40)]
+    assert np.mean(whole) > 0.4
+    assert (child != one).any(axis=1).mean() > 0.5
+
+
+def test_no_share_no_change(rng: np.random.Generator) -> None:
+    """A child that takes no groups is its first parent; one that takes all is its second."""
+    one, other = (rng.integers(0, 5, size=(9, 20)).astype(np.int32) for _ in range(2))
+    assert (cross_groups(one, other, np.zeros(9), rng) == one).all()
+    assert (cross_groups(one, other, np.ones(9), rng) == other).all()
+
+
+@pytest.mark.parametrize("economical", [False, True])
+@pytest.mark.parametrize("pairs", [0.0, 1.0])
+def test_mutation_respects_reach(instance: Instance, rng: np.random.Generator, economical: bool, pairs: float) -> None:
+    """However often rows mutate, nobody is sent where it cannot go, and nearly every row changes."""
+    landscape = Landscape(instance)
+    genes = some_genes(landscape, 30, rng)
+    before = genes.copy()
+    for _ in range(10):
+        mutate(genes, 1.0, landscape, rng, economical=economical, settings=Mutation(pairs=pairs))
+        assert landscape.allows(np.arange(landscape.n), genes).all()
+        assert genes.min() >= 0
+        assert genes.max() <= landscape.bench
+    assert (genes != before).any(axis=1).mean() > 0.9
+
+
+def test_mutation_moves_ability_to_where_it_lacks(rng: np.random.Generator) -> None:
+    """One exchange without noise makes good a deficit that an exchange can make good: 5 and 3 for 4 and 4."""
+    landscape = Landscape(Instance(ability=[3, 2, 2, 1], workload=[4, 4]))
+    genes = np.repeat(np.array([[0, 0, 1, 1]], dtype=np.int32), 50, axis=0)
+    settings = Mutation(exchanges=1.0, stray=0.0, temperature=0.0, pairs=0.0)
+    mutate(genes, 1.0, landscape, rng, settings=settings)
+    assert landscape.figures(genes, 1.0).shortfall.max() == 0
+
+
+def test_large_groups_are_sampled(rng: np.random.Generator) -> None:
+    """In groups beyond the cap every member may move: no agent is out of reach of mutation."""
+    landscape = Landscape(Instance(ability=np.ones(40), workload=[20, 20]))
+    touched = np.zeros(40, dtype=bool)
+    for _ in range(30):
+        genes = np.repeat(np.repeat([[0, 1]], 20, axis=1).astype(np.int32), 20, axis=0)
+        before = genes.copy()
+        mutate(genes, 1.0, landscape, rng, settings=Mutation(group_cap=4, pairs=0.0, stray=1.0))
+        touched |= (genes != before).any(axis=0)
+    assert touched.all()
+
+
+def test_tournament_prefers_the_first(rng: np.random.Generator) -> None:
+    """Of 10 in order, the first wins a tournament of three with probability 1 - 0.9^3 = 0.271, the last hardly ever."""
+    winners = tournament(10, 20_000, rng)
+    assert np.mean(winners == 0) == pytest.approx(0.271, abs=0.02)
+    assert np.mean(winners == 9) == pytest.approx(0.001, abs=0.002)
+
+
+def test_list_schedule_without_noise_is_greedy(instance: Instance, rng: np.random.Generator) -> None:
+    """A row without noise takes agents in order of ability, each to the lowest W / h: 3, 2, 2, 1 on 5 and 3 by hand."""
+    landscape = Landscape(Instance(ability=[3, 2, 2, 1], workload=[5, 3]))
+    rows = list_schedules(landscape, np.zeros(1), np.zeros(1), rng, lambda: False)
+    assert rows.tolist() == [[0, 1, 0, 1]]
+    noisy = list_schedules(Landscape(instance), np.full(20, 0.5), np.full(20, 1.0), rng, lambda: False)
+    assert Landscape(instance).allows(np.arange(12), noisy).all()
+    assert len(np.unique(noisy, axis=0)) > 10
+
+
+def test_homeward_draws_shorten_the_flight() -> None:
+    """Where energy counts, the agent drawn would fly less to the task drawn beside it, and can go there."""
+    rng = np.random.default_rng(4)
+    instance = Instance(
+        ability=np.ones(30),
+        workload=np.ones(6),
+        agent_position=rng.random((30, 2)),
+        task_position=rng.random((6, 2)),
+        communication_range=np.full(30, 0.9),
+    )
+    landscape = Landscape(instance)
+    task = np.array([rng.choice(np.flatnonzero(row)) for row in instance.reach.mask[instance.reach.origin]])
+    genes = np.tile(task.astype(np.int32), (50, 1))
+    giver, to = _draw_homeward(genes, landscape, rng)
+    away, new = landscape.distance(giver, task[giver]), landscape.distance(giver, to)
+    nearest = np.where(instance.reach.mask, instance.reach.distance, np.inf).min(axis=1)[instance.reach.origin]
+    could = nearest[giver] < away
+    assert could.any()
+    assert (new[could] < away[could]).all()
+    assert landscape.allows(giver, to)[could].all()

@@ -1,0 +1,58 @@
+"""Agents of equal ability exchange tasks so that they fly less."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from strategies import allocated
+
+from alloc.allocators import solve
+from alloc.allocators.heuristic.greedy.exchange import fly_less
+from alloc.problems import Allocation, Instance, evaluate, paper
+
+
+def never() -> bool:
+    return False
+
+
+@given(allocated(speeds=False))
+def test_work_stays_and_flights_do_not_grow(case: tuple[Instance, Allocation]) -> None:
+    """Each task keeps the abilities that it has, and all agents together fly no farther."""
+    instance, allocation = case
+    free = Instance(
+        ability=instance.ability,
+        workload=instance.workload,
+        agent_position=instance.start_position,
+        task_position=instance.task_position,
+    )
+    task = allocation.task_of_agent
+    changed = fly_less(free, task, never)
+    for j in range(-1, instance.m):
+        assert sorted(instance.ability[changed == j]) == sorted(instance.ability[task == j])
+    assert evaluate(free, Allocation(changed)).distance <= evaluate(free, allocation).distance
+
+
+def test_by_hand() -> None:
+    """On a line, equal agents take the tasks in their own order; the one of another ability stays."""
+    instance = Instance(
+        ability=[1, 1, 1, 2],
+        workload=[1, 1, 1],
+        agent_position=[[0, 0], [1, 0], [2, 0], [3, 0]],
+        task_position=[[0, 0], [1, 0], [2, 0]],
+    )
+    assert fly_less(instance, np.array([2, 0, 1, 0]), never).tolist() == [0, 1, 2, 0]
+
+
+def test_interrupted_it_is_no_worse() -> None:
+    """Out of time at once, nobody has moved."""
+    instance = paper(1, 0)
+    task = np.random.default_rng(0).integers(0, instance.m, instance.n)
+    changed = fly_less(instance, task, lambda: True)
+    assert evaluate(instance, Allocation(changed)).distance <= evaluate(instance, Allocation(task)).distance
+
+
+@pytest.mark.parametrize("scenario", [1, 4])
+def test_greedy_saves_energy_where_it_counts(scenario: int) -> None:
+    """The makespan is the same, the energy a good part less."""
+    fast, thrifty = (solve(paper(scenario, 0), "greedy", objective=goal) for goal in ("makespan", "makespan-energy"))
+    assert thrifty.makespan == pytest.approx(fast.makespan)
+    assert thrifty.energy < 0.7 * fast.energy

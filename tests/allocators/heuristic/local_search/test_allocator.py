@@ -1,0 +1,133 @@
+"""The method `local-search`, and `improve` for others to use."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from oracle import brute_force
+from strategies import allocated
+from tiny_instances import long_travel, tiny_instance
+
+from alloc.allocators import load, solve
+from alloc.allocators.contract.search import Budget, Search
+from alloc.allocators.heuristic.greedy.list_schedule import greedy
+from alloc.allocators.heuristic.local_search.improve import Parameters, improve
+from alloc.problems import Allocation, Instance, Objective, evaluate, serve_all
+from alloc.problems.generate import paper, random_instance
+from alloc.problems.generate.family import Family
+
+
+@pytest.fixture(scope="module")
+def allocator():
+    return load("local-search")
+
+
+@pytest.mark.parametrize("scenario", [1, 2, 3, 4])
+def test_paper_scenarios(allocator, scenario):
+    """T = 1 takes a few iterations in each of the paper's scenarios."""
+    result = solve(paper(scenario, 1500), allocator, iterations=40, time_limit_s=None)
+    assert result.makespan == 1.0
+
+
+def test_energy_of_a_paper_scenario(allocator):
+    """Within a hundred thousand exchanges the energy comes near the least, which is 88.824 by `milp`."""
+    result = solve(paper(1, 1000), allocator, objective="makespan-energy", iterations=100, time_limit_s=None)
+    assert result.makespan == 1.0
+    assert 88.824 * (1 - 1e-6) <= result.energy <= 88.824 * 1.08
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_tiny_instances(allocator, seed):
+    """On tiny instances as many tasks are served as can be; if all are, makespan and energy are the least there are."""
+    instance = tiny_instance(seed)
+    best = brute_force(instance)
+    result = solve(instance, allocator, objective="makespan-energy", iterations=60, time_limit_s=None)
+    assert len(result.evaluation.unserved_tasks) == best.unserved
+    if not best.unserved:
+        assert result.makespan == pytest.approx(best.makespan, rel=1e-9)
+        assert result.energy == pytest.approx(best.energy, rel=1e-9)
+
+
+@settings(max_examples=30, deadline=None)
+@given(allocated())
+@pytest.mark.parametrize("objective", list(Objective))
+def test_never_worse_than_start_or_greedy(allocator, objective, drawn):
+    """Whatever the start, the answer is no worse than it, nor than greedy, and sends nobody astray."""
+    instance, start = drawn
+    result = solve(instance, allocator, objective=objective, start=start, iterations=3, time_limit_s=None)
+    assert result.evaluation.violations == ()
+    for other in (start, greedy(instance)):
+        assert not evaluate(instance, serve_all(instance, other)).is_better_than(result.evaluation, objective)
+
+
+def test_slack_buys_energy(allocator):
+    """With a tenth more time, the plan flies less and keeps to that time."""
+    instance = paper(1, 1001)
+    strict = solve(instance, allocator, objective="makespan-energy", iterations=60, time_limit_s=None)
+    slack = solve(
+        instance, allocator, objective="makespan-energy", iterations=60, time_limit_s=None, makespan_slack=0.1
+    )
+    assert slack.energy < strict.energy
+    assert slack.makespan <= 1.1 * (1 + 1e-9)
+
+
+def test_travel_times_and_real_abilities(allocator):
+    """With speeds, and with real abilities in large groups, plans are faster than greedy's and fly far less."""
+    settings = {"objective": "makespan-energy", "iterations": 60, "time_limit_s": None, "makespan_slack": 0.01}
+    for speed in ((1.0, 3.0), None):
+        instance = random_instance(Family(agents=80, tasks=5, integer=False, speed=speed, starts="own"), 1)
+        first = evaluate(instance, serve_all(instance, greedy(instance)))
+        result = solve(instance, allocator, **settings)
+        assert result.lower_bound <= result.makespan <= first.makespan * 1.01
+        assert result.energy < 0.8 * first.energy
+
+
+@pytest.mark.parametrize(("seed", "least"), [(1, 77.27), (2, 57.17), (3, 63.68)])
+def test_long_travel_of_equal_agents(allocator, seed, least):
+    """Where flights take half of the time, equal agents are shared out within 1 % of the least that `cpsat` finds."""
+    result = solve(long_travel(seed), allocator, iterations=60, time_limit_s=None)
+    assert result.lower_bound <= result.makespan <= 1.01 * least
+
+
+def test_nothing_to_do(allocator):
+    """Where no task with work can be served, or none has any, everybody rests."""
+    places = {"agent_position": [[0, 0], [0, 1]], "task_position": [[1, 0], [2, 0]]}
+    for work, lists in (([0, 0], None), ([0, 1], [[0], [0]])):
+        instance = Instance(ability=[1, 1], workload=work, allowed_tasks=lists, **places)
+        start = Allocation([0, 0])
+        result = solve(instance, allocator, objective="makespan-energy", start=start, iterations=3, time_limit_s=None)
+        assert result.energy == 0
+
+
+def test_work_that_there_is_not(allocator):
+    """Agents that a start sends to a task without work come to rest."""
+    places = {"agent_position": [[0, 0], [0, 1]], "task_position": [[0, 0], [2, 0]]}
+    instance = Instance(ability=[1, 1], workload=[1, 0], **places)
+    start = Allocation([0, 1])
+    result = solve(instance, allocator, objective="makespan-energy", start=start, iterations=3, time_limit_s=None)
+    assert result.allocation == Allocation([0, 0])
+
+
+def test_few_agents_per_task(allocator):
+    """With four agents per task and abilities up to 1000, the bound is met within a thousandth."""
+    rng = np.random.default_rng(4)
+    instance = Instance(ability=rng.integers(1, 1001, 100), workload=np.full(25, 1000.0))
+    result = solve(instance, allocator, iterations=60, time_limit_s=None)
+    assert result.gap < 1e-3
+
+
+def test_many_agents(allocator):
+    """Without a table of distances, thirty thousand agents reach the bound, and fly less when that counts."""
+    instance = random_instance(Family(agents=30_000, tasks=300, starts="own", battery=None), 2)
+    result = solve(instance, allocator, objective="makespan-energy", iterations=40, time_limit_s=None)
+    assert result.gap < 1e-9
+    assert result.energy < evaluate(instance, greedy(instance)).energy
+
+
+def test_others_can_use_it():
+    """`improve` goes on from the best plan of any search, within its own limits, and submits what is better."""
+    instance = paper(1, 1002)
+    search = Search(instance, Objective.MAKESPAN_ENERGY, Budget(None, 1000), seed=1)
+    first = search.submit(greedy(instance))
+    improve(search, iterations=30, parameters=Parameters(exchanges=500))
+    assert search.iteration <= 30
+    assert search.best.evaluation.is_better_than(first, Objective.MAKESPAN_ENERGY)

@@ -1,0 +1,74 @@
+"""A2C: its returns against the definition, its gradient against numbers, and probe games with known answers."""
+
+import pytest
+import torch
+from probes import PROBES, probe, share_learned
+from same_lesson import assert_taken_up_elsewhere, weights
+
+from alloc.allocators.learned.algorithms.a2c import A2c, A2cParameters, n_step_returns
+from alloc.allocators.learned.algorithms.learner import Lesson
+from alloc.allocators.learned.play.action_sampling import log_probabilities
+from alloc.allocators.learned.play.trajectories import collect
+from alloc.problems.game import PAPER, PLANNING, Rules, Turn, begin, moved, step
+
+
+def test_returns_match_the_definition() -> None:
+    """Q is the discounted sum of the rewards to come and of the value of the last state."""
+    reward, alive = torch.tensor([[1.0], [2.0], [4.0]]), torch.ones(3, 1, dtype=torch.bool)
+    got = n_step_returns(reward, alive, torch.tensor([8.0]), 0.5)
+    assert got[:, 0].tolist() == [1 + 0.5 * 2 + 0.25 * 4 + 0.125 * 8, 2 + 0.5 * 4 + 0.25 * 8, 4 + 0.5 * 8]
+
+
+def test_nothing_follows_the_end_of_a_game() -> None:
+    """The step that stops a game earns its own reward only, whatever is written behind it."""
+    reward = torch.tensor([[1.0], [2.0], [99.0]])
+    alive = torch.tensor([[True], [True], [False]])
+    assert n_step_returns(reward, alive, torch.tensor([77.0]), 0.5)[:, 0].tolist() == [2.0, 2.0, 0.0]
+
+
+@pytest.mark.parametrize("rules", [PLANNING, Rules(turn=Turn.SIMULTANEOUS), PAPER])
+def test_segments_follow_on_each_other(rules: Rules) -> None:
+    """Playing on from the state after a segment earns what one long game earns: rewards add up to the rise."""
+    board = probe("pairing").board
+    learner, generator = A2c(), torch.Generator().manual_seed(0)
+    first = collect(learner.network, board, 1, generator, rules)
+    state = step(board, first.state[torch.tensor(0)], moved(board, first.state[torch.tensor(0)], first.actions[0]))
+    second = collect(learner.network, board, 2, generator, rules, state=state)
+    assert torch.equal(second.state.slot[0], state.slot)
+    assert torch.equal(second.state.done[0], state.done)
+    assert not torch.equal(second.state.slot[0], begin(board).slot)
+
+
+def test_likelier_after_a_gain_and_unlikelier_after_a_loss() -> None:
+    """One step raises the probability of what earned more than expected, and lowers that of what earned less."""
+    board = probe("right_task").board
+    for sign in (1.0, -1.0):
+        learner = A2c(parameters=A2cParameters(entropy_weight=0.0, value_weight=0.0))
+        played = collect(learner.network, board, 1, torch.Generator().manual_seed(0), PLANNING)
+        told = type(played)(**{**vars(played), "reward": 10 * sign * torch.ones_like(played.reward)})
+        told = type(told)(**{**vars(told), "last_value": torch.zeros_like(told.last_value)})
+        learner.update(told, PLANNING)
+        now = learner.network(board, begin(board))
+        again, _ = log_probabilities(board, begin(board), now, played.actions[0], PLANNING)
+        assert torch.sign((again - played.log_probability[0]).sum()).item() == sign
+
+
+def test_a_lesson_depends_on_state_and_lesson_only() -> None:
+    """Stored between lessons and taken up by another learner, training goes on bit for bit as without a break."""
+    assert_taken_up_elsewhere(A2c)
+
+
+def test_agents_that_choose_at_once_can_be_taught() -> None:
+    """The paper's turn rule works as well, and its report is finite."""
+    learner = A2c()
+    before = weights(learner)
+    report = learner.take(Lesson(0, 50, curriculum=probe("pairing"), rules=Rules(turn=Turn.SIMULTANEOUS)))
+    assert report.decisions >= 50
+    assert torch.isfinite(weights(learner)).all()
+    assert not torch.equal(weights(learner), before)
+
+
+@pytest.mark.parametrize("name", PROBES)
+def test_a2c_solves_probes(name: str) -> None:
+    """Games with known answers are solved, all of them."""
+    assert share_learned(A2c(), name) == 1.0

@@ -1,0 +1,89 @@
+"""DQN: its targets against numbers worked by hand, its target network, and probe games with known answers."""
+
+import pytest
+import torch
+from probes import PROBES, probe, share_learned
+from same_lesson import assert_taken_up_elsewhere
+from torch import Tensor
+
+from alloc.allocators.learned.algorithms.dqn import Dqn, DqnParameters, best_gain, td_target
+from alloc.allocators.learned.algorithms.learner import Lesson
+from alloc.allocators.learned.play.transitions import after
+from alloc.problems.game import PLANNING, State, begin, open_bids
+
+
+def test_target_by_hand() -> None:
+    """r + gamma max Q: what follows counts unless the game is over."""
+    reward, following, over = torch.tensor([1.0, 1.0]), torch.tensor([4.0, 4.0]), torch.tensor([False, True])
+    assert td_target(reward, following, over, 0.5).tolist() == [3.0, 1.0]
+
+
+def test_double_estimate_by_hand() -> None:
+    """One network picks the move, the other one values it."""
+    value, picker = torch.tensor([[1.0, 5.0, 0.0]]), torch.tensor([[3.0, 2.0, 0.0]])
+    assert best_gain(value, value).tolist() == [5.0]
+    assert best_gain(value, picker).tolist() == [1.0]
+
+
+def without_heads(learner: Dqn, bid: float, reserve: float) -> None:
+    """Make the target network score every bid and the reserve the same everywhere."""
+    for parameter in learner.target.parameters():
+        torch.nn.init.zeros_(parameter)
+    torch.nn.init.constant_(learner.target.local[-1].bias, bid)
+    torch.nn.init.constant_(learner.target.reserve[-1].bias, reserve)
+
+
+@pytest.mark.parametrize(
+    ("bid", "reserve", "following"),
+    [(7.0, 3.0, 4.0), (2.0, 3.0, 0.0)],
+)
+def test_targets_of_states(bid: float, reserve: float, following: float) -> None:
+    """Stopping follows for 0 where all bids are below the reserve; where no bid is open, nothing else can follow."""
+    learner = Dqn(parameters=DqnParameters(discount=0.5, double=False))
+    without_heads(learner, bid, reserve)
+    board = probe("right_task").board[torch.arange(2)]
+    state = begin(board)
+    none = State(**{**vars(state), "left": torch.ones_like(state.left)})
+    reward = torch.tensor([1.0, 2.0])
+    assert learner.wanted(board, state, reward, PLANNING).tolist() == [1 + 0.5 * following, 2 + 0.5 * following]
+    assert learner.wanted(board, none, reward, PLANNING).tolist() == [1.0, 2.0]
+
+
+def test_a_game_that_was_cut_off_is_not_over() -> None:
+    """The last move of a game cut off by the number of steps is followed by the value of the state after it."""
+    learner = Dqn(parameters=DqnParameters(discount=0.5, double=False))
+    without_heads(learner, 7.0, 3.0)
+    board = probe("pairing").board[torch.arange(3)]
+    first = open_bids(board, begin(board)).flatten(1).float().argmax(1)
+    following = after(board, begin(board), first)
+    assert not following.done.any()
+    assert learner.wanted(board, following, torch.zeros(3), PLANNING).tolist() == [2.0, 2.0, 2.0]
+
+
+def flat(network: torch.nn.Module) -> Tensor:
+    return torch.cat([one.detach().flatten() for one in network.parameters()])
+
+
+def test_target_network_is_renewed_in_periods() -> None:
+    """The target network holds still for as many updates as the parameter says, and is then the one that learns."""
+    learner = Dqn(parameters=DqnParameters(target_period=3, reuse=0.0))
+    learner.take(Lesson(0, 50, curriculum=probe("pairing")))
+    learner.updates = 0
+    learner.target.load_state_dict(learner.network.state_dict())
+    still, generator = flat(learner.target), torch.Generator().manual_seed(0)
+    for number in (1, 2, 3, 4):
+        learner.update(PLANNING, generator)
+        assert torch.equal(flat(learner.target), still) == (number < 3)
+        assert torch.equal(flat(learner.target), flat(learner.network)) == (number == 3)
+
+
+def test_a_lesson_depends_on_state_and_lesson_only() -> None:
+    """Stored with its memory between lessons and taken up by another learner, training goes on bit for bit."""
+    assert_taken_up_elsewhere(Dqn)
+
+
+@pytest.mark.parametrize("name", PROBES)
+def test_dqn_solves_probes(name: str) -> None:
+    """Games with known answers are solved, all of them."""
+    learner = Dqn(parameters=DqnParameters(learning_rate=3e-3, reuse=8.0))
+    assert share_learned(learner, name, decisions=60) == 1.0

@@ -1,0 +1,95 @@
+"""Hyperparameters out of range are told when they are set, wherever they come from."""
+
+import math
+import subprocess
+import sys
+from dataclasses import fields, replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from alloc.allocators.learned.algorithms.ddpg import Ddpg
+from alloc.allocators.learned.algorithms.hyperparameter_ranges import RANGES
+from alloc.allocators.learned.algorithms.hyperparameters import (
+    A2cParameters,
+    BreedingParameters,
+    DdpgParameters,
+    DqnParameters,
+    GappoParameters,
+    PpoParameters,
+)
+from alloc.allocators.learned.algorithms.learner import Lesson
+from alloc.allocators.learned.network.actor_critic import NetworkSize
+from alloc.allocators.learned.training.curriculum import Curriculum
+from alloc.allocators.learned.training.validation import own_games
+from alloc.problems import InputError
+from alloc.problems.generate import paper_like
+
+KINDS = (A2cParameters, BreedingParameters, DdpgParameters, DqnParameters, GappoParameters, PpoParameters)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_number_has_a_range(kind: type[Any]) -> None:
+    """No number of any method goes unchecked, and nothing but numbers passes."""
+    for field in fields(kind):
+        if isinstance(field.default, bool):
+            continue
+        assert field.name in RANGES
+        for wrong in (-1, -1e-3, math.nan, math.inf, -math.inf, 1e300, 10**30, "1", True):
+            with pytest.raises(InputError, match=f"{field.name}: must be a"):
+                kind(**{field.name: wrong})
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "wrong"),
+    [
+        (PpoParameters, "epochs", 0),
+        (PpoParameters, "epochs", 1.5),
+        (PpoParameters, "epochs", None),
+        (GappoParameters, "minibatch", 0),
+        (GappoParameters, "kl_target", 0.0),
+        (PpoParameters, "reward_scale", 0.0),
+        (PpoParameters, "clip", 0.0),
+        (PpoParameters, "discount", 0.0),
+        (PpoParameters, "discount", 1.01),
+        (PpoParameters, "smoothing", 1.01),
+        (PpoParameters, "learning_rate", 0.0),
+        (PpoParameters, "learning_rate", 1.1),
+        (A2cParameters, "steps", 0),
+        (DqnParameters, "temperature", 0.0),
+        (DqnParameters, "capacity", 0),
+        (DdpgParameters, "capacity", 0),
+        (DdpgParameters, "softness", 0.0),
+        (DdpgParameters, "target_share", 1.01),
+        (BreedingParameters, "tournament", 0),
+        (BreedingParameters, "mutation_probability", 1.01),
+    ],
+)
+def test_ends_of_ranges(kind: type[Any], name: str, wrong: Any) -> None:
+    """What divides by nothing, learns nothing or moves away is out, also where other parameters are changed."""
+    with pytest.raises(InputError, match=f"{name}: must be a"):
+        kind(**{name: wrong})
+    with pytest.raises(InputError, match=f"{name}: must be a"):
+        replace(kind(), **{name: wrong})
+
+
+def test_what_is_in_range() -> None:
+    """The ends that make sense are in, and so are numbers of numpy's."""
+    assert PpoParameters(capacity=0, smoothing=0, discount=1, learning_rate=1, entropy_weight=0.0, kl_target=None)
+    assert PpoParameters(epochs=np.int64(2), clip=np.float32(0.5))  # type: ignore[arg-type]
+    assert BreedingParameters(elite=0, mutation_probability=0, crossover_probability=1, mutation_size=0)
+
+
+def test_no_entropy_bonus() -> None:
+    """A bonus that begins at 0 stays there."""
+    curriculum, _ = own_games([paper_like(8, 2, 35, 0)], Curriculum(games=(2, 2)))
+    learner = Ddpg(NetworkSize(4, 4, 1), DdpgParameters(entropy_weight=0.0))
+    assert learner.take(Lesson(0, 20, curriculum, progress=0.5)).decisions >= 20
+
+
+def test_torch_is_not_loaded() -> None:
+    """Whoever sets hyperparameters wrong is told so before the seconds that torch takes."""
+    code = "import sys, alloc.allocators.learned.algorithms.registry as m; m.method_parameters('gappo'); print('torch' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"

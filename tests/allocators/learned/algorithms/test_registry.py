@@ -1,0 +1,53 @@
+"""Methods by name, and their hyperparameters as text."""
+
+from dataclasses import fields
+
+import pytest
+
+from alloc.allocators.learned.algorithms.ppo import Ppo, PpoParameters
+from alloc.allocators.learned.algorithms.registry import METHODS, method_parameters, new_learner
+from alloc.allocators.learned.network.actor_critic import NetworkSize
+from alloc.problems import InputError
+
+
+def test_learners_by_name() -> None:
+    """A name gives a learner of this size."""
+    learner = new_learner("ppo", NetworkSize(8, 8, 2), PpoParameters(), 0)
+    assert isinstance(learner, Ppo)
+    assert learner.policy.size == NetworkSize(8, 8, 2)
+
+
+def test_settings_are_read_as_the_kind_of_their_defaults() -> None:
+    """Whole numbers, broken ones and none are told apart."""
+    read = method_parameters("ppo", {"epochs": "5", "clip": "0.1", "kl_target": "none"})
+    assert read == PpoParameters(epochs=5, clip=0.1, kl_target=None)
+
+
+@pytest.mark.parametrize(
+    ("method", "settings", "message"),
+    [
+        ("gapo", {}, "did you mean 'gappo'"),
+        ("ppo", {"clipp": "1"}, "ppo has no parameter 'clipp'"),
+        ("ppo", {"epochs": "1.5"}, "epochs must be like 3, got '1.5'"),
+        ("ppo", {"epochs": "none"}, "epochs must be like 3, got 'none'"),
+        ("dqn", {"double": "maybe"}, "double must be like true, got 'maybe'"),
+        ("ppo", {"learning_rate": "-1"}, "learning_rate must be a number above 0 and at most 1, got -1$"),
+        ("ppo", {"reward_scale": "0"}, "reward_scale must be a number from 1e-09 to 1e[+]09, got 0$"),
+        ("ppo", {"clip": "nan"}, "clip must be a number from 1e-09 to 1e[+]09, got nan$"),
+        ("ppo", {"epochs": "0"}, "epochs must be a whole number from 1 to 1e[+]06, got 0$"),
+    ],
+)
+def test_mistakes_are_named(method: str, settings: dict[str, str], message: str) -> None:
+    """Unknown methods, unknown parameters, unreadable values and such out of range are told."""
+    with pytest.raises(InputError, match=message):
+        method_parameters(method, settings)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_an_unknown_parameter_is_answered_by_all(method: str) -> None:
+    """All names and defaults of the method are listed, just as they are set."""
+    with pytest.raises(InputError) as caught:
+        method_parameters(method, {"unknown": "1"})
+    listed = caught.value.message.rpartition(": ")[2].split(", ")
+    assert method_parameters(method, dict(entry.split("=") for entry in listed)) == method_parameters(method)
+    assert len(listed) == len(fields(method_parameters(method)))

@@ -1,0 +1,219 @@
+"""From scores to moves: probabilities against plain Python, draws against probabilities."""
+
+from collections import Counter
+from dataclasses import replace
+from itertools import product
+from math import exp, log
+
+import pytest
+import torch
+from boards import layout
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from strategies import instances
+
+from alloc.allocators.learned.network.actor_critic import Scores
+from alloc.allocators.learned.play.action_sampling import choose, log_probabilities
+from alloc.problems import Instance
+from alloc.problems.game import PAPER, PLANNING, Board, Rules, State, Turn, begin, moved, open_bids, step, tasks_of
+
+ONE_MOVE = Rules(most_moves=1)
+AT_ONCE = Rules(turn=Turn.SIMULTANEOUS)
+Chances = dict[tuple[int, ...], float]
+
+
+@pytest.fixture
+def board() -> Board:
+    """Four agents and three tasks; one agent has two of the tasks in reach, one begins idle."""
+    instance = Instance(
+        ability=[1, 2, 3, 2],
+        workload=[3, 2, 3],
+        task_position=[[0, 0], [1, 0], [2, 0]],
+        agent_position=[[0, 0], [0.9, 0], [0.2, 0], [2, 0]],
+        communication_range=[1.0, 5, 5, 5],
+    )
+    laid = layout(instance)
+    return replace(laid, start=torch.tensor([[0, 1, 0, 3]]))
+
+
+def scores_of(board: Board, seed: int = 0, spread: float = 1.0) -> Scores:
+    """Scores without a network: what is drawn does not depend on where they come from."""
+    generator = torch.Generator().manual_seed(seed)
+    reserve = spread * torch.randn(len(board.price), generator=generator)
+    return Scores(spread * torch.randn(board.shape, generator=generator), reserve, torch.zeros(len(board.price)))
+
+
+def rounds(board: Board, state: State, scores: Scores, most: int | None) -> Chances:
+    """Probability of every possible round of one game: a product of softmaxes over what may still be granted."""
+    _, n, c = board.shape
+    goal, task, idle = board.goal[0].tolist(), tasks_of(board, state)[0].tolist(), board.places - 1
+    bids, reserve = scores.bids[0].tolist(), float(scores.reserve[0])
+    may = open_bids(board, state)[0]
+    found: Chances = {}
+
+    def go_on(chance: float, granted: tuple[int, ...], used: set[int], gone: set[int]) -> None:
+        if len(granted) == most:
+            found[granted] = chance
+            return
+        weight = {n * c: exp(reserve)}
+        for agent, slot in product(range(n), range(c)):
+            if may[agent, slot] and agent not in gone and not {task[agent], goal[agent][slot]} & used:
+                weight[agent * c + slot] = exp(bids[agent][slot])
+        for action, share in weight.items():
+            likely = chance * share / sum(weight.values())
+            if action == n * c:
+                found[(*granted, action)] = likely
+            else:
+                agent, slot = divmod(action, c)
+                ends = {task[agent], goal[agent][slot]} - {idle}
+                go_on(likely, (*granted, action), used | ends, gone | {agent})
+
+    go_on(1.0, (), set(), set())
+    return found
+
+
+def choices(board: Board, state: State, scores: Scores) -> Chances:
+    """Probability of everything that agents who choose at once may do: each draws from a softmax, staying scores 0."""
+    _, n, c = board.shape
+    may, bids = open_bids(board, state)[0], scores.bids[0].tolist()
+    stays = state.slot[0].tolist()
+    shares = []
+    for agent in range(n):
+        weight = {s: exp(bids[agent][s]) for s in range(c) if may[agent, s]} | {stays[agent]: 1.0}
+        shares.append({agent * c + slot: value / sum(weight.values()) for slot, value in weight.items()})
+    found: Chances = {}
+    for some in product(*(share.items() for share in shares)):
+        chance = 1.0
+        for _, share in some:
+            chance *= share
+        found[tuple(action for action, _ in some)] = chance
+    return found
+
+
+def chances(board: Board, state: State, scores: Scores, rules: Rules) -> Chances:
+    if rules.turn == Turn.SIMULTANEOUS:
+        return choices(board, state, scores)
+    return rounds(board, state, scores, rules.most_moves)
+
+
+every_turn = pytest.mark.parametrize("rules", [PLANNING, ONE_MOVE, AT_ONCE], ids=["rounds", "one move", "at once"])
+
+
+@every_turn
+def test_probabilities_of_all_rounds_by_plain_python(board: Board, rules: Rules) -> None:
+    """Each possible round is as probable as its product of softmaxes says, and all together are certain."""
+    state, scores = begin(board), scores_of(board)
+    expected = chances(board, state, scores, rules)
+    assert sum(expected.values()) == pytest.approx(1)
+    width = max(map(len, expected))
+    actions = torch.tensor([[*one, *[-1] * (width - len(one))] for one in expected])
+    many = board[torch.zeros(len(actions), dtype=torch.int64)]
+    wide = Scores(*(one.expand(len(actions), *one.shape[1:]) for one in scores))
+    got, _ = log_probabilities(many, begin(many), wide, actions, rules)
+    assert got.sum(1).tolist() == pytest.approx([log(chance) for chance in expected.values()], abs=1e-4)
+    assert float(got.sum(1).exp().sum()) == pytest.approx(1, abs=1e-5)
+    assert (got[actions < 0] == 0).all()
+
+
+@every_turn
+def test_draws_are_as_frequent_as_probable(board: Board, rules: Rules) -> None:
+    """Chi-square of 20,000 draws with a fixed seed stays within four standard deviations of its mean."""
+    draws = 20_000
+    state, scores = begin(board), scores_of(board, 3)
+    expected = chances(board, state, scores, rules)
+    many = board[torch.zeros(draws, dtype=torch.int64)]
+    wide = Scores(*(one.expand(draws, *one.shape[1:]) for one in scores))
+    actions, _ = choose(many, begin(many), wide, rules, 1.0, torch.Generator().manual_seed(7))
+    seen = Counter(tuple(action for action in row if action >= 0) for row in actions.tolist())
+    assert set(seen) <= set(expected)
+    usual = {one for one, chance in expected.items() if chance * draws >= 10}
+    rare = draws * sum(chance for one, chance in expected.items() if one not in usual)
+    cells = [(seen[one], draws * expected[one]) for one in usual]
+    cells.append((sum(count for one, count in seen.items() if one not in usual), rare + 1e-9))
+    chi_square, freedom = sum((a - b) ** 2 / b for a, b in cells), len(cells) - 1
+    assert len(usual) > 5
+    assert abs(chi_square - freedom) < 4 * (2 * freedom) ** 0.5
+
+
+@pytest.mark.parametrize("temperature", [0.5, 2.0])
+def test_temperature_divides_the_scores(board: Board, temperature: float) -> None:
+    """A draw at a temperature is the draw at 1 with scores divided by it."""
+    state, scores = begin(board), scores_of(board)
+    other = Scores(scores.bids / temperature, scores.reserve / temperature, scores.value)
+    for rules in (PLANNING, AT_ONCE):
+        one, two = (
+            choose(board, state, some, rules, degrees, torch.Generator().manual_seed(1))[0]
+            for some, degrees in ((scores, temperature), (other, 1.0))
+        )
+        assert torch.equal(one, two)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_without_temperature_the_best_is_done(board: Board, seed: int) -> None:
+    """At temperature 0 bids are granted from the best down; agents that choose at once each take their best."""
+    state, scores = begin(board), scores_of(board, seed)
+    _, n, c = board.shape
+    expected: list[int] = []
+    left = rounds(board, state, scores, None)
+    everything = [*scores.bids.flatten().tolist(), float(scores.reserve)]
+    while not expected or expected[-1] != n * c:
+        able = {one[len(expected)] for one in left if list(one[: len(expected)]) == expected}
+        expected.append(max(able, key=everything.__getitem__))
+    actions, slot = choose(board, state, scores)
+    assert actions[0].tolist() == expected
+    assert torch.equal(slot, moved(board, state, actions))
+    actions, slot = choose(board, state, scores, AT_ONCE)
+    assert tuple(actions[0].tolist()) == max(choices(board, state, scores).items(), key=lambda item: item[1])[0]
+    assert torch.equal(slot[0], actions[0] % c)
+
+
+@settings(max_examples=40)
+@given(
+    instance=instances(),
+    seed=st.integers(0, 99),
+    rules=st.sampled_from([PLANNING, ONE_MOVE, AT_ONCE, PAPER, Rules(flying=True)]),
+    spread=st.sampled_from([1.0, 300.0]),
+)
+def test_what_is_drawn_has_a_probability(instance: Instance, seed: int, rules: Rules, spread: float) -> None:
+    """Whatever `choose` draws, in any game that goes on or has ended, has a finite log-probability, never above 0."""
+    board = layout(instance, instance, instance)
+    state, generator = begin(board), torch.Generator().manual_seed(seed)
+    state.done[1] = True
+    for number in range(4):
+        scores = scores_of(board, seed + number, spread)
+        actions, slot = choose(board, state, scores, rules, 1.0, generator)
+        got, entropy = log_probabilities(board, state, scores, actions, rules)
+        assert got.isfinite().all()
+        assert (got <= 1e-4).all()
+        assert entropy.isfinite().all()
+        assert (entropy >= -1e-5 * spread).all()
+        assert (actions[1] == -1).all()
+        state = step(board, state, slot)
+
+
+def test_entropy_by_plain_python(board: Board) -> None:
+    """Entropy is that of the first draw of a round, and that of the mean agent where all choose at once."""
+    state, scores = begin(board), scores_of(board)
+    first = rounds(board, state, scores, 1).values()
+    actions, _ = choose(board, state, scores)
+    _, entropy = log_probabilities(board, state, scores, actions)
+    assert entropy.item() == pytest.approx(-sum(p * log(p) for p in first), abs=1e-5)
+    everything = choices(board, state, scores).values()
+    _, entropy = log_probabilities(board, state, scores, actions=torch.zeros(1, 4, dtype=torch.long), rules=AT_ONCE)
+    assert 4 * entropy.item() == pytest.approx(-sum(p * log(p) for p in everything), abs=1e-5)
+
+
+def test_probabilities_have_gradients(board: Board) -> None:
+    """Raising the score of what was granted raises its probability, and barred bids are given no gradient."""
+    scores = scores_of(board)
+    bids, reserve = scores.bids.clone().requires_grad_(), scores.reserve.clone().requires_grad_()
+    actions, _ = choose(board, begin(board), scores, PLANNING, 1.0, torch.Generator().manual_seed(0))
+    got, entropy = log_probabilities(board, begin(board), Scores(bids, reserve, scores.value), actions)
+    (got.sum() + entropy.sum()).backward()
+    assert bids.grad is not None
+    assert bids.grad.isfinite().all()
+    assert (bids.grad[~open_bids(board, begin(board))] == 0).all()
+    (slope,) = torch.autograd.grad(
+        log_probabilities(board, begin(board), Scores(bids, reserve, scores.value), actions)[0][0, 0], bids
+    )
+    assert slope.flatten()[actions[0, 0]] > 0

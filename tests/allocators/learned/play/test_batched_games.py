@@ -1,0 +1,72 @@
+"""Compiled games: the same network, the same moves and the same best positions as by torch."""
+
+import numpy as np
+import pytest
+import torch
+from boards import layout
+from test_rollout import BOARDS
+
+from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize
+from alloc.allocators.learned.network.compiled import weights_of
+from alloc.allocators.learned.play.batched_games import Games, play_games, views_of
+from alloc.allocators.learned.play.rollout import play
+from alloc.problems import paper_like
+from alloc.problems.game import Board
+
+pytestmark = pytest.mark.timeout(400)  # compiles at first
+
+
+def games_on(board: Board, copies: int = 1) -> Games:
+    row = np.arange(len(board.price)).repeat(copies)
+    return Games(row, board.price.numpy().astype(float)[row], board.start.numpy()[row])
+
+
+@pytest.mark.parametrize("attention", [True, False])
+@pytest.mark.parametrize("total", [True, False])
+@pytest.mark.parametrize("name", BOARDS)
+def test_compiled_games_are_those_of_torch(name: str, total: bool, attention: bool) -> None:
+    """Played greedily, every game ends in the same best position, to single precision."""
+    board = BOARDS[name]()
+    torch.manual_seed(3)
+    network = ActorCritic(NetworkSize(attention=attention)).eval().requires_grad_(False)
+    compiled = play_games(network, board, games_on(board), rounds=12, total=total)
+    expected = play(network, board, steps=12, total=total)
+    assert torch.equal(compiled.unserved.long(), expected.unserved.long())
+    torch.testing.assert_close(compiled.shortfall.float(), expected.shortfall, atol=2e-5, rtol=1e-4)
+    torch.testing.assert_close(compiled.distance.float(), expected.distance, atol=2e-5, rtol=1e-4)
+    assert torch.equal(compiled.slot, expected.slot)
+
+
+def test_draws_are_legal_and_repeat() -> None:
+    """Drawn games keep to reach, differ from each other, and are the same again by the same seed."""
+    board = BOARDS["ranged"]()
+    torch.manual_seed(3)
+    network = ActorCritic().eval().requires_grad_(False)
+    first, again, other = (
+        play_games(network, board, games_on(board, 5), rounds=6, temperature=1.0, seed=seed) for seed in (1, 1, 2)
+    )
+    assert torch.equal(first.slot, again.slot)
+    assert not torch.equal(first.slot, other.slot)
+    legal = board.legal[torch.from_numpy(games_on(board, 5).row)]
+    assert legal.gather(2, first.slot[..., None]).all()
+
+
+def test_time_to_stop() -> None:
+    """When it is time to stop, the first game still has a position, and those not begun are infinitely bad."""
+    board = layout(*(paper_like(20, 4, 80, seed) for seed in range(3)))
+    network = ActorCritic().eval().requires_grad_(False)
+    best = play_games(network, board, games_on(board), rounds=5, should_stop=lambda: True)
+    assert torch.isfinite(best.distance[0])
+    assert torch.isinf(best.shortfall[1:]).all()
+
+
+def test_weights_and_views_keep_their_values() -> None:
+    """Weights come with the bias as last row, and views share the numbers of the board."""
+    network = ActorCritic()
+    weights = weights_of(network)
+    assert np.allclose(weights.local1[:-1].T, network.local[0].weight.detach().numpy())
+    assert np.allclose(weights.local1[-1], network.local[0].bias.detach().numpy())
+    board = BOARDS["dense"]()
+    view = views_of(board)[2]
+    assert np.array_equal(view.need, board.need[2].numpy())
+    assert np.array_equal(view.goal, board.goal[2].numpy())

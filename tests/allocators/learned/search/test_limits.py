@@ -1,0 +1,39 @@
+"""How large an instance may be, by numbers."""
+
+import numpy as np
+import pytest
+
+from alloc.allocators import Budget
+from alloc.allocators.learned.search.limits import LARGEST, MOST_TASKS, NEAR, PAIRS_PER_SECOND, too_large
+from alloc.problems import Instance
+
+
+def sized(agents: int, tasks: int) -> Instance:
+    return Instance(ability=np.ones(agents), workload=np.ones(tasks))
+
+
+@pytest.mark.parametrize(
+    ("agents", "tasks", "limit", "reason"),
+    [
+        (100, 20, 0.01, None),
+        (5000, 200, 10.0, None),
+        ((PAIRS_PER_SECOND - 1000) // (NEAR + 1), 100, 0.1, None),
+        (3 * PAIRS_PER_SECOND, 1, 5.0, "may take 6 s"),
+        (3 * PAIRS_PER_SECOND, 1, 6.0, None),
+        (3 * PAIRS_PER_SECOND, 1, None, None),
+        (1 + LARGEST // (NEAR + 1), 100, None, f"more than the {LARGEST // (NEAR + 1)}"),
+        (1900, 1900, 8.0, "1900 agents and 1900 tasks may take 9 s"),
+        (1900, 1900, 9.0, None),
+        (1, MOST_TASKS, None, None),
+        (1, MOST_TASKS + 1, None, f"more than the {MOST_TASKS}"),
+    ],
+)
+def test_limits(agents: int, tasks: int, limit: float | None, reason: str | None) -> None:
+    """Small ones are never refused; large ones are where the time is short or memory is, with the limit named."""
+    said = too_large(sized(agents, tasks), Budget(time_limit_s=limit, iterations=1))
+    if reason is None:
+        assert said is None
+    else:
+        assert said is not None
+        assert reason in said
+        assert "local-search" in said

@@ -1,0 +1,313 @@
+"""Training: resumes to the same curve on any engine, keeps the best, stops in time, and leaves whole files."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+from safetensors import safe_open
+
+from alloc.allocators.learned.algorithms.learner import Lesson, LessonReport
+from alloc.allocators.learned.algorithms.ppo import Ppo, PpoParameters
+from alloc.allocators.learned.algorithms.registry import METHODS
+from alloc.allocators.learned.files import checkpoint
+from alloc.allocators.learned.files.policy_file import load_policy
+from alloc.allocators.learned.network.actor_critic import NetworkSize
+from alloc.allocators.learned.training import trainer as module
+from alloc.allocators.learned.training.curriculum import Curriculum
+from alloc.allocators.learned.training.trainer import Limits, Report, Trainer, TrainingParameters, train
+from alloc.allocators.learned.training.validation import Validation, own_games
+from alloc.allocators.parallel.engine import SerialEngine
+from alloc.allocators.parallel.processes import ProcessEngine
+from alloc.problems import InputError
+from alloc.problems.game import PAPER
+from alloc.problems.generate import paper_like
+
+CURRICULUM, BOARDS = own_games([paper_like(10, 3, 44, seed) for seed in range(3)], Curriculum(games=(2, 4)))
+TINY = TrainingParameters(
+    population=3,
+    decisions=60,
+    network=NetworkSize(8, 8, 2),
+    learner=PpoParameters(epochs=1, minibatch=64, capacity=200),
+    curriculum=CURRICULUM,
+)
+TIMES = ("seconds", "decisions_per_second")
+
+
+def trainer(seed: int = 5, **changes: Any) -> Trainer:
+    return Trainer(replace(TINY, **changes), seed, BOARDS)
+
+
+def figures(history: Sequence[Report]) -> list[dict[str, float]]:
+    return [{name: value for name, value in asdict(report).items() if name not in TIMES} for report in history]
+
+
+def weights(run: Trainer) -> torch.Tensor:
+    everyone = [member.get("network", member.get("networks")) for member in run.members] + run.best
+    return torch.cat([weight.flatten() for network in everyone for weight in network.values()])
+
+
+@pytest.fixture
+def paths(tmp_path: Path) -> dict[str, Path]:
+    return {"output": tmp_path / "p", "checkpoint": tmp_path / "c", "log": tmp_path / "log.csv"}
+
+
+@pytest.fixture
+def planned(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Has generations bring the costs that a test plans, for one member."""
+
+    def plan(*costs: float) -> None:
+        coming = iter(costs)
+        monkeypatch.setattr(module, "validate", lambda *_: Validation(next(coming), 0.5, 1.0, 0.1, 1.0, 0.0))
+
+    return plan
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        *({"method": name, "population": 1, "learner": None} for name in METHODS if name != "gappo"),
+        {"rules": PAPER},
+    ],
+    ids=[*METHODS, "rules of the paper"],
+)
+def test_a_resumed_run_goes_on_as_if_nothing_had_happened(tmp_path: Path, changes: dict[str, Any]) -> None:
+    """Four generations at once, and two and two with a checkpoint between, give the same figures and weights."""
+    limits = Limits(steps=1000)
+    whole, first, second = (trainer(**changes) for _ in range(3))
+    for _ in range(4):
+        whole.advance(limits)
+    first.advance(limits)
+    first.advance(limits)
+    first.save(tmp_path / "checkpoint")
+    second.resume(tmp_path / "checkpoint")
+    second.advance(limits)
+    second.advance(limits)
+    assert figures(whole.history) == figures(second.history)
+    assert torch.equal(weights(whole), weights(second))
+
+
+def test_processes_train_the_same() -> None:
+    """Members that learn in other processes learn the same to the last bit."""
+    here, there = trainer(), trainer()
+    with ProcessEngine(2) as engine:
+        for _ in range(2):
+            here.advance()
+            there.advance(engine=engine)
+    assert figures(here.history) == figures(there.history)
+    assert torch.equal(weights(here), weights(there))
+
+
+def test_seeds_matter() -> None:
+    """Another seed begins with other weights and gives members other lessons."""
+    one, other = trainer(1), trainer(2)
+    assert not torch.equal(weights(one), weights(other))
+    lessons = {one._lesson(member, Limits()).seed for member in range(3)}
+    one.advance()
+    lessons |= {one._lesson(member, Limits()).seed for member in range(3)}
+    assert len(lessons) == 6
+
+
+def test_lessons_change_nothing_but_their_own_learner() -> None:
+    """A generation that is dropped leaves the run as it was, weights and optimisers, though its lessons were taken."""
+    run, undisturbed = trainer(), trainer()
+    for one in (run, undisturbed):
+        one.advance()
+    before = weights(run).clone()
+    asked = iter([False, False, True])
+    assert run.advance(engine=SerialEngine(), should_stop=lambda: next(asked)) is None
+    assert run.generation == 1
+    assert torch.equal(weights(run), before)
+    for one in (run, undisturbed):
+        one.advance()
+    assert torch.equal(weights(run), weights(undisturbed))
+
+
+def test_train_writes_policy_checkpoint_and_log(paths: dict[str, Path]) -> None:
+    """After every generation all three files are whole; the policy holds the population, and how it came about."""
+    run = trainer(1)
+    train(run, **paths, limits=Limits(iterations=2))
+    assert len(load_policy(paths["output"], "gappo")) == 3
+    with safe_open(paths["output"], framework="pt") as file:
+        said = file.metadata()
+    assert f'"generation": {run.best_generation}' in said["training"]
+    again = trainer(1)
+    again.resume(paths["checkpoint"])
+    assert again.generation == 2
+    lines = paths["log"].read_text().splitlines()
+    assert len(lines) == 3
+    assert lines[0].startswith("generation,decisions,evaluations,cost,unserved,time")
+
+
+def test_the_log_and_the_policy_are_put_right(paths: dict[str, Path]) -> None:
+    """A run that was killed after its checkpoint, before the other files, writes them when it is taken up."""
+    run = trainer(1)
+    train(run, **paths, limits=Limits(iterations=2))
+    log = paths["log"].read_bytes()
+    paths["log"].write_bytes(log[: len(log) // 2])
+    paths["output"].unlink()
+    again = trainer(1)
+    again.resume(paths["checkpoint"])
+    train(again, **paths, limits=Limits(iterations=2))
+    assert paths["log"].read_bytes() == log
+    for one, two in zip(load_policy(paths["output"], "gappo"), run.best, strict=True):
+        assert all(torch.equal(weight, two[name]) for name, weight in one.state_dict().items())
+
+
+def test_the_best_networks_are_kept(paths: dict[str, Path], planned: Callable[..., None]) -> None:
+    """The policy is that of the generation with the least cost, not the last one."""
+    planned(0.5, 0.2, 0.3, 0.4)
+    run = trainer(population=1, method="ppo")
+    for generation in range(1, 5):
+        run.advance()
+        if generation == 2:
+            second = {name: weight.clone() for name, weight in run.members[0]["network"].items()}
+    assert run.best_generation == 2
+    assert [report.best_cost for report in run.history] == [0.5, 0.2, 0.2, 0.2]
+    assert [report.unserved for report in run.history] == [0.5] * 4
+    run.write_policy(paths["output"])
+    (kept,) = load_policy(paths["output"], "ppo")
+    assert all(torch.equal(weight, second[name]) for name, weight in kept.state_dict().items())
+
+
+def test_patience_ends_a_run_that_gets_no_better(paths: dict[str, Path], planned: Callable[..., None]) -> None:
+    """Two generations in a row without better networks end it, one does not."""
+    planned(0.5, 0.6, 0.4, 0.4, 0.5, 0.1)
+    run = trainer(population=1, method="ppo")
+    train(run, **paths, limits=Limits(iterations=9, patience=2))
+    assert [report.cost for report in run.history] == [0.5, 0.6, 0.4, 0.4, 0.5]
+
+
+def test_steps_are_those_of_all_members_together(paths: dict[str, Path]) -> None:
+    """Training ends with the update that reaches the steps, and the last lessons are shorter."""
+    run = trainer()
+    train(run, **paths, limits=Limits(steps=400))
+    assert run.history[-1].decisions >= 400
+    assert run.history[-2].decisions < 400
+    assert run._lesson(0, Limits(steps=run.history[-1].decisions + 6)).decisions == 2
+
+
+def test_progress_follows_the_first_limit_given() -> None:
+    """Schedules follow the steps; without them the generations, and the clock alone only if there is nothing else."""
+    run = trainer()
+    assert run.progress(Limits()) == run.progress(Limits(steps=9)) == 0
+    run.advance()
+    done, spent = run.history[0].decisions, run.history[0].seconds
+    assert run.progress(Limits(steps=2 * done, iterations=1, minutes=1e-9)) == 0.5
+    assert run.progress(Limits(iterations=4, minutes=1e-9)) == 0.25
+    assert run.progress(Limits(minutes=spent / 60 * 4)) == pytest.approx(0.25)
+    assert run.progress(Limits(minutes=0)) == 1
+    assert run.is_over(Limits(minutes=0))
+
+
+def test_members_begin_with_given_weights() -> None:
+    """The networks of a policy file are dealt out in turn; without any, all members begin alike."""
+    given = [Ppo(TINY.network, seed=seed).policy.state_dict() for seed in (8, 9)]
+    run = Trainer(TINY, 0, BOARDS, given)
+    for member, expected in zip(run.members, (given[0], given[1], given[0]), strict=True):
+        assert all(torch.equal(member["network"][name], weight) for name, weight in expected.items())
+    alike = trainer().members
+    assert all(torch.equal(alike[0]["network"][name], weight) for name, weight in alike[2]["network"].items())
+
+
+def test_cost_and_decisions_of_all_members_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A report adds up what the members did, and fitness (12) gets their network evaluations."""
+
+    def take(self: Ppo, lesson: Lesson) -> LessonReport:
+        return LessonReport(10, 100, 1.0, 2.0, 0.0, 1e-3)
+
+    seen = []
+    monkeypatch.setattr(Ppo, "take", take)
+    monkeypatch.setattr(module, "fitness", lambda *columns: seen.append(columns[2]) or [1.0, 3.0, 2.0])
+    run = trainer()
+    run.advance()
+    run.advance()
+    assert (run.history[-1].decisions, run.history[-1].evaluations, run.history[-1].fitness) == (60, 600, 3.0)
+    assert seen == [[100, 100, 100]] * 2
+
+
+@pytest.mark.parametrize("content", [None, b"", b"not a checkpoint"])
+def test_bad_checkpoints(tmp_path: Path, content: bytes | None) -> None:
+    """A missing or broken checkpoint is told in one line."""
+    if content is not None:
+        (tmp_path / "checkpoint").write_bytes(content)
+    with pytest.raises(InputError, match="checkpoint") as caught:
+        trainer().resume(tmp_path / "checkpoint")
+    assert "\n" not in str(caught.value)
+
+
+def test_damaged_checkpoints(tmp_path: Path) -> None:
+    """A checkpoint cut short, or with a hole, is told in plain words, not in those of torch."""
+    path = tmp_path / "checkpoint"
+    trainer().save(path)
+    whole = path.read_bytes()
+    for content in (whole[:100], whole[: len(whole) // 2], whole[:-1], whole[:30] + b"x" * 200 + whole[230:]):
+        path.write_bytes(content)
+        with pytest.raises(InputError) as caught:
+            trainer().resume(path)
+        assert caught.value.message == "is no checkpoint, or is damaged; name another by --checkpoint, or remove it"
+
+
+def test_checkpoints_of_other_versions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """They are not gone on with, but what they hold is known."""
+    monkeypatch.setattr(checkpoint, "CHECKPOINT_FORMAT", "alloc-checkpoint/2")
+    run = trainer()
+    run.save(tmp_path / "none")
+    run.advance()
+    run.save(tmp_path / "one")
+    monkeypatch.undo()
+    assert [checkpoint.generations_in(tmp_path / name) for name in ("none", "one")] == [0, 1]
+    with pytest.raises(InputError, match="is a checkpoint of another version"):
+        trainer().resume(tmp_path / "one")
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"population": 2}, "is a run with population 3, not 2"),
+        ({"seed": 6}, "is a run with seed 5, not 6"),
+        ({"method": "ppo"}, "is a run with method gappo, not ppo"),
+        ({"learner": PpoParameters(epochs=2)}, "is a run with learner"),
+        ({"curriculum": Curriculum(("travel",))}, "is a run with curriculum.families mixed, not travel"),
+        ({"curriculum": replace(CURRICULUM, own=CURRICULUM.own[:1])}, "is a run with instances"),
+    ],
+)
+def test_checkpoints_of_other_runs_are_refused(tmp_path: Path, changes: dict[str, Any], message: str) -> None:
+    """A checkpoint knows what it is a run of, and says what differs."""
+    trainer().save(tmp_path / "checkpoint")
+    with pytest.raises(InputError, match=message):
+        trainer(**changes).resume(tmp_path / "checkpoint")
+
+
+def test_files_that_cannot_be_read_are_not_called_damaged(tmp_path, monkeypatch):
+    """No memory, no permission and a damaged file are three things: only the last is advised to be removed."""
+    path = tmp_path / "run.checkpoint"
+    trainer().save(path)
+    for error, words in (
+        (MemoryError(), "does not fit into memory"),
+        (RuntimeError("DefaultCPUAllocator: can't allocate memory"), "does not fit into memory"),
+        (PermissionError(13, "Permission denied"), "may not be read"),
+        (RuntimeError("invalid header"), "or remove it"),
+    ):
+        with monkeypatch.context() as patch:
+            patch.setattr("torch.load", _raising(error))
+            with pytest.raises(InputError, match=words) as caught:
+                trainer().resume(path)
+        assert caught.value.__cause__ is not None
+        assert ("remove" in str(caught.value)) == (words == "or remove it")
+
+
+def _raising(error):
+    def fail(*arguments, **options):
+        raise error
+
+    return fail
+
+
+def test_ddpg_is_not_bred():
+    """Breeding needs single networks, which is told before anything is trained."""
+    with pytest.raises(InputError, match="population: breeding"):
+        TrainingParameters(method="ddpg", population=2)

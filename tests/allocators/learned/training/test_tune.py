@@ -1,0 +1,74 @@
+"""Tuning: begins with the defaults, goes on where it stopped, and ends hopeless trials early."""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from alloc.allocators.learned.algorithms.registry import METHODS, method_parameters
+from alloc.allocators.learned.network.actor_critic import NetworkSize
+from alloc.allocators.learned.training import trainer as module
+from alloc.allocators.learned.training.curriculum import Curriculum
+from alloc.allocators.learned.training.trainer import Limits, TrainingParameters
+from alloc.allocators.learned.training.tune import SHARES, SPACES, open_study, suggested, tune
+from alloc.allocators.learned.training.validation import Validation, own_games
+from alloc.problems import InputError
+from alloc.problems.generate import paper_like
+
+CURRICULUM, BOARDS = own_games([paper_like(8, 2, 35, 0)], Curriculum(games=(2, 2)))
+TINY = TrainingParameters("ppo", 1, 20, NetworkSize(4, 4, 1), method_parameters("ppo"), curriculum=CURRICULUM)
+
+
+def test_a_study_begins_with_the_defaults_and_is_gone_on_with(tmp_path: Path) -> None:
+    """Two trials, then one more in another process's place, are three; the first is what a user gets untuned."""
+    pytest.importorskip("optuna")
+    path = tmp_path / "study.db"
+    tune(open_study(path, "ppo", 0), TINY, 2, Limits(iterations=1), boards=BOARDS)
+    again = open_study(path, "ppo", 0)
+    tune(again, TINY, 3, Limits(iterations=1), boards=BOARDS)
+    assert [trial.number for trial in again.trials] == [0, 1, 2]
+    first = again.trials[0].params
+    assert first == {name: getattr(TINY.learner, name) for name in first}
+    assert len({trial.params["learning_rate"] for trial in again.trials}) == 3
+
+
+def test_hopeless_trials_end_early(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A trial that does worse than most before it is pruned."""
+    pytest.importorskip("optuna")
+    costs = iter([0.1] * 15 + [0.9] * 3)
+    monkeypatch.setattr(module, "validate", lambda *_: Validation(next(costs), 0.0, 1.0, 0.1, 1.0, 0.0))
+    study = open_study(tmp_path / "study.db", "ppo", 0)
+    tune(study, replace(TINY, decisions=1), 6, Limits(iterations=3), boards=BOARDS)
+    assert [trial.state.name for trial in study.trials] == ["COMPLETE"] * 5 + ["PRUNED"]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_every_method_has_something_to_tune(method: str) -> None:
+    """What is tuned lies around the defaults of every method."""
+
+    class Lowest:
+        def suggest_float(self, name: str, low: float, high: float, log: bool = False) -> float:
+            assert low <= getattr(default, name) <= high, name
+            return low
+
+        suggest_int = suggest_float
+
+    default = method_parameters(method)
+    got = suggested(Lowest(), default)
+    assert {"learning_rate", "discount"} <= got.keys() <= SPACES.keys() | SHARES.keys()
+
+
+def test_without_optuna_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whoever tunes is told what to install."""
+    monkeypatch.setitem(sys.modules, "optuna", None)
+    with pytest.raises(InputError, match=r"alloc-mrta\[tune\]"):
+        open_study(tmp_path / "study.db", "ppo", 0)
+
+
+def test_other_files_are_no_studies(tmp_path: Path) -> None:
+    """A file that is no SQLite database is told in one line."""
+    pytest.importorskip("optuna")
+    (tmp_path / "study.db").write_text("no database, and long enough to be seen as such" * 10)
+    with pytest.raises(InputError, match="is not a file of studies"):
+        open_study(tmp_path / "study.db", "ppo", 0)

@@ -1,0 +1,103 @@
+"""Validation: the figures are those of the plans that the policy makes, by the one scorer."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from boards import plan_of
+
+from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize
+from alloc.allocators.learned.play.action_sampling import choose
+from alloc.allocators.learned.training.curriculum import Curriculum, reference_board
+from alloc.allocators.learned.training.families import RECIPES
+from alloc.allocators.learned.training.validation import (
+    DISTANCE_WEIGHT,
+    hold_out,
+    own_games,
+    validate,
+    validation_boards,
+)
+from alloc.problems import InputError, Instance, evaluate
+from alloc.problems.game import PLANNING, begin, step
+from alloc.problems.generate import paper_like
+
+
+@pytest.fixture
+def network() -> ActorCritic:
+    torch.manual_seed(3)
+    return ActorCritic(NetworkSize(8, 8, 2))
+
+
+def test_time_is_that_of_the_best_plan_met(network: ActorCritic) -> None:
+    """T, distance and cost agree with the evaluator's of every plan along the game, at its cheapest."""
+    instance = paper_like(10, 3, 44, 1)
+    curriculum, (board,) = own_games([instance], Curriculum())
+    got = validate(network, [board], PLANNING, curriculum)
+    scale = 0.66 / instance.reach.rows(instance.reach.origin)[0].mean()
+    state, costs = begin(board), []
+    while not state.done.all():
+        _, slot = choose(board, state, network(board, state))
+        state = step(board, state, slot)
+        score = evaluate(instance, plan_of(board, state))
+        time = score.served_makespan / curriculum.own[0].hours
+        distance = score.distance * scale / instance.n
+        unserved = len(score.unserved_tasks)
+        costs.append((1 - 1 / time + unserved + DISTANCE_WEIGHT * distance, unserved, time, distance))
+    assert (got.cost, got.unserved, got.time, got.distance) == pytest.approx(min(costs), rel=1e-4)
+    assert got.others_time == got.time
+
+
+def test_a_bad_game_does_not_decide(network: ActorCritic) -> None:
+    """However far from its reference a makespan is, it costs no more than an unserved task."""
+    boards = [reference_board([paper_like(10, 3, 44, 1)] * 2, [1.0] * 2, np.random.default_rng(0))]
+    hard = replace(boards[0], need=boards[0].need * torch.tensor([[1.0], [1e6]]))
+    costs = [validate(network, [board], PLANNING, Curriculum()).cost for board in (boards[0], hard)]
+    assert 0 < costs[1] - costs[0] < 0.6
+
+
+def test_unserved_tasks_are_their_part_of_the_cost(network: ActorCritic) -> None:
+    """What nobody can serve is told, as a mean over boards as the cost is; the rest of the cost is small."""
+    served, unserved = paper_like(10, 3, 44, 1), Instance(ability=[1], workload=[1, 1, 1], allowed_tasks=[[]])
+    curriculum, boards = own_games([served, unserved], Curriculum())
+    got = validate(network, boards, PLANNING, curriculum)
+    assert got.unserved == 1.5
+    assert 0 <= got.cost - got.unserved < 1
+
+
+def test_a_fifth_of_own_instances_is_held_out() -> None:
+    """With five or more instances, networks are judged by some that they do not learn from, always the same."""
+    instances = [paper_like(10, 3, 44, seed) for seed in range(10)]
+    train, held = hold_out(instances)
+    assert (len(train), len(held)) == (8, 2)
+    assert sorted([*train, *held], key=instances.index) == instances
+    assert held != instances[-2:]
+    assert hold_out(instances) == (train, held)
+    curriculum, boards = own_games(instances, Curriculum())
+    assert [one.instance for one in curriculum.own] == train
+    assert [board.shape[0] for board in boards] == [2]
+    few, (board,) = own_games(instances[:3], Curriculum())
+    assert len(few.own) == board.shape[0] == 3
+
+
+def test_instances_without_work_judge_nobody(network: ActorCritic) -> None:
+    """Where there is nothing to do no network is better than another: such instances are left out."""
+    idle = Instance(ability=[1, 2], workload=[0, 0])
+    busy = [paper_like(10, 3, 44, seed) for seed in range(6)]
+    train, held = hold_out([idle, *busy, idle, idle, idle])
+    assert (len(train), len(held)) == (5, 1)
+    assert idle not in train + held
+    curriculum, boards = own_games([*busy, *[idle] * 4], Curriculum())
+    assert validate(network, boards, PLANNING, curriculum).cost > 0
+    with pytest.raises(InputError, match="no work to do in any instance"):
+        hold_out([idle, idle])
+
+
+def test_validation_games_are_always_the_same() -> None:
+    """Paper-like games of scenario 1's size come first, then every family twice."""
+    boards, again = (validation_boards(Curriculum()) for _ in range(2))
+    assert [board.shape[:2] for board in boards] == [(12, 100), (2 * len(RECIPES), 60)]
+    assert all(torch.equal(one.need, two.need) for one, two in zip(boards, again, strict=True))
+    assert np.allclose(boards[0].need.sum(1), 100)
+    assert len(validation_boards(Curriculum(("paper",)))) == 1
+    assert validation_boards(Curriculum(("travel", "depots")))[1].shape[0] == 4

@@ -1,0 +1,195 @@
+"""Engines: the same results in the same order whatever dies, and nothing left behind."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import engine_jobs as jobs
+import pytest
+import torch
+
+from alloc.allocators.parallel.engine import Engine, EngineError, SerialEngine, make_engine
+from alloc.allocators.parallel.processes import ProcessEngine
+from alloc.allocators.parallel.torch_state import torch_threads
+from alloc.problems import InputError
+
+
+def states(count: int) -> list[dict[str, torch.Tensor]]:
+    return [{"seed": torch.tensor(seed), "weight": torch.rand(40, 40) * 0 + seed} for seed in range(count)]
+
+
+def gone(pid: int, within_s: float = 20) -> bool:
+    """Whether the process ends in time; a dead one that nobody has waited for is gone as well."""
+    end = time.monotonic() + within_s
+    while time.monotonic() < end:
+        try:
+            os.kill(pid, 0)
+            if Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z":
+                return True
+        except (ProcessLookupError, FileNotFoundError):
+            return True
+        time.sleep(0.02)
+    return False
+
+
+def when_written(*paths: Path) -> Callable[[], bool]:
+    return lambda: all(path.exists() for path in paths)
+
+
+@pytest.fixture(scope="module")
+def pair() -> Iterator[ProcessEngine]:
+    """Two processes for many tests: a process takes a second to load torch."""
+    with ProcessEngine(2) as engine:
+        yield engine
+
+
+@pytest.fixture(scope="module", params=["serial", "one process", "two processes"])
+def engine(request: pytest.FixtureRequest, pair: ProcessEngine) -> Iterator[Engine]:
+    with SerialEngine() if request.param == "serial" else ProcessEngine(1) as engine:
+        yield pair if request.param == "two processes" else engine
+
+
+def test_same_results_in_order(engine: Engine) -> None:
+    """Every engine returns what a loop over one thread returns, to the last bit."""
+    assert engine.map(jobs.square, range(7)) == [0, 1, 4, 9, 16, 25, 36]
+    assert engine.map(jobs.square, []) == []
+    assert engine.map(jobs.threads, [0]) == [1]
+    before = torch.get_num_threads()
+    with torch_threads(1):
+        expected = [jobs.step(state) for state in states(4)]
+    got = engine.map(jobs.step, states(4))
+    assert got is not None
+    for a, b in zip(got, expected, strict=True):
+        assert a["seed"] == b["seed"]
+        assert torch.equal(a["weight"], b["weight"])
+    assert torch.get_num_threads() == before
+
+
+def test_workers_are_kept_until_closed() -> None:
+    """One item needs one process of ten, the next finds it there, and a close, or two, leaves none."""
+    with ProcessEngine(10) as engine:
+        first, second = engine.map(jobs.pid, [0]), engine.map(jobs.pid, [0])
+    engine.close()
+    assert first is not None
+    assert first == second
+    assert gone(first[0], 0.1)
+
+
+def test_a_killed_worker_loses_nothing(tmp_path: Path, pair: ProcessEngine) -> None:
+    """Items whose process is killed at the first try are done at the second, the others go on undisturbed."""
+    items = [(number, str(tmp_path / str(number))) for number in range(4)]
+    results = pair.map(jobs.die_first, items)
+    assert results is not None
+    assert [square for square, _ in results] == [0, 1, 4, 9]
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+def test_an_item_that_always_kills_is_given_up(tmp_path: Path) -> None:
+    """After the last try there is one error; what is killed while idle costs no try; the engine goes on."""
+    with ProcessEngine(1, tries=2) as engine:
+        with pytest.raises(EngineError, match=r"died 2 times .* \(exit code -9\)"):
+            engine.map(jobs.die, [str(tmp_path / "tries")])
+        assert (tmp_path / "tries").read_text().count("tried") == 2
+    with ProcessEngine(1, tries=1) as engine:
+        first = engine.map(jobs.pid, [0])
+        assert first is not None
+        os.kill(first[0], signal.SIGKILL)
+        while engine._workers[0].alive:  # its threads may outlive its first one for a moment
+            time.sleep(0.01)
+        assert engine.map(jobs.square, [3]) == [9]
+
+
+def test_errors_of_the_function_are_raised_here(engine: Engine) -> None:
+    """They keep their type, and tell where in the worker they arose."""
+    with pytest.raises(KeyError, match="item 5") as caught:
+        engine.map(jobs.fail, [5])
+    if isinstance(engine, ProcessEngine):
+        assert "engine_jobs.py" in caught.value.__notes__[0]
+    with pytest.raises((RuntimeError, jobs.UnpicklableError), match="of two parts"):
+        engine.map(jobs.fail_oddly, [5])
+
+
+def test_a_stop_drops_what_is_under_work(tmp_path: Path, pair: ProcessEngine) -> None:
+    """`map` returns None at once, its workers are gone, and the engine can be used again."""
+    markers = [tmp_path / name for name in ("a", "b")]
+    assert pair.map(jobs.sleep_long, [str(marker) for marker in markers], when_written(*markers)) is None
+    assert all(gone(int(marker.read_text())) for marker in markers)
+    assert pair.map(jobs.square, [3]) == [9]
+
+
+def test_the_serial_engine_stops_between_items() -> None:
+    """It is asked before every item."""
+    answers = iter([False, False, True])
+    assert SerialEngine().map(jobs.square, range(9), lambda: next(answers)) is None
+
+
+SCRIPT = """
+import sys, threading
+import engine_jobs as jobs
+from alloc.allocators.runtime.interrupts import signals_set
+from alloc.allocators.parallel.processes import ProcessEngine
+if __name__ == "__main__":
+    stop = threading.Event()
+    with signals_set(stop), ProcessEngine(2) as engine:
+        print(engine.map(jobs.sleep_long, sys.argv[1:], stop.is_set))
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL], ids=lambda number: number.name)
+def test_no_orphans(number: signal.Signals, tmp_path: Path) -> None:
+    """Ctrl-C of a whole process group, SIGTERM and even SIGKILL of the parent end the workers; the first two tidily."""
+    script, markers = tmp_path / "script.py", [tmp_path / name for name in ("a", "b")]
+    script.write_text(SCRIPT)
+    parent = subprocess.Popen(
+        [sys.executable, str(script), *map(str, markers)],
+        env=os.environ | {"PYTHONPATH": str(Path(jobs.__file__).parent)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    written = when_written(*markers)
+    while parent.poll() is None and not written():
+        time.sleep(0.05)
+    if number == signal.SIGINT:
+        os.killpg(parent.pid, number)
+    else:
+        parent.send_signal(number)
+    output, errors = parent.communicate(timeout=30)
+    assert all(gone(int(marker.read_text())) for marker in markers)
+    assert errors == ""
+    if number != signal.SIGKILL:
+        assert (output, parent.returncode) == ("None\n", 0)
+
+
+def test_ctrl_c_while_workers_start_does_not_reach_them() -> None:
+    """Half a process cannot handle a signal, so it never gets one: the worker comes up and does its item."""
+    results: list[list[int] | None] = []
+    with ProcessEngine(1) as engine:
+        thread = threading.Thread(target=lambda: results.append(engine.map(jobs.square, [3])))
+        thread.start()
+        while not engine._workers:
+            time.sleep(0.001)
+        pid = engine._workers[0]._process.pid
+        assert pid is not None
+        os.kill(pid, signal.SIGINT)
+        thread.join()
+    assert results == [[9]]
+
+
+def test_make_engine_refuses_what_does_not_fit() -> None:
+    """Each mistake is one line that names its option."""
+    assert isinstance(make_engine(), SerialEngine)
+    with make_engine("processes", workers=2) as engine:
+        assert isinstance(engine, ProcessEngine)
+    with pytest.raises(InputError, match=r"engine: no such engine: 'process' \(did you mean 'processes'\?\)"):
+        make_engine("process")
+    with pytest.raises(InputError, match="workers: belongs to the engine processes"):
+        make_engine("serial", workers=2)
+    with pytest.raises(InputError, match="address: belongs to the engine ray"):
+        make_engine("processes", address="auto")

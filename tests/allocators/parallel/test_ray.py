@@ -1,0 +1,237 @@
+"""The Ray engine: a machine of the cluster dies in mid-work, also of a whole training, and nothing is lost."""
+
+import contextlib
+import csv
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import engine_jobs as jobs
+import pytest
+import torch
+from ray_cluster import add_machine, at_work, kill_at_work, living, ray_cluster
+from safetensors.torch import load_file
+
+from alloc.allocators.parallel.engine import Engine, EngineError, SerialEngine, make_engine
+from alloc.cli.main import main
+from alloc.problems import InputError
+from alloc.problems.formats import write_instance
+from alloc.problems.generate import paper_like
+
+
+def test_without_ray_the_mend_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One line says what to install."""
+    monkeypatch.setitem(sys.modules, "ray", None)
+    with pytest.raises(InputError, match=r"engine: Ray is not installed: pip install 'alloc-mrta\[cluster\]'"):
+        make_engine("ray")
+
+
+@pytest.mark.parametrize("address", ["127.0.0.1:1", "nowhere.invalid:6379", "ray://127.0.0.1:1", "1.2.3.4:99999", "x"])
+def test_nobody_there(address: str) -> None:
+    """An address where no cluster is, is told at once, where Ray itself tries for minutes."""
+    pytest.importorskip("ray")
+    began = time.monotonic()
+    with pytest.raises(InputError, match=f"address: no Ray cluster at '{address}': "):
+        make_engine("ray", address=address)
+    assert time.monotonic() - began < 30
+
+
+def test_a_cluster_that_cannot_be_joined(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What Ray says against it is told, the versions in its later lines too."""
+
+    def refuse(**_: object) -> None:
+        raise RuntimeError("Version mismatch: The cluster was started with:\n    Ray: 2.9.0\n    Python: 3.9.1")
+
+    monkeypatch.setattr(pytest.importorskip("ray"), "init", refuse)
+    with pytest.raises(InputError, match=r"address: no Ray cluster at 'x': Version .* with: Ray: 2\.9\.0 Python: 3"):
+        make_engine("ray", address="x")
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[Any]:
+    with ray_cluster(machines=2) as cluster:
+        yield cluster
+
+
+@pytest.fixture(scope="module")
+def engine(cluster: Any) -> Iterator[Engine]:
+    before = signal.getsignal(signal.SIGTERM)
+    with make_engine("ray", address=cluster.address) as engine:
+        assert signal.getsignal(signal.SIGTERM) is before
+        yield engine
+
+
+@pytest.mark.slow
+def test_same_results_in_order(engine: Engine) -> None:
+    """A cluster returns what this process returns, to the last bit, and raises what it raises."""
+    assert engine.map(jobs.square, range(5)) == [0, 1, 4, 9, 16]
+    assert engine.map(jobs.threads, [0]) == [1]
+    states = [{"seed": torch.tensor(seed), "weight": torch.full((40, 40), 0.1 * seed)} for seed in range(3)]
+    got, expected = engine.map(jobs.step, states), SerialEngine().map(jobs.step, states)
+    assert got is not None
+    assert expected is not None
+    for a, b in zip(got, expected, strict=True):
+        assert torch.equal(a["weight"], b["weight"])
+        a["weight"] += 1  # not a view of memory that belongs to Ray
+    with pytest.raises(KeyError, match="item 5"):
+        engine.map(jobs.fail, [5])
+
+
+@pytest.mark.slow
+def test_more_threads_than_processors(cluster: Any, engine: Engine) -> None:
+    """What no machine can ever do is told at once, where Ray waits forever; the connection is still there."""
+    with pytest.raises(InputError, match=r"threads: no machine of the cluster has 2 processors; the largest has 1"):
+        make_engine("ray", address=cluster.address, threads=2)
+    assert engine.map(jobs.square, [3]) == [9]
+
+
+@pytest.mark.slow
+def test_a_killed_worker_loses_nothing(engine: Engine, tmp_path: Path) -> None:
+    """Items whose process is killed at the first try are done at the next."""
+    results = engine.map(jobs.die_first, [(number, str(tmp_path / str(number))) for number in range(4)])
+    assert results is not None
+    assert [square for square, _ in results] == [0, 1, 4, 9]
+
+
+@pytest.mark.slow
+def test_an_item_that_always_kills_is_given_up(cluster: Any, engine: Engine, tmp_path: Path) -> None:
+    """After the last try there is one error, and an engine that finds a connection leaves it open."""
+    with make_engine("ray", address=cluster.address) as second:
+        second._task = second._task.options(max_retries=1)
+        with pytest.raises(EngineError, match="Ray gave an item up"):
+            second.map(jobs.die, [str(tmp_path / "tries")])
+    assert (tmp_path / "tries").read_text().count("tried") == 2
+    assert engine.map(jobs.square, [3]) == [9]
+
+
+@pytest.mark.slow
+def test_a_stop_drops_what_is_under_work(engine: Engine, tmp_path: Path) -> None:
+    """`map` returns None, and the processors are free for the next items."""
+    markers = [tmp_path / name for name in ("a", "b")]
+    stopped = engine.map(jobs.sleep_long, [str(m) for m in markers], lambda: all(m.exists() for m in markers))
+    assert stopped is None
+    assert engine.map(jobs.square, [3]) == [9]
+
+
+@pytest.mark.slow
+def test_a_machine_dies_and_nothing_is_lost(cluster: Any, engine: Engine, tmp_path: Path) -> None:
+    """One of three machines is killed with an item under work; every result arrives, and is right."""
+    add_machine(cluster)
+    items = [(number, str(tmp_path)) for number in range(6)]
+
+    def kill_one() -> None:
+        while len(busy := {path.read_text() for path in tmp_path.glob("*.try")}) < 2:
+            time.sleep(0.02)
+        doomed = next(machine for machine in cluster.worker_nodes if machine.node_id in busy)
+        (tmp_path / "doomed").write_text(doomed.node_id)
+        cluster.remove_node(doomed, allow_graceful=False)
+
+    thread = threading.Thread(target=kill_one)
+    thread.start()
+    results = engine.map(jobs.square_where_it_is_safe, items)
+    thread.join()
+    assert results == [0, 1, 4, 9, 16, 25]
+    tries = [path.name.partition("-")[0] for path in tmp_path.glob("*.try")]
+    assert sorted(set(tries)) == list("012345")
+    assert len(tries) > 6
+
+
+@pytest.fixture(scope="module")
+def options(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    """Arguments of a training of four generations, each long enough to be killed in its midst."""
+    mine = tmp_path_factory.mktemp("mine") / "mine.json"
+    write_instance(paper_like(10, 3, 44, 0), mine)
+    shape = ["--population", "3", "--iterations", "4", "--lesson", "200", "--seed", "1"]
+    return ["train", "gappo", "--instances", str(mine), *shape]
+
+
+@pytest.fixture(scope="module")
+def undisturbed(options: list[str], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The policy of that training in this process alone."""
+    policy = tmp_path_factory.mktemp("undisturbed") / "p"
+    assert main([*options, "--output", str(policy), "--engine", "serial"]) == 0
+    return policy
+
+
+@contextlib.contextmanager
+def training(cluster: Any, *options: str) -> Iterator[subprocess.Popen[str]]:
+    """The command in a process of its own, which does not outlive the block."""
+    command = [sys.executable, "-c", "from alloc.cli.main import main; raise SystemExit(main())", *options]
+    command += ["--engine", "ray", "--address", cluster.address]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+def first_generation(lines: Iterable[str]) -> str:
+    """Return the first line of a generation; Ray may speak in between, of machines that it lost before, too."""
+    return next((line for line in lines if line.startswith("gen ")), "no generation")
+
+
+def curve(policy: Path) -> list[list[str]]:
+    """All figures of the log but those of time, and what they are called."""
+    with policy.with_suffix(".csv").open(newline="") as file:
+        return [row[:-2] for row in csv.reader(file)]
+
+
+def members(policy: Path) -> Any:
+    """All that the networks of the population are, with the states of their optimisers."""
+    return torch.load(policy.with_suffix(".checkpoint"), weights_only=True)["members"]
+
+
+def assert_same_end(policy: Path, expected: Path) -> None:
+    assert len(curve(expected)) == 5
+    assert curve(policy) == curve(expected)
+    torch.testing.assert_close(load_file(policy), load_file(expected), rtol=0, atol=0)
+    torch.testing.assert_close(members(policy), members(expected), rtol=0, atol=0)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+def test_a_machine_dies_in_a_training(cluster: Any, options: list[str], undisturbed: Path, tmp_path: Path) -> None:
+    """The lesson that a killed machine was at is taken again on another, and nobody needs to do anything."""
+    add_machine(cluster)
+    before, policy = living(cluster), tmp_path / "p"
+    with training(cluster, *options, "--output", str(policy)) as process:
+        assert process.stderr is not None
+        assert first_generation(process.stderr).startswith("gen 1 ")
+        killed = kill_at_work(cluster, goes_on=lambda: process.poll() is None)
+        assert killed is not None
+        assert process.poll() is None
+        assert len(curve(policy)) < 5
+        told = process.stderr.read()
+        assert process.wait() == 0, told
+    while living(cluster) == before:  # the cluster may hear later of the machine than of its lesson
+        time.sleep(0.1)
+    assert living(cluster) == before - 1
+    cluster.remove_node(killed)
+    assert_same_end(policy, undisturbed)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+def test_a_killed_training_is_resumed(cluster: Any, options: list[str], undisturbed: Path, tmp_path: Path) -> None:
+    """After kill -9 the cluster is free for the next command, which goes on where the checkpoint stands."""
+    policy = tmp_path / "p"
+    with training(cluster, *options, "--output", str(policy)) as process:
+        assert process.stderr is not None
+        assert first_generation(process.stderr).startswith("gen 1 ")
+        while process.poll() is None and not any(at_work(machine) for machine in cluster.worker_nodes):
+            time.sleep(0.01)
+    assert process.returncode == -signal.SIGKILL
+    behind = len(curve(policy)) - 1
+    assert behind < 4
+    with training(cluster, *options, "--output", str(policy), "--resume") as process:
+        assert process.stderr is not None
+        told = process.stderr.read()
+        assert process.wait() == 0, told
+    begun = first_generation(told.splitlines())
+    assert begun.startswith((f"gen {behind + 1} ", f"gen {behind + 2} ")), told  # the checkpoint precedes the log
+    assert_same_end(policy, undisturbed)

@@ -1,0 +1,153 @@
+"""Torch as others have set it: by the caller around a run, and by whoever else is in the process."""
+
+import threading
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from functools import partial
+
+import pytest
+import torch
+
+from alloc.allocators import load, solve
+from alloc.allocators.contract.search import STANDS
+from alloc.allocators.learned import policy
+from alloc.allocators.learned.algorithms.a2c import A2c
+from alloc.allocators.learned.algorithms.ddpg import Ddpg
+from alloc.allocators.learned.algorithms.dqn import Dqn
+from alloc.allocators.learned.algorithms.ppo import Ppo
+from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize
+from alloc.allocators.learned.search.fine_tuning import FineTuning, FineTuningParameters
+from alloc.allocators.parallel.engine import SerialEngine
+from alloc.allocators.parallel.torch_state import torch_threads
+from alloc.problems.generate import paper_like
+
+pytestmark = pytest.mark.timeout(400)  # the first game waits for the compiler, long on a busy machine
+
+LEARNED = ["gappo", "gappo-ls", "ppo", "a2c", "dqn", "ddpg"]
+CONTEXTS: dict[str, Callable[[], AbstractContextManager[object]]] = {
+    "no gradients": torch.no_grad,
+    "inference": torch.inference_mode,
+    "autocast": partial(torch.autocast, "cpu", dtype=torch.bfloat16),
+    "another device": partial(torch.device, "meta"),
+}
+
+
+@pytest.fixture
+def lessons(monkeypatch: pytest.MonkeyPatch) -> list[FineTuning]:
+    """Have `gappo` learn on after 0.1 s; what learned is in the list."""
+    made: list[FineTuning] = []
+
+    def early(*arguments: object) -> FineTuning:
+        made.append(FineTuning(*arguments, FineTuningParameters(after_s=0.1, games=8, rounds=4)))  # type: ignore[arg-type]
+        return made[-1]
+
+    monkeypatch.setattr(policy, "FineTuning", early)
+    return made
+
+
+@pytest.mark.parametrize("method", LEARNED)
+@pytest.mark.parametrize("context", CONTEXTS)
+def test_the_callers_torch_changes_no_answer(method: str, context: str) -> None:
+    """Loaded and run within such a context, a method answers as it does without."""
+    run = partial(solve, paper_like(24, 6, 100, 0), objective="makespan-energy", time_limit_s=None, iterations=5)
+    plain = run(load(method))
+    with CONTEXTS[context]():
+        within = run(load(method))
+        again = torch.zeros(2, device="cpu") + 1
+    assert (within.allocation, within.notes) == (plain.allocation, plain.notes)
+    assert again.is_inference() is (context == "inference")
+
+
+@pytest.mark.parametrize("context", CONTEXTS)
+def test_learning_on_works_in_the_callers_torch(context: str, lessons: list[FineTuning]) -> None:
+    """Gradients are had, and in full precision, though the caller wants none."""
+    with CONTEXTS[context]():
+        result = solve(paper_like(24, 6, 100, 0), "gappo", objective="makespan-energy", time_limit_s=1.5)
+    assert result.notes == ()
+    assert lessons[0].lessons > 0
+
+
+def test_a_failure_in_learning_on_costs_no_plan(
+    lessons: list[FineTuning], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """The run goes on to its end with the policy as shipped, a note says what happened, and the log where."""
+
+    def fail(*_: object) -> None:
+        raise RuntimeError("out of luck")
+
+    monkeypatch.setattr(FineTuning, "learn", fail)
+    result = solve(paper_like(24, 6, 100, 0), "gappo", objective="makespan-energy", time_limit_s=1.0)
+    assert str(result.stop_reason) == "time_limit"
+    assert result.notes == (f"learning on failed (RuntimeError: out of luck); {STANDS}",)
+    (record,) = caplog.records
+    assert (record.name, record.exc_info is not None) == ("alloc", True)
+
+
+def test_threads_are_those_of_the_calling_thread() -> None:
+    """Runs that overlap leave every thread with what it had, and others see nothing of it meanwhile."""
+    seen: list[int] = []
+    first_in, second_in, first_out = threading.Event(), threading.Event(), threading.Event()
+
+    def fresh() -> int:
+        thread = threading.Thread(target=lambda: seen.append(torch.get_num_threads()))
+        thread.start()
+        thread.join()
+        return seen[-1]
+
+    def overlapping() -> None:
+        first_in.wait(10)
+        with torch_threads(1):
+            seen.append(torch.get_num_threads())
+            second_in.set()
+            first_out.wait(10)
+        seen.append(torch.get_num_threads())
+
+    before = torch.get_num_threads()
+    torch.set_num_threads(3)
+    try:
+        other = threading.Thread(target=overlapping)
+        other.start()
+        with torch_threads(1):
+            assert torch.get_num_threads() == 1
+            first_in.set()
+            second_in.wait(10)
+            assert fresh() == 3
+        first_out.set()
+        other.join()
+        assert seen == [1, 3, 3]
+        assert (torch.get_num_threads(), fresh()) == (3, 3)
+    finally:
+        torch.set_num_threads(before)
+
+
+@pytest.mark.parametrize("learner", [Ppo, A2c, Dqn, Ddpg])
+def test_first_weights_are_torchs_own(learner: Callable[..., Ppo]) -> None:
+    """First weights are those that the layers draw after `manual_seed`, but no shared generator is drawn from."""
+    size = NetworkSize(8, 8, 2)
+    before = torch.get_rng_state()
+    made = learner(size, seed=5).policy.state_dict()
+    assert torch.equal(torch.get_rng_state(), before)
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(5)
+        expected = ActorCritic(size).state_dict()
+    assert made.keys() == expected.keys()
+    assert all(torch.equal(made[name], expected[name]) for name in expected)
+
+
+def learned(seed: int) -> dict[str, torch.Tensor]:
+    return dict(Ppo(NetworkSize(8, 8, 2), seed=seed).policy.state_dict())
+
+
+def test_training_works_in_the_callers_torch() -> None:
+    """An engine gives its work gradients and the CPU."""
+    with torch.inference_mode(), torch.device("meta"):
+        (weights,) = SerialEngine().map(learned, [3]) or []
+    assert all(not weight.is_inference() and weight.device.type == "cpu" for weight in weights.values())
+
+
+@pytest.mark.parametrize("method", LEARNED)
+def test_loading_draws_from_no_shared_generator(method: str) -> None:
+    """Whoever seeds torch draws the same numbers, loads and runs in between or not."""
+    before = torch.get_rng_state()
+    load(method)
+    assert torch.equal(torch.get_rng_state(), before)

@@ -1,0 +1,116 @@
+"""Stopping from outside: signals, and solvers on another thread."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+
+from alloc.allocators.runtime.interrupts import left_behind, run_native, signals_set
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_signals_set_the_event(number: signal.Signals) -> None:
+    """The first signal sets the event and nothing else; afterwards all handlers are as before."""
+    before, stop = signal.getsignal(number), threading.Event()
+    with signals_set(stop):
+        os.kill(os.getpid(), number)
+        assert stop.wait(5)
+    assert signal.getsignal(number) is before
+
+
+def test_a_second_interrupt_gets_through() -> None:
+    """Whoever insists is obeyed at once."""
+
+    def insist() -> None:
+        stop = threading.Event()
+        with signals_set(stop):
+            os.kill(os.getpid(), signal.SIGINT)
+            assert stop.wait(5)
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(5)
+
+    with pytest.raises(KeyboardInterrupt):
+        insist()
+
+
+def test_other_threads_leave_signals_alone() -> None:
+    """Outside the main thread, where Python allows no handlers, nothing is set up."""
+    seen = []
+
+    def work() -> None:
+        with signals_set(threading.Event()):
+            seen.append(signal.getsignal(signal.SIGINT))
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert seen == [signal.getsignal(signal.SIGINT)]
+
+
+def test_native_work_answers_or_raises() -> None:
+    """Its answer is handed back, its exception raised here."""
+    assert run_native(lambda: 7, lambda: False, lambda: None) == 7
+
+    def fail() -> None:
+        raise KeyError("inside")
+
+    with pytest.raises(KeyError, match="inside"):
+        run_native(fail, lambda: False, lambda: None)
+
+
+def test_native_work_is_halted() -> None:
+    """Once time is up the solver is told so, and what it then answers counts."""
+    halted = threading.Event()
+
+    def work() -> str:
+        assert halted.wait(10)
+        return "best so far"
+
+    assert run_native(work, lambda: True, halted.set) == "best so far"
+
+
+def test_native_work_that_does_not_obey_is_left_behind() -> None:
+    """It costs a fraction of a second, not the run."""
+    release, begin = threading.Event(), time.monotonic()
+    assert run_native(lambda: release.wait(10), lambda: True, lambda: None) is None
+    assert time.monotonic() - begin < 2
+    (thread,) = left_behind()
+    release.set()
+    thread.join(5)
+    assert not left_behind()
+
+
+def test_native_work_is_halted_by_what_a_handler_raises() -> None:
+    """A KeyboardInterrupt in the calling thread leaves no solver at work."""
+    halted = threading.Event()
+
+    def interrupted() -> bool:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_native(lambda: halted.wait(10), interrupted, halted.set)
+    assert halted.is_set()
+    assert not left_behind()
+
+
+PROGRAM = """
+import time
+from alloc.allocators.runtime.interrupts import run_native
+
+def work():
+    time.sleep(1.5)
+    print("calls back", flush=True)
+
+run_native(work, lambda: True, lambda: None)
+print("over", flush=True)
+"""
+
+
+def test_the_end_of_the_process_waits_for_what_is_left_behind() -> None:
+    """A solver that calls back into an interpreter that has ended would crash a program that embeds us."""
+    ran = subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, text=True, timeout=30)
+    assert (ran.returncode, ran.stdout.split("\n"), ran.stderr) == (0, ["over", "calls back", ""], "")

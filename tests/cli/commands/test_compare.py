@@ -1,0 +1,77 @@
+import csv
+import io
+import json
+import os
+import signal
+import threading
+from pathlib import Path
+
+import pytest
+
+from alloc.cli.commands.compare import _seeds
+
+
+def test_table_has_a_row_per_instance_and_method(alloc, small, unservable):
+    """Each instance and method has one row over all seeds, with T, gap, energy and time."""
+    ran = alloc("compare", "small.json", "unservable.json", "--methods", "greedy,cpsat", "--seeds", "2", "--json")
+    assert ran.code == 1  # a task of one instance cannot be served
+    rows = ran.json["rows"]
+    assert [(row["instance"], row["method"]) for row in rows] == [
+        ("small", "greedy"),
+        ("small", "cpsat"),
+        ("unservable", "greedy"),
+        ("unservable", "cpsat"),
+    ]
+    assert [row["runs"] for row in rows] == [2, 2, 2, 2]
+    assert rows[1]["makespan_mean"] == pytest.approx(13 / 11)
+    assert rows[2]["makespan_mean"] is None
+    assert rows[2]["unserved"] == 1
+
+
+def test_table_for_people_and_csv(alloc, small):
+    """People get a table on standard error; --csv writes the same rows, - to standard output."""
+    ran = alloc("compare", "small.json", "--methods", "greedy", "--csv", "t.csv")
+    assert (ran.code, ran.out) == (0, "")
+    assert "T (h)" in ran.err
+    rows = list(csv.DictReader(io.StringIO(Path("t.csv").read_text())))
+    assert rows[0]["method"] == "greedy"
+    assert float(rows[0]["makespan_mean"]) >= 13 / 11 - 1e-9
+    assert alloc("compare", "small.json", "--methods", "greedy", "--csv", "-").out.startswith("instance,method,")
+
+
+def test_a_refusal_is_a_row(alloc):
+    """A method that refuses an instance has a row with the reason, and the others have their figures."""
+    Path("fast.json").write_text(
+        json.dumps(
+            {
+                "format": "alloc-instance/1",
+                "agents": [{"id": "a", "ability": 1, "speed": 2, "position": [0, 0]}],
+                "tasks": [{"id": "t", "workload": 1, "position": [1, 1]}],
+            }
+        )
+    )
+    ran = alloc("compare", "fast.json", "--methods", "ga,greedy", "--json")
+    assert ran.code == 0
+    refused, figures = ran.json["rows"]
+    assert "finite speeds" in refused["reason"]
+    assert (refused["runs"], figures["runs"], figures["reason"]) == (0, 1, "")
+    assert "refuses" in alloc("compare", "fast.json", "--methods", "ga,greedy").err
+
+
+@pytest.mark.parametrize(("text", "seeds"), [("3", [0, 1, 2]), ("7,", [7]), ("4,2,4", [4, 2]), ("0, 5", [0, 5])])
+def test_seeds(text, seeds):
+    """A number is a count, a list is a list."""
+    assert _seeds(text) == seeds
+
+
+def test_interrupted_comparison_prints_what_is_finished(alloc, small):
+    """Ctrl-C ends the comparison; the rows that are complete are printed."""
+    alloc("generate", "random", "--agents", "40", "--tasks", "13", "--real", "--seed", "2", "--output", "hard.json")
+    threading.Timer(1.0, os.kill, (os.getpid(), signal.SIGINT)).start()
+    ran = alloc("compare", "small.json", "hard.json", "--methods", "greedy,ga", "--time-limit", "30", "--json")
+    assert "interrupted after" in ran.err
+    done = [(row["instance"], row["method"]) for row in ran.json["rows"]]
+    assert ran.code == 1  # though every task is served in the rows that there are
+    assert all(row["unserved"] == 0 for row in ran.json["rows"])
+    assert ("small", "greedy") in done
+    assert ("hard", "ga") not in done

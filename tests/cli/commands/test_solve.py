@@ -1,0 +1,173 @@
+import json
+import re
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from matplotlib.testing.compare import compare_images
+
+from alloc.allocators import solve
+from alloc.allocators.plotting.figure import save_plot
+from alloc.cli.main import main
+from alloc.cli.output.console import number
+from alloc.problems import Allocation, evaluate
+from alloc.problems.formats import read_instance
+
+FIELDS = [
+    "format", "method", "objective", "instance", "seed", "status", "stop_reason", "makespan", "served_makespan",
+    "lower_bound", "gap", "energy", "energy_lower_bound", "energy_gap", "distance", "battery_remaining_percent",
+    "reward", "unserved_tasks", "violations", "runtime_s", "assignment", "trace",
+]  # fmt: skip
+
+
+def test_json_is_the_result_format_and_all_there_is_on_stdout(alloc, small):
+    """Standard output holds the fields of alloc-result/1, and they are what the evaluator says."""
+    ran = alloc("solve", "small.json", "--method", "greedy", "--seed", "3", "--json")
+    result = ran.json
+    assert (ran.code, ran.err) == (0, "")
+    assert list(result) == FIELDS
+    score = evaluate(small, Allocation.from_ids(small, result["assignment"]))
+    assert (result["makespan"], result["energy"], result["seed"]) == (score.makespan, score.energy, 3)
+
+
+def test_summary_goes_to_stderr(alloc, small):
+    """Without --json the summary stands on standard error: status, figures, the last task and what would help."""
+    ran = alloc("solve", "small.json", "--method", "greedy")
+    assert (ran.code, ran.out) == (0, "")
+    for words in ("small (5 agents, 3 tasks), greedy", "makespan", "energy", "battery", "Last: ", "One more agent"):
+        assert words in ran.err
+
+
+def test_quiet_says_nothing(alloc, small):
+    """With --quiet a run that goes well prints nothing at all."""
+    ran = alloc("solve", "small.json", "--quiet", "--method", "greedy")
+    assert (ran.code, ran.out, ran.err) == (0, "", "")
+
+
+def test_auto_says_what_it_picked(alloc, small):
+    """The notes of the result, such as auto's choice, come on standard error."""
+    ran = alloc("solve", "small.json", "--json")
+    assert "note: auto picked" in ran.err
+    assert ran.json["status"] == "optimal"
+
+
+def test_unserved_tasks_give_exit_code_1(alloc, unservable):
+    """A task that nobody can take gives exit code 1, the best partial plan, and the reason."""
+    ran = alloc("solve", "unservable.json", "--method", "greedy", "--json")
+    assert ran.code == 1
+    assert ran.json["unserved_tasks"] == ["t2"]
+    assert "no agent can take task 't2'" in ran.err
+    ran = alloc("solve", "unservable.json", "--method", "greedy")
+    assert "Unserved: t2." in ran.err
+
+
+def test_output_start_and_standard_streams(alloc, small):
+    """A result written with --output starts another run, which is never worse; `-` reads and writes streams."""
+    assert alloc("solve", "small.json", "--method", "cpsat", "--output", "best.json", "-q").code == 0
+    best = json.loads(Path("best.json").read_text())
+    ran = alloc("solve", "small.json", "--method", "greedy", "--start", "best.json", "--output", "-")
+    assert ran.json["makespan"] <= best["makespan"]
+    ran = alloc("solve", "-", "--method", "greedy", "--json", stdin=Path("small.json").read_text())
+    assert ran.json["instance"] == "instance" or ran.json["instance"] == "small"
+
+
+def test_iterations_alone_are_reproducible(alloc, small):
+    """With --iterations the same seed gives the same answer, and no time limit interferes."""
+    runs = [alloc("solve", "small.json", "--method", "ga", "--iterations", "5", "--json").json for _ in range(2)]
+    assert runs[0]["assignment"] == runs[1]["assignment"]
+    assert runs[0]["stop_reason"] != "time_limit"
+
+
+def test_foreign_start_is_a_note(alloc, small):
+    """An allocation made for another instance is used, with a note that says so."""
+    Path("other.json").write_text(
+        json.dumps({"format": "alloc-allocation/1", "instance": "other", "assignment": {"a1": "t1"}})
+    )
+    ran = alloc("solve", "small.json", "--method", "greedy", "--start", "other.json", "--json")
+    assert ran.code == 0
+    assert "'other'" in ran.err
+
+
+def test_saturated_reward_is_a_note(alloc):
+    """A reward beyond the range of floats is told."""
+    document = {
+        "format": "alloc-instance/1",
+        "agents": [{"id": "a", "ability": 1}],
+        "tasks": [{"id": "t", "workload": 1e6}],
+    }
+    ran = alloc("solve", "-", "--method", "greedy", "--json", stdin=json.dumps(document))
+    assert ran.code == 0
+    assert "too large for a float" in ran.err
+    assert ran.json["reward"] < -1e300
+
+
+def test_the_picture_is_that_of_the_answer(alloc, small):
+    """--plot draws the plan that is answered with, to the last pixel."""
+    assert alloc("solve", "small.json", "--method", "greedy", "--plot", "picture.png", "-q").code == 0
+    save_plot(solve(small, "greedy", handle_signals=False), "expected.png")
+    assert compare_images("expected.png", "picture.png", 0) is None
+
+
+def test_a_drawing_in_svg_names_all(alloc, small):
+    """--plot writes .svg too: a bar and a name for each task, and what is answered in the title."""
+    assert alloc("solve", "small.json", "--method", "greedy", "--plot", "picture.svg", "-q").code == 0
+    content = Path("picture.svg").read_text("utf-8")
+    assert ElementTree.fromstring(content).tag == "{http://www.w3.org/2000/svg}svg"
+    result = solve(small, "greedy", handle_signals=False)
+    written = [words.strip() for words in re.findall("<!--(.*?)-->", content, re.DOTALL)]
+    assert [written.count(name) for name in small.task_ids] == [1, 1, 1]  # at their bars
+    assert any(f"T = {number(result.makespan, 4)} h" in words for words in written)
+
+
+def test_the_saved_result_is_that_of_stdout(alloc, small):
+    """--output and --json give the same document, and the instance is left alone."""
+    ran = alloc("solve", "small.json", "--method", "greedy", "--output", "result.json", "--json")
+    assert json.loads(Path("result.json").read_text()) == ran.json
+    assert read_instance("small.json").name == "small"
+
+
+@pytest.mark.parametrize("option", ["--output", "--plot"])
+def test_an_empty_name_is_no_file(alloc, small, option):
+    """A variable of the shell that is empty does not mean the working folder."""
+    ran = alloc("solve", "small.json", option, "")
+    assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
+
+
+def test_closed_standard_output_is_told(alloc, small, monkeypatch):
+    """JSON that has nowhere to go is an error, not silence; a file asked for is written all the same."""
+    monkeypatch.setattr("sys.stdout", None)
+    assert main(["solve", "small.json", "--method", "greedy", "-q", "--json", "--output", "best.json"]) == 2
+    assert json.loads(Path("best.json").read_text())["instance"] == "small"
+
+
+def test_slack_buys_energy(alloc, small):
+    """With slack the answer is slower, within the limit that the result names, and takes less energy."""
+    strict = alloc("solve", "small.json", "--objective", "makespan-energy", "--json").json
+    loose = alloc("solve", "small.json", "--objective", "makespan-energy", "--makespan-slack", "1", "--json")
+    assert "makespan_limit" not in strict
+    assert loose.json["makespan_limit"] == pytest.approx(2 * strict["makespan"])
+    assert strict["makespan"] < loose.json["makespan"] <= loose.json["makespan_limit"]
+    assert loose.json["energy"] < strict["energy"]
+    assert loose.json["status"] == "optimal"
+    shown = alloc("solve", "small.json", "--objective", "makespan-energy", "--makespan-limit", "9").err
+    assert "optimal, no allocation within 9 h takes less energy" in shown
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--makespan-slack", "0.1"], "it is for the objective makespan-energy"),
+        (["--makespan-slack", "inf", "--objective", "makespan-energy"], "must be a finite number"),
+        (["--makespan-limit", "0", "--objective", "makespan-energy"], "hours > 0"),
+        (
+            ["--makespan-limit", "3", "--objective", "makespan-energy", "--method", "ga"],
+            "makes no use of slack for the makespan; use ",
+        ),
+    ],
+)
+def test_wrong_slack_is_refused(alloc, small, arguments, words):
+    """Slack without energy, slack that is no number, and a method that has no use for it: one line, exit code 2."""
+    ran = alloc("solve", "small.json", *arguments)
+    assert (ran.code, ran.out) == (2, "")
+    assert words in ran.err
+    assert ran.err.count("\n") == 1

@@ -1,0 +1,364 @@
+"""``alloc train``: mistakes are told beforehand, interrupts lose nothing, and kill -9 changes no curve."""
+
+import csv
+import inspect
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import torch
+from safetensors import safe_open
+from safetensors.torch import save_file
+
+from alloc.allocators.learned.algorithms.ppo import Ppo
+from alloc.allocators.learned.files.policy_file import save_policy
+from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize
+from alloc.allocators.learned.training import trainer as module_of_training
+from alloc.allocators.learned.training.families import FAMILIES
+from alloc.allocators.parallel.engine import ENGINES, EngineError, SerialEngine
+from alloc.cli.commands import train as module
+from alloc.problems import Instance
+from alloc.problems.formats import write_instance
+from alloc.problems.game import Reward, Turn
+from alloc.problems.generate import paper_like
+
+QUICK = ("--instances", "mine", "--lesson", "150", "--set", "epochs=1")
+
+
+@pytest.fixture
+def mine(tmp_path: Path) -> Path:
+    """A folder with instances on which a generation takes no time."""
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    for seed in range(2):
+        write_instance(paper_like(8, 2, 35, seed), folder / f"{seed}.json")
+    return folder
+
+
+def curve(path: Path) -> list[list[str]]:
+    """All figures but those of time."""
+    with path.open(newline="") as file:
+        return [row[:-2] for row in csv.reader(file)]
+
+
+def files() -> dict[Path, bytes]:
+    return {path: path.read_bytes() for path in Path().rglob("*") if path.is_file()}
+
+
+def weights(path: Path) -> dict[str, torch.Tensor]:
+    with safe_open(path, framework="pt") as file:
+        return {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        ("--resume",),
+        ("--checkpoint", "p.safetensors"),
+        ("--checkpoint", "nowhere/c"),
+        ("--population", "0"),
+        ("--family", "mixt"),
+        ("--set", "clip"),
+        ("--set", "clipp=1"),
+        ("--seed", str(2**63)),
+        ("--minutes", "nan"),
+        ("--set", "learning_rate=-1"),
+        ("--set", "clip=nan"),
+        ("--instances", "nowhere.json"),
+        ("--init", "nowhere.safetensors"),
+        ("--workers", "2"),
+        ("--turn", "both"),
+    ],
+)
+def test_bad_usage_is_told_before_training(alloc, more):
+    """Whatever cannot work is told at once, in one line."""
+    ran = alloc("train", "gappo", "--output", "p.safetensors", *more)
+    assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
+    assert not Path("p.safetensors").exists()
+
+
+def test_methods_that_cannot_be_trained_so(alloc):
+    """Unknown methods are told, and that a single network is no population."""
+    assert "did you mean 'gappo'" in alloc("train", "gapo", "--output", "p.safetensors").err
+    ran = alloc("train", "ppo", "--output", "p.safetensors", "--population", "3")
+    assert (ran.code, ran.err.count("\n")) == (2, 1)
+
+
+def test_tensorboard_that_is_not_installed_is_told_before_training(alloc, monkeypatch):
+    """The extra to install is named."""
+    monkeypatch.setitem(sys.modules, "torch.utils.tensorboard", None)
+    ran = alloc("train", "ppo", "--output", "p.safetensors", "--tensorboard", "events")
+    assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
+    assert "alloc-mrta[train]" in ran.err
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_interrupted_before_the_first_generation_writes_no_policy(alloc, monkeypatch, mine, number):
+    """A signal ends a training in the midst of a lesson; without a whole generation there is no policy."""
+
+    def take(self, lesson):
+        os.kill(os.getpid(), number)
+        time.sleep(10)
+        raise AssertionError("not interrupted")
+
+    monkeypatch.setattr(Ppo, "take", take)
+    before = signal.getsignal(number)
+    ran = alloc("train", "ppo", "--output", "p.safetensors", *QUICK)
+    assert ran.code == 1
+    assert "interrupted" in ran.err
+    assert not Path("p.safetensors").exists()
+    assert signal.getsignal(number) is before
+
+
+def test_an_engine_that_gives_up_is_told_in_one_line(alloc, monkeypatch, mine):
+    """Too little memory is no defect of the program; the line says what is kept, and how to go on."""
+
+    def give_up(*_):
+        raise EngineError("a worker process died 3 times at the same item")
+
+    monkeypatch.setattr(SerialEngine, "map", give_up)
+    ran = alloc("train", "ppo", "--output", "p.safetensors", *QUICK)
+    assert (ran.code, ran.out) == (1, "")
+    judges, told = ran.err.splitlines()
+    assert judges.startswith("note: ")
+    assert "died 3 times at the same item; p.checkpoint holds 0 generations, and --resume" in told
+
+
+def test_a_run_is_not_overwritten_by_mistake(alloc, mine):
+    """Where a checkpoint stands already, a new training has to be told to go on, or to go elsewhere."""
+    assert alloc("train", "ppo", "--output", "p.safetensors", *QUICK, "--iterations", "1").code == 0
+    before = files()
+    ran = alloc("train", "ppo", "--output", "p.safetensors", *QUICK)
+    assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
+    assert "p.checkpoint: holds a training run; go on with --resume" in ran.err
+    assert files() == before
+    Path("p.safetensors").unlink()  # without the policy the checkpoint alone says it
+    assert "p.checkpoint: holds a training run" in alloc("train", "ppo", "--output", "p.safetensors", *QUICK).err
+
+
+def test_a_run_without_a_generation_blocks_none(alloc, mine):
+    """What a run leaves behind that failed or ended at once may be resumed, and need not be removed."""
+    assert alloc("train", "gappo", "--output", "p", *QUICK, "--iterations", "0").code == 1
+    assert Path("p.checkpoint").exists()
+    ran = alloc("train", "gappo", "--output", "p", *QUICK, "--iterations", "1", "--population", "2", "--resume")
+    assert (ran.code, ran.err.count("\n")) == (2, 1)
+    assert "is a run with population 4, not 2" in ran.err
+    ran = alloc("train", "gappo", "--output", "p", *QUICK, "--iterations", "0", "--population", "2")
+    assert ran.code == 1
+    ran = alloc("train", "gappo", "--output", "p", *QUICK, "--iterations", "1", "--population", "2", "--resume")
+    assert ran.code == 0
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        (("gapo",), "did you mean 'gappo'"),
+        (("gappo", "--family", "mixt"), "did you mean 'mixed'"),
+        (("gappo", "--set", "clip=-1"), "clip must be"),
+        (("gappo", "--instances", "nowhere.json"), "nowhere.json: there is no such file"),
+        (("gappo", "--init", "nowhere"), "nowhere: no such policy file"),
+        (("gappo", "--workers", "2"), "belongs to --engine processes"),
+    ],
+)
+def test_what_is_wrong_in_any_case_comes_first(alloc, more, message):
+    """Whoever mistypes an option is told of that, not of a checkpoint that is beside the point."""
+    Path("p.checkpoint").write_bytes(b"weeks of training")
+    ran = alloc("train", *more, "--output", "p.safetensors")
+    assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
+    assert message in ran.err
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        (("--output", "small.json"), "small.json: is there already, and no policy file"),
+        (("--output", "tensors"), "tensors: is there already, and no policy file"),
+        (("--output", "small.json", "--resume", "--checkpoint", "small.json"), "small.json: is --output and"),
+        (("--output", "policy"), "policy: holds a policy, and no checkpoint to go on from is beside it"),
+        (("--output", "policy", "--init", "policy"), "policy: is --init and --output at once"),
+        (("--output", "new", "--checkpoint", "small.json"), "small.json: is there already, and no checkpoint"),
+        (("--output", "new", "--log", "small.json"), "small.json: is there already, and no log of a training"),
+        (("--output", "new", "--log", "new"), "new: is --output and --log at once"),
+        (("--output", "q.pt"), "q.pt: has the suffix '.pt', but policies are safetensors; end it in .safetensors"),
+        (("--output", "q.safetensors.gz"), "q.safetensors.gz: has the suffix '.gz', but policies are safetensors"),
+        (("--output", ""), "'': is no name of a file"),
+        (("--output", "-"), "policy, checkpoint and log must be files"),
+    ],
+)
+def test_what_training_did_not_write_is_not_replaced(alloc, small, more, message):
+    """Instances, tensors from elsewhere, policies and tables are safe from a mistyped name."""
+    save_file({"a": torch.zeros(2)}, "tensors")
+    save_policy("policy", [ActorCritic(NetworkSize(4, 4, 1))], "ppo")
+    before = files()
+    ran = alloc("train", "ppo", *more)
+    assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
+    assert message in ran.err
+    assert files() == before
+
+
+def test_empty_files_hold_nothing(alloc, mine):
+    """A temporary file, made beforehand, is a place to write to."""
+    for name in ("p", "p.checkpoint", "p.csv"):
+        Path(name).touch()
+    assert alloc("train", "ppo", "--output", "p", *QUICK, "--iterations", "1").code == 0
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("gapo",),
+        ("gappo", "--family", "mixt"),
+        ("gappo", "--set", "clipp=1"),
+        ("gappo", "--set", "clip=-1"),
+        ("gappo", "--resume"),
+        ("gappo", "--init", "nowhere"),
+        ("gappo", "--init", "small.json"),
+        ("gappo", "--instances", "nowhere.json"),
+        ("gappo", "--engine", "ray"),
+        ("gappo", "--output", "small.json"),
+    ],
+)
+def test_mistakes_are_told_before_torch_is_loaded(small, tmp_path, arguments):
+    """Nobody waits seconds to be told of a typing error."""
+    code = (
+        "import sys\nsys.modules['ray'] = None\nfrom alloc.cli.main import main\n"
+        "code = main(['train', '--output', 'p', *sys.argv[1:]])\nprint(code, 'torch' in sys.modules)"
+    )
+    ran = subprocess.run([sys.executable, "-c", code, *arguments], capture_output=True, text=True, cwd=tmp_path)
+    assert (ran.stdout, ran.stderr.count("\n")) == ("2 False\n", 1)
+
+
+def test_resumed_by_another_command_it_goes_on_to_the_same_curve(alloc, mine):
+    """Two generations, and then two more, are four; progress and the outcome are told."""
+    whole = alloc("train", "gappo", "--output", "w", *QUICK, "--steps", "1500", "--population", "2")
+    assert whole.code == 0
+    assert "T 1." in whole.err
+    assert "  unserved 0  cost 0." in whole.err
+    assert "0 tasks unserved" in whole.err.splitlines()[-1]
+    assert (
+        alloc(
+            "train", "gappo", "--output", "p", *QUICK, "--steps", "1500", "--population", "2", "--iterations", "2"
+        ).code
+        == 0
+    )
+    ran = alloc("train", "gappo", "--output", "p", *QUICK, "--steps", "1500", "--population", "2", "--resume")
+    assert ran.code == 0
+    assert curve(Path("p.csv")) == curve(Path("w.csv"))
+    other = alloc("train", "gappo", "--output", "p", *QUICK, "--population", "3", "--resume")
+    assert (other.code, other.err.count("\n")) == (2, 1)
+    assert "population 2, not 3" in other.err
+
+
+def test_killed_at_any_moment_it_resumes_to_the_same_curve(alloc, mine):
+    """kill -9 in mid-training, again and again, leaves whole files, and changes neither log nor policy."""
+    options = [*QUICK, "--steps", "6000", "--population", "2"]
+    assert alloc("train", "gappo", "--output", "w", *options).code == 0
+    command = [sys.executable, "-c", "from alloc.cli.main import main; raise SystemExit(main())"]
+    command += ["train", "gappo", "--output", "p", *options]
+    rng = random.Random(0)
+    killed = 0
+    for number in range(20):
+        more = ["--resume"] if Path("p.checkpoint").exists() else []
+        run = subprocess.Popen([*command, *more], stderr=subprocess.DEVNULL)
+        if number < 2:
+            before = Path("p.checkpoint").stat().st_mtime_ns if more else 0
+            while run.poll() is None and not _is_newer("p.checkpoint", before):
+                time.sleep(0.01)
+            time.sleep(rng.uniform(0, 0.4))
+            run.kill()
+        code = run.wait()
+        killed += code == -signal.SIGKILL
+        if code == 0:
+            break
+    assert killed > 0
+    assert curve(Path("p.csv")) == curve(Path("w.csv"))
+    expected, got = weights(Path("w")), weights(Path("p"))
+    assert expected.keys() == got.keys()
+    assert all(torch.equal(weight, got[name]) for name, weight in expected.items())
+
+
+def _is_newer(name: str, moment: int) -> bool:
+    return os.path.exists(name) and os.stat(name).st_mtime_ns > moment
+
+
+def test_a_policy_is_a_beginning(alloc, mine):
+    """--init starts from the networks of a policy, whatever method trained it; the file tells how it came about."""
+    assert alloc("train", "ppo", "--output", "p", *QUICK, "--steps", "300", "--seed", "3").code == 0
+    ran = alloc("train", "gappo", "--output", "g", *QUICK, "--init", "p", "--iterations", "0", "--checkpoint", "c")
+    assert ran.code == 1
+    state = torch.load("c", weights_only=True)
+    first = {name.removeprefix("0."): weight for name, weight in weights(Path("p")).items()}
+    for member in state["members"]:
+        assert all(torch.equal(member["network"][name], weight) for name, weight in first.items())
+    with safe_open("p", framework="pt") as file:
+        said = file.metadata()
+    assert said["method"] == "ppo"
+    training = json.loads(said["training"])
+    assert training["seed"] == 3
+    assert training["decisions"] >= 150
+    assert training["turn"] == "bidding"
+
+
+def test_what_judges_the_networks_is_named(alloc, mine):
+    """Some of one's own instances are held out, and named; those with nothing to do count for nothing."""
+    ran = alloc("train", "ppo", "--output", "p", *QUICK, "--iterations", "1")
+    assert "note: the networks are judged on the instances that they learn from" in ran.err
+    for seed in range(2, 6):
+        write_instance(paper_like(8, 2, 35, seed), mine / f"{seed}.json")
+    for name in ("x", "y"):
+        write_instance(Instance(name=name, ability=[1], workload=[0]), mine / f"{name}.json")
+    ran = alloc("train", "ppo", "--output", "q", *QUICK, "--iterations", "1")
+    assert "note: 2 of 8 instances left out: there is no work to do\n" in ran.err
+    assert "note: 1 of 8 instances held out to judge the networks: paper-like-" in ran.err
+
+
+def test_the_game_of_the_paper_can_be_trained_on(alloc, mine):
+    """All agents choosing at once for coverage is a training, too."""
+    ran = alloc(
+        "train", "ppo", "--output", "p", *QUICK, "--iterations", "1", "--turn", "simultaneous", "--reward", "coverage"
+    )
+    assert ran.code == 0
+
+
+def test_options_are_those_of_the_library():
+    """The command line, which must not wait for torch, names the same turns, rewards, engines and families."""
+    assert set(module.Turn) == set(Turn)
+    assert set(module.Reward) == set(Reward)
+    assert {engine.value for engine in module.Engine} == set(ENGINES)
+    for name in FAMILIES:
+        assert name in inspect.getsource(module.train_command)
+
+
+def test_a_resumed_run_keeps_its_events(alloc, mine):
+    """TensorBoard shows the generations before --resume beside those after it, each once."""
+    pytest.importorskip("tensorboard")
+    from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+    run = ("train", "ppo", "--output", "p.safetensors", *QUICK, "--tensorboard", "events")
+    assert alloc(*run, "--iterations", "2").code == 0
+    assert alloc(*run, "--iterations", "3", "--resume").code == 0
+    steps = [event.step for event in EventAccumulator("events").Reload().Scalars("training/cost")]
+    with Path("p.csv").open(newline="") as file:
+        assert steps == [int(row["decisions"]) for row in csv.DictReader(file)]
+    assert len(steps) == 3
+
+
+def test_a_checkpoint_that_cannot_be_written_costs_no_policy(alloc, mine, monkeypatch):
+    """Where the disk has no room for the whole run, the networks of its last generation are still stored."""
+    save = module_of_training.Trainer.save
+
+    def fail(self, path):
+        if self.generation:
+            raise OSError(28, "No space left on device", str(path))
+        save(self, path)
+
+    monkeypatch.setattr(module_of_training.Trainer, "save", fail)
+    ran = alloc("train", "ppo", "--output", "p.safetensors", *QUICK, "--iterations", "1")
+    assert (ran.code, ran.err.splitlines()[-1]) == (2, "alloc: p.checkpoint: No space left on device")
+    assert weights(Path("p.safetensors"))

@@ -1,0 +1,29 @@
+"""``alloc tune``."""
+
+import pytest
+
+from alloc.allocators.learned.training import tune as module
+
+
+def test_the_best_is_told_as_options_of_train(alloc, monkeypatch):
+    """What a study ends with can be pasted behind `alloc train`."""
+    pytest.importorskip("optuna")
+
+    def tune(study, parameters, trials, limits, *, seed, on_trial):
+        study.optimize(lambda trial: trial.suggest_float("learning_rate", 0.5, 0.5), trials, callbacks=[on_trial])
+
+    monkeypatch.setattr(module, "tune", tune)
+    ran = alloc("tune", "ppo", "--study", "ppo.db", "--trials", "2")
+    assert (ran.code, ran.out) == (0, "")
+    assert ran.err.splitlines()[-1] == "best cost 0.5: alloc train ppo --set learning_rate=0.5"
+
+
+def test_bad_usage(alloc):
+    """Unknown methods, families and folders are told in one line."""
+    for options in (
+        ("gapo", "--study", "s.db"),
+        ("ppo", "--study", "nowhere/s.db"),
+        ("ppo", "--study", "s", "--family", "x"),
+    ):
+        ran = alloc("tune", *options)
+        assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)

@@ -1,0 +1,90 @@
+import io
+import json
+import sys
+
+import pytest
+
+from alloc.cli.main import main
+from alloc.cli.output.console import is_terminal, one_line, percent, say, table, to_json
+from alloc.cli.output.files import check_output
+from alloc.problems import InputError
+
+
+def test_control_characters_cannot_break_the_line():
+    """Whatever an id or a file name holds, the line stays one line."""
+    assert one_line("a\nb\x1b[2J\tc") == "a b [2J c"
+
+
+@pytest.mark.parametrize(
+    ("share", "text"), [(None, "-"), (0.0, "0 %"), (4e-7, "0 %"), (0.0321, "3.2 %"), (1.0, "100 %"), (0.5, "50 %")]
+)
+def test_percent(share, text):
+    """Shares read well, and proven gaps are 0 %."""
+    assert percent(share) == text
+
+
+def test_table_is_aligned():
+    """Text columns go left, figures go right."""
+    assert table(["id", "T"], [["a", "10"], ["bcd", "9"]]) == "id    T\n---  --\na    10\nbcd   9"
+
+
+def test_streams_without_unicode(monkeypatch):
+    """A terminal that cannot show a letter gets its escape instead of an exception."""
+    stream = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
+    monkeypatch.setattr(sys, "stderr", stream)
+    say("Z\u00fcrich")
+    assert stream.buffer.getvalue() == b"Z\\xfcrich\n"  # type: ignore[attr-defined]
+
+
+def test_write_protected_places_are_told(tmp_path, monkeypatch):
+    """A file that may not be written is found before the run, as the writing itself would find it."""
+    (tmp_path / "x.json").touch()
+    monkeypatch.setattr("os.access", lambda path, mode: False)
+    with pytest.raises(InputError, match="cannot be written: it is write-protected"):
+        check_output(str(tmp_path / "x.json"))
+
+
+class Bare:
+    """What a program may put in the place of a stream: it takes text, and has nothing else."""
+
+    def __init__(self) -> None:
+        self.text = ""
+
+    def write(self, text: str) -> None:
+        self.text += text
+
+
+def test_streams_that_can_only_be_written_to(alloc, small, monkeypatch):
+    """Neither `isatty` nor `flush` is needed, whatever the command; a closed stream is no terminal."""
+    for arguments in (
+        ("solve", "small.json", "--method", "greedy"),
+        ("compare", "small.json", "--methods", "greedy"),
+        ("pareto", "small.json", "--points", "1", "--iterations", "1", "--method", "local-search"),
+    ):
+        error, out = Bare(), Bare()
+        with monkeypatch.context() as patch:
+            patch.setattr(sys, "stderr", error)
+            patch.setattr(sys, "stdout", out)
+            assert main([*arguments, "--json"]) == 0
+            assert main(arguments) == 0
+        assert json.loads(out.text)
+        assert "T" in error.text or "makespan" in error.text
+    closed = io.StringIO()
+    closed.close()
+    assert not is_terminal(closed)
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        {},
+        [],
+        3,
+        [1, {"a": 2}],
+        {"a": {}, "b": [], "c": {"x": None, "é\n": '"q"'}, "d": [{"x": [1, 2]}], "e": {"q": 1}},
+        {"t": {"k": {"j": "x"}}},
+    ],
+)
+def test_json_is_that_of_the_standard_library(value: object) -> None:
+    """Large objects are encoded another way, which nobody can tell."""
+    assert to_json(value) == json.dumps(value, indent=2) + "\n"

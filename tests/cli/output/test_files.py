@@ -1,0 +1,171 @@
+"""Files that a command reads are not replaced by what it writes, nor one output by another."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from alloc.allocators.learned.files.policy_file import save_policy
+from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("solve", "small.json", "--output", "small.json"),
+        ("solve", "small.json", "--output", "./nowhere/../small.json"),
+        ("solve", "small.json", "--output", "link.json"),
+        ("solve", "tables", "--output", "tables/tasks.csv"),
+        ("solve", "small.json", "--method", "ppo", "--policy", "p.safetensors", "--output", "p.safetensors"),
+        ("solve", "small.json", "--output", "same.png", "--plot", "same.png"),
+        ("pareto", "small.json", "--output", "small.json"),
+        ("pareto", "small.json", "--output", "same.png", "--plot", "same.png"),
+        ("compare", "other.json", "small.json", "--methods", "greedy", "--csv", "small.json"),
+    ],
+)
+def test_outputs_that_clash_are_refused(alloc, small, arguments):
+    """One line says which two names are one file, and every file stays as it was."""
+    Path("nowhere").mkdir()
+    Path("link.json").symlink_to("small.json")
+    shutil.copy("small.json", "other.json")
+    assert alloc("convert", "small.json", "tables").code == 0
+    save_policy("p.safetensors", [ActorCritic(NetworkSize(4, 4, 1))], "ppo")
+    before = {path: path.read_bytes() for path in Path().rglob("*") if path.is_file()}
+    ran = alloc(*arguments)
+    assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
+    assert " at once; name another file" in ran.err
+    assert {path: path.read_bytes() for path in Path().rglob("*") if path.is_file()} == before
+
+
+def test_a_start_may_be_replaced_by_what_is_better(alloc, small):
+    """An answer may take the place of the one that it began with, and devices take all."""
+    assert alloc("solve", "small.json", "--method", "greedy", "--output", "best.json").code == 0
+    again = ("solve", "small.json", "--method", "greedy", "--start", "best.json", "--output", "best.json")
+    assert alloc(*again).code == 0
+    assert alloc("evaluate", "small.json", "best.json").code == 0
+
+
+def test_standard_output_holds_one_thing(alloc, small):
+    """A table as CSV and as JSON cannot both go to standard output."""
+    ran = alloc("compare", "small.json", "--methods", "greedy", "--csv", "-", "--json")
+    assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
+    assert "'--csv': and --json cannot both be standard output" in ran.err
+
+
+RUNS = [
+    ("solve", "small.json", "--method", "greedy", "-q", "--output"),
+    ("solve", "small.json", "--method", "greedy", "-q", "--plot"),
+    ("pareto", "small.json", "--points", "1", "--iterations", "1", "-q", "--output"),
+    ("pareto", "small.json", "--points", "1", "--iterations", "1", "-q", "--plot"),
+    ("compare", "small.json", "--methods", "greedy", "--csv"),
+]
+
+
+@pytest.fixture
+def full_disk(monkeypatch):
+    """Every file may be made, and none may be filled."""
+
+    def fail(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.replace", fail)
+
+
+@pytest.mark.parametrize("arguments", RUNS)
+def test_what_cannot_be_written_after_a_run_is_printed(alloc, small, full_disk, arguments):
+    """A disk that is full by the end of a run loses nothing: what was found is on standard output, with exit code 2."""
+    ran = alloc(*arguments, "found.png")
+    assert ran.code == 2
+    assert ran.err.splitlines()[-1] == "alloc: found.png: cannot be written: no space left on device"
+    if arguments[0] == "compare":
+        assert ran.out.startswith("instance,method,")
+        assert ran.out.count("\n") == 2
+    else:
+        assert json.loads(ran.out)["format"] in ("alloc-result/1", "alloc-pareto/1")
+
+
+@pytest.mark.parametrize("arguments", RUNS)
+def test_what_is_printed_anyway_is_printed_once(alloc, small, full_disk, arguments):
+    """With --json standard output holds one document, whatever fails beside it."""
+    ran = alloc(*arguments, "found.png", "--json")
+    assert (ran.code, ran.json["format"].split("-")[0]) == (2, "alloc")
+
+
+def test_a_picture_is_drawn_although_the_result_cannot_be_written(alloc, small, monkeypatch):
+    """One thing that fails does not keep the others from being done."""
+    replace = os.replace
+
+    def fail(begin, end):
+        if str(end).endswith(".json"):
+            raise OSError(28, "No space left on device")
+        replace(begin, end)
+
+    monkeypatch.setattr("os.replace", fail)
+    ran = alloc("solve", "small.json", "--method", "greedy", "-q", "--output", "x.json", "--plot", "x.png")
+    assert (ran.code, ran.json["instance"]) == (2, "small")
+    assert Path("x.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device that is always full")
+def test_full_standard_output_leaves_standard_error(small, tmp_path):
+    """Where standard output takes nothing, the result is on standard error, and a full device has the same end."""
+    command = [sys.executable, "-m", "alloc.cli", "solve", "small.json", "--method", "greedy", "-q"]
+    with open("/dev/full", "w") as full:
+        ran = subprocess.run([*command, "--json"], stdout=full, stderr=subprocess.PIPE, text=True, cwd=tmp_path)
+    found, end = json.JSONDecoder().raw_decode(ran.stderr)
+    assert (ran.returncode, found["format"]) == (2, "alloc-result/1")
+    assert ran.stderr[end:].strip() == "alloc: standard output: No space left on device"
+    ran = subprocess.run([*command, "--output", "/dev/full"], capture_output=True, text=True, cwd=tmp_path)
+    assert (ran.returncode, json.loads(ran.stdout)["format"], ran.stderr.count("\n")) == (2, "alloc-result/1", 1)
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="process substitution is of bash")
+@pytest.mark.parametrize(
+    ("line", "kept"),
+    [
+        ("{} --output /dev/stdout >> log", "earlier\n"),
+        ("{} --output /dev/stdout --json >> log", "earlier\n"),
+        ("{} --output /proc/self/fd/1 >> log", "earlier\n"),
+        ("{} --output /dev/fd/7 7>> log", "earlier\n"),
+        ("{} --output >(cat >> log); wait $!", "earlier\n"),
+        ("{} --output /dev/stdout | cat >> log", "earlier\n"),
+        ("mkfifo p; cat p >> log & {} --output p; wait", "earlier\n"),
+    ],
+)
+def test_descriptors_and_pipes_take_results(small, tmp_path, line, kept):
+    """What stood in a file that is appended to stays before the result, which is there once."""
+    (tmp_path / "log").write_text(kept)
+    command = f"'{sys.executable}' -m alloc.cli solve small.json --method greedy -q"
+    ran = subprocess.run(["bash", "-c", line.format(command)], capture_output=True, text=True, cwd=tmp_path)
+    assert ran.stderr == ""
+    text = (tmp_path / "log").read_text()
+    assert text.startswith(kept)
+    assert json.loads(text.removeprefix(kept))["instance"] == "small"
+
+
+def test_file_names_that_are_no_utf_8(small, tmp_path):
+    """Names from an old disk are names: of instances, results, pictures, tables and policies, in every command."""
+    old = os.fsdecode(b"caf\xe9")
+    shutil.copy(tmp_path / "small.json", tmp_path / "plain.json")
+    document = json.loads((tmp_path / "small.json").read_text())
+    del document["name"]
+    (tmp_path / f"{old}.json").write_text(json.dumps(document))
+    save_policy(tmp_path / f"{old}.safetensors", [ActorCritic(NetworkSize(4, 4, 1))], "ppo")
+    solve = ("solve", f"{old}.json", "--seed", "1", "--iterations", "1")
+    for arguments in (
+        (*solve, "--method", "greedy", "--output", f"{old}.out", "--plot", f"{old}.png"),
+        (*solve, "--method", "ppo", "--policy", f"{old}.safetensors"),
+        ("evaluate", f"{old}.json", f"{old}.out"),
+        ("convert", f"{old}.json", old),
+        ("convert", old, f"{old}.npz"),
+        ("validate", f"{old}.json", f"{old}.npz", old),
+        ("compare", f"{old}.json", "--methods", "greedy", "--csv", f"{old}.csv"),
+    ):
+        command = [sys.executable, "-m", "alloc.cli", *arguments]
+        ran = subprocess.run(command, capture_output=True, cwd=tmp_path)
+        assert ran.returncode == 0, ran.stderr
+    assert json.loads((tmp_path / f"{old}.out").read_text())["instance"] == "caf\N{REPLACEMENT CHARACTER}"

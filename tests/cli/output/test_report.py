@@ -1,0 +1,75 @@
+import pytest
+
+from alloc.allocators import solve
+from alloc.cli.output.report import holdup, rounded_up, summary
+from alloc.problems import Instance
+
+
+@pytest.mark.parametrize(
+    ("ability", "whole", "text"),
+    [
+        (2.0, True, "2"),
+        (2.0001, True, "3"),
+        (0.96101, False, "0.962"),
+        (123.4, False, "124"),
+        (999_998.5, True, "999999"),
+        (1_234_000.0, True, "1.24e+06"),
+        (1.2345e300, True, "1.24e+300"),
+    ],
+)
+def test_abilities_are_rounded_up(ability, whole, text):
+    """What is said to be enough is enough, and long numbers look as elsewhere."""
+    assert float(text) >= ability
+    assert rounded_up(ability, whole=whole) == text
+
+
+def test_ties_gain_nothing():
+    """Tasks that are last together are named, and one more agent on one of them gains nothing."""
+    lines = holdup(solve(Instance(ability=[2, 2], workload=[2, 2]), "greedy", handle_signals=False))
+    assert lines[0].startswith("Last: 2 of 2 tasks together, at 1 h: t1, t2")
+    assert "gains nothing" in lines[1]
+    assert "100 % of all ability is at work" in lines[2]
+
+
+def test_single_task_says_what_a_median_agent_gains():
+    """Without a next task there is no ability that is enough; the median agent stands in."""
+    lines = holdup(solve(Instance(ability=[3], workload=[6]), "greedy", handle_signals=False))
+    assert "of ability 3, the median, gains 50 %: 1 h" in lines[1]
+
+
+def test_finite_speeds_say_so():
+    """With travel times the further agent is said to be there at once."""
+    instance = Instance(
+        ability=[3, 1], workload=[6, 1], speed=[1, 1], agent_position=[[0, 0], [0, 1]], task_position=[[1, 0], [0, 1]]
+    )
+    assert "One more agent there that is there at once" in "\n".join(
+        holdup(solve(instance, "greedy", handle_signals=False))
+    )
+
+
+def test_one_agent_and_one_task():
+    """One of a kind is not told as several."""
+    result = solve(Instance(name="one", ability=[3], workload=[6]), "greedy", handle_signals=False)
+    assert summary(result).startswith("one (1 agent, 1 task), greedy: ")
+
+
+def test_no_work_is_no_bottleneck():
+    """Without any work the summary says so."""
+    result = solve(Instance(ability=[3], workload=[0]), "greedy", handle_signals=False)
+    assert "There is no work to do." in summary(result)
+    assert "optimal" in summary(result)
+
+
+def test_what_slack_leaves_open_is_not_called_settled():
+    """With slack the cheapest allocation is proven, but the same agents may well be done sooner."""
+    instance = Instance(
+        ability=[1, 1, 1], workload=[3, 1], task_position=[[0, 0], [9, 0]], agent_position=[[0, 0], [9, 0], [9, 0]]
+    )
+    result = solve(
+        instance, "milp", objective="makespan-energy", makespan_slack=9, handle_signals=False, time_limit_s=30
+    )
+    assert result.energy == 0
+    lines = summary(result)
+    assert "optimal, no allocation within" in lines
+    assert "cannot be done sooner" not in lines
+    assert "the same agents, allocated otherwise, gain" in lines
