@@ -1,8 +1,10 @@
 """Methods that allocate, behind one contract; `solve` runs and scores any of them."""
 
 from alloc.allocators.contract.base import Allocator, Proposal, RefusedError
+from alloc.allocators.contract.budget import Budget, StopReason
 from alloc.allocators.contract.method import Kind, Method
-from alloc.allocators.contract.search import Budget, Deadline, Improvement, Search, StopReason
+from alloc.allocators.contract.search import Improvement, Search
+from alloc.allocators.contract.tolerance import MakespanTolerance
 from alloc.allocators.registry import describe, load, names
 from alloc.allocators.result import Result, Status
 from alloc.allocators.solve import solve
@@ -10,9 +12,9 @@ from alloc.allocators.solve import solve
 __all__ = [
     "Allocator",
     "Budget",
-    "Deadline",
     "Improvement",
     "Kind",
+    "MakespanTolerance",
     "Method",
     "Proposal",
     "RefusedError",

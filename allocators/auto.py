@@ -6,7 +6,7 @@ nearly so, up to about 1,000 pairs for each second, and up to 5,000 they still c
 far better bound. Beyond, the local search finds better allocations in the same time.
 """
 
-from alloc.allocators.contract.search import Budget
+from alloc.allocators.contract.budget import Budget
 from alloc.problems import Instance, Objective, count_classes
 
 MAKESPAN_PAIRS_PER_SECOND = 30_000

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from alloc.allocators.contract.base import Allocator
-from alloc.allocators.contract.search import PROVEN, Budget
+from alloc.allocators.contract.budget import Budget
+from alloc.allocators.contract.tolerance import PROVEN
 from alloc.allocators.registry import load
 from alloc.allocators.result import Result
 from alloc.allocators.runtime.interrupts import signals_set

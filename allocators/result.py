@@ -4,7 +4,9 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
-from alloc.allocators.contract.search import PROVEN, STRICT, Deadline, Improvement, StopReason, relative_gap
+from alloc.allocators.contract.budget import StopReason
+from alloc.allocators.contract.search import Improvement
+from alloc.allocators.contract.tolerance import EXACT, PROVEN, MakespanTolerance, relative_gap
 from alloc.problems import Allocation, Evaluation, Instance, Objective
 from alloc.problems.evaluation import RELATIVE_TOLERANCE
 
@@ -50,7 +52,7 @@ class Result:
     notes : tuple of str
         What the user should know, in plain words: what `auto` picked and why, what the method tells of its run, which
         tasks too few agents can reach.
-    deadline : Deadline
+    tolerance : MakespanTolerance
         The slack and the limit that were given for the makespan.
     """
 
@@ -67,7 +69,7 @@ class Result:
     trace: tuple[Improvement, ...]
     notes: tuple[str, ...] = ()
     makespan_limit: float | None = None
-    deadline: Deadline = STRICT
+    tolerance: MakespanTolerance = EXACT
 
     @property
     def makespan(self) -> float | None:
@@ -109,7 +111,7 @@ class Result:
         """Whether the makespan is proven to be the least, up to the slack or the limit that was given."""
         if self.makespan is None or self.lower_bound is None:
             return False
-        excess = relative_gap(self.makespan, self.deadline.hours(self.lower_bound))
+        excess = relative_gap(self.makespan, self.tolerance.hours(self.lower_bound))
         return excess <= PROVEN + RELATIVE_TOLERANCE
 
     def to_dict(self) -> dict[str, Any]:

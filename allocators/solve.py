@@ -14,16 +14,9 @@ import numpy as np
 
 from alloc.allocators.auto import choose
 from alloc.allocators.contract.base import Allocator, Proposal, RefusedError
-from alloc.allocators.contract.search import (
-    PROVEN,
-    STRICT,
-    Budget,
-    Deadline,
-    Improvement,
-    Search,
-    StopReason,
-    relative_gap,
-)
+from alloc.allocators.contract.budget import Budget, StopReason
+from alloc.allocators.contract.search import Improvement, Search
+from alloc.allocators.contract.tolerance import EXACT, PROVEN, MakespanTolerance, relative_gap
 from alloc.allocators.registry import BUILT_IN, load
 from alloc.allocators.result import Result
 from alloc.allocators.runtime.interrupts import ended_with_process, run_native, signals_set
@@ -86,7 +79,7 @@ def solve(
         Threads that the method may use; as many as there are processors by default.
     makespan_slack, makespan_limit : float
         Relative excess over the fastest allocation found, and hours, up to which makespans are equally good, so that
-        the energy decides; for the objective ``makespan-energy``. See `Deadline`.
+        the energy decides; for the objective ``makespan-energy``. See `MakespanTolerance`.
     on_improvement : callable, optional
         Called with every new best; what it raises ends the run and is passed on.
     stop : threading.Event, optional
@@ -110,14 +103,14 @@ def solve(
     of_type(instance, Instance, "instance")
     of_type(method, (str, Allocator), "method")
     goal, budget = choice(Objective, objective, "objective"), Budget(time_limit_s, iterations, target_gap)
-    deadline = _deadline(makespan_slack, makespan_limit)
+    tolerance = _tolerance(makespan_slack, makespan_limit)
     seed = whole(seed, "seed", 0, LARGEST_SEED)
     threads = None if threads is None else whole(threads, "threads", 1, MOST_THREADS)
     begun = None if start is None else as_allocation(instance, start, "start")
     function(on_improvement, "on_improvement")
     event(stop, "stop")
     handle_signals = flag(handle_signals, "handle_signals")
-    if goal is Objective.MAKESPAN and deadline != STRICT:
+    if goal is Objective.MAKESPAN and tolerance != EXACT:
         option = "makespan_slack" if makespan_slack else "makespan_limit"
         raise InputError(f"leaves room for less energy; it is for the objective {Objective.MAKESPAN_ENERGY}", option)
     notes: list[str] = []
@@ -133,7 +126,7 @@ def solve(
         raise InputError(f"an allocator that is loaded already takes no options, got {', '.join(options)}", "method")
     allocator = load(method, **options) if isinstance(method, str) else method
     begin = time.monotonic()
-    refuse(allocator, instance, goal, budget, deadline)
+    refuse(allocator, instance, goal, budget, tolerance)
     spent_s += time.monotonic() - begin
     if target_gap is not None:
         importlib.import_module("scipy.optimize")  # for the bound below; loading counts for no method
@@ -149,7 +142,7 @@ def solve(
             seed=seed,
             start=begun if shortage is None else None,
             threads=threads or available_threads(),
-            deadline=deadline,
+            tolerance=tolerance,
             on_improvement=on_improvement,
             stop=stop,
             spent_s=spent_s + time.monotonic() - begin,
@@ -179,10 +172,10 @@ def _run(allocator: Allocator, search: Search) -> tuple[Proposal, StopReason | N
     return proposal, stop_reason
 
 
-def _deadline(makespan_slack: float, makespan_limit: float | None) -> Deadline:
+def _tolerance(makespan_slack: float, makespan_limit: float | None) -> MakespanTolerance:
     slack = real(makespan_slack, "makespan_slack")
     limit = None if makespan_limit is None else real(makespan_limit, "makespan_limit", above=True, unit="of hours ")
-    return Deadline(slack, limit)
+    return MakespanTolerance(slack, limit)
 
 
 def as_allocation(instance: Instance, given: Allocation | Result | Mapping[str, str | None], name: str) -> Allocation:
@@ -221,7 +214,7 @@ def available_threads() -> int:
 
 
 def refuse(
-    allocator: Allocator, instance: Instance, objective: Objective, budget: Budget, deadline: Deadline = STRICT
+    allocator: Allocator, instance: Instance, objective: Objective, budget: Budget, tolerance: MakespanTolerance = EXACT
 ) -> None:
     """Raise `RefusedError` if `allocator` cannot handle `instance` within `budget`."""
     method = allocator.method
@@ -231,7 +224,7 @@ def refuse(
         reason = f"finite speeds are beyond it; use {_either(able)}"
     elif objective not in method.objectives:
         reason = f"it does not optimise {objective}"
-    elif deadline != STRICT and not method.makespan_slack:
+    elif tolerance != EXACT and not method.makespan_slack:
         able = [name for name, other in BUILT_IN.items() if other.makespan_slack]
         reason = f"it makes no use of slack for the makespan; use {_either(able)}"
     reason = reason or allocator.refusal(instance, objective, budget)
@@ -285,8 +278,8 @@ def _conclude(
         runtime_s=runtime_s,
         trace=tuple(search.trace),
         notes=(*notes, *search.notes),
-        makespan_limit=None if infeasible or search.deadline == STRICT else search.makespan_limit,
-        deadline=search.deadline,
+        makespan_limit=None if infeasible or search.tolerance == EXACT else search.makespan_limit,
+        tolerance=search.tolerance,
     )
 
 

@@ -3,7 +3,8 @@
 import sys
 import threading
 
-from alloc.allocators.contract.search import PROVEN, Deadline, Search, relative_gap
+from alloc.allocators.contract.search import Search
+from alloc.allocators.contract.tolerance import PROVEN, MakespanTolerance, relative_gap
 from alloc.problems import Allocation, Objective, Shortage, only_allowed
 
 
@@ -34,8 +35,8 @@ class Split:
         self.search: Search | None = None
         if start is not None:
             whole.submit(only_allowed(whole.instance, start))
-        rest, deadline = shortage.rest, whole.deadline
-        self._hours = max(deadline.hours(shortage.hours), sys.float_info.min)
+        rest, tolerance = shortage.rest, whole.tolerance
+        self._hours = max(tolerance.hours(shortage.hours), sys.float_info.min)
         if rest is None:
             whole.submit(self._merged(None, self._hours))
             return
@@ -46,7 +47,9 @@ class Split:
             seed=whole.seed,
             start=None if start is None else shortage.part_of(start),
             threads=whole.threads,
-            deadline=Deadline(deadline.slack, self._hours),  # the rest need not be faster than the contested tasks
+            tolerance=MakespanTolerance(
+                tolerance.slack, self._hours
+            ),  # the rest need not be faster than the contested tasks
             on_improvement=lambda found: self._tell(found.allocation),
             stop=stop,
             spent_s=whole.elapsed_s,

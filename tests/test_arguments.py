@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from alloc.allocators import Budget, Deadline, load, solve
+from alloc.allocators import Budget, MakespanTolerance, load, solve
 from alloc.allocators.experiments.compare import compare
 from alloc.allocators.pareto import pareto
 from alloc.problems import (
@@ -67,7 +67,7 @@ DOORS = [
     *((partial(machine_covering, 3, 2, 1, 5), name, SEEDS) for name in ("seed",)),
     *((Budget, name, ("1", -1, NAN, INF, True, [1])) for name in ("time_limit_s", "iterations", "target_gap")),
     (Budget, "iterations", (1.5,)),
-    *((Deadline, name, ("1", -1, NAN, INF, True)) for name in ("slack", "limit")),
+    *((MakespanTolerance, name, ("1", -1, NAN, INF, True)) for name in ("slack", "limit")),
     (partial(solve, SMALL), "method", (None, 5, "gredy", Allocation)),
     (solve, "instance", (None, "x.json")),
     (run, "objective", ("energy", None, 5, [])),

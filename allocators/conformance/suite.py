@@ -15,7 +15,9 @@ import pytest
 from alloc.allocators.conformance.cases import CASES, large_case, least_energy, medium_case, optimum
 from alloc.allocators.conformance.surroundings import instance_state, process_state
 from alloc.allocators.contract.base import Allocator, Proposal, RefusedError
-from alloc.allocators.contract.search import PROVEN, STANDS, Budget, Deadline, Improvement, Search
+from alloc.allocators.contract.budget import Budget
+from alloc.allocators.contract.search import STANDS, Improvement, Search
+from alloc.allocators.contract.tolerance import PROVEN, MakespanTolerance
 from alloc.allocators.registry import load
 from alloc.allocators.result import Result, Status
 from alloc.allocators.solve import refuse, solve
@@ -67,7 +69,7 @@ class AllocatorConformance:
         settings = {"iterations": self.iterations, "time_limit_s": None, "threads": 1, **settings}
         budget = Budget(settings["time_limit_s"], settings["iterations"])
         try:
-            refuse(subject, instance, objective, budget, Deadline(settings.get("makespan_slack", 0.0)))
+            refuse(subject, instance, objective, budget, MakespanTolerance(settings.get("makespan_slack", 0.0)))
         except RefusedError as refused:
             with pytest.raises(RefusedError, match=re.escape(str(refused))):
                 solve(instance, subject, objective=objective, **settings)

@@ -4,8 +4,9 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
+from alloc.allocators.contract.budget import Budget
 from alloc.allocators.contract.method import Method
-from alloc.allocators.contract.search import Budget, Search
+from alloc.allocators.contract.search import Search
 from alloc.problems import Allocation, Instance, Objective, RefusedError
 
 __all__ = ["Allocator", "Proposal", "RefusedError"]

@@ -33,8 +33,8 @@ class Method:
     finite_speeds : bool
         Whether it handles agents that need time to travel; `solve` refuses it where it cannot.
     makespan_slack : bool
-        Whether it spends the slack that `Deadline` leaves to the makespan on less energy; `solve` refuses it where it
-        does not.
+        Whether it spends the slack that `MakespanTolerance` leaves to the makespan on less energy; `solve` refuses it
+        where it does not.
     proves : bool
         Whether it proves bounds of its own.
     warm_start : bool

@@ -1,15 +1,15 @@
-"""One run of one method on one instance: budget, clock, best so far, and the will to stop."""
+"""One run of one method on one instance: its clock, the best so far, and requests to stop."""
 
 import logging
 import math
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from enum import StrEnum
 
+from alloc.allocators.contract.budget import Budget, StopReason
+from alloc.allocators.contract.tolerance import EXACT, PROVEN, MakespanTolerance, relative_gap
 from alloc.problems import (
     Allocation,
     Evaluation,
@@ -19,82 +19,13 @@ from alloc.problems import (
     makespan_lower_bound,
     serve_all,
 )
-from alloc.problems.arguments import real, whole
 from alloc.problems.evaluation import RELATIVE_TOLERANCE, last_equal
-
-PROVEN = 1e-6
-"""Relative gap at which a stage of the objective counts as proven."""
 
 STANDS = "the best plan up to then stands"
 """What a note says of a failure that cost no plan."""
 
 _log = logging.getLogger("alloc")
 _log.addHandler(logging.NullHandler())  # a program that wants to see it sets up its own
-
-
-@dataclass(frozen=True)
-class Budget:
-    """How long a run may take; every limit that is not None holds.
-
-    Attributes
-    ----------
-    time_limit_s : float or None
-        Seconds on the wall clock, >= 0.
-    iterations : int or None
-        Iterations in the method's own unit, >= 0; with this limit alone, runs are reproducible.
-    target_gap : float or None
-        Relative gap of the makespan, >= 0, at which the run may stop.
-    """
-
-    time_limit_s: float | None = 10.0
-    iterations: int | None = None
-    target_gap: float | None = None
-
-    def __post_init__(self) -> None:
-        for name, check in (("time_limit_s", real), ("iterations", whole), ("target_gap", real)):
-            value = getattr(self, name)
-            if value is not None:
-                object.__setattr__(self, name, check(value, name))
-
-
-@dataclass(frozen=True)
-class Deadline:
-    """How slow an allocation may be before its makespan counts against it; for the objective with energy.
-
-    Attributes
-    ----------
-    slack : float
-        Relative excess over the fastest allocation found, >= 0; 0.02 takes any that is at most 2 % slower.
-    limit : float or None
-        Hours, > 0; allocations that are no slower are equally fast.
-    """
-
-    slack: float = 0.0
-    limit: float | None = None
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "slack", real(self.slack, "slack"))
-        if self.limit is not None:
-            object.__setattr__(self, "limit", real(self.limit, "limit", above=True, unit="of hours "))
-
-    def hours(self, fastest: float) -> float:
-        """Return the makespan up to which allocations are equally fast, where the fastest takes `fastest` hours."""
-        return min(max((1 + self.slack) * fastest, self.limit or 0.0), sys.float_info.max)
-
-
-STRICT = Deadline()
-"""No slack: the least makespan, whatever energy it takes."""
-
-
-class StopReason(StrEnum):
-    """Why a run ended."""
-
-    PROVEN = "proven"
-    FINISHED = "finished"
-    TIME_LIMIT = "time_limit"
-    ITERATIONS = "iterations"
-    TARGET_GAP = "target_gap"
-    INTERRUPTED = "interrupted"
 
 
 @dataclass(frozen=True)
@@ -136,7 +67,7 @@ class Search:
         The best submitted so far.
     fastest : Improvement or None
         That with the least makespan, of those with the fewest unserved tasks; the same as `best` but for energy.
-    deadline : Deadline
+    tolerance : MakespanTolerance
         How much slower than the fastest the best may be.
     notes : list of str
         What the user should know of the run, in plain words.
@@ -151,14 +82,14 @@ class Search:
         seed: int = 0,
         start: Allocation | None = None,
         threads: int = 1,
-        deadline: Deadline = STRICT,
+        tolerance: MakespanTolerance = EXACT,
         on_improvement: Callable[[Improvement], None] | None = None,
         stop: threading.Event | None = None,
         spent_s: float = 0.0,
     ) -> None:
         self._begin = time.monotonic() - spent_s  # what was spent on choosing the method is part of the run
         self.instance, self.objective, self.budget = instance, objective, budget
-        self.deadline = deadline
+        self.tolerance = tolerance
         self.seed, self.start, self.threads = seed, start, threads
         self._on_improvement, self._stop = on_improvement, stop or threading.Event()
         self.iteration = 0
@@ -193,7 +124,7 @@ class Search:
     @property
     def makespan_limit(self) -> float:
         """Hours up to which allocations are equally fast, so that energy alone tells them apart; ``inf`` at first."""
-        return math.inf if self.fastest is None else self.deadline.hours(self.fastest.evaluation.served_makespan)
+        return math.inf if self.fastest is None else self.tolerance.hours(self.fastest.evaluation.served_makespan)
 
     def submit(self, allocation: Allocation) -> Evaluation:
         """Score `allocation`, keep it if it is the best so far, and report that."""
@@ -202,7 +133,7 @@ class Search:
         if self.fastest is None or evaluation.is_better_than(self.fastest.evaluation, Objective.MAKESPAN):
             self.fastest = found
         candidates = [found]
-        if self.deadline.slack > 0:
+        if self.tolerance.slack > 0:
             candidates = self._front = _undominated([*self._front, found], self.makespan_limit)
         for candidate in candidates:
             if self.best is None or self._is_better(candidate.evaluation, self.best.evaluation):
@@ -255,7 +186,7 @@ class Search:
         """Whether the fastest so far is proven to be that, or keeps to the limit that was given."""
         if self.fastest is None or self.fastest.evaluation.makespan is None:
             return False
-        given = self.deadline.limit
+        given = self.tolerance.limit
         return self.gap <= PROVEN or (given is not None and self.fastest.evaluation.makespan <= given)
 
     def stop_reason(self) -> StopReason | None:
@@ -277,11 +208,6 @@ class Search:
     def should_stop(self) -> bool:
         """Whether the run should end now."""
         return self.stop_reason() is not None
-
-
-def relative_gap(value: float, bound: float) -> float:
-    """Return (value - bound) / value, 0 where the two agree or value is 0."""
-    return 0.0 if value <= 0 else max(0.0, (value - bound) / value)
 
 
 def _undominated(found: list[Improvement], limit: float) -> list[Improvement]:

@@ -5,7 +5,8 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from alloc.allocators.contract.search import Search, StopReason
+from alloc.allocators.contract.budget import StopReason
+from alloc.allocators.contract.search import Search
 from alloc.allocators.exact.model import Demand, Model
 from alloc.allocators.runtime.interrupts import run_native
 from alloc.problems.instance import FloatArray, IntArray

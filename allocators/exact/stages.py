@@ -8,7 +8,8 @@ import scipy.optimize
 import scipy.sparse.csgraph  # noqa: F401 - both are loaded with the method, so that no run waits for them
 
 from alloc.allocators.contract.base import Allocator, Proposal
-from alloc.allocators.contract.search import Budget, Search
+from alloc.allocators.contract.budget import Budget
+from alloc.allocators.contract.search import Search
 from alloc.allocators.exact.energy import narrowing
 from alloc.allocators.exact.energy.least_energy import least_energy
 from alloc.allocators.exact.makespan import enumeration

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from alloc.allocators.contract.base import Allocator, RefusedError
-from alloc.allocators.contract.search import Budget, StopReason, relative_gap
+from alloc.allocators.contract.budget import Budget, StopReason
+from alloc.allocators.contract.tolerance import relative_gap
 from alloc.allocators.registry import load
 from alloc.allocators.result import Result
 from alloc.allocators.solve import LARGEST_SEED, MOST_THREADS, solve

@@ -7,7 +7,8 @@ from pathlib import Path
 import torch
 
 from alloc.allocators.contract.base import Allocator, Proposal
-from alloc.allocators.contract.search import Budget, Search
+from alloc.allocators.contract.budget import Budget
+from alloc.allocators.contract.search import Search
 from alloc.allocators.learned.algorithms.hyperparameters import DqnParameters
 from alloc.allocators.learned.files.policy_file import load_policy
 from alloc.allocators.learned.network.actor_critic import ActorCritic
@@ -57,7 +58,9 @@ class PolicyAllocator(Allocator):
     def _read(self, policy: Path | str | None) -> list[ActorCritic]:
         if policy is not None:
             return load_policy(policy, self.trained_by, self.device)
-        with as_file(files("alloc.allocators.learned.files") / "policies" / f"{self.trained_by}.safetensors") as shipped:
+        with as_file(
+            files("alloc.allocators.learned.files") / "policies" / f"{self.trained_by}.safetensors"
+        ) as shipped:
             return load_policy(shipped, self.trained_by, self.device)
 
     def refusal(self, instance: Instance, objective: Objective, budget: Budget) -> str | None:

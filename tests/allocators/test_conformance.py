@@ -9,7 +9,7 @@ import pytest
 from alloc.allocators import Budget, RefusedError, load
 from alloc.allocators.conformance import AllocatorConformance
 from alloc.allocators.conformance.cases import CASES
-from alloc.allocators.contract.search import Deadline
+from alloc.allocators.contract.tolerance import MakespanTolerance
 from alloc.allocators.registry import BUILT_IN
 from alloc.allocators.solve import refuse
 from alloc.problems import InputError, Objective
@@ -99,7 +99,7 @@ def test_who_refuses_what():
         for instance in CASES.values():
             for what, slack in (("speeds" if instance.has_travel_time else "plain", 0.0), ("slack", 0.5)):
                 try:
-                    refuse(allocator, instance, Objective.MAKESPAN_ENERGY, Budget(), Deadline(slack))
+                    refuse(allocator, instance, Objective.MAKESPAN_ENERGY, Budget(), MakespanTolerance(slack))
                 except RefusedError:
                     refused.add((name, what))
                     break

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from alloc.allocators import Result, Status, StopReason
-from alloc.allocators.contract.search import relative_gap
+from alloc.allocators.contract.tolerance import relative_gap
 from alloc.problems import Allocation, Instance, Objective, evaluate
 
 

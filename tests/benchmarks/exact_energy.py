@@ -12,7 +12,7 @@ import numpy as np
 
 from alloc.allocators import Allocator, load, solve
 from alloc.allocators.auto import choose
-from alloc.allocators.contract.search import Budget
+from alloc.allocators.contract.budget import Budget
 from alloc.problems import Objective
 from alloc.problems.generate import paper
 

@@ -4,7 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from alloc.allocators.contract.search import PROVEN, Search
+from alloc.allocators.contract.search import Search
+from alloc.allocators.contract.tolerance import PROVEN
 from alloc.allocators.exact.makespan.configuration import Configurations
 from alloc.allocators.exact.makespan.descent import descend
 from alloc.allocators.exact.makespan.enumeration import choose_groups, enumerate_groups
@@ -85,7 +86,7 @@ class LeastMakespan:
 
     @property
     def _closed(self) -> bool:
-        given = self._search.deadline.limit
+        given = self._search.tolerance.limit
         return self._high <= max(self._low * (1 + TIGHT), given or 0.0)
 
     @property

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from alloc.allocators.contract.base import Allocator, Proposal
-from alloc.allocators.contract.search import Budget, Search
+from alloc.allocators.contract.budget import Budget
+from alloc.allocators.contract.search import Search
 from alloc.allocators.heuristic.decentralised.auction_rounds import Market, bid
 from alloc.allocators.heuristic.decentralised.communication import hearing
 from alloc.allocators.heuristic.decentralised.hedonic import CHANCE, Game, compile_game, too_many_minds

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from alloc.allocators.contract.base import Allocator, Proposal
-from alloc.allocators.contract.search import Budget, Search
+from alloc.allocators.contract.budget import Budget
+from alloc.allocators.contract.search import Search
 from alloc.allocators.heuristic.decentralised.communication import Hearing, hearing
 from alloc.allocators.heuristic.decentralised.hedonic_game import Minds, World, play
 from alloc.allocators.registry import BUILT_IN

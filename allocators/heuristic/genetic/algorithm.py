@@ -6,7 +6,8 @@ import numpy as np
 from deap import base, tools
 
 from alloc.allocators.contract.base import Allocator, Proposal
-from alloc.allocators.contract.search import Budget, Search
+from alloc.allocators.contract.budget import Budget
+from alloc.allocators.contract.search import Search
 from alloc.allocators.heuristic.genetic.operators import cross_groups, mutate, tournament
 from alloc.allocators.heuristic.genetic.population import Genes, Landscape, list_schedules
 from alloc.allocators.heuristic.greedy.list_schedule import greedy

@@ -8,7 +8,8 @@ from scipy.optimize import OptimizeResult, linprog
 from scipy.sparse import csr_array, hstack, vstack
 
 from alloc.allocators.contract.base import Allocator, Proposal
-from alloc.allocators.contract.search import Budget, Search
+from alloc.allocators.contract.budget import Budget
+from alloc.allocators.contract.search import Search
 from alloc.allocators.heuristic.greedy.list_schedule import greedy
 from alloc.allocators.heuristic.local_search import improve as local
 from alloc.allocators.heuristic.local_search.annealing_state import Chain

@@ -38,7 +38,9 @@ def new_learner(method: str, size: "NetworkSize", parameters: Any, seed: int) ->
         If there is no such method.
     """
     module, name, _ = _names(method)
-    learner: Learner = getattr(import_module(f"alloc.allocators.learned.algorithms.{module}"), name)(size, parameters, seed)
+    learner: Learner = getattr(import_module(f"alloc.allocators.learned.algorithms.{module}"), name)(
+        size, parameters, seed
+    )
     return learner
 
 

@@ -1,6 +1,6 @@
 """How large an instance a learned policy can play within a budget; knows nothing of torch."""
 
-from alloc.allocators.contract.search import Budget
+from alloc.allocators.contract.budget import Budget
 from alloc.problems import Instance
 
 NEAR = 20

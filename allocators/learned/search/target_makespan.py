@@ -77,7 +77,7 @@ class Aims:
     def _given_limit(self) -> float:
         """Hours that the user gave, up to which a plan need be no faster."""
         energy_counts = self.search.objective is Objective.MAKESPAN_ENERGY
-        return self.search.deadline.limit or 0.0 if energy_counts else 0.0
+        return self.search.tolerance.limit or 0.0 if energy_counts else 0.0
 
     def _aim_at(self, hours: float) -> None:
         self.hours, self.stale = hours, 0

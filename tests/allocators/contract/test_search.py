@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from alloc.allocators import Budget, Deadline, Improvement, Search, StopReason
+from alloc.allocators import Budget, Improvement, MakespanTolerance, Search, StopReason
 from alloc.allocators.contract.search import STANDS
 from alloc.problems import Allocation, InputError, Instance, Objective
 
@@ -104,7 +104,7 @@ def test_starts_are_submitted(instance: Instance) -> None:
 
 def test_slack_lets_energy_decide(instance: Instance) -> None:
     """Within the slack the cheapest is the best, whatever comes later and is faster."""
-    run = Search(instance, Objective.MAKESPAN_ENERGY, Budget(None), deadline=Deadline(slack=0.4))
+    run = Search(instance, Objective.MAKESPAN_ENERGY, Budget(None), tolerance=MakespanTolerance(slack=0.4))
     slow, middle, fast = Allocation([0, 1, -1]), Allocation([0, 0, 1]), Allocation([0, 1, 0])
     for allocation, best in ((slow, slow), (middle, slow), (fast, slow)):
         run.submit(allocation)  # T = 4/3, 2 and 1 for energy 1
@@ -118,7 +118,7 @@ def test_slack_lets_energy_decide(instance: Instance) -> None:
 def test_a_find_comes_back_when_the_fastest_gets_faster() -> None:
     """The cheapest leaves the slack; the one that was second then is the best, not merely the fastest."""
     instance = Instance(ability=[4, 2, 1], workload=[4], task_position=[[3, 0]], agent_position=[[0, 0]] * 2 + [[2, 0]])
-    run = Search(instance, Objective.MAKESPAN_ENERGY, Budget(None), deadline=Deadline(slack=0.5))
+    run = Search(instance, Objective.MAKESPAN_ENERGY, Budget(None), tolerance=MakespanTolerance(slack=0.5))
     for plan in ([-1, -1, 0], [-1, 0, -1], [0, -1, -1], [0, 0, 0], [0, -1, 0]):
         run.submit(Allocation(plan))  # T = 4, 2, 1, 4/7, 0.8
     assert [step.evaluation.makespan for step in run.trace] == pytest.approx([4, 2, 1, 4 / 7, 0.8])
@@ -129,7 +129,7 @@ def test_a_find_comes_back_when_the_fastest_gets_faster() -> None:
 
 def test_a_limit_makes_all_in_time_equal(instance: Instance) -> None:
     """Up to the limit energy alone counts; beyond it, the makespan still does."""
-    run = Search(instance, Objective.MAKESPAN_ENERGY, Budget(None), deadline=Deadline(limit=1.5))
+    run = Search(instance, Objective.MAKESPAN_ENERGY, Budget(None), tolerance=MakespanTolerance(limit=1.5))
     far, cheap = Allocation([1, 0, 0]), Allocation([0, 1, -1])
     run.submit(far)  # T = 4/3 for energy 1
     assert run.fast_enough
@@ -143,7 +143,7 @@ def test_a_limit_makes_all_in_time_equal(instance: Instance) -> None:
 def test_deadlines_are_checked(wrong: dict[str, float]) -> None:
     """Slack is finite and not negative, a limit finite and positive."""
     with pytest.raises(InputError):
-        Deadline(**wrong)
+        MakespanTolerance(**wrong)
 
 
 def test_a_stage_that_fails_costs_no_plan(instance: Instance, caplog: pytest.LogCaptureFixture) -> None:

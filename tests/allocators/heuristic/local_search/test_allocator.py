@@ -8,7 +8,8 @@ from strategies import allocated
 from tiny_instances import long_travel, tiny_instance
 
 from alloc.allocators import load, solve
-from alloc.allocators.contract.search import Budget, Search
+from alloc.allocators.contract.budget import Budget
+from alloc.allocators.contract.search import Search
 from alloc.allocators.heuristic.greedy.list_schedule import greedy
 from alloc.allocators.heuristic.local_search.improve import Parameters, improve
 from alloc.problems import Allocation, Instance, Objective, evaluate, serve_all

@@ -90,6 +90,9 @@ def test_no_entropy_bonus() -> None:
 
 def test_torch_is_not_loaded() -> None:
     """Whoever sets hyperparameters wrong is told so before the seconds that torch takes."""
-    code = "import sys, alloc.allocators.learned.algorithms.registry as m; m.method_parameters('gappo'); print('torch' in sys.modules)"
+    code = (
+        "import sys, alloc.allocators.learned.algorithms.registry as registry\n"
+        "registry.method_parameters('gappo'); print('torch' in sys.modules)"
+    )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"

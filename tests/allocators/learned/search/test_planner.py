@@ -10,7 +10,7 @@ from boards import EXTREMES
 from oracle import brute_force
 from tiny_instances import tiny_instance
 
-from alloc.allocators import Budget, Deadline, Search
+from alloc.allocators import Budget, MakespanTolerance, Search
 from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize
 from alloc.allocators.learned.play.batched_games import Games, play_games
 from alloc.allocators.learned.play.rollout import Best
@@ -326,15 +326,15 @@ def test_slack_and_limit_buy_energy(network: ActorCritic) -> None:
     """The more time a plan may take, the less it flies; a limit that is given is what is aimed at."""
     instance = paper_like(24, 5, 100, 3)
     spent = []
-    for deadline in (Deadline(), Deadline(slack=0.3), Deadline(limit=3.0)):
-        search = planned(network, instance, objective=ENERGY, iterations=8, deadline=deadline)
+    for tolerance in (MakespanTolerance(), MakespanTolerance(slack=0.3), MakespanTolerance(limit=3.0)):
+        search = planned(network, instance, objective=ENERGY, iterations=8, tolerance=tolerance)
         assert search.best is not None
         assert search.best.evaluation.makespan is not None
         assert search.best.evaluation.makespan <= search.makespan_limit * (1 + 1e-9)
         spent.append(search.best.evaluation.energy)
     assert spent[2] < spent[1] < spent[0]
-    assert planner(network, instance, ENERGY, deadline=Deadline(limit=3.0)).aims.hours == 3.0
-    assert planner(network, instance, ENERGY, deadline=Deadline(limit=0.5)).aims.hours == pytest.approx(1.0)
+    assert planner(network, instance, ENERGY, tolerance=MakespanTolerance(limit=3.0)).aims.hours == 3.0
+    assert planner(network, instance, ENERGY, tolerance=MakespanTolerance(limit=0.5)).aims.hours == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("objective", list(Objective))
