@@ -14,6 +14,12 @@ settings.register_profile(
 settings.load_profile("alloc")
 
 
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Skip a test that is marked as in need of a package that is not there."""
+    for mark in item.iter_markers("needs"):
+        pytest.importorskip(*mark.args)
+
+
 @pytest.fixture(autouse=True, scope="session")
 def interruptible() -> None:
     """Let Ctrl-C through: a shell that runs the tests in the background has them ignore it, and what they start."""

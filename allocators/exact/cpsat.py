@@ -162,7 +162,7 @@ def _set_parameters(solver: cp_model.CpSolver, question: Question) -> None:
         parameters.max_deterministic_time = REPEATABLE_EFFORT
 
 
-def _read(solver: cp_model.CpSolver, status: cp_model.CpSolverStatus, question: Question, scale: float) -> Answer:
+def _read(solver: cp_model.CpSolver, status: "cp_model.CpSolverStatus", question: Question, scale: float) -> Answer:
     if status == cp_model.INFEASIBLE:
         return Answer(impossible=True)
     bound = 0.0 if question.cost is None else solver.best_objective_bound / scale

@@ -5,9 +5,9 @@ import pytest
 from alloc.allocators.learned.training import tune as module
 
 
+@pytest.mark.needs("optuna")
 def test_the_best_is_told_as_options_of_train(alloc, monkeypatch):
     """What a study ends with can be pasted behind `alloc train`."""
-    pytest.importorskip("optuna")
 
     def tune(study, parameters, trials, limits, *, seed, on_trial):
         study.optimize(lambda trial: trial.suggest_float("learning_rate", 0.5, 0.5), trials, callbacks=[on_trial])

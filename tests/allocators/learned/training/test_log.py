@@ -25,9 +25,9 @@ def test_lines_are_appended_to_the_history(tmp_path: Path) -> None:
     assert path.read_text().split() == ["decisions,cost", "10,0.5", "20,0.25"]
 
 
+@pytest.mark.needs("tensorboard")
 def test_events_hold_every_figure(tmp_path: Path) -> None:
     """TensorBoard shows each column over the decisions; steps that a resumed run repeats appear once."""
-    pytest.importorskip("tensorboard")
     from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
     with TrainingLog(Line, tmp_path / "log.csv", tmp_path / "events", []) as log:

@@ -20,9 +20,9 @@ CURRICULUM, BOARDS = own_games([paper_like(8, 2, 35, 0)], Curriculum(games=(2, 2
 TINY = TrainingParameters("ppo", 1, 20, NetworkSize(4, 4, 1), method_parameters("ppo"), curriculum=CURRICULUM)
 
 
+@pytest.mark.needs("optuna")
 def test_a_study_begins_with_the_defaults_and_is_gone_on_with(tmp_path: Path) -> None:
     """Two trials, then one more in another process's place, are three; the first is what a user gets untuned."""
-    pytest.importorskip("optuna")
     path = tmp_path / "study.db"
     tune(open_study(path, "ppo", 0), TINY, 2, Limits(iterations=1), boards=BOARDS)
     again = open_study(path, "ppo", 0)
@@ -33,9 +33,9 @@ def test_a_study_begins_with_the_defaults_and_is_gone_on_with(tmp_path: Path) ->
     assert len({trial.params["learning_rate"] for trial in again.trials}) == 3
 
 
+@pytest.mark.needs("optuna")
 def test_hopeless_trials_end_early(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A trial that does worse than most before it is pruned."""
-    pytest.importorskip("optuna")
     costs = iter([0.1] * 15 + [0.9] * 3)
     monkeypatch.setattr(module, "validate", lambda *_: Validation(next(costs), 0.0, 1.0, 0.1, 1.0, 0.0))
     study = open_study(tmp_path / "study.db", "ppo", 0)
@@ -66,9 +66,9 @@ def test_without_optuna_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.M
         open_study(tmp_path / "study.db", "ppo", 0)
 
 
+@pytest.mark.needs("optuna")
 def test_other_files_are_no_studies(tmp_path: Path) -> None:
     """A file that is no SQLite database is told in one line."""
-    pytest.importorskip("optuna")
     (tmp_path / "study.db").write_text("no database, and long enough to be seen as such" * 10)
     with pytest.raises(InputError, match="is not a file of studies"):
         open_study(tmp_path / "study.db", "ppo", 0)
