@@ -2,7 +2,6 @@
 
 import importlib
 import math
-import os
 import sys
 import threading
 import time
@@ -17,6 +16,7 @@ from alloc.allocators.contract.base import Allocator, Proposal, RefusedError
 from alloc.allocators.contract.budget import Budget, StopReason
 from alloc.allocators.contract.search import Improvement, Search
 from alloc.allocators.contract.tolerance import EXACT, PROVEN, MakespanTolerance, relative_gap
+from alloc.allocators.parallel.processors import available_threads
 from alloc.allocators.registry import BUILT_IN, load
 from alloc.allocators.result import Result
 from alloc.allocators.runtime.interrupts import ended_with_process, run_native, signals_set
@@ -206,11 +206,6 @@ def _allocation_of(result: Result, instance: Instance) -> Allocation:
     if (theirs.agent_ids, theirs.task_ids) == (instance.agent_ids, instance.task_ids):
         return result.allocation
     return Allocation.from_ids(instance, result.allocation.to_ids(theirs))
-
-
-def available_threads() -> int:
-    """Return the number of processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def refuse(

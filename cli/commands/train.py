@@ -23,7 +23,9 @@ from alloc.cli.output.console import STANDARD, complain, counted, note, number, 
 from alloc.cli.output.files import check_output, check_outputs
 
 if TYPE_CHECKING:
-    from alloc.allocators.learned.training.trainer import Limits, Report, Trainer
+    from alloc.allocators.learned.training.limits import Limits
+    from alloc.allocators.learned.training.report import Report
+    from alloc.allocators.learned.training.trainer import Trainer
 
 EXAMPLES = examples(
     "alloc train gappo --output policy.safetensors --steps 2000000",
@@ -53,7 +55,7 @@ class Reward(StrEnum):
 
 
 class Engine(StrEnum):
-    """As `alloc.allocators.parallel.engine.ENGINES`."""
+    """As `alloc.allocators.parallel.engines.ENGINES`."""
 
     SERIAL = "serial"
     PROCESSES = "processes"
@@ -114,8 +116,8 @@ def train_command(
         typer.Option(
             "--set",
             metavar="NAME=VALUE",
-            help="A hyperparameter of the method, such as clip=0.1; may be repeated. A name that the method does not "
-            "have, such as in help=, is answered by all that it has, and their defaults.",
+            help="A hyperparameter of the method, such as clip_coef=0.1; may be repeated. A name that the method does "
+            "not have, such as in help=, is answered by all that it has, and their defaults.",
         ),
     ] = None,
     turn: Annotated[Turn, typer.Option(help="Who moves: the best bids, or all agents at once.")] = Turn.BIDDING,
@@ -161,7 +163,8 @@ def train_command(
     learner = learner_parameters(method, families, settings or [])
     if population is not None and method != "gappo":
         raise typer.BadParameter(f"{method} trains one network; gappo breeds several", param_hint="'--population'")
-    from alloc.allocators.parallel.engine import EngineError, check_engine, make_engine
+    from alloc.allocators.parallel.engine import EngineError
+    from alloc.allocators.parallel.engines import check_engine, make_engine
 
     check_engine(engine.value, workers, address)
     problems = None if instances is None else read_instances(instances)
@@ -172,8 +175,10 @@ def train_command(
     policy, run = Path(output), Path(kept)
     check_free(policy, run, Path(lines), resume=resume)
     check_suffix(policy)
+    from alloc.allocators.learned.training.limits import Limits
     from alloc.allocators.learned.training.log import summary_writer
-    from alloc.allocators.learned.training.trainer import Limits, train
+    from alloc.allocators.learned.training.loop import run_training
+    from alloc.allocators.learned.training.run_files import RunFiles
 
     if tensorboard is not None:
         summary_writer()  # a writer of its own would hide what is in the folder
@@ -194,13 +199,10 @@ def train_command(
     with make_engine(engine.value, workers, address, threads) as where:
         try:
             with _interrupts():
-                train(
+                run_training(
                     trainer,
-                    policy,
-                    checkpoint=run,
-                    log=Path(lines),
-                    limits=limits,
-                    tensorboard=None if tensorboard is None else Path(tensorboard),
+                    RunFiles.beside(policy, run, lines, tensorboard),
+                    limits,
                     engine=where,
                     on_report=lambda report: _tell(report, trainer, limits),
                 )

@@ -3,14 +3,16 @@
 import zipfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import typer
 
 from alloc.cli.output.console import note
 
 if TYPE_CHECKING:
-    from alloc.allocators.learned.training.trainer import Trainer, TrainingParameters
+    from alloc.allocators.learned.algorithms.hyperparameters import Hyperparameters
+    from alloc.allocators.learned.training.parameters import TrainingParameters
+    from alloc.allocators.learned.training.trainer import Trainer
     from alloc.problems import Instance
     from alloc.problems.game import Board
 
@@ -18,7 +20,7 @@ MOST_NAMES = 10
 """Instances that are named at the most."""
 
 
-def learner_parameters(method: str, families: Sequence[str], settings: Sequence[str] = ()) -> Any:
+def learner_parameters(method: str, families: Sequence[str], settings: Sequence[str] = ()) -> "Hyperparameters":
     """Return the hyperparameters that the options ask for.
 
     Raises
@@ -123,7 +125,7 @@ def _is_policy(path: Path) -> bool:
 
 def training_parameters(
     method: str,
-    learner: Any,
+    learner: "Hyperparameters",
     *,
     families: Sequence[str],
     lesson: int,
@@ -136,7 +138,7 @@ def training_parameters(
     from alloc.allocators.learned.files.policy_file import load_policy
     from alloc.allocators.learned.network.actor_critic import NetworkSize
     from alloc.allocators.learned.training.curriculum import Curriculum
-    from alloc.allocators.learned.training.trainer import TrainingParameters
+    from alloc.allocators.learned.training.parameters import TrainingParameters
     from alloc.problems.game import Rules
 
     return TrainingParameters(
@@ -162,11 +164,11 @@ def new_trainer(
 
     from alloc.allocators.learned.files.policy_file import load_policy
     from alloc.allocators.learned.training.trainer import Trainer
-    from alloc.allocators.learned.training.validation import own_games
+    from alloc.allocators.learned.training.validation import games_on
 
     boards: list[Board] | None = None
     if instances is not None:
-        curriculum, boards = own_games(instances, parameters.curriculum)
+        curriculum, boards = games_on(instances, parameters.curriculum)
         parameters = replace(parameters, curriculum=curriculum)
     weights = [] if init is None else [network.state_dict() for network in load_policy(init, None)]
     trainer = Trainer(parameters, seed, boards, weights)

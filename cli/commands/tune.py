@@ -47,7 +47,7 @@ def tune_command(
     import torch
 
     torch.set_num_threads(1)
-    from alloc.allocators.learned.training.trainer import Limits
+    from alloc.allocators.learned.training.limits import Limits
     from alloc.allocators.learned.training.tune import open_study, tune
 
     opened = open_study(Path(study), method, seed)

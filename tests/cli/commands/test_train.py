@@ -21,14 +21,16 @@ from alloc.allocators.learned.files.policy_file import save_policy
 from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize
 from alloc.allocators.learned.training import trainer as module_of_training
 from alloc.allocators.learned.training.families import FAMILIES
-from alloc.allocators.parallel.engine import ENGINES, EngineError, SerialEngine
+from alloc.allocators.parallel.engine import EngineError
+from alloc.allocators.parallel.engines import ENGINES
+from alloc.allocators.parallel.serial import SerialEngine
 from alloc.cli.commands import train as module
 from alloc.problems import Instance
 from alloc.problems.formats import write_instance
 from alloc.problems.game import Reward, Turn
 from alloc.problems.generate import paper_like
 
-QUICK = ("--instances", "mine", "--lesson", "150", "--set", "epochs=1")
+QUICK = ("--instances", "mine", "--lesson", "150", "--set", "update_epochs=1")
 
 
 @pytest.fixture
@@ -64,12 +66,12 @@ def weights(path: Path) -> dict[str, torch.Tensor]:
         ("--checkpoint", "nowhere/c"),
         ("--population", "0"),
         ("--family", "mixt"),
-        ("--set", "clip"),
-        ("--set", "clipp=1"),
+        ("--set", "clip_coef"),
+        ("--set", "clip_coeff=1"),
         ("--seed", str(2**63)),
         ("--minutes", "nan"),
         ("--set", "learning_rate=-1"),
-        ("--set", "clip=nan"),
+        ("--set", "clip_coef=nan"),
         ("--instances", "nowhere.json"),
         ("--init", "nowhere.safetensors"),
         ("--workers", "2"),
@@ -102,12 +104,12 @@ def test_tensorboard_that_is_not_installed_is_told_before_training(alloc, monkey
 def test_interrupted_before_the_first_generation_writes_no_policy(alloc, monkeypatch, mine, number):
     """A signal ends a training in the midst of a lesson; without a whole generation there is no policy."""
 
-    def take(self, lesson):
+    def train_on(self, job):
         os.kill(os.getpid(), number)
         time.sleep(10)
         raise AssertionError("not interrupted")
 
-    monkeypatch.setattr(Ppo, "take", take)
+    monkeypatch.setattr(Ppo, "train_on", train_on)
     before = signal.getsignal(number)
     ran = alloc("train", "ppo", "--output", "p.safetensors", *QUICK)
     assert ran.code == 1
@@ -160,10 +162,10 @@ def test_a_run_without_a_generation_blocks_none(alloc, mine):
     [
         (("gapo",), "did you mean 'gappo'"),
         (("gappo", "--family", "mixt"), "did you mean 'mixed'"),
-        (("gappo", "--set", "clip=-1"), "clip must be"),
+        (("gappo", "--set", "clip_coef=-1"), "clip_coef must be"),
         (("gappo", "--instances", "nowhere.json"), "nowhere.json: there is no such file"),
         (("gappo", "--init", "nowhere"), "nowhere: no such policy file"),
-        (("gappo", "--workers", "2"), "belongs to --engine processes"),
+        (("gappo", "--workers", "2"), "belongs to the engine processes"),
     ],
 )
 def test_what_is_wrong_in_any_case_comes_first(alloc, more, message):
@@ -214,8 +216,8 @@ def test_empty_files_hold_nothing(alloc, mine):
     [
         ("gapo",),
         ("gappo", "--family", "mixt"),
-        ("gappo", "--set", "clipp=1"),
-        ("gappo", "--set", "clip=-1"),
+        ("gappo", "--set", "clip_coeff=1"),
+        ("gappo", "--set", "clip_coef=-1"),
         ("gappo", "--resume"),
         ("gappo", "--init", "nowhere"),
         ("gappo", "--init", "small.json"),
