@@ -9,8 +9,6 @@ from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from typing import Any
 
-import numpy as np
-
 from alloc.allocators.auto import choose
 from alloc.allocators.contract.base import Allocator, Proposal, RefusedError
 from alloc.allocators.contract.budget import Budget, StopReason
@@ -26,10 +24,10 @@ from alloc.problems import (
     InputError,
     Instance,
     Objective,
-    contested_tasks,
     energy_lower_bound,
     find_shortage,
     lp_makespan_lower_bound,
+    minimal_unservable_set,
     serve_all,
 )
 from alloc.problems.allocation import require_fit
@@ -37,6 +35,9 @@ from alloc.problems.arguments import choice, event, flag, function, of_type, rea
 
 UNHURRIED_S = 30.0
 """Limit of the linear programme before a run that counts iterations: no clock should decide where it ends."""
+
+REPAIR_S = 0.3
+"""Time to serve more tasks after a run whose own time is up."""
 
 LARGEST_SEED = 2**63 - 1
 MOST_THREADS = 1024
@@ -167,7 +168,8 @@ def _run(allocator: Allocator, search: Search) -> tuple[Proposal, StopReason | N
     if proposal.allocation is not None:
         search.submit(proposal.allocation)
     if search.best is not None and search.best.evaluation.unserved_tasks:
-        search.submit(serve_all(search.instance, search.best.allocation))
+        end = time.monotonic() + max(REPAIR_S, search.remaining_s)
+        search.submit(serve_all(search.instance, search.best.allocation, lambda: end - time.monotonic()))
     search.raise_bound(proposal.makespan_lower_bound or 0.0)
     return proposal, stop_reason
 
@@ -243,7 +245,7 @@ def _conclude(
     instance, best = search.instance, search.best
     infeasible = best is not None and bool(best.evaluation.unserved_tasks)
     if infeasible:
-        notes.append(_contest(instance))
+        notes.append(_unservable(search, split))
     if split is not None:
         if split.search is not None and not split.search.fast_enough:
             _raise_by_programme(split.search, time.monotonic() + _patience_s(search))
@@ -315,14 +317,20 @@ def _patience_s(search: Search) -> float:
     return 0.2 + 0.1 * min(10.0, 10.0 if limit is None else limit)
 
 
-def _contest(instance: Instance) -> str:
+def _unservable(search: Search, split: Split | None) -> str:
     """Say which tasks compete for too few agents."""
-    tasks = contested_tasks(instance)
+    instance = search.instance
+    if split is not None and split.shortage.is_proven:
+        tasks = split.shortage.unservable
+    elif split is None and search.budget.time_limit_s is None:
+        tasks = minimal_unservable_set(instance)
+    else:
+        return "time ran out before it was proven that no plan serves more tasks"
     assert tasks is not None, "tasks are left unserved although a matching serves all"
-    able = len(np.unique(np.concatenate([instance.reach.agents_of(task) for task in tasks.tolist()])))
     ids = [repr(instance.task_ids[j]) for j in tasks[:10].tolist()]
     more = f" and {len(tasks) - 10} more" if len(tasks) > 10 else ""
-    if len(tasks) == 1:
+    able = len(tasks) - 1
+    if not able:
         return f"no agent can take task {ids[0]}"
     agents = "only 1 agent" if able == 1 else f"only {able} agents"
     return f"{agents} can take any of the {len(tasks)} tasks {', '.join(ids)}{more}"

@@ -11,7 +11,7 @@ from alloc.problems import Allocation, Objective, Shortage, only_allowed
 class Split:
     """A run on an instance in which not every task can be served.
 
-    Who serves which of the contested tasks is settled beforehand, at the least makespan, and again at the end, at the
+    Who serves which of the competing tasks is settled beforehand, at the least makespan, and again at the end, at the
     least energy in the time that the rest takes; a method allocates the rest, where every task can be served.
 
     Parameters
@@ -26,12 +26,13 @@ class Split:
 
     Attributes
     ----------
+    shortage : Shortage
     search : Search or None
         The run on the rest, for the method; None where nothing is left for it.
     """
 
     def __init__(self, whole: Search, shortage: Shortage, start: Allocation | None, stop: threading.Event) -> None:
-        self._whole, self._shortage = whole, shortage
+        self._whole, self.shortage = whole, shortage
         self.search: Search | None = None
         if start is not None:
             whole.submit(only_allowed(whole.instance, start))
@@ -49,29 +50,29 @@ class Split:
             threads=whole.threads,
             tolerance=MakespanTolerance(
                 tolerance.slack, self._hours
-            ),  # the rest need not be faster than the contested tasks
+            ),  # the rest need not be faster than the competing tasks
             on_improvement=lambda found: self._tell(found.allocation),
             stop=stop,
             spent_s=whole.elapsed_s,
         )
 
     def _tell(self, rest: Allocation) -> None:
-        self._whole.submit(self._shortage.merged(rest))
+        self._whole.submit(self.shortage.merged(rest))
 
     def conclude(self) -> None:
-        """Submit the best of the rest beside the cheapest allocation of the contested tasks that is as fast."""
+        """Submit the best of the rest beside the cheapest allocation of the competing tasks that is as fast."""
         if self.search is not None and self.search.best is not None:
             self._whole.submit(self._merged(self.search.best.allocation, self.search.makespan_limit))
 
     def _merged(self, rest: Allocation | None, hours: float) -> Allocation:
-        shortage = self._shortage
+        shortage = self.shortage
         if self._whole.objective is Objective.MAKESPAN_ENERGY:
             shortage = shortage.economical(hours, lambda: 0.0 if self._whole.interrupted else self._whole.remaining_s)
         return shortage.merged(rest)
 
     def notes(self) -> list[str]:
         """Say what went wrong with the rest, and what is proven of the makespan of the tasks that are served."""
-        best, bound = self._whole.best, self._shortage.bound
+        best, bound = self._whole.best, self.shortage.bound
         told: list[str] = []
         if self.search is not None:
             bound, told = max(bound, self.search.lower_bound), self.search.notes

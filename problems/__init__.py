@@ -13,9 +13,9 @@ from alloc.problems.generate import paper, paper_like, random_instance
 from alloc.problems.generate.covering import machine_covering
 from alloc.problems.generate.family import Family
 from alloc.problems.instance import IDLE, Instance
-from alloc.problems.matching.contested import contested_tasks, fewest_unserved
 from alloc.problems.matching.serving import only_allowed, serve_all
 from alloc.problems.matching.shortage import Shortage, find_shortage
+from alloc.problems.matching.unservable import fewest_unserved, minimal_unservable_set
 
 __all__ = [
     "IDLE",
@@ -34,7 +34,6 @@ __all__ = [
     "TrainingError",
     "Violation",
     "agent_classes",
-    "contested_tasks",
     "count_classes",
     "energy_lower_bound",
     "evaluate",
@@ -43,6 +42,7 @@ __all__ = [
     "lp_makespan_lower_bound",
     "machine_covering",
     "makespan_lower_bound",
+    "minimal_unservable_set",
     "only_allowed",
     "paper",
     "paper_like",

@@ -34,6 +34,9 @@ MOST_DOUBLINGS = 1000
 SCARCE = 32
 """Tasks whose agents are counted where the table of who reaches what is too large for all."""
 
+SAMPLED_PAIRS = 4_000_000
+"""Pairs of a sampled agent and a task by which these are found."""
+
 LP_SIZE_LIMIT = 500_000
 """Pairs of agent class and task beyond which no linear programme is built."""
 
@@ -86,7 +89,8 @@ def _reach_bound(instance: Instance) -> float:
 def _reach_bound_of_scarce(instance: Instance) -> float:
     """The same for `SCARCE` tasks alone: those with the most work for those of a sample who can reach them."""
     reach, work = instance.reach, instance.workload
-    sample = np.unique(np.linspace(0, instance.n - 1, 10 * SCARCE).astype(np.intp))
+    size = min(10 * SCARCE, max(1, SAMPLED_PAIRS // instance.m))
+    sample = np.unique(np.linspace(0, instance.n - 1, size).astype(np.intp))
     rate = instance.ability[sample] @ reach.rows(reach.origin[sample])[1]
     with np.errstate(divide="ignore", invalid="ignore"):
         scarce = np.argsort(-np.where(work > 0, work / rate, 0.0), kind="stable")[:SCARCE]

@@ -158,6 +158,11 @@ class Reach(ReadOnly):
         distance = distance_table(self.place[origins], self.goal, self.unit)
         return distance, self._mask_of(origins, distance)
 
+    def block(self, origins: Indices, tasks: Indices) -> tuple[Floats, Flags]:
+        """Return these rows and columns of `distance` and `mask`, each of shape (k, l), without a table."""
+        distance = distance_table(self.place[origins], self.goal[tasks], self.unit)
+        return distance, self.is_within(origins[:, None], tasks, distance)
+
     def agents_of(self, task: int) -> Indices:
         """Return the agents that can take `task`, in ascending order."""
         if self.has_table:

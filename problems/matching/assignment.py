@@ -1,12 +1,12 @@
 """Agents and tasks one to one: the fastest such assignment, and the cheapest."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from alloc.problems.instance import IDLE, FloatArray, IntArray
+from alloc.problems.matching.clock import MATCHED_PER_SECOND, Clock
 
 SEARCH = 10_000_000_000
 """Agents times pairs at which looking for the cheapest assignment takes about a second."""
@@ -63,7 +63,7 @@ def match(first: IntArray, task: IntArray) -> IntArray:
     return matched
 
 
-def bottleneck(pairs: Pairs, known: IntArray, time_left: Callable[[], float]) -> tuple[IntArray, float]:
+def bottleneck(pairs: Pairs, known: IntArray, latest: float, time_left: Clock) -> tuple[IntArray, float]:
     """Return a task for each agent so that the last is done as early as can be, and a bound on when that is.
 
     By halving the hours in question, with a matching for each; the bound falls short where time runs out.
@@ -74,13 +74,15 @@ def bottleneck(pairs: Pairs, known: IntArray, time_left: Callable[[], float]) ->
         With a pair for each agent and its task in `known`, or k that are no slower.
     known : ndarray of int, shape (k,)
         Some such assignment.
+    latest : float
+        When the last agent is done in it.
     time_left : callable
         Seconds.
     """
     best, least = known, 0.0
     bound = float(np.minimum.reduceat(pairs.hours, pairs.first[:-1]).max())  # each takes its fastest
-    low, high = bound, float(pairs.hours.max())
-    while time_left() > 0:
+    low, high = bound, min(latest, float(pairs.hours.max()))
+    while time_left() > len(pairs.task) / MATCHED_PER_SECOND:
         in_question = pairs.hours[(pairs.hours >= low) & (pairs.hours <= high)]
         if not len(in_question):
             break
@@ -98,7 +100,7 @@ def bottleneck(pairs: Pairs, known: IntArray, time_left: Callable[[], float]) ->
     return best, max(bound, least)
 
 
-def cheapest(pairs: Pairs, known: IntArray, cost: FloatArray, time_left: Callable[[], float]) -> IntArray:
+def cheapest(pairs: Pairs, known: IntArray, cost: FloatArray, time_left: Clock) -> IntArray:
     """Return the assignment with the least sum of `cost`, shape (p,) and >= 0; `known` where time does not allow it.
 
     By shortest augmenting paths (Jonker and Volgenant 1987, doi:10.1007/BF02278710), among the cheapest pairs of each
@@ -108,7 +110,7 @@ def cheapest(pairs: Pairs, known: IntArray, cost: FloatArray, time_left: Callabl
     from scipy.sparse.csgraph import min_weight_full_bipartite_matching
 
     k = len(known)
-    work = min(1.0, 0.2 * time_left()) * SEARCH
+    work = min(1.0, 0.1 * time_left()) * SEARCH
     most = int(work // max(1, k * k))
     if most < 1 or not len(cost):
         return known

@@ -7,10 +7,12 @@ import numpy as np
 
 from alloc.problems.allocation import Allocation, require_fit
 from alloc.problems.arguments import of_type
+from alloc.problems.distances.neighbours import estimated_pairs
 from alloc.problems.instance import IDLE, Instance, IntArray
+from alloc.problems.matching.clock import EVALUATED_PER_SECOND, GATHERED_PER_SECOND, Clock, unlimited
 
 SPENT = -1
-"""Mark of agents that a search in vain has met: no later path leads through them."""
+"""Mark of agents that a failed search has met: no later path leads through them."""
 
 NEARBY = 64
 """Origins next to a task that are looked at first where there are many."""
@@ -22,7 +24,7 @@ MANY = 50_000_000
 class _Matching:
     """One agent kept for each served task, grown by augmenting paths (Berge 1957, doi:10.1073/pnas.43.9.842)."""
 
-    def __init__(self, instance: Instance, task_of_agent: IntArray, unserved: int) -> None:
+    def __init__(self, instance: Instance, task_of_agent: IntArray, unserved: int, time_left: Clock) -> None:
         self.reach, self.m = instance.reach, instance.m
         self.task_of_agent = task_of_agent.copy()
         self.keeper = np.full(instance.m, IDLE, dtype=np.intp)
@@ -35,6 +37,7 @@ class _Matching:
         self.search = 0
         reach = self.reach
         many = not reach.has_table and unserved * len(reach.place) > MANY and not reach.is_complete
+        many = many and (limit := GATHERED_PER_SECOND * time_left()) > 0 and estimated_pairs(reach) <= limit
         near = reach.neighbours if many else None
         self._rows = None if near is None else near.by_task(instance.m)
 
@@ -100,11 +103,12 @@ def only_allowed(instance: Instance, allocation: Allocation) -> Allocation:
     return Allocation(task)
 
 
-def serve_all(instance: Instance, allocation: Allocation) -> Allocation:
+def serve_all(instance: Instance, allocation: Allocation, time_left: Clock = unlimited) -> Allocation:
     """Change `allocation` so that as few tasks as possible are unserved.
 
     Agents sent where they cannot go are idle in the answer. A task that is served stays served. Agents change places
     along augmenting paths alone, each with the fewest moves, at whose end an idle agent is preferred, then the nearest.
+    Where `time_left`, in seconds, runs out, the tasks that are left may stay unserved.
     """
     task = only_allowed(instance, allocation).task_of_agent
     served = np.zeros(instance.m, dtype=bool)
@@ -114,10 +118,13 @@ def serve_all(instance: Instance, allocation: Allocation) -> Allocation:
         return Allocation(task)
     if instance.reach.is_complete and instance.n * len(unserved) > MANY:
         return Allocation(_serve_by_anyone(instance, task, unserved))
-    if len(instance.reach.place) * len(unserved) > MANY and not instance.reach.has_table:
+    pairs = len(instance.reach.place) * len(unserved)
+    if not instance.reach.has_table and (pairs > MANY or pairs > EVALUATED_PER_SECOND * time_left()):
         task, unserved = _serve_nearby(instance, task, unserved)
-    matching = _start(instance, task, len(unserved))
+    matching = _start(instance, task, len(unserved), time_left)
     for j in unserved:
+        if time_left() <= 0 and not instance.reach.has_table:
+            break
         matching.serve(j)
     return Allocation(matching.task_of_agent)
 
@@ -149,7 +156,7 @@ def _serve_nearby(instance: Instance, task_of_agent: IntArray, unserved: list[in
     if not len(origins) or not len(goals):
         return task_of_agent, unserved
     count = min(NEARBY, len(origins))
-    _, near = cKDTree(reach.place[origins] / reach.unit).query(reach.goal[goals] / reach.unit, k=count)
+    _, near = cKDTree(reach.place[origins]).query(reach.goal[goals], k=count)
     served = set()
     for j, row in zip(goals.tolist(), origins[near.reshape(len(goals), count)], strict=True):
         same = np.full(count, j)
@@ -161,9 +168,9 @@ def _serve_nearby(instance: Instance, task_of_agent: IntArray, unserved: list[in
     return task_of_agent, [j for j in unserved if j not in served]
 
 
-def _start(instance: Instance, task_of_agent: IntArray, unserved: int) -> _Matching:
+def _start(instance: Instance, task_of_agent: IntArray, unserved: int, time_left: Clock = unlimited) -> _Matching:
     """Begin a matching in which tasks without workload keep nobody; `unserved`: how many tasks are to be served."""
-    matching = _Matching(instance, task_of_agent, unserved)
+    matching = _Matching(instance, task_of_agent, unserved, time_left)
     for j in np.flatnonzero(instance.workload == 0).tolist():
         if matching.keeper[j] != IDLE:
             matching.kept_task[matching.keeper[j]] = IDLE

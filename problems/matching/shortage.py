@@ -1,38 +1,38 @@
 """Tasks that too few agents can reach: which of them to serve, and by whom.
 
-Tasks that not every allocation with the fewest unserved tasks serves are *contested*. In each such allocation every
-agent that can take a contested task serves exactly one of them, alone (Dulmage and Mendelsohn 1958,
-doi:10.4153/CJM-1958-052-0). So these agents and tasks are a problem of assignment, which is solved here, and what is
+Tasks that not every allocation with the fewest unserved tasks serves *compete* for agents. In each such allocation
+every agent that can take a competing task serves exactly one of them, alone (Dulmage and Mendelsohn 1958,
+doi:10.4153/CJM-1958-052-0). So these agents and tasks are an assignment problem, which is solved here, and what is
 left is an instance of its own, in which every task can be served.
 """
 
-import sys
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from alloc.problems.allocation import Allocation
-from alloc.problems.evaluation import RELATIVE_TOLERANCE
+from alloc.problems.evaluation import last_equal
 from alloc.problems.instance import AGENT_ARRAYS, IDLE, FloatArray, Instance, IntArray
-from alloc.problems.matching.assignment import Pairs, bottleneck, cheapest, match
-from alloc.problems.matching.contested import contested_part
+from alloc.problems.matching.assignment import Pairs, bottleneck, cheapest
+from alloc.problems.matching.clock import EVALUATED_PER_SECOND, Clock, unlimited
+from alloc.problems.matching.pairs import all_pairs, bound_by_size, hours_alone, sampled_pairs
+from alloc.problems.matching.unservable import competing_part
 
-Clock = Callable[[], float]
-"""Seconds that are left."""
+SAMPLE_SHARE = 0.3
+"""Share of the time that is left for the pairs of an assignment, where a sample has to do."""
 
 
 @dataclass(frozen=True, eq=False)
 class Shortage:
-    """Who serves which of the contested tasks, and what is left to be allocated.
+    """Who serves which of the competing tasks, and what is left to be allocated.
 
     Attributes
     ----------
     instance : Instance
     agents : ndarray of int, shape (k,)
-        All agents that can take a contested task.
+        Agents that serve a competing task each, alone.
     tasks : ndarray of int, shape (more than k,)
-        The contested tasks.
+        The competing tasks.
     task_of_agent : ndarray of int, shape (k,)
         The task of each of `agents`.
     hours : float
@@ -41,6 +41,10 @@ class Shortage:
         Hours that every allocation needs that leaves as few tasks unserved.
     rest_agents, rest_tasks : ndarray of int
         The other agents, and the other tasks with workload: what `rest` is made of.
+    unservable : ndarray of int
+        Competing tasks that fewer agents can reach: a set as small as is at hand.
+    is_proven : bool
+        Whether no allocation serves more tasks; False where time ran out.
     """
 
     instance: Instance
@@ -51,6 +55,8 @@ class Shortage:
     bound: float
     rest_agents: IntArray
     rest_tasks: IntArray
+    unservable: IntArray
+    is_proven: bool = True
 
     @property
     def rest(self) -> Instance | None:
@@ -74,28 +80,26 @@ class Shortage:
 
     def economical(self, hours: float, time_left: Clock) -> "Shortage":
         """Return the same with the least energy within `hours`, as far as time allows."""
-        pairs = (
-            _pairs(self.instance, self.agents, self.tasks, hours, time_left, by_distance=True)
-            if len(self.agents)
-            else None
-        )
+        if not len(self.agents):
+            return self
+        args = (self.instance, self.agents, self.tasks)
+        pairs, _ = _pairs(*args, self.task_of_agent, hours, time_left, by_distance=True)
         if pairs is None:
             return self
         chosen = cheapest(pairs, self.task_of_agent, pairs.distance, time_left)
         return replace(self, task_of_agent=chosen, hours=float(_hours(self.instance, self.agents, chosen).max()))
 
 
-def find_shortage(instance: Instance, time_left: Clock = lambda: np.inf) -> Shortage | None:
-    """Return who serves which of the contested tasks at the least makespan, or None if all tasks can be served.
+def find_shortage(instance: Instance, time_left: Clock = unlimited) -> Shortage | None:
+    """Return who serves which of the competing tasks at the least makespan, or None if all tasks can be served.
 
     Of the allocations with that makespan, one with little work is taken. Where `time_left` runs out, the makespan may
-    be more, and None may be returned although some task cannot be served.
+    be more, some task may be unserved that could be served, and None may be returned although some task cannot.
     """
-    part = contested_part(instance) or _by_least_work(instance, time_left)
+    part = competing_part(instance, time_left)
     if part is None:
         return None
-    agents, tasks, chosen = part
-    bound = 0.0
+    agents, tasks, chosen, bound = part.agents, part.tasks, part.task_of_agent, 0.0
     if len(agents) and instance.reach.is_complete and not instance.has_travel_time:
         bound = float(_hours(instance, agents, chosen).max())  # the least work by the least able: none is faster
     elif len(agents):
@@ -110,102 +114,55 @@ def find_shortage(instance: Instance, time_left: Clock = lambda: np.inf) -> Shor
         tasks,
         chosen,
         float(_hours(instance, agents, chosen).max(initial=0.0)),
-        bound,
+        bound if part.is_proven else 0.0,
         np.flatnonzero(others),
         np.flatnonzero(needed),
+        part.unservable,
+        part.is_proven,
     )
-
-
-def _by_least_work(instance: Instance, time_left: Clock) -> tuple[IntArray, IntArray, IntArray] | None:
-    """Return the same as `contested_part` where too many pairs are within reach for it, but every agent is needed.
-
-    The tasks with the least work are enough, as soon as they have something for each agent.
-    """
-    reach, everyone = instance.reach, np.arange(instance.n)
-    tasks = np.flatnonzero(instance.workload > 0)
-    if reach.is_complete or reach.neighbours is not None or len(tasks) <= instance.n:
-        return None
-    by_work = tasks[np.argsort(instance.workload[tasks], kind="stable")]
-    count = 2 * instance.n
-    while count < 2 * len(tasks) and time_left() > 0:
-        few = np.sort(by_work[:count])
-        near = _restricted(instance, everyone, few).reach.neighbours
-        if near is None:
-            return None
-        length = np.diff(near.first)[reach.origin]
-        first = np.concatenate([[0], np.cumsum(length)])
-        entry = np.repeat(near.first[reach.origin] - first[:-1], length) + np.arange(first[-1])
-        found = match(first, near.task[entry])
-        if (found != IDLE).all():
-            return everyone, tasks, few[found]
-        count *= 2
-    return None
 
 
 def _fastest(
     instance: Instance, agents: IntArray, tasks: IntArray, chosen: IntArray, time_left: Clock
 ) -> tuple[IntArray, float]:
     """Return a matching with the least makespan and, of these, one with little work; and a bound on that makespan."""
-    pairs = _pairs(instance, agents, tasks, np.inf, time_left)
-    if pairs is None:
-        return chosen, 0.0
-    chosen, bound = bottleneck(pairs, chosen, time_left)
-    within = pairs.within(float(_hours(instance, agents, chosen).max()) * (1 + RELATIVE_TOLERANCE))
-    _, rank = np.unique(instance.workload[within.task], return_inverse=True)
-    return cheapest(within, chosen, rank.astype(np.float64), time_left), bound
-
-
-def _hours(instance: Instance, agents: IntArray, tasks: IntArray) -> FloatArray:
-    """Return when each of `agents` is done, alone with the task beside it."""
-    return _alone(instance, agents, tasks, instance.reach.distance_of(agents, tasks))
-
-
-def _alone(instance: Instance, agents: IntArray, tasks: IntArray, distance: FloatArray) -> FloatArray:
-    with np.errstate(over="ignore"):
-        hours = instance.workload[tasks] / instance.ability[agents] + distance / instance.speed[agents]
-        return np.minimum(hours, sys.float_info.max)
+    latest, bound = float(_hours(instance, agents, chosen).max()), 0.0
+    pairs, complete = _pairs(instance, agents, tasks, chosen, latest, time_left)
+    while pairs is not None:
+        chosen, least = bottleneck(pairs, chosen, latest, time_left)
+        before, latest = latest, float(_hours(instance, agents, chosen).max())
+        within = pairs.within(last_equal(latest))
+        bound = least if complete else bound_by_size(instance, agents, tasks)
+        if complete or latest >= before:
+            _, rank = np.unique(instance.workload[within.task], return_inverse=True)
+            return cheapest(within, chosen, rank.astype(np.float64), time_left), bound
+        pairs, complete = _pairs(instance, agents, tasks, chosen, latest, time_left)
+    return chosen, bound
 
 
 def _pairs(
     instance: Instance,
     agents: IntArray,
     tasks: IntArray,
-    hours: float,
+    known: IntArray,
+    latest: float,
     time_left: Clock,
     *,
     by_distance: bool = False,
-) -> Pairs | None:
-    """Return for each of k agents the k best pairs with `tasks` that it does within `hours`; None if time runs out.
+) -> tuple[Pairs | None, bool]:
+    """Return pairs that are done by `latest`, None if time runs out, and whether they are as good as all pairs."""
+    if instance.reach.has_table:
+        return all_pairs(instance, agents, tasks, latest, time_left, by_distance=by_distance), True
+    seconds = time_left()
+    if seconds <= 0:
+        return None, False
+    evaluations = SAMPLE_SHARE * seconds * EVALUATED_PER_SECOND
+    return sampled_pairs(instance, agents, tasks, known, evaluations, time_left, latest=latest, by_distance=by_distance)
 
-    The best are the fastest, or the nearest. No more are needed: whoever has the choice of k tasks finds one of them
-    free, whatever the other k - 1 agents do.
-    """
-    reach, contested = instance.reach, np.zeros(instance.m, dtype=np.bool_)
-    contested[tasks] = True
-    near = None if reach.is_complete else reach.neighbours
-    k, latest = len(agents), hours * (1 + RELATIVE_TOLERANCE)
-    first, parts = np.zeros(k + 1, dtype=np.intp), []
-    for row, agent in enumerate(agents.tolist()):
-        if time_left() <= 0:
-            return None
-        origin = int(reach.origin[agent])
-        if near is None:
-            distance, mask = (table[0] for table in reach.rows(np.array([origin])))
-            task = np.flatnonzero(mask & contested)
-            away = distance[task]
-        else:
-            span = slice(near.first[origin], near.first[origin + 1])
-            useful = contested[near.task[span]]
-            task, away = near.task[span][useful].astype(np.intp), near.distance[span][useful]
-        time = _alone(instance, np.full(len(task), agent), task, away)
-        keep = np.flatnonzero(time <= latest)
-        if len(keep) > k:
-            key = (away if by_distance else time)[keep]
-            keep = np.sort(keep[np.argpartition(key, k - 1)[:k]])
-        parts.append((task[keep], time[keep], away[keep]))
-        first[row + 1] = first[row] + len(keep)
-    columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
-    return Pairs(first, columns[0], columns[1], columns[2])
+
+def _hours(instance: Instance, agents: IntArray, tasks: IntArray) -> FloatArray:
+    """Return when each of `agents` is done, alone with the task beside it."""
+    return hours_alone(instance, agents, tasks, instance.reach.distance_of(agents, tasks))
 
 
 def _restricted(instance: Instance, agents: IntArray, tasks: IntArray) -> Instance:

@@ -11,9 +11,9 @@ from strategies import allocated, instances
 from alloc.problems import (
     Allocation,
     Instance,
-    contested_tasks,
     evaluate,
     fewest_unserved,
+    minimal_unservable_set,
     serve_all,
 )
 
@@ -58,9 +58,9 @@ def test_serve_all_leaves_complete_plans_alone(case: tuple[Instance, Allocation]
 
 
 @given(instances())
-def test_contested_tasks_are_inclusion_minimal(instance: Instance) -> None:
+def test_the_unservable_set_is_inclusion_minimal(instance: Instance) -> None:
     """They cannot all be served, the rest of them can without any one, and one agent too few can take any of them."""
-    tasks = contested_tasks(instance)
+    tasks = minimal_unservable_set(instance)
     needed = tuple(np.flatnonzero(instance.workload > 0).tolist())
     assert (tasks is None) == can_all_be_served(instance, needed)
     if tasks is not None:
@@ -73,7 +73,7 @@ def test_contested_tasks_are_inclusion_minimal(instance: Instance) -> None:
 
 def test_contested_by_hand(contested: Instance) -> None:
     """Three tasks share two agents; the fourth has its own."""
-    tasks = contested_tasks(contested)
+    tasks = minimal_unservable_set(contested)
     assert tasks is not None
     assert tasks.tolist() == [0, 1, 3]
     assert fewest_unserved(contested) == 1

@@ -1,4 +1,4 @@
-"""Who serves which of the contested tasks; brute force as oracle."""
+"""Who serves which of the competing tasks; brute force as oracle."""
 
 import numpy as np
 import pytest

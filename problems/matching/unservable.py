@@ -1,22 +1,53 @@
 """The fewest unserved tasks, and which tasks compete for too few agents."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from alloc.problems.distances.neighbours import Neighbours
+from alloc.problems.distances.neighbours import Neighbours, estimated_pairs
 from alloc.problems.instance import IDLE, Instance, IntArray
+from alloc.problems.matching.agent_matching import AgentMatching
 from alloc.problems.matching.assignment import match
+from alloc.problems.matching.clock import GATHERED_PER_SECOND, Clock, unlimited
 from alloc.problems.matching.serving import needs_agent, serve_in_turn
 
 FEW, SAMPLE = 8, 20
 """Agents near a task that a quick try looks at, and agents for each task from which they are taken."""
 
 
+@dataclass(frozen=True, eq=False)
+class CompetingPart:
+    """Tasks that compete for too few agents, with a matching.
+
+    Attributes
+    ----------
+    agents : ndarray of int, shape (k,)
+        Agents that serve one of `tasks` each, alone, in every allocation with the fewest unserved tasks.
+    tasks : ndarray of int, shape (more than k,)
+        All tasks that these serve in such an allocation, or that none serves.
+    task_of_agent : ndarray of int, shape (k,)
+        Some task for each of `agents`, no task twice.
+    unservable : ndarray of int
+        Tasks, among `tasks`, that fewer agents can reach.
+    is_proven : bool
+        Whether no allocation serves more tasks; False where time ran out.
+    """
+
+    agents: IntArray
+    tasks: IntArray
+    task_of_agent: IntArray
+    unservable: IntArray
+    is_proven: bool = True
+
+
 def fewest_unserved(instance: Instance) -> int:
     """Return how many tasks with workload no allocation can serve, at the least."""
-    tasks = needs_agent(instance)
-    if instance.reach.is_complete:
+    tasks, reach = needs_agent(instance), instance.reach
+    if reach.is_complete:
         return max(0, len(tasks) - instance.n)
-    near = instance.reach.neighbours
+    if len(tasks) > instance.n and not reach.has_table:
+        return len(tasks) - int((AgentMatching(instance, tasks, unlimited).task_of_agent != IDLE).sum())
+    near = reach.neighbours
     if near is None:
         return sum(rivals is not None for rivals in serve_in_turn(instance, tasks))
     return int((_origin_of_task(instance, near, tasks)[tasks] == IDLE).sum())
@@ -43,27 +74,47 @@ def _origin_of_task(instance: Instance, near: Neighbours, tasks: IntArray) -> In
     return origin
 
 
-def contested_part(instance: Instance) -> tuple[IntArray, IntArray, IntArray] | None:
-    """Return what `Shortage` calls agents and contested tasks, and some task for each of these agents.
+def competing_part(instance: Instance, time_left: Clock = unlimited) -> CompetingPart | None:
+    """Return the tasks that compete for too few agents, and these agents.
 
-    None if all tasks can be served, and where too many pairs are within reach to tell.
+    None if all tasks can be served, and where there is no time, or no memory, to tell.
     """
     tasks, reach = needs_agent(instance), instance.reach
     if reach.is_complete:
         if instance.n >= len(tasks):
             return None
-        least = tasks[np.argsort(instance.workload[tasks], kind="stable")][: instance.n]
-        return np.arange(instance.n), tasks, _by_size(instance, np.arange(instance.n), least)
-    if _are_served_simply(instance, tasks) or reach.neighbours is None:
+        everyone, least = np.arange(instance.n), tasks[np.argsort(instance.workload[tasks], kind="stable")]
+        chosen = _by_size(instance, everyone, least[: instance.n])
+        return CompetingPart(everyone, tasks, chosen, tasks[: instance.n + 1])
+    if len(tasks) > instance.n and not reach.has_table:
+        return _of_scarce_agents(instance, tasks, time_left)
+    if _are_served_simply(instance, tasks):
         return None
-    near = reach.neighbours
+    if not reach.has_table and estimated_pairs(reach) > GATHERED_PER_SECOND * time_left():
+        return None
+    return None if reach.neighbours is None else _of_neighbours(instance, tasks, reach.neighbours)
+
+
+def _of_scarce_agents(instance: Instance, tasks: IntArray, time_left: Clock) -> CompetingPart:
+    """The same for more tasks than agents, without looking at all pairs, as a rule."""
+    matching = AgentMatching(instance, tasks, time_left)
+    if matching.is_largest:
+        agents, left = np.flatnonzero(~matching.replaceable), tasks[~matching.their_tasks[tasks]]
+    else:
+        agents, left = np.flatnonzero(matching.task_of_agent != IDLE), tasks
+    unservable = left[: len(agents) + 1]
+    return CompetingPart(agents, left, matching.task_of_agent[agents], unservable, matching.is_largest)
+
+
+def _of_neighbours(instance: Instance, tasks: IntArray, near: Neighbours) -> CompetingPart | None:
+    """The same from all pairs within reach."""
     origin = _origin_of_task(instance, near, tasks)
     left_out = tasks[origin[tasks] == IDLE]
     if not len(left_out):
         return None
-    contested, origins = _rivals(near, origin, left_out, instance.m)
-    first, by_origin = reach.agents_by_origin
-    held = contested[origin[contested] != IDLE]
+    competing, origins = _rivals(near, origin, left_out, instance.m)
+    first, by_origin = instance.reach.agents_by_origin
+    held = competing[origin[competing] != IDLE]
     held = held[np.argsort(origin[held], kind="stable")]
     bounds = np.searchsorted(origin[held], [origins, origins + 1])
     agents = [by_origin[first[i] : first[i + 1]] for i in origins.tolist()]
@@ -71,7 +122,8 @@ def contested_part(instance: Instance) -> tuple[IntArray, IntArray, IntArray] | 
         _by_size(instance, group, held[begin:end]) for group, begin, end in zip(agents, *bounds.tolist(), strict=True)
     ]
     none: list[IntArray] = [np.zeros(0, dtype=np.intp)]
-    return np.concatenate(agents + none), contested, np.concatenate(chosen + none)
+    unservable = _rivals(near, origin, left_out[:1], instance.m)[0]
+    return CompetingPart(np.concatenate(agents + none), competing, np.concatenate(chosen + none), unservable)
 
 
 def _by_size(instance: Instance, agents: IntArray, tasks: IntArray) -> IntArray:
@@ -141,15 +193,15 @@ def _by_sample(instance: Instance, tasks: IntArray) -> bool:
     sample = sample[~np.isnan(reach.place[reach.origin[sample], 0])]
     if np.isnan(reach.goal[tasks, 0]).any() or len(sample) < len(tasks):
         return False
-    tree = cKDTree(reach.place[reach.origin[sample]] / reach.unit)
-    _, near = tree.query(reach.goal[tasks] / reach.unit, k=min(FEW, len(sample)))
+    tree = cKDTree(reach.place[reach.origin[sample]])
+    _, near = tree.query(reach.goal[tasks], k=min(FEW, len(sample)))
     agent, task = sample[near].ravel(), np.repeat(tasks, near.size // len(tasks))
     able = reach.allows(agent, task)
     first = np.concatenate([[0], np.cumsum(able.reshape(len(tasks), -1).sum(axis=1))])
     return bool((match(first, agent[able]) != IDLE).all())
 
 
-def contested_tasks(instance: Instance) -> IntArray | None:
+def minimal_unservable_set(instance: Instance) -> IntArray | None:
     """Return an inclusion-minimal set of tasks that too few agents can reach, or None if all tasks can be served.
 
     Such a set has one task more than agents that can take any of them; without any one of its tasks, the rest could

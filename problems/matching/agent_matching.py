@@ -1,0 +1,95 @@
+"""More tasks than agents: agents get a task each, by a sample of the pairs first and by augmenting paths then."""
+
+from collections import deque
+
+import numpy as np
+
+from alloc.problems.instance import IDLE, Instance, IntArray
+from alloc.problems.matching.assignment import Pairs, match
+from alloc.problems.matching.clock import EVALUATED_PER_SECOND, Clock, unlimited
+from alloc.problems.matching.pairs import bound_by_size, sampled_pairs
+
+SAMPLE_SHARE, MOST_EVALUATED = 0.2, 20_000_000
+"""Share of the time, and distances at most, for the sample."""
+
+FEWEST_EVALUATED = 256
+"""Distances that the sample takes for each agent, whatever the time."""
+
+SLOWER = (2.0, 8.0, 32.0)
+"""Makespans that are tried before any will do, as multiples of a bound."""
+
+
+class AgentMatching:
+    """A matching of agents with `tasks`, as large as time allows.
+
+    Attributes
+    ----------
+    task_of_agent : ndarray of int, shape (n,)
+        The task of each agent, no task twice; `IDLE` where it has none.
+    is_largest : bool
+        Whether no matching is larger.
+    replaceable : ndarray of bool, shape (n,)
+        Agents that some largest matching leaves without a task; all of them if `is_largest`.
+    their_tasks : ndarray of bool, shape (m,)
+        The tasks within reach of these: every largest matching serves them, by these agents.
+    """
+
+    def __init__(self, instance: Instance, tasks: IntArray, time_left: Clock) -> None:
+        self._reach = instance.reach
+        self._wanted = np.zeros(instance.m, dtype=np.bool_)
+        self._wanted[tasks] = True
+        everyone = np.arange(instance.n)
+        evaluations = min(MOST_EVALUATED, SAMPLE_SHARE * max(0.0, time_left()) * EVALUATED_PER_SECOND)
+        evaluations = max(evaluations, float(FEWEST_EVALUATED * instance.n))
+        pairs, _ = sampled_pairs(instance, everyone, tasks, None, evaluations, unlimited)
+        self.task_of_agent = _fast_matching(pairs, bound_by_size(instance, everyone, tasks))
+        self.replaceable = np.zeros(instance.n, dtype=np.bool_)
+        self.their_tasks = np.zeros(instance.m, dtype=np.bool_)
+        self._holder = np.full(instance.m, IDLE, dtype=np.intp)
+        held = np.flatnonzero(self.task_of_agent != IDLE)
+        self._holder[self.task_of_agent[held]] = held
+        self.is_largest = all(
+            self._augment(agent, time_left) for agent in np.flatnonzero(self.task_of_agent == IDLE).tolist()
+        )
+
+    def _augment(self, agent: int, time_left: Clock) -> bool:
+        """Find a task for `agent` by the fewest moves, or mark all that it could move; False if time runs out."""
+        queue, agents = deque([agent]), [agent]
+        seen = self.their_tasks.copy()
+        wanted_by: dict[int, int] = {}
+        while queue:
+            if time_left() <= 0:
+                return False
+            able = queue.popleft()
+            mask = self._reach.rows(self._reach.origin[able : able + 1])[1][0]
+            tasks = np.flatnonzero(mask & self._wanted & ~seen)
+            free = tasks[self._holder[tasks] == IDLE]
+            if len(free):
+                self._move(able, int(free[0]), wanted_by)
+                return True
+            seen[tasks] = True
+            wanted_by.update(dict.fromkeys(tasks.tolist(), able))
+            holders = self._holder[tasks].tolist()
+            queue.extend(holders)
+            agents.extend(holders)
+        self.replaceable[agents] = True
+        self.their_tasks = seen
+        return True
+
+    def _move(self, agent: int, task: int, wanted_by: dict[int, int]) -> None:
+        while True:
+            before = int(self.task_of_agent[agent])
+            self.task_of_agent[agent], self._holder[task] = task, agent
+            if before == IDLE:
+                return
+            task, agent = before, wanted_by[before]
+
+
+def _fast_matching(pairs: Pairs, bound: float) -> IntArray:
+    """Return a largest matching, without the slow pairs where as many agents have a task without them."""
+    for factor in SLOWER:
+        within = pairs.within(factor * bound)
+        found = match(within.first, within.task)
+        if (found != IDLE).all():
+            return found
+    return match(pairs.first, pairs.task)

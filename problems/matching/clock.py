@@ -1,0 +1,21 @@
+"""How much time matchings have, and how much they get done in it."""
+
+import math
+from collections.abc import Callable
+
+Clock = Callable[[], float]
+"""Seconds that are left."""
+
+EVALUATED_PER_SECOND = 10_000_000
+"""Distances that are worked out in a second, at the least."""
+
+GATHERED_PER_SECOND = 1_000_000
+"""Pairs within reach that are gathered in a second, at the least."""
+
+MATCHED_PER_SECOND = 4_000_000
+"""Pairs for which a largest matching takes a second, at the most, as a rule."""
+
+
+def unlimited() -> float:
+    """Return ``inf``: no limit of time."""
+    return math.inf

@@ -1,0 +1,207 @@
+"""Pairs of agents and tasks that agents can do alone: all of them, or a sample where there are too many."""
+
+import sys
+
+import numpy as np
+from numpy.typing import NDArray
+
+from alloc.problems.evaluation import last_equal
+from alloc.problems.instance import FloatArray, Instance, IntArray
+from alloc.problems.matching.assignment import Pairs
+from alloc.problems.matching.clock import Clock
+
+BLOCK_OF_AGENTS = 64
+"""Agents that share a sample of tasks, so that their distances are worked out together."""
+
+LARGEST_BLOCK = 1 << 20
+"""Distances that are held at a time."""
+
+MOST_PAIRS = 8_000_000
+"""Pairs of a sample that are kept."""
+
+NEAREST = 32
+"""Nearest tasks that a sample for the least energy holds besides."""
+
+
+def hours_alone(instance: Instance, agents: IntArray, tasks: IntArray, distance: FloatArray) -> FloatArray:
+    """Return when each of `agents` is done, alone with the task beside it, which is `distance` away; shape (k,)."""
+    with np.errstate(over="ignore"):
+        hours = instance.workload[tasks] / instance.ability[agents] + distance / instance.speed[agents]
+        return np.minimum(hours, sys.float_info.max)
+
+
+def bound_by_size(instance: Instance, agents: IntArray, tasks: IntArray) -> float:
+    """Return a bound on the makespan of an assignment: the least work by the least able, wherever they are."""
+    least = np.sort(instance.workload[tasks])[: len(agents)]
+    return float((least / np.sort(instance.ability[agents])).max())
+
+
+def all_pairs(
+    instance: Instance,
+    agents: IntArray,
+    tasks: IntArray,
+    latest: float,
+    time_left: Clock,
+    *,
+    by_distance: bool = False,
+) -> Pairs | None:
+    """Return for each of k agents the k best pairs with `tasks` that it does by `latest`; None if time runs out.
+
+    The best are the fastest, or the nearest. No more are needed: whoever has the choice of k tasks finds one of them
+    free, whatever the other k - 1 agents do.
+    """
+    reach, wanted = instance.reach, np.zeros(instance.m, dtype=np.bool_)
+    wanted[tasks] = True
+    k, last = len(agents), last_equal(latest)
+    first, parts = np.zeros(k + 1, dtype=np.intp), []
+    for row, agent in enumerate(agents.tolist()):
+        if time_left() <= 0:
+            return None
+        distance, mask = (table[0] for table in reach.rows(reach.origin[agent : agent + 1]))
+        task = np.flatnonzero(mask & wanted)
+        away = distance[task]
+        time = hours_alone(instance, np.full(len(task), agent), task, away)
+        keep = np.flatnonzero(time <= last)
+        if len(keep) > k:
+            key = (away if by_distance else time)[keep]
+            keep = np.sort(keep[np.argpartition(key, k - 1)[:k]])
+        parts.append((task[keep], time[keep], away[keep]))
+        first[row + 1] = first[row] + len(keep)
+    columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
+    return Pairs(first, columns[0], columns[1], columns[2])
+
+
+def sampled_pairs(
+    instance: Instance,
+    agents: IntArray,
+    tasks: IntArray,
+    known: IntArray | None,
+    evaluations: float,
+    time_left: Clock,
+    *,
+    latest: float = np.inf,
+    by_distance: bool = False,
+) -> tuple[Pairs, bool]:
+    """Return pairs of `agents` with `tasks` after about so many distances, and whether they are as good as all pairs.
+
+    Each agent looks at tasks of every size: at as many of the smallest, as of the next, which are twice as many, and
+    so on. Agents bound to a list look at all of it.
+
+    Parameters
+    ----------
+    known : ndarray of int, shape (k,), optional
+        A task of each agent, whose pair is among those returned.
+    evaluations : float
+        Distances that may be worked out.
+    latest : float
+        Hours by which a pair must be done.
+    by_distance : bool
+        Whether the nearest pairs are wanted, not the fastest.
+    """
+    found = _Found(instance, agents, latest, by_distance=by_distance)
+    origin = instance.reach.origin[agents]
+    listed = instance.reach.list_of[origin] >= 0
+    wanted = np.zeros(instance.m, dtype=np.bool_)
+    wanted[tasks] = True
+    for row in np.flatnonzero(listed).tolist():
+        choice = instance.reach.lists[instance.reach.list_of[origin[row]]]
+        found.add(np.array([row]), choice[wanted[choice]])
+    free, by_work = np.flatnonzero(~listed), tasks[np.argsort(instance.workload[tasks], kind="stable")]
+    free = free[np.argsort(instance.ability[agents[free]], kind="stable")]
+    each = int(min(len(tasks), evaluations // max(1, len(free))))
+    complete, rng = True, np.random.default_rng(0)
+    size = max(1, min(BLOCK_OF_AGENTS, LARGEST_BLOCK // max(1, each)))
+    for begin in range(0, len(free), size):
+        if time_left() <= 0:
+            complete = False
+            break
+        block = free[begin : begin + size]
+        most = min(found.last * float(instance.ability[agents[block[-1]]]), sys.float_info.max)
+        some = by_work[: np.searchsorted(instance.workload[by_work], most, side="right")]
+        if len(some) > each:
+            complete, some = False, some[_of_every_size(len(some), each, rng)]
+        found.add(block, some)
+    if by_distance and not complete and len(free):
+        _add_nearest(found, free, tasks)
+    if known is not None:
+        found.add_pairs(np.arange(len(agents)), known)
+    return found.pairs(), complete and not found.is_cut
+
+
+class _Found:
+    """Pairs found so far, block by block."""
+
+    def __init__(self, instance: Instance, agents: IntArray, latest: float, *, by_distance: bool) -> None:
+        self.instance, self.agents = instance, agents
+        self.last, self.by_distance = last_equal(latest), by_distance
+        self.most = min(len(agents), max(NEAREST, MOST_PAIRS // len(agents)))
+        self.is_cut = False
+        none, nothing = np.zeros(0, dtype=np.intp), np.zeros(0)
+        self.parts: list[tuple[IntArray, IntArray, FloatArray, FloatArray]] = [(none, none, nothing, nothing)]
+
+    def add(self, rows: IntArray, tasks: IntArray) -> None:
+        """Add the pairs of all agents at `rows` with all of `tasks`."""
+        if not len(tasks):
+            return
+        distance, mask = self.instance.reach.block(self.instance.reach.origin[self.agents[rows]], tasks)
+        row, column = np.nonzero(mask)
+        self._keep(rows[row], tasks[column], distance[mask])
+
+    def add_pairs(self, rows: IntArray, tasks: IntArray) -> None:
+        """Add the pair of the agent at each of `rows` with the task beside it, where it is within reach."""
+        reach, origin = self.instance.reach, self.instance.reach.origin[self.agents[rows]]
+        distance = reach.distances_between(origin, tasks)
+        good = reach.is_within(origin, tasks, distance)
+        self._keep(rows[good], tasks[good], distance[good])
+
+    def _keep(self, row: IntArray, task: IntArray, distance: FloatArray) -> None:
+        hours = hours_alone(self.instance, self.agents[row], task, distance)
+        keep = np.flatnonzero(hours <= self.last)
+        if np.bincount(row[keep]).max(initial=0) > self.most:
+            best = _first_of_each(row[keep], (distance if self.by_distance else hours)[keep], self.most)
+            keep, self.is_cut = keep[best], self.is_cut or self.most < len(self.agents)
+        self.parts.append((row[keep], task[keep], hours[keep], distance[keep]))
+
+    def pairs(self) -> Pairs:
+        """Return the pairs, each once, agent by agent."""
+        row, task, hours, distance = (np.concatenate(column) for column in zip(*self.parts, strict=True))
+        _, once = np.unique(row * self.instance.m + task, return_index=True)
+        first = np.searchsorted(row[once], np.arange(len(self.agents) + 1))
+        return Pairs(first, task[once], hours[once], distance[once])
+
+
+def _first_of_each(row: IntArray, key: FloatArray, most: int) -> IntArray:
+    """Return the places of the entries with the least keys of each row, at most so many a row; `row` ascends."""
+    order = np.lexsort((key, row))
+    length = np.bincount(row)
+    begin = np.cumsum(length) - length
+    kept: IntArray = order[np.arange(len(row)) - begin[row[order]] < most]
+    return kept
+
+
+def _of_every_size(count: int, each: int, rng: np.random.Generator) -> IntArray:
+    """Return about `each` of `count` places: equally many of shells that double in size, the first of all."""
+    width = max(1, each)
+    while width > 1 and width * (1 + int(np.ceil(np.log2(max(1.0, count / width))))) > each:
+        width = max(1, width * 3 // 4)
+    places, low, high = [np.arange(min(width, count))], min(width, count), min(2 * width, count)
+    while low < high:
+        step = (high - low) / width
+        places.append((low + (np.arange(width) + rng.random()) * step).astype(np.intp))
+        low, high = high, min(2 * high, count)
+    chosen: NDArray[np.intp] = np.unique(np.minimum(np.concatenate(places), count - 1))
+    return chosen
+
+
+def _add_nearest(found: _Found, rows: IntArray, tasks: IntArray) -> None:
+    """Add the pairs of each agent with the `NEAREST` tasks."""
+    from scipy.spatial import cKDTree
+
+    reach = found.instance.reach
+    tasks = tasks[~np.isnan(reach.goal[tasks, 0])]
+    place = reach.place[reach.origin[found.agents[rows]]]
+    placed = ~np.isnan(place[:, 0])
+    if len(tasks) and placed.any():
+        count = min(NEAREST, len(tasks))
+        _, near = cKDTree(reach.goal[tasks]).query(place[placed], k=count)
+        found.add_pairs(np.repeat(rows[placed], count), tasks[near.ravel()])
