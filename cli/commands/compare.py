@@ -8,8 +8,9 @@ import typer
 
 from alloc.cli import options
 from alloc.cli.options import Objective, examples
-from alloc.cli.output.console import is_terminal, note, number, percent, say, table, to_json
+from alloc.cli.output.console import is_terminal, note, say, table, to_json
 from alloc.cli.output.files import check_outputs, save
+from alloc.problems.text import number, percent
 
 if TYPE_CHECKING:
     from alloc.allocators.experiments.compare import Row

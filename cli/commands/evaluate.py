@@ -156,8 +156,9 @@ def _tasks(result: "Result") -> list[dict[str, Any]]:
 
 
 def _tell(result: "Result") -> None:
-    from alloc.cli.output.console import number, table
+    from alloc.cli.output.console import table
     from alloc.cli.output.report import figures, holdup
+    from alloc.problems.text import number
 
     score = result.evaluation
     assert score is not None

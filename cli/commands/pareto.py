@@ -8,8 +8,9 @@ import typer
 
 from alloc.cli import options
 from alloc.cli.options import examples
-from alloc.cli.output.console import is_terminal, note, number, percent, say, table, to_json
+from alloc.cli.output.console import is_terminal, note, say, table, to_json
 from alloc.cli.output.files import check_outputs, read_known, save
+from alloc.problems.text import number, percent
 
 if TYPE_CHECKING:
     from alloc.allocators import Result
@@ -57,7 +58,7 @@ def pareto_command(
     read = [("INSTANCE", instance)]
     check_outputs(("--output", output), ("--plot", plot), read=read)
     if plot is not None:
-        from alloc.allocators.plotting.style import check_plot
+        from alloc.allocators.plotting import check_plot
 
         check_plot(plot)
     problem, starts = read_known(instance, start, quiet=quiet)
@@ -74,7 +75,9 @@ def pareto_command(
     )
     then = [] if quiet else [lambda: _tell(front, with_table=not json)]
     if plot is not None:
-        then.append(lambda: _draw(front, plot))
+        from alloc.allocators.plotting import plot_front
+
+        then.append(lambda: plot_front(front, plot))
     text = cache(lambda: to_json(front.to_dict()))
     save(text, output, text if json else None, then)
     raise typer.Exit(0 if front.points and front.points[0].makespan is not None else 1)
@@ -85,12 +88,6 @@ def _tell(front: "Front", *, with_table: bool) -> None:
         say(_table(front))
     for line in dict.fromkeys(line for result in front.points for line in result.notes):
         note(line)
-
-
-def _draw(front: "Front", path: str) -> None:
-    from alloc.allocators.plotting.front import save_front
-
-    save_front(front, path)
 
 
 def _show_point(result: "Result") -> None:

@@ -71,7 +71,7 @@ def solve_command(
     read = [("INSTANCE", instance), ("--policy", policy)]
     check_outputs(("--output", output), ("--plot", plot), read=read)
     if plot is not None:
-        from alloc.allocators.plotting.style import check_plot
+        from alloc.allocators.plotting import check_plot
 
         check_plot(plot)
     problem, first, _ = read_pair(instance, start, quiet=quiet)
@@ -94,16 +94,12 @@ def solve_command(
         )
     then = [] if quiet else [lambda: _tell(result, summary=not json)]
     if plot is not None:
-        then.append(lambda: _draw(result, plot))
+        from alloc.allocators.plotting import plot as draw
+
+        then.append(lambda: draw(result, plot))
     text = cache(lambda: to_json(result.to_dict()))
     save(text, output, text if json else None, then)
     raise typer.Exit(0 if result.evaluation is not None and not result.evaluation.unserved_tasks else 1)
-
-
-def _draw(result: "Result", path: str) -> None:
-    from alloc.allocators.plotting.figure import save_plot
-
-    save_plot(result, path)
 
 
 def _tell(result: "Result", *, summary: bool) -> None:

@@ -19,8 +19,9 @@ from alloc.cli.commands.training import (
     training_parameters,
 )
 from alloc.cli.options import examples
-from alloc.cli.output.console import STANDARD, complain, counted, note, number, say
+from alloc.cli.output.console import STANDARD, complain, note, say
 from alloc.cli.output.files import check_output, check_outputs
+from alloc.problems.text import counted, number
 
 if TYPE_CHECKING:
     from alloc.allocators.learned.training.trainer import Limits, Report, Trainer

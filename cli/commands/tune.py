@@ -7,8 +7,9 @@ import typer
 
 from alloc.cli.commands.training import learner_parameters, training_parameters
 from alloc.cli.options import examples
-from alloc.cli.output.console import note, number, say
+from alloc.cli.output.console import note, say
 from alloc.cli.output.files import check_output
+from alloc.problems.text import number
 
 if TYPE_CHECKING:
     import optuna

@@ -6,7 +6,8 @@ import typer
 
 from alloc.cli import options
 from alloc.cli.options import examples
-from alloc.cli.output.console import complain, counted, number, percent, say, write_json
+from alloc.cli.output.console import complain, say, write_json
+from alloc.problems.text import counted, number, percent
 
 if TYPE_CHECKING:
     from alloc.problems import Instance

@@ -7,6 +7,8 @@ import sys
 from collections.abc import Sequence
 from typing import Any, TextIO
 
+from alloc.problems.text import one_line
+
 STANDARD = "-"
 """The name of standard input and standard output where a file is asked for."""
 
@@ -58,28 +60,6 @@ def _entry(value: Any) -> str:
         flat = json.dumps(value, separators=(",\n    ", ": "))
         return "{\n    " + flat[1:-1] + "\n  }"
     return json.dumps(value, indent=2, allow_nan=False).replace("\n", "\n  ")
-
-
-def one_line(text: str) -> str:
-    """Return `text` with line breaks and control characters turned into blanks."""
-    return " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
-
-
-def number(value: float | None, digits: int = 6) -> str:
-    """Return `value` for people; a dash where there is none."""
-    return "-" if value is None else f"{value:.{digits}g}"
-
-
-def counted(count: int, noun: str) -> str:
-    """Return a number of things: ``1 task``, ``2 tasks``."""
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
-
-
-def percent(share: float | None) -> str:
-    """Return a share of one for people; a dash where there is none."""
-    if share is None:
-        return "-"
-    return "0 %" if share < 5e-7 else f"{100 * share:.{2 if share < 0.1 else 3}g} %"
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]], *, left: int = 1) -> str:

@@ -51,7 +51,7 @@ def save(
     found: Callable[[], str],
     output: str | None,
     shown: Callable[[], str] | None = None,
-    then: Iterable[Callable[[], None]] = (),
+    then: Iterable[Callable[[], object]] = (),
 ) -> None:
     """Write what a run found to the file asked for, show it on standard output, and do the rest that was asked for.
 
@@ -91,7 +91,7 @@ def save(
         raise failure
 
 
-def _failure(step: Callable[[], None]) -> Exception | None:
+def _failure(step: Callable[[], object]) -> Exception | None:
     """Take a step, and return why it failed, None where it did not."""
     try:
         step()

@@ -8,7 +8,8 @@ import time
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from alloc.cli.output.console import counted, flush, is_terminal, number, percent
+from alloc.cli.output.console import flush, is_terminal
+from alloc.problems.text import counted, number, percent
 
 if TYPE_CHECKING:
     from alloc.allocators import Improvement

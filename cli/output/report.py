@@ -4,8 +4,8 @@ import math
 
 from alloc.allocators import Result, Status, StopReason
 from alloc.allocators.explain import Bottleneck, explain
-from alloc.cli.output.console import counted, number, percent
 from alloc.problems import Instance, Objective
+from alloc.problems.text import counted, number, percent
 
 STOPS = {
     StopReason.PROVEN: "nothing better exists",
