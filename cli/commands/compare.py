@@ -19,7 +19,7 @@ EXAMPLES = examples(
     "alloc compare demo.json --methods greedy,ga,cpsat",
     "alloc compare instances/*.json --methods ga,gappo --seeds 5 --time-limit 3 --csv table.csv",
     "alloc compare demo.json --methods milp,gappo --objective makespan-energy --seeds 7,8,9 --json",
-    closing="A method that refuses an instance has a row with the reason. Ctrl-C prints what is finished, with exit "
+    closing="A method that refuses an instance has a row with the reason. Ctrl-C prints the finished rows, with exit "
     "code 1.",
 )
 
@@ -30,7 +30,7 @@ def register(app: typer.Typer) -> None:
 
 
 def compare_command(
-    instances: Annotated[list[str], typer.Argument(metavar="INSTANCE...", help=f"Instances, each {options.READABLE}.")],
+    instances: options.InstancesArgument,
     methods: Annotated[
         str,
         typer.Option(
@@ -110,7 +110,7 @@ def _seeds(text: str) -> list[int]:
 
 
 def _show_done(row: "Row", count: int, total: int) -> None:
-    """On a terminal, tell each row as it comes; the table follows at the end."""
+    """On a terminal, print each row as soon as it is known; the table follows at the end."""
     if is_terminal(sys.stderr):
         outcome = row.reason or f"T {number(row.makespan_mean)} h, gap {percent(row.gap_mean)}"
         say(f"[{count}/{total}] {row.instance}, {row.method}: {outcome}")
@@ -154,7 +154,7 @@ def _cells(row: "Row") -> list[str]:
 
 
 def _csv(rows: "list[Row]") -> str:
-    """One line per row under the names of its fields; empty where there is no value."""
+    """Return a header with the names of the fields, and a line per row; None is empty."""
     import csv
     import io
     from dataclasses import fields
