@@ -123,8 +123,9 @@ def _is_close(one: object, other: float | None) -> bool:
 
 
 def _number(value: object) -> float | None:
-    is_number = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
-    return float(value) if is_number else None
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= sys.float_info.max:
+        return None
+    return float(value)
 
 
 def _bounded(result: "Result", claims: dict[str, object]) -> "Result":

@@ -1,6 +1,7 @@
 """``alloc pareto``."""
 
 import sys
+from collections.abc import Callable
 from functools import cache
 from typing import TYPE_CHECKING, Annotated
 
@@ -71,7 +72,7 @@ def pareto_command(
         threads=threads,
         on_point=None if quiet else _show_point,
     )
-    then = [] if quiet else [lambda: _tell(front, with_table=not json)]
+    then: list[Callable[[], object]] = [] if quiet else [lambda: _tell(front, with_table=not json)]
     if plot is not None:
         from alloc.allocators.plotting import plot_front
 

@@ -1,7 +1,8 @@
 """``alloc solve``."""
 
+from collections.abc import Callable
 from functools import cache
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -100,7 +101,7 @@ def solve_command(
     raise typer.Exit(0 if result.evaluation is not None and not result.evaluation.unserved_tasks else 1)
 
 
-def _settings(settings: list[str] | None) -> dict[str, object]:
+def _settings(settings: list[str] | None) -> dict[str, Any]:
     """Return the parameters of the method; what has an option of its own is none of them."""
     from inspect import signature
 
@@ -115,7 +116,7 @@ def _settings(settings: list[str] | None) -> dict[str, object]:
 
 def _save(result: "Result", output: str | None, plot: str | None, *, json: bool, quiet: bool) -> None:
     """Write, print and draw the result, as asked for."""
-    then = [] if quiet else [lambda: _tell(result, summary=not json)]
+    then: list[Callable[[], object]] = [] if quiet else [lambda: _tell(result, summary=not json)]
     if plot is not None:
         from alloc.allocators import plotting
 
