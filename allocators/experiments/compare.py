@@ -2,21 +2,22 @@
 
 import logging
 import threading
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from alloc.allocators.contract.base import Allocator, RefusedError
+from alloc.allocators.contract.base import Allocator
 from alloc.allocators.contract.budget import Budget, StopReason
 from alloc.allocators.contract.tolerance import relative_gap
 from alloc.allocators.registry import load
+from alloc.allocators.request import checked_seed, checked_threads
 from alloc.allocators.result import Result
-from alloc.allocators.solve import LARGEST_SEED, MOST_THREADS, solve
-from alloc.problems import InputError, Instance, Objective
-from alloc.problems.arguments import choice, event, listed, of_type, text, whole
+from alloc.allocators.solve import solve
+from alloc.problems import InputError, Instance, Objective, RefusedError
+from alloc.problems.arguments import choice, event, listed, of_type
 
 LOG = logging.getLogger("alloc.compare")
 
@@ -79,9 +80,13 @@ class Row:
         return {name: value for name, value in asdict(self).items() if name != "makespans"}
 
 
+Methods = Sequence[str | Allocator] | Mapping[str, str | Allocator]
+"""Names of methods and allocators; where a mapping, with the name that each has in the rows."""
+
+
 def compare(
     instances: Iterable[Instance],
-    methods: Sequence[str],
+    methods: Methods,
     seeds: Sequence[int] = (0,),
     *,
     objective: Objective | str = Objective.MAKESPAN,
@@ -96,8 +101,9 @@ def compare(
     Parameters
     ----------
     instances : iterable of Instance
-    methods : sequence of str
-        Names; each method is loaded once.
+    methods : sequence or dict
+        Names, each of which is loaded once, and allocators with their own parameters. The keys of a dict name the
+        methods in the rows: ``{"small": GeneticAlgorithm(population=20), "large": GeneticAlgorithm(population=200)}``.
     seeds : sequence of int
     objective, time_limit_s, iterations, target_gap, threads
         As in `solve`; the budget is that of each single run.
@@ -115,8 +121,8 @@ def compare(
     InputError
         If an argument is not what it should be; its place is the parameter.
     """
-    names = [text(name, "methods") for name in listed(methods, "methods", "names of methods")]
-    numbers = [whole(seed, "seeds", 0, LARGEST_SEED) for seed in listed(seeds, "seeds", "whole numbers")]
+    loaded = _labelled(methods)
+    numbers = [checked_seed(seed, "seeds") for seed in listed(seeds, "seeds", "whole numbers")]
     problems = instances if isinstance(instances, Iterator) else listed(instances, "instances", "instances")
     Budget(time_limit_s, iterations, target_gap)
     stop = event(stop, "stop") or threading.Event()
@@ -126,24 +132,35 @@ def compare(
         time_limit_s=time_limit_s,
         iterations=iterations,
         target_gap=target_gap,
-        threads=None if threads is None else whole(threads, "threads", 1, MOST_THREADS),
+        threads=checked_threads(threads),
         stop=stop,
         handle_signals=False,
     )
-    return _rows(run, problems, names, numbers, stop)
+    return _rows(run, problems, loaded, numbers, stop)
+
+
+def _labelled(methods: Methods) -> dict[str, str | Allocator]:
+    """Return the methods by the name that they have in the rows."""
+    if isinstance(methods, Mapping):
+        return {str(label): of_type(method, (str, Allocator), "methods") for label, method in methods.items()}
+    given = [of_type(method, (str, Allocator), "methods") for method in listed(methods, "methods", "methods")]
+    labelled = {method if isinstance(method, str) else method.method.name: method for method in given}
+    if len(labelled) < len({id(method) if isinstance(method, Allocator) else method for method in given}):
+        raise InputError("has several allocators of one method; give a dict with a name for each", "methods")
+    return labelled
 
 
 def _rows(
     run: Callable[..., Result],
     instances: Iterable[Instance],
-    methods: Sequence[str],
+    methods: Mapping[str, str | Allocator],
     seeds: Sequence[int],
     stop: threading.Event,
 ) -> Iterator[Row]:
-    loaded = {name: _load(name) for name in methods}
+    loaded = {label: _load(method) if isinstance(method, str) else method for label, method in methods.items()}
     for number, instance in enumerate(instances, 1):
         of_type(instance, Instance, "instances")
-        for name, method in loaded.items():
+        for label, method in loaded.items():
             results: list[Result] = []
             reason = ""
             if isinstance(method, Exception):
@@ -151,7 +168,7 @@ def _rows(
             else:
                 results, reason = _run_seeds(partial(run, instance, method), seeds)
             if reason or results:
-                yield replace(summarise(instance, name, results, reason), number=number)
+                yield replace(summarise(instance, label, results, reason), number=number)
             if stop.is_set():
                 return
 

@@ -168,8 +168,8 @@ def _tasks(result: "Result") -> list[TaskScore]:
 
 
 def _tell(result: "Result") -> None:
+    from alloc.allocators.summary import bottleneck_lines, figures
     from alloc.cli.output.console import table
-    from alloc.cli.output.report import figures, holdup
     from alloc.problems.text import number
 
     score = result.evaluation
@@ -186,7 +186,7 @@ def _tell(result: "Result") -> None:
         for entry in _tasks(result)
     ]
     say(table(["task", "workload", "agents", "ability W", "W - h", "done at (h)"], rows))
-    say("\n".join(["", f"{result.instance.name}:", *figures(result), *holdup(result)]))
+    say("\n".join(["", f"{result.instance.name}:", *figures(result), *bottleneck_lines(result)]))
     for violation in score.violations:
         agent, task = result.instance.agent_ids[violation.agent], result.instance.task_ids[violation.task]
         say(f"Violation: agent {agent} cannot take task {task}: {violation.reason}.")

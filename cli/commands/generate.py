@@ -140,7 +140,9 @@ def _instance(family: Family, wanted: dict[str, Any], seed: int) -> "Instance":
         return _covering(seed=seed, **wanted)
     if family is not Family.RANDOM:
         return paper(int(family.removeprefix("paper-")), seed)
-    values: dict[str, Any] = {name: _spread(value, name) if name in SPREADS else value for name, value in wanted.items()}
+    values: dict[str, Any] = {
+        name: _spread(value, name) if name in SPREADS else value for name, value in wanted.items()
+    }
     return random_instance(Parameters(**values), seed)
 
 

@@ -127,9 +127,7 @@ def _save(result: "Result", output: str | None, plot: str | None, *, json: bool,
 
 def _tell(result: "Result", *, summary: bool) -> None:
     if summary:
-        from alloc.cli.output.report import summary as words
-
-        say(words(result))
+        say(str(result))
     for line in result.notes:
         note(line)
     if result.evaluation is not None and result.evaluation.reward_saturated:
