@@ -108,11 +108,12 @@ def _scored(problem: "Instance", allocation: "Allocation") -> "Result":
 
 def _is_of(result: "Result", claims: dict[str, object]) -> bool:
     """Return whether the fields `claims` of a result file fit `result`: the same agents and the same scores."""
-    found = result.to_dict()
+    found, assignment = result.to_dict(), claims.get("assignment")
     same = ("makespan", "energy", "distance", "battery_remaining_percent", "reward")
     return (
         claims.get("instance") == found["instance"]
-        and claims["assignment"].keys() == found["assignment"].keys()
+        and isinstance(assignment, dict)
+        and assignment.keys() == found["assignment"].keys()
         and all(_is_close(claims.get(name), found[name]) for name in same)
     )
 

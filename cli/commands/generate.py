@@ -140,10 +140,8 @@ def _instance(family: Family, wanted: dict[str, Any], seed: int) -> "Instance":
         return _covering(seed=seed, **wanted)
     if family is not Family.RANDOM:
         return paper(int(family.removeprefix("paper-")), seed)
-    values: dict[str, Any] = {
-        name: _spread(value, name) if name in SPREADS else value for name, value in wanted.items()
-    }
-    return random_instance(Parameters(**values), seed)
+    spreads: dict[str, Any] = {name: _spread(value, name) for name, value in wanted.items() if name in SPREADS}
+    return random_instance(Parameters(**{**wanted, **spreads}), seed)
 
 
 def _covering(
