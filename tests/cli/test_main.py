@@ -256,7 +256,12 @@ def instance_of(agent: bytes, task: bytes = b'"workload": 1') -> bytes:
 def test_malformed_files_are_one_line_with_the_file(alloc, tmp_path, command, content):
     """A malformed instance gives exit code 2 and one line that names the file, whatever the command."""
     Path("bad.json").write_bytes(content)
-    more = {"convert": ["out.npz"], "evaluate": ["x.json"], "compare": ["--methods", "greedy"]}.get(command, ["--json"])
+    more = {
+        "convert": ["out.npz"],
+        "evaluate": ["x.json"],
+        "plot": ["x.json", "--output", "p.png"],
+        "compare": ["--methods", "greedy"],
+    }.get(command, ["--json"])
     ran = alloc(command, "bad.json", *more)
     assert (ran.code, ran.out) == (2, "")
     assert ran.err.startswith("alloc: bad.json: ")
