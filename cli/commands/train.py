@@ -4,25 +4,27 @@ import signal
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from types import FrameType
+from typing import TYPE_CHECKING
 
 import typer
 
+from alloc.cli.commands import train_options as options
+from alloc.cli.commands.train_options import Engine, Reward, Turn
 from alloc.cli.commands.training import (
-    check_free,
-    check_suffix,
+    TrainingFiles,
     learner_parameters,
     new_trainer,
     read_instances,
     training_parameters,
 )
-from alloc.cli.options import examples
-from alloc.cli.output.console import STANDARD, complain, counted, note, number, say
-from alloc.cli.output.files import check_output, check_outputs
+from alloc.cli.options import SeedOption, examples
+from alloc.cli.output.console import complain, note, say
+from alloc.problems.text import counted, number
 
 if TYPE_CHECKING:
+    import alloc.allocators.parallel.engine as engines
     from alloc.allocators.learned.training.trainer import Limits, Report, Trainer
 
 EXAMPLES = examples(
@@ -30,34 +32,10 @@ EXAMPLES = examples(
     "alloc train gappo --output policy.safetensors --steps 2000000 --resume",
     "alloc train ppo --output mine.safetensors --instances my-instances --init policy.safetensors --minutes 10",
     "alloc solve demo.json --method gappo --policy policy.safetensors",
-    closing="Ctrl-C ends the training; what the last whole generation brought is stored, and --resume goes on from it "
-    "to the same curve, also after a crash. With --steps or --iterations the same seed trains the same policy, on any "
-    "engine; with --minutes alone the schedules follow the clock.",
+    closing="Ctrl-C ends the training; the last complete generation is stored, and --resume continues from it to the "
+    "same curve, also after a crash. With --steps or --iterations the same seed trains the same policy, on any engine; "
+    "with --minutes alone the schedules follow the clock.",
 )
-
-STEPS = 500_000
-
-
-class Turn(StrEnum):
-    """As `alloc.problems.game.Turn`, without torch; a test compares the two."""
-
-    BIDDING = "bidding"
-    SIMULTANEOUS = "simultaneous"
-
-
-class Reward(StrEnum):
-    """As `alloc.problems.game.Reward`."""
-
-    MAKESPAN = "makespan"
-    COVERAGE = "coverage"
-
-
-class Engine(StrEnum):
-    """As `alloc.allocators.parallel.engine.ENGINES`."""
-
-    SERIAL = "serial"
-    PROCESSES = "processes"
-    RAY = "ray"
 
 
 def register(app: typer.Typer) -> None:
@@ -66,152 +44,87 @@ def register(app: typer.Typer) -> None:
 
 
 def train_command(
-    method: Annotated[str, typer.Argument(metavar="METHOD", help="What to train: gappo, ppo, a2c, dqn or ddpg.")],
-    output: Annotated[str, typer.Option(metavar="FILE", help="Policy file to write: the best networks up to now.")],
-    steps: Annotated[
-        int | None,
-        typer.Option(
-            min=1,
-            help="Decisions of agents, those of the whole population and before --resume included.",
-            show_default=f"{STEPS}; none where --minutes or --iterations is given",
-        ),
-    ] = None,
-    minutes: Annotated[
-        float | None, typer.Option(min=0, help="Minutes of training, those before --resume included.")
-    ] = None,
-    iterations: Annotated[int | None, typer.Option(min=0, help="Generations, those before --resume included.")] = None,
-    patience: Annotated[
-        int | None, typer.Option(min=1, help="Stop after so many generations without better networks.")
-    ] = None,
-    family: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME",
-            help="Instances to train on: mixed, paper (small ones like the paper's), elsewhere, real, heavy-tailed, "
-            "clustered, depots, short-range, travel, battery, priority, unbalanced or varied; may be repeated.",
-            show_default="mixed",
-        ),
-    ] = None,
-    instances: Annotated[
-        str | None,
-        typer.Option(
-            metavar="FILE|DIR",
-            help="Train on these instances instead; with five or more, a fifth of them, drawn at random, "
-            "judges the networks and is not trained on.",
-        ),
-    ] = None,
-    init: Annotated[
-        str | None, typer.Option(metavar="POLICY", help="Start from the networks of this policy file.")
-    ] = None,
-    population: Annotated[
-        int | None, typer.Option(min=1, help="Networks that are trained and bred; for gappo only.", show_default="4")
-    ] = None,
-    lesson: Annotated[
-        int, typer.Option(min=1, help="Decisions of agents between two generations, for each network.")
-    ] = 20_000,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="NAME=VALUE",
-            help="A hyperparameter of the method, such as clip=0.1; may be repeated. A name that the method does not "
-            "have, such as in help=, is answered by all that it has, and their defaults.",
-        ),
-    ] = None,
-    turn: Annotated[Turn, typer.Option(help="Who moves: the best bids, or all agents at once.")] = Turn.BIDDING,
-    reward: Annotated[Reward, typer.Option(help="Makespan, or the paper's coverage (3).")] = Reward.MAKESPAN,
-    seed: Annotated[int, typer.Option(min=0, max=2**63 - 1, help="Source of all randomness.")] = 0,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint.")] = False,
-    checkpoint: Annotated[
-        str | None,
-        typer.Option(metavar="FILE", help="The whole run, for --resume.", show_default="OUTPUT with .checkpoint"),
-    ] = None,
-    log: Annotated[
-        str | None,
-        typer.Option(metavar="FILE", help="A CSV line for each generation.", show_default="OUTPUT with .csv"),
-    ] = None,
-    tensorboard: Annotated[
-        str | None, typer.Option(metavar="DIR", help="Also write event files for TensorBoard there.")
-    ] = None,
-    engine: Annotated[Engine, typer.Option(help="Where the networks of the population learn.")] = Engine.SERIAL,
-    workers: Annotated[
-        int | None,
-        typer.Option(min=1, max=1024, help="For --engine processes.", show_default="all processors"),
-    ] = None,
-    address: Annotated[
-        str | None,
-        typer.Option(
-            help="For --engine ray: head of the cluster.", show_default="RAY_ADDRESS, else the cluster on this machine"
-        ),
-    ] = None,
-    threads: Annotated[
-        int,
-        typer.Option(min=1, max=1024, help="Threads of torch; the tensors are small, and more than one rarely pays."),
-    ] = 1,
+    method: options.MethodArgument,
+    output: options.OutputOption,
+    steps: options.StepsOption = None,
+    minutes: options.MinutesOption = None,
+    iterations: options.GenerationsOption = None,
+    patience: options.PatienceOption = None,
+    family: options.FamilyOption = None,
+    instances: options.TrainingInstancesOption = None,
+    init: options.InitOption = None,
+    population: options.PopulationOption = None,
+    generation_steps: options.GenerationStepsOption = 20_000,
+    lesson: options.FormerGenerationStepsOption = None,
+    settings: options.HyperparametersOption = None,
+    turn: options.TurnOption = Turn.BIDDING,
+    reward: options.RewardOption = Reward.MAKESPAN,
+    seed: SeedOption = 0,
+    resume: options.ResumeOption = False,
+    checkpoint: options.CheckpointOption = None,
+    log: options.LogOption = None,
+    tensorboard: options.TensorBoardOption = None,
+    engine: options.EngineOption = Engine.SERIAL,
+    workers: options.WorkersOption = None,
+    address: options.AddressOption = None,
+    threads: options.TorchThreadsOption = 1,
 ) -> None:
     """Train a learned method, with a checkpoint after each generation."""
-    check_output(output)
-    kept = checkpoint or str(Path(output).with_suffix(".checkpoint"))
-    lines = log or str(Path(output).with_suffix(".csv"))
-    check_outputs(("--output", output), ("--checkpoint", kept), ("--log", lines), read=[("--init", init)])
-    if STANDARD in (output, kept, lines):
-        raise typer.BadParameter("policy, checkpoint and log must be files", param_hint="'--output'")
-    # from cheap to dear: nobody need wait for torch to be told of a mistake that can be seen without it
-    families = family or ["mixed"]
-    learner = learner_parameters(method, families, settings or [])
-    if population is not None and method != "gappo":
-        raise typer.BadParameter(f"{method} trains one network; gappo breeds several", param_hint="'--population'")
-    from alloc.allocators.parallel.engine import EngineError, check_engine, make_engine
+    files = TrainingFiles.of(output, checkpoint, log, tensorboard, read=init)
+    # checks that need no torch come first, so that mistakes are reported without loading it
+    learner = learner_parameters(method, family or ["mixed"], settings or [], population)
+    from alloc.allocators.parallel.engine import check_engine, make_engine
 
     check_engine(engine.value, workers, address)
     problems = None if instances is None else read_instances(instances)
-    if init is not None:
-        from alloc.allocators.learned.files.policy_header import read_header
-
-        read_header(init)
-    policy, run = Path(output), Path(kept)
-    check_free(policy, run, Path(lines), resume=resume)
-    check_suffix(policy)
-    from alloc.allocators.learned.training.log import summary_writer
-    from alloc.allocators.learned.training.trainer import Limits, train
-
-    if tensorboard is not None:
-        summary_writer()  # a writer of its own would hide what is in the folder
+    files.check(init, resume=resume)
     parameters = training_parameters(
         method,
         learner,
-        families=families,
-        lesson=lesson,
+        families=family or ["mixed"],
+        generation_steps=lesson or generation_steps,
         population=population,
         turn=turn.value,
         reward=reward.value,
         init=init,
     )
-    trainer = new_trainer(parameters, seed, problems, init, run if resume else None)
-    if steps is None and minutes is None and iterations is None:
-        steps = STEPS
-    limits = Limits(steps, iterations, minutes, patience)
+    trainer = new_trainer(parameters, seed, problems, init, files.checkpoint if resume else None)
     with make_engine(engine.value, workers, address, threads) as where:
-        try:
-            with _interrupts():
-                train(
-                    trainer,
-                    policy,
-                    checkpoint=run,
-                    log=Path(lines),
-                    limits=limits,
-                    tensorboard=None if tensorboard is None else Path(tensorboard),
-                    engine=where,
-                    on_report=lambda report: _tell(report, trainer, limits),
-                )
-        except KeyboardInterrupt:
-            note(f"interrupted; {kept} holds {counted(trainer.generation, 'generation')}")
-        except EngineError as error:
-            complain(
-                f"{error}; {kept} holds {counted(trainer.generation, 'generation')}, and --resume goes on from them"
+        _train(trainer, files, _limits(steps, iterations, minutes, patience), where)
+    _close(trainer, files.policy)
+
+
+def _limits(steps: int | None, iterations: int | None, minutes: float | None, patience: int | None) -> "Limits":
+    from alloc.allocators.learned.training.trainer import Limits
+
+    if steps is None and minutes is None and iterations is None:
+        steps = options.STEPS
+    return Limits(steps, iterations, minutes, patience)
+
+
+def _train(trainer: "Trainer", files: TrainingFiles, limits: "Limits", engine: "engines.Engine") -> None:
+    """Train until a limit, an interrupt or a failure of the engine; say what is stored in the last two cases."""
+    from alloc.allocators.learned.training.trainer import train
+    from alloc.allocators.parallel.engine import EngineError
+
+    try:
+        with _interrupts():
+            train(
+                trainer,
+                files.policy,
+                checkpoint=files.checkpoint,
+                log=files.log,
+                limits=limits,
+                tensorboard=files.tensorboard,
+                engine=engine,
+                on_report=lambda report: _tell(report, trainer, limits),
             )
-            raise typer.Exit(1) from None
-    _close(trainer, policy)
+    except KeyboardInterrupt:
+        note(f"interrupted; {files.checkpoint} holds {counted(trainer.generation, 'generation')}")
+    except EngineError as error:
+        stored = f"{files.checkpoint} holds {counted(trainer.generation, 'generation')}"
+        complain(f"{error}; {stored}, and --resume continues from there")
+        raise typer.Exit(1) from None
 
 
 def _close(trainer: "Trainer", policy: Path) -> None:
@@ -227,9 +140,9 @@ def _close(trainer: "Trainer", policy: Path) -> None:
 
 @contextmanager
 def _interrupts() -> Iterator[None]:
-    """Let SIGTERM do what Ctrl-C does: what is on disk is whole at any moment, so that neither has to wait."""
+    """Treat SIGTERM as Ctrl-C: files are complete at any moment, so neither has to wait."""
 
-    def interrupt(*_: Any) -> None:
+    def interrupt(_number: int, _frame: FrameType | None) -> None:
         raise KeyboardInterrupt
 
     if threading.current_thread() is not threading.main_thread():
