@@ -262,8 +262,7 @@ def _class(name: str) -> type[Allocator]:
     if name not in BUILT_IN:
         return _plugin_class(name)
     module, _, attribute = TARGETS[name].partition(":")
-    kind = getattr(importlib.import_module(module), attribute)
-    assert issubclass(kind, Allocator)
+    kind: type[Allocator] = getattr(importlib.import_module(module), attribute)
     return kind
 
 

@@ -77,7 +77,7 @@ def result_fields(document: Mapping[str, Any], instance: Instance) -> ResultFiel
         If a field is missing or wrong, an id is unknown, or the scores are not those on this instance.
     """
     of_type(instance, Instance, "instance")
-    fields = dict(of_type(document, Mapping, "document"))  # type: ignore[type-abstract]
+    fields = dict(of_type(document, Mapping, "document"))
     require_format(fields.get("format"), (RESULT_FORMAT,))
     status = choice(Status, fields.get("status"), "status")
     allocation = evaluation = None

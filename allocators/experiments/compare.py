@@ -1,4 +1,4 @@
-"""Several methods on several instances and seeds: one row for each method and instance."""
+"""Several methods on several instances and seeds: one row per method and instance."""
 
 import logging
 import threading
@@ -24,13 +24,13 @@ LOG = logging.getLogger("alloc.compare")
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """How one method did on one instance, over all seeds.
+    """The figures of one method on one instance, over all seeds.
 
     Attributes
     ----------
     instance, method : str
     picked : str
-        What ran, where the method is ``auto``.
+        The method that ran, where it is ``auto``.
     agents, tasks : int
     runs : int
         Runs that the figures are taken over; 0 for a refusal.
@@ -47,11 +47,11 @@ class Row:
     energy_mean, energy_worst : float or None
     runtime_mean_s, runtime_worst_s : float or None
     reason : str
-        Why there are no figures: what the method refuses, what is missing, or how it failed.
+        Why there are no figures: what the method refuses, which package is not installed, or how it failed.
     number : int
-        Which of the instances, from 1, as names may repeat.
+        Number of the instance, from 1, as names may repeat.
     makespans : tuple of float
-        Of each run, where all served all tasks; not in `to_dict`.
+        Of each run that served all tasks; not in `to_dict`.
     """
 
     instance: str
@@ -76,7 +76,12 @@ class Row:
     makespans: tuple[float, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the fields by name."""
+        """Return the fields by name, ready for JSON.
+
+        Returns
+        -------
+        dict
+        """
         return {name: value for name, value in asdict(self).items() if name != "makespans"}
 
 
@@ -142,12 +147,18 @@ def compare(
 def _labelled(methods: Methods) -> dict[str, str | Allocator]:
     """Return the methods by the name that they have in the rows."""
     if isinstance(methods, Mapping):
-        return {str(label): of_type(method, (str, Allocator), "methods") for label, method in methods.items()}
-    given = [of_type(method, (str, Allocator), "methods") for method in listed(methods, "methods", "methods")]
+        return {str(label): _method(method) for label, method in methods.items()}
+    given = [_method(method) for method in listed(methods, "methods", "methods")]
     labelled = {method if isinstance(method, str) else method.method.name: method for method in given}
-    if len(labelled) < len({id(method) if isinstance(method, Allocator) else method for method in given}):
+    if len(labelled) < len({method if isinstance(method, str) else id(method) for method in given}):
         raise InputError("has several allocators of one method; give a dict with a name for each", "methods")
     return labelled
+
+
+def _method(given: object) -> str | Allocator:
+    of_type(given, (str, Allocator), "methods")
+    assert isinstance(given, str | Allocator)
+    return given
 
 
 def _rows(
@@ -181,7 +192,7 @@ def _run_seeds(run: Callable[..., Result], seeds: Sequence[int]) -> tuple[list[R
             result = run(seed=seed)
         except RefusedError as error:
             return [], str(error)
-        except Exception as error:  # one faulty plugin must not cost the figures of all others
+        except Exception as error:  # the figures of the other methods do not depend on a faulty plugin
             LOG.warning("a run failed with seed %s", seed, exc_info=error)
             return [], f"failed with seed {seed}: {type(error).__name__}: {error}"
         if result.stop_reason is StopReason.INTERRUPTED:
@@ -231,6 +242,14 @@ def share_bounds(rows: Sequence[Row]) -> list[Row]:
     """Return the rows with all gaps against the best bound that any method proved on the instance.
 
     A bound holds for every method; against its own, a method that proves little would look worse than it is.
+
+    Parameters
+    ----------
+    rows : sequence of Row
+
+    Returns
+    -------
+    list of Row
     """
     best: dict[int, float] = {}
     for row in rows:
@@ -245,19 +264,19 @@ def _against(row: Row, bound: float) -> Row:
 
 
 def _load(name: str) -> str | Allocator | Exception:
-    """Load once; `auto` stays a name, and what cannot be loaded says so in its rows."""
+    """Load a method once; `auto` stays a name, and an error goes into the rows."""
     if name == "auto":
         return name
     try:
         return load(name)
     except InputError as error:
         return error
-    except Exception as error:  # a faulty plugin again
+    except Exception as error:  # as above
         LOG.warning("method %r cannot be loaded", name, exc_info=error)
         return ImportError(f"cannot be loaded: {type(error).__name__}: {error}")
 
 
 def _mean_and_worst(values: Sequence[float | None]) -> tuple[float | None, float | None]:
-    """None where one of the values is missing: a mean over the others alone would flatter."""
+    """Return mean and maximum; None where a value is missing, as a mean over the others alone would be too good."""
     known = [value for value in values if value is not None]
     return (float(np.mean(known)), max(known)) if len(known) == len(values) else (None, None)
