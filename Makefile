@@ -15,9 +15,10 @@ solve: $(VENV)/.installed  ## allocate the agents of a real instance with GAPPO,
 test: $(VENV)/.tested  ## run the tests
 	$(BIN)/python -m pytest
 
-check: $(VENV)/.checked  ## lint, format and types
+check: $(VENV)/.checked  ## lint, format, imports and types
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/lint-imports
 	$(BIN)/mypy
 
 format: $(VENV)/.checked  ## put the code into shape

@@ -1,29 +1,100 @@
-"""Methods that allocate, behind one contract; `solve` runs and scores any of them."""
+"""Methods that allocate, behind one contract; `solve` runs and scores any of them.
 
-from alloc.allocators.contract.base import Allocator, Proposal, RefusedError
+The classes of the methods, `plot` and `train` are imported on first use, as they take large libraries.
+"""
+
+import importlib
+from typing import TYPE_CHECKING
+
+from alloc.allocators.contract.base import Allocator, Proposal
 from alloc.allocators.contract.budget import Budget, StopReason
+from alloc.allocators.contract.improvement import Improvement, TracePoint
 from alloc.allocators.contract.method import Kind, Method
-from alloc.allocators.contract.search import Improvement, Search
+from alloc.allocators.contract.search import Search
+from alloc.allocators.contract.status import Status
 from alloc.allocators.contract.tolerance import MakespanTolerance
-from alloc.allocators.registry import describe, load, names
-from alloc.allocators.result import Result, Status
+from alloc.allocators.experiments.compare import Row, compare
+from alloc.allocators.explain import Bottleneck, explain
+from alloc.allocators.pareto import Front, pareto
+from alloc.allocators.registry import TARGETS, describe, load, method_parameters, names
+from alloc.allocators.result import Result, read_result
 from alloc.allocators.solve import solve
+from alloc.problems import AllocError, InputError, MissingPackageError, RefusedError, TrainingError
+
+if TYPE_CHECKING:
+    from alloc.allocators.exact.cpsat import CpSat
+    from alloc.allocators.exact.milp import Milp
+    from alloc.allocators.heuristic.decentralised.auction import Auction
+    from alloc.allocators.heuristic.decentralised.hedonic import Hedonic
+    from alloc.allocators.heuristic.genetic.algorithm import GeneticAlgorithm
+    from alloc.allocators.heuristic.greedy.list_schedule import Greedy
+    from alloc.allocators.heuristic.local_search.allocator import LocalSearch
+    from alloc.allocators.heuristic.lp_rounding.allocator import LpRound
+    from alloc.allocators.learned.policy import A2c, Ddpg, Dqn, Gappo, GappoLs, Ppo
+    from alloc.allocators.learned.training import train
+    from alloc.allocators.plotting import plot
 
 __all__ = [
+    "A2c",
+    "AllocError",
     "Allocator",
+    "Auction",
+    "Bottleneck",
     "Budget",
+    "CpSat",
+    "Ddpg",
+    "Dqn",
+    "Front",
+    "Gappo",
+    "GappoLs",
+    "GeneticAlgorithm",
+    "Greedy",
+    "Hedonic",
     "Improvement",
+    "InputError",
     "Kind",
+    "LocalSearch",
+    "LpRound",
     "MakespanTolerance",
     "Method",
+    "Milp",
+    "MissingPackageError",
+    "Ppo",
     "Proposal",
     "RefusedError",
     "Result",
+    "Row",
     "Search",
     "Status",
     "StopReason",
+    "TracePoint",
+    "TrainingError",
+    "compare",
     "describe",
+    "explain",
     "load",
+    "method_parameters",
     "names",
+    "pareto",
+    "plot",
+    "read_result",
     "solve",
+    "train",
 ]
+
+_LAZY = {
+    **{target.partition(":")[2]: target.partition(":")[0] for target in TARGETS.values()},
+    "plot": "alloc.allocators.plotting",
+    "train": "alloc.allocators.learned.training",
+}
+"""Module of each public name that is imported on first use."""
+
+
+def __getattr__(name: str) -> object:
+    if name not in _LAZY:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(_LAZY[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -1,4 +1,4 @@
-"""The front of makespan against energy: how much energy each hour saved costs."""
+"""The Pareto front of makespan and energy: how much energy each hour saved costs."""
 
 import math
 import sys
@@ -15,21 +15,22 @@ from alloc.allocators.contract.base import Allocator
 from alloc.allocators.contract.budget import Budget
 from alloc.allocators.contract.tolerance import PROVEN
 from alloc.allocators.registry import load
+from alloc.allocators.request import as_allocation
 from alloc.allocators.result import Result
 from alloc.allocators.runtime.interrupts import signals_set
-from alloc.allocators.solve import as_allocation, solve
+from alloc.allocators.solve import solve
 from alloc.problems import Allocation, Evaluation, Instance, Objective, evaluate
 from alloc.problems.arguments import event, flag, function, listed, of_type, whole
 
 PARETO_FORMAT = "alloc-pareto/1"
 
 CLOSE = 1e-3
-"""Ratio of two makespans below which nothing is looked for between them."""
+"""Relative difference of two makespans up to which there is no run between them."""
 
 
 @dataclass(frozen=True, eq=False)
 class Front:
-    """Allocations of which none is both faster and cheaper than another, the fastest first.
+    """Allocations that do not dominate each other in makespan and energy, the fastest first.
 
     Attributes
     ----------
@@ -37,7 +38,7 @@ class Front:
     points : tuple of Result
         Each the least energy found within its `makespan_limit`, with the bound on it; at least one.
     complete : bool
-        Whether every run came to its end, none was interrupted.
+        Whether no run was interrupted.
     """
 
     instance: Instance
@@ -45,7 +46,12 @@ class Front:
     complete: bool
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the fields of the format `alloc-pareto/1`."""
+        """Return the fields of the format `alloc-pareto/1`, ready for JSON.
+
+        Returns
+        -------
+        dict
+        """
         return {
             "format": PARETO_FORMAT,
             "instance": self.instance.name,
@@ -76,13 +82,15 @@ def pareto(
     on_point: Callable[[Result], None] | None = None,
     stop: threading.Event | None = None,
     handle_signals: bool = True,
+    parameters: object = None,
+    **settings: object,
 ) -> Front:
     """Trace the front of makespan against energy.
 
-    The fastest allocation comes first, then the one with the least energy of all; then, again and again, the least
-    energy at a makespan between the two neighbours that leave the largest area open (the epsilon-constraint method of
-    Haimes, Lasdon and Wismer 1971, doi:10.1109/TSMC.1971.4308298, on an adaptive grid). Every run begins with the
-    best allocation that an earlier one found within its limit.
+    The fastest allocation comes first, then the one with the least energy of all; then, repeatedly, the least energy
+    at a makespan between the two neighbours that leave the largest area open (the epsilon-constraint method of
+    Haimes, Lasdon and Wismer 1971, doi:10.1109/TSMC.1971.4308298, on an adaptive grid). Every run starts from the best
+    allocation within its limit that an earlier one found.
 
     Parameters
     ----------
@@ -90,7 +98,7 @@ def pareto(
     method : str or Allocator
         One that makes use of slack for the makespan, or ``auto``.
     points : int
-        Runs, >= 1, and as many as there are `starts` at the least; the front may have fewer points, where several
+        Number of runs, >= 1, and at least as many as there are `starts`; the front may have fewer points, where several
         limits have the same best allocation.
     time_limit_s, iterations, seed, threads
         Of each single run, as in `solve`.
@@ -102,6 +110,12 @@ def pareto(
         Setting it ends the run in progress and returns the front so far.
     handle_signals : bool
         Whether SIGINT and SIGTERM do the same.
+    parameters, **settings
+        Parameters of the method, as in `solve`.
+
+    Returns
+    -------
+    Front
 
     Raises
     ------
@@ -114,45 +128,59 @@ def pareto(
     Budget(time_limit_s, iterations)
     plans = [as_allocation(instance, start, "starts") for start in listed(starts, "starts", "allocations")]
     function(on_point, "on_point")
-    event(stop, "stop")
+    stop = event(stop, "stop") or threading.Event()
     handle_signals = flag(handle_signals, "handle_signals")
-    allocator = load(method) if isinstance(method, str) and method != "auto" else method
-    stop = stop or threading.Event()
+    if isinstance(method, str) and method != "auto":
+        method, parameters, settings = load(method, parameters, **settings), None, {}
+    run = partial(
+        solve,
+        instance,
+        method,
+        objective=Objective.MAKESPAN_ENERGY,
+        time_limit_s=time_limit_s,
+        iterations=iterations,
+        seed=seed,
+        threads=threads,
+        stop=stop,
+        handle_signals=False,
+        parameters=parameters,
+        **settings,
+    )
+    with signals_set(stop) if handle_signals else nullcontext():
+        results = _traced(run, instance, plans, points, on_point or (lambda _: None), stop)
+    return Front(instance, _undominated(results), complete=not stop.is_set())
+
+
+def _traced(
+    run: Callable[..., Result],
+    instance: Instance,
+    plans: Sequence[Allocation],
+    points: int,
+    on_point: Callable[[Result], None],
+    stop: threading.Event,
+) -> list[Result]:
+    """Return the results of all runs, each with its own limit on the makespan."""
     known = [(start, evaluate(instance, start)) for start in plans]
     wanted = sorted((score.served_makespan, score.energy) for _, score in known if score.makespan)
     points = max(points, len(wanted))
     results: list[Result] = []
-    with signals_set(stop) if handle_signals else nullcontext():
-        run = partial(
-            solve,
-            instance,
-            allocator,
-            objective=Objective.MAKESPAN_ENERGY,
-            time_limit_s=time_limit_s,
-            iterations=iterations,
-            seed=seed,
-            threads=threads,
-            stop=stop,
-            handle_signals=False,
-        )
-        while len(results) < points:
-            limit = _next_limit(instance, results, wanted)
-            if limit is None or (results and stop.is_set()):
-                break
-            result = run(start=_best_within(known, limit), makespan_limit=None if limit == 0 else limit)
-            results.append(result)
-            if result.allocation is not None and result.evaluation is not None:
-                known.append((result.allocation, result.evaluation))
-            if on_point is not None:
-                on_point(result)
-    return Front(instance, _undominated(results), complete=not stop.is_set())
+    while len(results) < points:
+        limit = _next_limit(instance, results, wanted)
+        if limit is None or (results and stop.is_set()):
+            break
+        result = run(start=_best_within(known, limit), makespan_limit=None if limit == 0 else limit)
+        results.append(result)
+        if result.allocation is not None and result.evaluation is not None:
+            known.append((result.allocation, result.evaluation))
+        on_point(result)
+    return results
 
 
 def _next_limit(instance: Instance, results: Sequence[Result], wanted: Sequence[tuple[float, float]]) -> float | None:
-    """Return the makespan up to which the next run shall save energy; 0 for the fastest, None if all is known.
+    """Return the limit on the makespan of the next run; 0 for the fastest allocation, None if no run is left.
 
-    After both ends come the makespans of the allocations to begin with, `wanted` with their energies, unless a result
-    is as good already.
+    After both ends of the front come the makespans of the given allocations, `wanted` with their energies, unless a
+    result is as good already.
     """
     if not results:
         return 0.0
@@ -169,7 +197,7 @@ def _next_limit(instance: Instance, results: Sequence[Result], wanted: Sequence[
 
 
 def _gaps(results: Sequence[Result]) -> list[tuple[float, float]]:
-    """Return area left open and middle of each pair of neighbours; areas with makespans on a logarithmic scale."""
+    """Return open area and middle of each pair of neighbours; areas with makespans on a logarithmic scale."""
     ends = sorted((_limit(result), result.makespan or 0.0, result.energy or 0.0) for result in results)
     gaps, (left, _, costly) = [], ends[0]
     for limit, right, cheap in ends[1:]:
@@ -180,7 +208,7 @@ def _gaps(results: Sequence[Result]) -> list[tuple[float, float]]:
 
 
 def _is_as_good(result: Result, hours: float, energy: float) -> bool:
-    """Whether `result` is neither slower nor costlier than that, but for trifles."""
+    """Whether `result` is neither slower nor costlier, up to a small tolerance."""
     slow, costly = result.makespan or 0.0, result.energy or 0.0
     return slow <= hours * (1 + CLOSE) and costly <= energy * (1 + PROVEN)
 

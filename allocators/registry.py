@@ -1,8 +1,8 @@
-"""Methods by name, imported when they are needed; third parties add theirs by entry point."""
+"""Methods by name, imported on first use; third parties add theirs by entry point."""
 
 import importlib
 from importlib.metadata import EntryPoint, entry_points
-from typing import Any
+from inspect import signature
 
 from alloc.allocators.contract.base import Allocator
 from alloc.allocators.contract.method import Kind, Method
@@ -13,7 +13,7 @@ from alloc.problems.errors import nearest
 
 ENTRY_POINT_GROUP = "alloc.allocators"
 
-_TARGETS = {
+TARGETS = {
     "greedy": "alloc.allocators.heuristic.greedy.list_schedule:Greedy",
     "local-search": "alloc.allocators.heuristic.local_search.allocator:LocalSearch",
     "milp": "alloc.allocators.exact.milp:Milp",
@@ -41,7 +41,7 @@ BUILT_IN = {
         ),
         Method(
             name="local-search",
-            summary="annealed exchanges between two groups, each shared out anew at the least price",
+            summary="simulated annealing over exchanges between two groups, each repartitioned at the least cost",
             requires=("numba",),
             finite_speeds=True,
             warm_start=True,
@@ -133,24 +133,9 @@ BUILT_IN = {
                     ("deap", "numba"),
                     "Fang et al. (2025), doi:10.20944/preprints202502.0192.v1",
                 ),
-                (
-                    "ppo",
-                    "learned policy: proximal policy optimisation",
-                    (),
-                    "Schulman et al. (2017), arXiv:1707.06347",
-                ),
-                (
-                    "a2c",
-                    "learned policy: advantage actor-critic",
-                    (),
-                    "Mnih et al. (2016), arXiv:1602.01783",
-                ),
-                (
-                    "dqn",
-                    "learned policy: deep Q-network",
-                    (),
-                    "Mnih et al. (2015), doi:10.1038/nature14236",
-                ),
+                ("ppo", "learned policy: proximal policy optimisation", (), "Schulman et al. (2017), arXiv:1707.06347"),
+                ("a2c", "learned policy: advantage actor-critic", (), "Mnih et al. (2016), arXiv:1602.01783"),
+                ("dqn", "learned policy: deep Q-network", (), "Mnih et al. (2015), doi:10.1038/nature14236"),
                 (
                     "ddpg",
                     "learned policy: deep deterministic policy gradient, over relaxed choices",
@@ -164,12 +149,27 @@ BUILT_IN = {
 
 
 def names() -> list[str]:
-    """Return the names of all methods: ours, then those of installed plugins."""
+    """Return the names of all methods.
+
+    Returns
+    -------
+    list of str
+        Those built in, then those of installed plugins.
+    """
     return [*BUILT_IN, *_plugins()]
 
 
 def describe(name: str) -> Method:
-    """Return what is known of a method; ours are not imported for it, a plugin is.
+    """Return the description of a method; a built-in one is not imported for it, a plugin is.
+
+    Parameters
+    ----------
+    name : str
+        One of `names`.
+
+    Returns
+    -------
+    Method
 
     Raises
     ------
@@ -180,52 +180,103 @@ def describe(name: str) -> Method:
     return BUILT_IN[name] if name in BUILT_IN else _plugin_class(name).method
 
 
-def load(name: str, **options: Any) -> Allocator:
+def load(name: str, parameters: object = None, **settings: object) -> Allocator:
     """Return a method, ready to be used many times and from several threads.
 
     Parameters
     ----------
     name : str
         One of `names`.
-    **options
-        Options of the method, such as ``policy`` of ``gappo``; those that are None are left out.
+    parameters : object, optional
+        All parameters of the method, of its `Allocator.parameters_type`.
+    **settings
+        Single ones by name, such as ``population`` of ``ga`` or ``policy`` of ``gappo``; None stands for the default.
+
+    Returns
+    -------
+    Allocator
 
     Raises
     ------
     InputError
-        If there is no such method, it takes no such option, or what it requires is not installed.
+        If there is no such method, it has no such parameter, or a value is wrong.
+    MissingPackageError
+        If what it requires is not installed.
     """
     method = describe(name)
-    given = {key: value for key, value in options.items() if value is not None}
-    for key in given:
-        if key not in method.options:
-            raise InputError(f"method {name!r} takes no option {key!r}{_hint(key, method)}", key)
-    if method.missing:
-        modules = " ".join(method.missing)
-        raise MissingPackageError(f"method {name!r} needs {modules}; install with: pip install {modules}", "method")
-    if name not in BUILT_IN:
-        return _plugin_class(name)(**given)
-    if "policy" in given:
+    given = {key: value for key, value in settings.items() if value is not None}
+    _require_installed(method)
+    if "policy" in given and "policy" in method.options:
         from alloc.allocators.learned.files.policy_header import read_header
 
-        read_header(given["policy"])  # what is no policy is told before the seconds that torch takes
-    module, _, attribute = _TARGETS[name].partition(":")
-    with ended_with_process(lambda: None):  # the import of a large library can only be awaited
-        allocator = getattr(importlib.import_module(module), attribute)(**given)
-    assert isinstance(allocator, Allocator)
-    return allocator
+        read_header(text(given["policy"], "policy"))  # a wrong file is an error before the seconds that torch takes
+    with ended_with_process(lambda: None):  # the import of a large library cannot be interrupted
+        kind = _class(name)
+        for key in given:
+            if key not in method.options and key not in kind.default_parameters():
+                raise InputError(f"method {name!r} takes no option {key!r}{_hint(key, method, kind)}", key)
+        if parameters is None:
+            return kind(**given)
+        if kind.parameters_type is None:
+            raise InputError(f"method {name!r} has no parameters", "parameters")
+        return kind(parameters=parameters, **given)
 
 
-def _hint(option: str, method: Method) -> str:
-    """Say which option may be meant, or which of our methods takes this one."""
-    takers = [other.name for other in BUILT_IN.values() if option in other.options]
+def method_parameters(name: str) -> dict[str, object]:
+    """Return what can be set of a method, with the defaults; its class is imported for it.
+
+    Parameters
+    ----------
+    name : str
+        One of `names`.
+
+    Returns
+    -------
+    dict
+        Default by name of parameter, as `load` and `solve` take them.
+
+    Raises
+    ------
+    InputError
+        If there is no such method.
+    MissingPackageError
+        If what it requires is not installed.
+    """
+    method = describe(name)
+    _require_installed(method)
+    kind = _class(name)
+    arguments = signature(kind).parameters
+    options = {key: arguments[key].default for key in method.options if key in arguments}
+    return {**options, **kind.default_parameters()}
+
+
+def _require_installed(method: Method) -> None:
+    if method.missing:
+        modules = " ".join(method.missing)
+        message = f"method {method.name!r} needs {modules}; install with: pip install {modules}"
+        raise MissingPackageError(message, "method")
+
+
+def _class(name: str) -> type[Allocator]:
+    """Import the class of a method."""
+    if name not in BUILT_IN:
+        return _plugin_class(name)
+    module, _, attribute = TARGETS[name].partition(":")
+    kind: type[Allocator] = getattr(importlib.import_module(module), attribute)
+    return kind
+
+
+def _hint(key: str, method: Method, kind: type[Allocator]) -> str:
+    """Return which of our methods take this option, or which one may be meant."""
+    takers = [other.name for other in BUILT_IN.values() if key in other.options]
     if takers:
         return f"; {', '.join(takers)} {'do' if len(takers) > 1 else 'does'}"
-    return nearest(option, method.options) if method.options else ""
+    known = [*method.options, *kind.default_parameters()]
+    return nearest(key, known) if known else ""
 
 
 def _plugins() -> dict[str, EntryPoint]:
-    """Entry points of other packages; a name of ours cannot be taken."""
+    """Return the entry points of other packages; the name of a built-in method cannot be taken."""
     return {entry.name: entry for entry in entry_points(group=ENTRY_POINT_GROUP) if entry.name not in BUILT_IN}
 
 

@@ -1,36 +1,36 @@
 """The answer of `solve`: an allocation with its scores, how good it is proven to be, and why the run stopped."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import StrEnum
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from alloc.allocators.contract.budget import StopReason
-from alloc.allocators.contract.search import Improvement
+from alloc.allocators.contract.improvement import TracePoint
+from alloc.allocators.contract.status import Status
 from alloc.allocators.contract.tolerance import EXACT, PROVEN, MakespanTolerance, relative_gap
-from alloc.problems import Allocation, Evaluation, Instance, Objective
+from alloc.allocators.result_document import read_document, result_fields
+from alloc.allocators.summary import summary
+from alloc.problems import IDLE, Allocation, Evaluation, InputError, Instance, MissingPackageError, Objective
 from alloc.problems.evaluation import RELATIVE_TOLERANCE
+from alloc.problems.formats.allocation_file import RESULT_FORMAT
+from alloc.problems.formats.files import PathLike, named
+from alloc.problems.formats.messages import told
 
-RESULT_FORMAT = "alloc-result/1"
-
-
-class Status(StrEnum):
-    """How good the answer is proven to be."""
-
-    OPTIMAL = "optimal"
-    FEASIBLE = "feasible"
-    INFEASIBLE = "infeasible"
-    NO_SOLUTION = "no_solution"
+if TYPE_CHECKING:
+    import pandas
 
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What came out of one run.
+    """The outcome of one run; ``print(result)`` prints a summary.
 
     Attributes
     ----------
     instance : Instance
     method : str
-        Name of the method that ran; the one picked, where `auto` was asked for.
+        Name of the method that ran; the one picked, where the method was ``auto``.
     objective : Objective
     seed : int
     allocation : Allocation or None
@@ -38,20 +38,20 @@ class Result:
     evaluation : Evaluation or None
         Scores of `allocation`.
     lower_bound, energy_lower_bound : float or None
-        Best proven bounds on the makespan in hours, and on the energy of any allocation with this makespan, or within
-        `makespan_limit`; None while a task is unserved, and for the energy also where it is no objective or no bound
-        is at hand.
+        Best proven lower bounds on the makespan in hours, and on the energy of any allocation with this makespan, or
+        within `makespan_limit`. None while a task is unserved; for the energy also where it is no objective, or no
+        bound was found.
     status : Status
     makespan_limit : float or None
-        Hours up to which the energy alone counted, where a slack or a limit was given for the makespan.
+        Hours up to which only the energy counted, where a slack or a limit was given for the makespan.
     stop_reason : StopReason
     runtime_s : float
         Seconds from the instance in memory to the allocation in memory.
-    trace : tuple of Improvement
-        Every improvement, in order.
+    trace : tuple of TracePoint
+        Figures of every improvement, in order.
     notes : tuple of str
-        What the user should know, in plain words: what `auto` picked and why, what the method tells of its run, which
-        tasks too few agents can reach.
+        Messages for the user: what ``auto`` picked and why, notes of the method on its run, which tasks too few agents
+        can reach.
     tolerance : MakespanTolerance
         The slack and the limit that were given for the makespan.
     """
@@ -66,7 +66,7 @@ class Result:
     energy_lower_bound: float | None
     stop_reason: StopReason
     runtime_s: float
-    trace: tuple[Improvement, ...]
+    trace: tuple[TracePoint, ...]
     notes: tuple[str, ...] = ()
     makespan_limit: float | None = None
     tolerance: MakespanTolerance = EXACT
@@ -114,8 +114,17 @@ class Result:
         excess = relative_gap(self.makespan, self.tolerance.hours(self.lower_bound))
         return excess <= PROVEN + RELATIVE_TOLERANCE
 
+    def __str__(self) -> str:
+        """How good the answer is, its figures, and its bottleneck, a line or two each."""
+        return summary(self)
+
     def to_dict(self) -> dict[str, Any]:
-        """Return the fields of the format `alloc-result/1`."""
+        """Return the fields of the format `alloc-result/1`, ready for JSON.
+
+        Returns
+        -------
+        dict
+        """
         ids, score = self.instance, self.evaluation
         limit = {} if self.makespan_limit is None else {"makespan_limit": self.makespan_limit}
         return {
@@ -147,7 +156,89 @@ class Result:
             "runtime_s": self.runtime_s,
             "assignment": {} if self.allocation is None else self.allocation.to_ids(ids),
             "trace": [
-                {"time_s": step.time_s, "makespan": step.evaluation.makespan, "energy": step.evaluation.energy}
-                for step in self.trace
+                {"time_s": point.time_s, "makespan": point.makespan, "energy": point.energy} for point in self.trace
             ],
         }
+
+    @classmethod
+    def from_dict(cls, document: Mapping[str, Any], instance: Instance) -> "Result":
+        """Return the result that `to_dict` turned into `document`.
+
+        Notes, the lower bounds in the trace, and the slack of the makespan are not in the document.
+
+        Parameters
+        ----------
+        document : mapping
+        instance : Instance
+            The instance that was solved.
+
+        Returns
+        -------
+        Result
+
+        Raises
+        ------
+        InputError
+            If a field is missing or wrong, an id is unknown, or the scores are not those on `instance`; its place is
+            the field.
+        """
+        fields = result_fields(document, instance)
+        result = cls(instance=instance, **fields)
+        if result.status != document["status"]:
+            raise InputError(f"is {document['status']}, but by its scores and bounds it is {result.status}", "status")
+        return result
+
+    def to_frame(self) -> "pandas.DataFrame":
+        """Return a table with a row for each agent.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns `agent`, `task` (None for idle agents), `ability`, `distance` (to the task), `completion_time` (of
+            the task, in hours; NaN for idle agents). Empty if there is no allocation.
+
+        Raises
+        ------
+        MissingPackageError
+            If pandas is not installed.
+        """
+        try:
+            import pandas
+        except ImportError as error:
+            raise MissingPackageError("to_frame needs pandas; install with: pip install pandas") from error
+        if self.allocation is None or self.evaluation is None:
+            return pandas.DataFrame(columns=["agent", "task", "ability", "distance", "completion_time"])
+        instance, task = self.instance, self.allocation.task_of_agent
+        assigned = np.flatnonzero(task != IDLE)
+        distance, time = np.zeros(instance.n), np.full(instance.n, np.nan)
+        distance[assigned] = instance.reach.distance_of(assigned, task[assigned])
+        time[assigned] = self.evaluation.completion_time[task[assigned]]
+        assignment = self.allocation.to_ids(instance)
+        columns = {"agent": list(assignment), "task": list(assignment.values()), "ability": instance.ability}
+        return pandas.DataFrame({**columns, "distance": distance, "completion_time": time})
+
+
+def read_result(path: PathLike, instance: Instance) -> Result:
+    """Read a result that ``alloc solve --output`` wrote, or the JSON of `Result.to_dict`.
+
+    Parameters
+    ----------
+    path : str or path
+        A JSON file whatever its suffix, or ``-`` for standard input.
+    instance : Instance
+        The instance that was solved.
+
+    Returns
+    -------
+    Result
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or as `Result.from_dict` does.
+    """
+    document = read_document(path)
+    try:
+        return Result.from_dict(document, instance)
+    except InputError as error:
+        raise told(error, named(path)) from error.__cause__

@@ -1,4 +1,4 @@
-"""The command `alloc`: its commands, and how errors become one line and an exit code."""
+"""The command `alloc`: its commands, and the line and exit code of each error."""
 
 import contextlib
 import gc
@@ -6,22 +6,22 @@ import os
 import sys
 import threading
 from collections.abc import Sequence
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import typer
 
-from alloc.cli.commands import compare, convert, evaluate, generate, methods, pareto, solve, train, tune, validate
-from alloc.cli.options import examples, option_of
+from alloc.cli.commands import compare, convert, evaluate, generate, methods, pareto, plot, solve, train, tune, validate
+from alloc.cli.options import Parameter, examples, option_of
 from alloc.cli.output.console import complain, flush, write_out
 
 SERVED, UNSERVED, BAD_INPUT = 0, 1, 2
-"""Exit codes: every task is served; one is not; bad usage or bad input."""
+"""Exit codes: every task is served; a task is unserved; bad usage or bad input."""
 
 DEFECT = 70
-"""Exit code of a defect in the program (EX_SOFTWARE)."""
+"""Exit code of a defect of the program (EX_SOFTWARE)."""
 
 INTERRUPTED = 130
-"""Exit code after Ctrl-C, except where it ends a run that has an answer."""
+"""Exit code after Ctrl-C, unless it ended a run that has an answer."""
 
 _USAGE_ERROR = typer.BadParameter.__mro__[1]  # its base has moved between versions of typer
 
@@ -37,7 +37,7 @@ app = typer.Typer(
         closing="Exit codes: 0 every task is served, 1 not, 2 bad usage or bad input.",
     ),
 )
-for module in (solve, compare, pareto, evaluate, generate, validate, convert, methods, train, tune):
+for module in (solve, compare, pareto, evaluate, plot, generate, validate, convert, methods, train, tune):
     module.register(app)
 
 
@@ -59,13 +59,13 @@ def _alloc(
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run `alloc` with `arguments`, those of the process by default, and return its exit code.
 
-    With the arguments of the process, it ends the process itself where a solver in native code did not obey.
+    With the arguments of the process, it ends the process itself if a solver in native code ignored a stop request.
     """
     code = _run(arguments)
     if arguments is None:
         if _is_solver_left():
             _leave(code)
-        gc.freeze()  # spares the last collection: with torch loaded, that is most of a second after Ctrl-C
+        gc.freeze()  # skips the last garbage collection, which with torch takes most of a second after Ctrl-C
     return code
 
 
@@ -83,20 +83,20 @@ def _run(arguments: Sequence[str] | None) -> int:
     return code if isinstance(code, int) else SERVED
 
 
-def _parameters(arguments: Sequence[str]) -> list[Any]:
-    """Return arguments and options of the command that was called; the program itself has none with a value."""
+def _parameters(arguments: Sequence[str]) -> list[Parameter]:
+    """Return the arguments and options of the command that was called."""
     commands = typer.main.get_command(app).commands  # type: ignore[attr-defined]
     name = next((argument for argument in arguments if argument in commands), None)
-    return [] if name is None else commands[name].params
+    return [] if name is None else list(commands[name].params)
 
 
 def _is_solver_left() -> bool:
-    """Whether `run_native` had to leave a thread behind."""
+    """Return whether `run_native` left a thread running."""
     return any(thread.name == "alloc-native-solver" for thread in threading.enumerate())
 
 
 def _leave(code: int) -> NoReturn:
-    """End the process without the interpreter's own end, in which a native thread that goes on would crash."""
+    """End the process without finalising the interpreter, in which a running native thread would crash."""
     for stream in (sys.stdout, sys.stderr):
         if stream is not None:
             with contextlib.suppress(OSError, ValueError):
@@ -113,7 +113,7 @@ def _explain(error: Exception, arguments: Sequence[str]) -> int:
     from alloc.problems import AllocError, InputError
 
     if isinstance(error, InputError):
-        place = error.place if error.source else option_of(error.place, _parameters(arguments))
+        place = error.place if error.source else option_of(error.place, _parameters(arguments), arguments)
         complain(str(InputError(error.message, place, error.source)))
     elif isinstance(error, AllocError):
         complain(str(error))

@@ -24,7 +24,7 @@ BUILT_IN_METHODS = (
     "dqn",
     "ddpg",
 )
-"""For completion alone, which must not wait for numpy; a test compares them with the registry."""
+"""For completion, which must not load numpy; a test compares them with the registry."""
 
 READABLE = "a .json or .npz file, a folder with agents.csv and tasks.csv, or - for JSON on standard input"
 
@@ -37,7 +37,7 @@ class Objective(StrEnum):
 
 
 def examples(*lines: str, closing: str = "") -> str:
-    """Return the examples of a command, as they stand under its help."""
+    """Return the examples below the help of a command."""
     parts = ["\b\nExamples:\n" + "\n".join(f"  {line}" for line in lines)]
     return "\n\n".join([*parts, closing] if closing else parts)
 
@@ -52,10 +52,10 @@ def complete_methods(incomplete: str) -> list[str]:
 
 
 InstanceArgument = Annotated[str, typer.Argument(metavar="INSTANCE", help=f"The instance: {READABLE}.")]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON to standard output.")]
+InstancesArgument = Annotated[list[str], typer.Argument(metavar="INSTANCE...", help=f"Instances, each {READABLE}.")]
 ObjectiveOption = Annotated[
     Objective,
-    typer.Option(help="What counts after the number of unserved tasks; the second one also counts energy."),
+    typer.Option(help="What is minimised, after the number of unserved tasks: the makespan, or then the energy too."),
 ]
 TimeLimitOption = Annotated[
     float | None,
@@ -67,32 +67,79 @@ IterationsOption = Annotated[
 TargetGapOption = Annotated[
     float | None, typer.Option(min=0, help="Stop at this relative gap of the makespan; 0.01 is 1 %.")
 ]
+SeedOption = Annotated[int, typer.Option(min=0, max=2**63 - 1, help="Seed of all random numbers.")]
 ThreadsOption = Annotated[int | None, typer.Option(min=1, max=1024, help="Threads.", show_default="all processors")]
+PlotOption = Annotated[str | None, typer.Option(metavar="FILE", help="Draw it as .png or .svg.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON to standard output.")]
+QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Print no summary, no notes, no progress.")]
+SettingsOption = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the method; may be repeated."),
+]
 
 
-RENAMED = {
+OPTION_NAMES = {
     "time_limit_s": "time_limit",
     "scenario": "family",
     "low": "ability_min",
     "high": "ability_max",
 }
-"""Parameters of the library whose option has another name than themselves."""
+"""Options by the parameter of the library that they set, where the two have different names."""
 
 
-def option_of(place: str, parameters: Sequence[typer.core.TyperArgument | typer.core.TyperOption]) -> str:
-    """Return what a command calls the parameter that the library names: an option, an argument, or `place` itself.
+Parameter = typer.core.TyperArgument | typer.core.TyperOption
 
-    A command that takes several of them has the plural: ``seed`` of `solve` is ``--seeds`` of ``alloc compare``.
+
+def option_of(place: str, parameters: Sequence[Parameter], arguments: Sequence[str] = ()) -> str:
+    """Return the option or argument of a command that sets the parameter `place` of the library, else `place` itself.
+
+    A command that takes several values has the plural: ``seed`` of `solve` is ``--seeds`` of ``alloc compare``. The
+    parameter of a method is the ``--set`` among the `arguments` that names it.
     """
-    name = RENAMED.get(place, place)
+    name = OPTION_NAMES.get(place, place)
     for known in (name, f"{name}s"):
         for parameter in parameters:
             if parameter.name == known:
                 is_option = isinstance(parameter, typer.core.TyperOption)
                 return parameter.opts[0] if is_option else parameter.metavar or known.upper()
+    if any(argument.removeprefix("--set=").startswith(f"{place}=") for argument in arguments):
+        return f"--set {place}"
     return place
 
 
 def time_limit(given: float | None, iterations: int | None) -> float | None:
-    """Return the time limit: 10 s, unless iterations are counted, which makes runs reproducible."""
+    """Return the time limit: 10 s by default, none where iterations are limited, so that runs are reproducible."""
     return 10.0 if given is None and iterations is None else given
+
+
+def assignments(settings: Sequence[str] | None) -> dict[str, str]:
+    """Return the names and values of ``--set NAME=VALUE``."""
+    for setting in settings or ():
+        if "=" not in setting:
+            raise typer.BadParameter(f"{setting!r} is not NAME=VALUE", param_hint="'--set'")
+    return dict(setting.split("=", 1) for setting in settings or ())
+
+
+def values(settings: Sequence[str] | None) -> dict[str, object]:
+    """Return the values of ``--set NAME=VALUE`` by name, as numbers, tuples of numbers, booleans, None or text."""
+    return {name: value_of(text) for name, text in assignments(settings).items()}
+
+
+def value_of(text: str) -> object:
+    """Return the value that a text stands for, as Python writes it; several with commas are a tuple."""
+    known = {"true": True, "false": False, "none": None}
+    if text.lower() in known:
+        return known[text.lower()]
+    parts = [_number(part) for part in text.removesuffix(",").split(",")]
+    if any(part is None for part in parts):
+        return text
+    return tuple(parts) if "," in text else parts[0]
+
+
+def _number(text: str) -> int | float | None:
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return None

@@ -1,11 +1,13 @@
 """Fixtures for all tests: tiny named instances, and how hypothesis runs."""
 
 import signal
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
 
 from alloc.problems import Instance
+from alloc.problems.formats import write_instance
 
 # the same examples in every run, and no deadline: a busy machine is no bug
 settings.register_profile(
@@ -52,3 +54,27 @@ def contested() -> Instance:
         workload=[2, 2, 2, 2],
         allowed_tasks=[[0, 1, 3], [0, 1, 3], [2], [2]],
     )
+
+
+@pytest.fixture
+def small(tmp_path: Path) -> Instance:
+    """Five agents, three tasks, in small.json; the optimum is 13 / 11 h."""
+    instance = Instance(
+        name="small",
+        ability=[5, 2, 1, 8, 3],
+        workload=[3, 13, 4],
+        task_position=[[0, 0], [1, 0], [0, 2]],
+        start_task=[0, 0, 1, 1, 2],
+        battery=[20] * 5,
+        energy_per_distance=6,
+    )
+    write_instance(instance, tmp_path / "small.json")
+    return instance
+
+
+@pytest.fixture
+def unservable(tmp_path: Path) -> Instance:
+    """Nobody can take t2; in unservable.json."""
+    instance = Instance(name="unservable", ability=[2, 3], workload=[4, 6], allowed_tasks=[[0], [0]])
+    write_instance(instance, tmp_path / "unservable.json")
+    return instance

@@ -2,7 +2,8 @@
 
 import pytest
 
-pytest.register_assert_rewrite("alloc.allocators.conformance.suite")  # failed checks then show their values
+for _module in ("runner", "answers", "runs", "isolation"):
+    pytest.register_assert_rewrite(f"alloc.allocators.conformance.{_module}")  # failed checks then show their values
 
 from alloc.allocators.conformance.suite import AllocatorConformance  # noqa: E402
 

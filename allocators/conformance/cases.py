@@ -1,4 +1,4 @@
-"""Instances small enough to know their optimum by trying everything, each with something that methods stumble over."""
+"""Instances small enough to know their optimum by enumeration, each with a feature that is easy to get wrong."""
 
 from functools import cache
 from itertools import product

@@ -1,4 +1,4 @@
-"""What an allocator must leave as it was: the instance, and what a process has but once."""
+"""What an allocator must leave unchanged: the instance, and the global state of the process."""
 
 import os
 import pickle
@@ -23,10 +23,10 @@ def instance_state(instance: Instance) -> dict[str, object]:
 
 
 def process_state() -> dict[str, object]:
-    """Return the global generators and settings that a method might disturb, as values that can be compared."""
+    """Return the global generators and settings that a method might change, as values that can be compared."""
     state: dict[str, object] = {
         "random": random.getstate(),
-        "numpy.random": pickle.dumps(np.random.get_state()),  # noqa: NPY002 (the global state is what is watched)
+        "numpy.random": pickle.dumps(np.random.get_state()),  # noqa: NPY002 (the global state itself is compared)
         "numpy.errstate": tuple(np.geterr().items()),
         "environment": dict(os.environ),
         "working directory": os.getcwd(),
@@ -47,9 +47,14 @@ def process_state() -> dict[str, object]:
 
 
 def _in_a_new_thread(ask: Callable[[], object]) -> object:
-    """Ask in a thread that has settings of its own yet to get."""
+    """Call `ask` in a new thread, which starts with the defaults of the process."""
     answers: list[object] = []
     thread = threading.Thread(target=lambda: answers.append(ask()))
     thread.start()
     thread.join()
     return answers[0]
+
+
+def changed(before: dict[str, object], after: dict[str, object]) -> list[str]:
+    """Return the names whose values differ."""
+    return [name for name in before if before[name] != after.get(name)]

@@ -1,31 +1,30 @@
-"""The contract of an allocator: it gets a `Search`, and returns a `Proposal`."""
+"""The contract of an allocator: it receives a `Search` and returns a `Proposal`."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from alloc.allocators.contract.budget import Budget
 from alloc.allocators.contract.method import Method
+from alloc.allocators.contract.parameters import with_settings
 from alloc.allocators.contract.search import Search
-from alloc.problems import Allocation, Instance, Objective, RefusedError
-
-__all__ = ["Allocator", "Proposal", "RefusedError"]
+from alloc.problems import Allocation, InputError, Instance, Objective
 
 
 @dataclass(frozen=True)
 class Proposal:
-    """What an allocator answers; `solve` scores it.
+    """What an allocator returns; `solve` scores it.
 
     Attributes
     ----------
     allocation : Allocation or None
-        Its answer; None stands for the best that it gave to `Search.submit`, if any.
+        The answer; None means the best allocation passed to `Search.submit`, if any.
     makespan_lower_bound : float or None
-        Hours that every allocation serving all tasks needs, as far as the method proved it.
+        Proven lower bound on the makespan, in hours, of every allocation that serves all tasks.
     energy_lower_bound : float or None
-        Energy that every allocation needs whose makespan is at most that of the answer, as far as proved.
+        Proven lower bound on the energy of every allocation whose makespan is at most that of the answer.
     notes : tuple of str
-        What the user should know of the run, in plain words; `Result.notes` tells it.
+        Messages for the user; they end up in `Result.notes`.
     """
 
     allocation: Allocation | None = None
@@ -37,20 +36,75 @@ class Proposal:
 class Allocator(ABC):
     """A method, loaded and ready; one object serves many instances and threads at once.
 
-    Subclasses set `method`, and keep no state that `allocate` changes.
+    Subclasses set `method`, and `parameters_type` if they have parameters; `allocate` changes no attribute.
+
+    Parameters
+    ----------
+    parameters : parameters_type, optional
+        Its parameters; the defaults if None.
+    **settings
+        Single parameters by name, such as ``population=200``.
+
+    Attributes
+    ----------
+    method : Method
+        Name and capabilities.
+    parameters_type : type or None
+        Frozen dataclass of the parameters, with a default for each; None for a method without parameters.
+    parameters : parameters_type
+        What is set; only where `parameters_type` is given.
+
+    Raises
+    ------
+    InputError
+        If there is no such parameter, or its value is wrong; its place is the name of the parameter.
     """
 
     method: ClassVar[Method]
+    parameters_type: ClassVar[type[Any] | None] = None
+    parameters: object
+
+    def __init__(self, parameters: object = None, **settings: object) -> None:
+        if self.parameters_type is not None:
+            self.parameters = with_settings(self.parameters_type, parameters, settings)
+        elif parameters is not None or settings:
+            raise InputError(f"method {self.method.name!r} has no parameters", next(iter(settings), "parameters"))
+
+    @classmethod
+    def default_parameters(cls) -> dict[str, object]:
+        """Return the default of each parameter, by name; nothing for a method without parameters."""
+        return {} if cls.parameters_type is None else dict(vars(cls.parameters_type()))
 
     def refusal(self, instance: Instance, objective: Objective, budget: Budget) -> str | None:
-        """Return why this method cannot hold `budget` on `instance`, or None if it can; must be quick."""
+        """Return why the method cannot keep to `budget` on `instance`, or None if it can.
+
+        Parameters
+        ----------
+        instance : Instance
+        objective : Objective
+        budget : Budget
+
+        Returns
+        -------
+        str or None
+            Determined within milliseconds, without building a model.
+        """
         return None
 
     @abstractmethod
     def allocate(self, search: Search) -> Proposal:
-        """Look for the best allocation of ``search.instance``.
+        """Search for the best allocation of ``search.instance``.
 
-        Call ``search.submit`` with every improvement and ask ``search.should_stop()`` often, every 0.1 s at the
-        least. Count ``search.iteration`` up where the method iterates; the same ``search.seed`` must give the same
-        answer when the budget counts iterations.
+        Call ``search.submit`` with every improvement and ``search.should_stop()`` at least every 0.1 s. Increment
+        ``search.iteration`` in each iteration. With a budget in iterations, the same ``search.seed`` must give the same
+        answer.
+
+        Parameters
+        ----------
+        search : Search
+            The run: instance, objective, seed, clock and best allocation so far.
+
+        Returns
+        -------
+        Proposal
         """

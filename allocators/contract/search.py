@@ -1,4 +1,4 @@
-"""One run of one method on one instance: its clock, the best so far, and requests to stop."""
+"""One run of one method on one instance: clock, budget, best allocation so far, stop requests."""
 
 import logging
 import math
@@ -6,9 +6,10 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from alloc.allocators.contract.budget import Budget, StopReason
+from alloc.allocators.contract.improvement import Improvement, TracePoint
 from alloc.allocators.contract.tolerance import EXACT, PROVEN, MakespanTolerance, relative_gap
 from alloc.problems import (
     Allocation,
@@ -22,34 +23,24 @@ from alloc.problems import (
 from alloc.problems.evaluation import RELATIVE_TOLERANCE, last_equal
 
 STANDS = "the best plan up to then stands"
-"""What a note says of a failure that cost no plan."""
+"""End of the note on a stage that failed after a plan had been found."""
 
 _log = logging.getLogger("alloc")
-_log.addHandler(logging.NullHandler())  # a program that wants to see it sets up its own
-
-
-@dataclass(frozen=True)
-class Improvement:
-    """A new best allocation, as told to `on_improvement`.
-
-    Attributes
-    ----------
-    time_s : float
-        Seconds since the run began.
-    allocation : Allocation
-    evaluation : Evaluation
-    lower_bound : float
-        Best lower bound on the makespan at that moment, in hours.
-    """
-
-    time_s: float
-    allocation: Allocation
-    evaluation: Evaluation
-    lower_bound: float
 
 
 class Search:
-    """What a method sees of its run; made by `solve`.
+    """The run as a method sees it; made by `solve`.
+
+    Parameters
+    ----------
+    instance, objective, budget, seed, start, threads, tolerance
+        As the attributes below.
+    on_improvement : callable, optional
+        Called with every new best.
+    stop : threading.Event, optional
+        Setting it ends the run.
+    spent_s : float
+        Seconds that count for the run although they have passed already.
 
     Attributes
     ----------
@@ -58,7 +49,7 @@ class Search:
     budget : Budget
     seed : int
     start : Allocation or None
-        A warm start, already submitted; agents sent where they cannot go are idle in it.
+        A warm start, already submitted; agents assigned to tasks that they cannot do are idle in it.
     threads : int
         Threads that the method may use.
     lower_bound : float
@@ -66,11 +57,16 @@ class Search:
     best : Improvement or None
         The best submitted so far.
     fastest : Improvement or None
-        That with the least makespan, of those with the fewest unserved tasks; the same as `best` but for energy.
+        The one with the least makespan among those with the fewest unserved tasks; differs from `best` only where
+        energy counts.
     tolerance : MakespanTolerance
         How much slower than the fastest the best may be.
+    iteration : int
+        Iterations done, counted by the method in its own unit.
+    trace : list of TracePoint
+        Figures of every improvement, in order.
     notes : list of str
-        What the user should know of the run, in plain words.
+        Messages for the user.
     """
 
     def __init__(
@@ -87,7 +83,7 @@ class Search:
         stop: threading.Event | None = None,
         spent_s: float = 0.0,
     ) -> None:
-        self._begin = time.monotonic() - spent_s  # what was spent on choosing the method is part of the run
+        self._begin = time.monotonic() - spent_s  # choosing the method is part of the run
         self.instance, self.objective, self.budget = instance, objective, budget
         self.tolerance = tolerance
         self.seed, self.start, self.threads = seed, start, threads
@@ -95,14 +91,14 @@ class Search:
         self.iteration = 0
         self.best: Improvement | None = None
         self.fastest: Improvement | None = None
-        self._front: list[Improvement] = []  # candidates for `best` should the fastest become faster
-        self.trace: list[Improvement] = []
+        self._front: list[Improvement] = []  # candidates for `best` once the fastest becomes faster
+        self.trace: list[TracePoint] = []
         self.notes: list[str] = []
-        self._refused = False  # whether `on_improvement` ended the run
+        self._callback_failed = False  # whether `on_improvement` raised an exception
         self.lower_bound = makespan_lower_bound(instance)
         if start is not None:
-            evaluate(instance, start)  # says what is wrong with a start of another size
-            self.start = serve_all(instance, start)  # agents that can no longer go where they were sent are idle
+            evaluate(instance, start)  # raises if the sizes do not fit
+            self.start = serve_all(instance, start)  # agents that cannot do their tasks become idle
             self.submit(self.start)
 
     @property
@@ -118,16 +114,25 @@ class Search:
 
     @property
     def interrupted(self) -> bool:
-        """Whether somebody asked the run to end."""
+        """Whether a stop was requested, by a signal or the `stop` event."""
         return self._stop.is_set()
 
     @property
     def makespan_limit(self) -> float:
-        """Hours up to which allocations are equally fast, so that energy alone tells them apart; ``inf`` at first."""
+        """Hours up to which allocations count as equally fast, so that energy decides; ``inf`` before the first one."""
         return math.inf if self.fastest is None else self.tolerance.hours(self.fastest.evaluation.served_makespan)
 
     def submit(self, allocation: Allocation) -> Evaluation:
-        """Score `allocation`, keep it if it is the best so far, and report that."""
+        """Score `allocation`, and keep and report it if it is the best so far.
+
+        Parameters
+        ----------
+        allocation : Allocation
+
+        Returns
+        -------
+        Evaluation
+        """
         evaluation = evaluate(self.instance, allocation)
         found = Improvement(self.elapsed_s, allocation, evaluation, self.lower_bound)
         if self.fastest is None or evaluation.is_better_than(self.fastest.evaluation, Objective.MAKESPAN):
@@ -135,28 +140,37 @@ class Search:
         candidates = [found]
         if self.tolerance.slack > 0:
             candidates = self._front = _undominated([*self._front, found], self.makespan_limit)
+        before = self.best
         for candidate in candidates:
             if self.best is None or self._is_better(candidate.evaluation, self.best.evaluation):
                 self.best = replace(candidate, time_s=found.time_s, lower_bound=found.lower_bound)
-        if self.best is not None and (not self.trace or self.trace[-1] is not self.best):
-            self.trace.append(self.best)
-            if self._on_improvement is not None:
-                self._refused = True
-                self._on_improvement(self.best)
-                self._refused = False
+        if self.best is not None and self.best is not before:
+            self._report(self.best)
         return evaluation
+
+    def _report(self, best: Improvement) -> None:
+        self.trace.append(best.figures)
+        if self._on_improvement is not None:
+            self._callback_failed = True
+            self._on_improvement(best)
+            self._callback_failed = False
 
     @contextmanager
     def improving(self, stage: str) -> Iterator[None]:
-        """Let an exception in the block end no more than the block: it is logged, and a note says so.
+        """Let an exception in the block end only the block: it is logged, and a note tells the user.
 
-        For stages that a run can do without, once there is a plan; without one, the exception is passed on. So is what
+        For optional stages after a plan has been found; without a plan the exception propagates, as does any that
         `on_improvement` raises.
+
+        Parameters
+        ----------
+        stage : str
+            What the note and the log call the block.
         """
         try:
             yield
         except Exception as error:
-            if self.best is None or self._refused:
+            if self.best is None or self._callback_failed:
                 raise
             _log.exception("%s failed", stage)
             self.notes.append(f"{stage} failed ({type(error).__name__}: {error}); {STANDS}")
@@ -172,7 +186,7 @@ class Search:
         return other.energy - one.energy > RELATIVE_TOLERANCE * other.energy
 
     def raise_bound(self, hours: float) -> None:
-        """Tell a proven lower bound on the makespan."""
+        """Record a proven lower bound on the makespan, in hours."""
         self.lower_bound = max(self.lower_bound, hours)
 
     @property
@@ -183,7 +197,7 @@ class Search:
 
     @property
     def fast_enough(self) -> bool:
-        """Whether the fastest so far is proven to be that, or keeps to the limit that was given."""
+        """Whether the fastest so far is proven to be fastest, or keeps to the makespan limit that was given."""
         if self.fastest is None or self.fastest.evaluation.makespan is None:
             return False
         given = self.tolerance.limit

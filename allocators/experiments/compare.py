@@ -1,35 +1,36 @@
-"""Several methods on several instances and seeds: one row for each method and instance."""
+"""Several methods on several instances and seeds: one row per method and instance."""
 
 import logging
 import threading
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from alloc.allocators.contract.base import Allocator, RefusedError
+from alloc.allocators.contract.base import Allocator
 from alloc.allocators.contract.budget import Budget, StopReason
 from alloc.allocators.contract.tolerance import relative_gap
 from alloc.allocators.registry import load
+from alloc.allocators.request import checked_seed, checked_threads
 from alloc.allocators.result import Result
-from alloc.allocators.solve import LARGEST_SEED, MOST_THREADS, solve
-from alloc.problems import InputError, Instance, Objective
-from alloc.problems.arguments import choice, event, listed, of_type, text, whole
+from alloc.allocators.solve import solve
+from alloc.problems import InputError, Instance, Objective, RefusedError
+from alloc.problems.arguments import choice, event, listed, of_type
 
 LOG = logging.getLogger("alloc.compare")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """How one method did on one instance, over all seeds.
+    """The figures of one method on one instance, over all seeds.
 
     Attributes
     ----------
     instance, method : str
     picked : str
-        What ran, where the method is ``auto``.
+        The method that ran, where it is ``auto``.
     agents, tasks : int
     runs : int
         Runs that the figures are taken over; 0 for a refusal.
@@ -46,11 +47,11 @@ class Row:
     energy_mean, energy_worst : float or None
     runtime_mean_s, runtime_worst_s : float or None
     reason : str
-        Why there are no figures: what the method refuses, what is missing, or how it failed.
+        Why there are no figures: what the method refuses, which package is not installed, or how it failed.
     number : int
-        Which of the instances, from 1, as names may repeat.
+        Number of the instance, from 1, as names may repeat.
     makespans : tuple of float
-        Of each run, where all served all tasks; not in `to_dict`.
+        Of each run that served all tasks; not in `to_dict`.
     """
 
     instance: str
@@ -75,13 +76,22 @@ class Row:
     makespans: tuple[float, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the fields by name."""
+        """Return the fields by name, ready for JSON.
+
+        Returns
+        -------
+        dict
+        """
         return {name: value for name, value in asdict(self).items() if name != "makespans"}
+
+
+Methods = Sequence[str | Allocator] | Mapping[str, str | Allocator]
+"""Names of methods and allocators; where a mapping, with the name that each has in the rows."""
 
 
 def compare(
     instances: Iterable[Instance],
-    methods: Sequence[str],
+    methods: Methods,
     seeds: Sequence[int] = (0,),
     *,
     objective: Objective | str = Objective.MAKESPAN,
@@ -96,8 +106,9 @@ def compare(
     Parameters
     ----------
     instances : iterable of Instance
-    methods : sequence of str
-        Names; each method is loaded once.
+    methods : sequence or dict
+        Names, each of which is loaded once, and allocators with their own parameters. The keys of a dict name the
+        methods in the rows: ``{"small": GeneticAlgorithm(population=20), "large": GeneticAlgorithm(population=200)}``.
     seeds : sequence of int
     objective, time_limit_s, iterations, target_gap, threads
         As in `solve`; the budget is that of each single run.
@@ -115,8 +126,8 @@ def compare(
     InputError
         If an argument is not what it should be; its place is the parameter.
     """
-    names = [text(name, "methods") for name in listed(methods, "methods", "names of methods")]
-    numbers = [whole(seed, "seeds", 0, LARGEST_SEED) for seed in listed(seeds, "seeds", "whole numbers")]
+    loaded = _labelled(methods)
+    numbers = [checked_seed(seed, "seeds") for seed in listed(seeds, "seeds", "whole numbers")]
     problems = instances if isinstance(instances, Iterator) else listed(instances, "instances", "instances")
     Budget(time_limit_s, iterations, target_gap)
     stop = event(stop, "stop") or threading.Event()
@@ -126,24 +137,41 @@ def compare(
         time_limit_s=time_limit_s,
         iterations=iterations,
         target_gap=target_gap,
-        threads=None if threads is None else whole(threads, "threads", 1, MOST_THREADS),
+        threads=checked_threads(threads),
         stop=stop,
         handle_signals=False,
     )
-    return _rows(run, problems, names, numbers, stop)
+    return _rows(run, problems, loaded, numbers, stop)
+
+
+def _labelled(methods: Methods) -> dict[str, str | Allocator]:
+    """Return the methods by the name that they have in the rows."""
+    if isinstance(methods, Mapping):
+        return {str(label): _method(method) for label, method in methods.items()}
+    given = [_method(method) for method in listed(methods, "methods", "methods")]
+    labelled = {method if isinstance(method, str) else method.method.name: method for method in given}
+    if len(labelled) < len({method if isinstance(method, str) else id(method) for method in given}):
+        raise InputError("has several allocators of one method; give a dict with a name for each", "methods")
+    return labelled
+
+
+def _method(given: object) -> str | Allocator:
+    of_type(given, (str, Allocator), "methods")
+    assert isinstance(given, str | Allocator)
+    return given
 
 
 def _rows(
     run: Callable[..., Result],
     instances: Iterable[Instance],
-    methods: Sequence[str],
+    methods: Mapping[str, str | Allocator],
     seeds: Sequence[int],
     stop: threading.Event,
 ) -> Iterator[Row]:
-    loaded = {name: _load(name) for name in methods}
+    loaded = {label: _load(method) if isinstance(method, str) else method for label, method in methods.items()}
     for number, instance in enumerate(instances, 1):
         of_type(instance, Instance, "instances")
-        for name, method in loaded.items():
+        for label, method in loaded.items():
             results: list[Result] = []
             reason = ""
             if isinstance(method, Exception):
@@ -151,7 +179,7 @@ def _rows(
             else:
                 results, reason = _run_seeds(partial(run, instance, method), seeds)
             if reason or results:
-                yield replace(summarise(instance, name, results, reason), number=number)
+                yield replace(summarise(instance, label, results, reason), number=number)
             if stop.is_set():
                 return
 
@@ -164,7 +192,7 @@ def _run_seeds(run: Callable[..., Result], seeds: Sequence[int]) -> tuple[list[R
             result = run(seed=seed)
         except RefusedError as error:
             return [], str(error)
-        except Exception as error:  # one faulty plugin must not cost the figures of all others
+        except Exception as error:  # the figures of the other methods do not depend on a faulty plugin
             LOG.warning("a run failed with seed %s", seed, exc_info=error)
             return [], f"failed with seed {seed}: {type(error).__name__}: {error}"
         if result.stop_reason is StopReason.INTERRUPTED:
@@ -214,6 +242,14 @@ def share_bounds(rows: Sequence[Row]) -> list[Row]:
     """Return the rows with all gaps against the best bound that any method proved on the instance.
 
     A bound holds for every method; against its own, a method that proves little would look worse than it is.
+
+    Parameters
+    ----------
+    rows : sequence of Row
+
+    Returns
+    -------
+    list of Row
     """
     best: dict[int, float] = {}
     for row in rows:
@@ -228,19 +264,19 @@ def _against(row: Row, bound: float) -> Row:
 
 
 def _load(name: str) -> str | Allocator | Exception:
-    """Load once; `auto` stays a name, and what cannot be loaded says so in its rows."""
+    """Load a method once; `auto` stays a name, and an error goes into the rows."""
     if name == "auto":
         return name
     try:
         return load(name)
     except InputError as error:
         return error
-    except Exception as error:  # a faulty plugin again
+    except Exception as error:  # as above
         LOG.warning("method %r cannot be loaded", name, exc_info=error)
         return ImportError(f"cannot be loaded: {type(error).__name__}: {error}")
 
 
 def _mean_and_worst(values: Sequence[float | None]) -> tuple[float | None, float | None]:
-    """None where one of the values is missing: a mean over the others alone would flatter."""
+    """Return mean and maximum; None where a value is missing, as a mean over the others alone would be too good."""
     known = [value for value in values if value is not None]
     return (float(np.mean(known)), max(known)) if len(known) == len(values) else (None, None)

@@ -127,10 +127,10 @@ class GappoLs(Gappo):
     method = BUILT_IN["gappo-ls"]
 
     def __init__(self, policy: Path | str | None = None, device: str = "cpu") -> None:
-        from alloc.allocators.heuristic.local_search.warm_up import warm_up
+        from alloc.allocators.heuristic.local_search.annealing_state import compile_loops
 
         super().__init__(policy, device)
-        warm_up()
+        compile_loops()
 
     def plan(self, search: Search) -> None:
         """Play one game on the whole instance, then improve its plan by local search."""

@@ -1,1 +1,7 @@
-"""Pictures of results, for notebooks and the command line alike; needs matplotlib."""
+"""Drawings of results and fronts, for programs, notebooks and the command line; needs matplotlib."""
+
+from alloc.allocators.plotting.figure import plot
+from alloc.allocators.plotting.front import plot_front
+from alloc.allocators.plotting.style import check_plot
+
+__all__ = ["check_plot", "plot", "plot_front"]

@@ -1,4 +1,4 @@
-"""Colours of a drawing, to be told apart with every kind of colour vision, and in grey."""
+"""Colours of a drawing, distinguishable with any kind of colour vision, and in grey."""
 
 from typing import TYPE_CHECKING
 
@@ -17,7 +17,7 @@ MOVE = "#56606b"
 
 
 def scale() -> "ListedColormap":
-    """Return the scale of completion times: the darker, the later; cividis without its harsh ends."""
+    """Return the colour map of completion times, dark is late: cividis without its two ends."""
     from matplotlib import colormaps
     from matplotlib.colors import ListedColormap
 
@@ -25,7 +25,7 @@ def scale() -> "ListedColormap":
 
 
 def colour_range(result: "Result") -> tuple[float, float]:
-    """From the earliest to the latest task served; at least a tenth of the makespan, so that trifles look alike."""
+    """Return the earliest and the latest completion time, at least a tenth of the makespan apart."""
     if result.evaluation is None:
         return 0.0, 1.0
     time = result.evaluation.completion_time
@@ -36,20 +36,20 @@ def colour_range(result: "Result") -> tuple[float, float]:
 
 
 def shades(result: "Result") -> "FloatArray":
-    """Place of each task on the scale, from 0 (early) to 1 (late), shape (m,); 0 where unserved."""
+    """Return the position of each task on the colour map, from 0 (early) to 1 (late), shape (m,); 0 where unserved."""
     low, high = colour_range(result)
     time = finite_times(result)
     return np.clip((time - low) / (high - low), 0.0, 1.0)
 
 
 def colours(result: "Result") -> "FloatArray":
-    """Colour of each task, shape (m, 4)."""
+    """Return the colour of each task, shape (m, 4)."""
     rgba: FloatArray = np.asarray(scale()(shades(result)), dtype=np.float64)
     return rgba
 
 
 def finite_times(result: "Result") -> "FloatArray":
-    """Completion times in hours, 0 where unserved."""
+    """Return completion times in hours, 0 where unserved, shape (m,)."""
     if result.evaluation is None:
         return np.zeros(result.instance.m)
     time = result.evaluation.completion_time
@@ -57,7 +57,7 @@ def finite_times(result: "Result") -> "FloatArray":
 
 
 def unserved_tasks(result: "Result") -> "NDArray[np.bool_]":
-    """Which tasks are unserved, shape (m,)."""
+    """Return which tasks are unserved, shape (m,)."""
     marked = np.zeros(result.instance.m, dtype=bool)
     if result.evaluation is not None:
         marked[list(result.evaluation.unserved_tasks)] = True

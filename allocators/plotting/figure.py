@@ -1,13 +1,13 @@
-"""Drawing an answer into a file."""
+"""The drawing of a result."""
 
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from alloc.allocators.plotting.sites import draw_sites, name_sites, plain_text, shortened
-from alloc.allocators.plotting.style import drawing, new_figure, save_figure
-from alloc.allocators.plotting.times import MOST_ROWS, draw_times
-from alloc.cli.output.console import counted, number, percent
+from alloc.allocators.plotting.style import drawn, new_figure
+from alloc.allocators.plotting.times import MAX_ROWS, draw_times
+from alloc.problems.text import counted, number, percent
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -15,16 +15,31 @@ if TYPE_CHECKING:
     from alloc.allocators import Result
 
 
-def save_plot(result: "Result", path: str) -> None:
-    """Draw `result` into a .png or .svg file, which is written whole or not at all."""
-    with drawing():
-        save_figure(draw(result), path)
+def plot(result: "Result", path: str | None = None) -> "Figure":
+    """Draw a result: sites and moves, and when each task is done; without positions, completion times alone.
+
+    Parameters
+    ----------
+    result : Result
+    path : str, optional
+        A .png or .svg file to write as well, whole or not at all.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        On a canvas of its own; matplotlib's current figure stays as it is.
+
+    Raises
+    ------
+    InputError
+        If `path` has another suffix, or cannot be written.
+    """
+    return drawn(lambda: _draw(result), path)
 
 
-def draw(result: "Result") -> "Figure":
-    """Return the drawing of `result`, on a canvas of its own; without positions it shows completion times alone."""
+def _draw(result: "Result") -> "Figure":
     if np.isnan(result.instance.task_position[:, 0]).all():
-        rows = min(result.instance.m, MOST_ROWS)
+        rows = min(result.instance.m, MAX_ROWS)
         figure = new_figure(7.5, float(np.clip(2.0 + 0.25 * rows, 3.0, 6.2)))
         draw_times(figure.subplots(), result)
         figure.suptitle(_title(result), fontsize=12)
@@ -34,7 +49,7 @@ def draw(result: "Result") -> "Figure":
     left, right = figure.subplots(1, 2, width_ratios=[1.25, 1])
     sites, radius = draw_sites(left, result)
     draw_times(right, result)
-    figure.draw_without_rendering()  # settles the layout, by which names are placed
+    figure.draw_without_rendering()  # fixes the layout, on which the places of names depend
     name_sites(left, result, sites, radius)
     return figure
 

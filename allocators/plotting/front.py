@@ -1,11 +1,11 @@
-"""Drawing a front of makespan against energy into a file."""
+"""The drawing of a front of makespan against energy."""
 
 from typing import TYPE_CHECKING
 
 from alloc.allocators.plotting.colours import LIMIT, MAKESPAN
 from alloc.allocators.plotting.sites import plain_text, shortened
-from alloc.allocators.plotting.style import drawing, new_figure, save_figure
-from alloc.cli.output.console import counted, number
+from alloc.allocators.plotting.style import drawn, new_figure
+from alloc.problems.text import counted, number
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -14,23 +14,38 @@ if TYPE_CHECKING:
     from alloc.allocators.pareto import Front
 
 WIDE = 3.0
-"""Ratio of the slowest to the fastest from which on makespans have a logarithmic scale."""
+"""Ratio of the largest to the smallest makespan above which the axis is logarithmic."""
 
 
-def save_front(front: "Front", path: str) -> None:
-    """Draw `front` into a .png or .svg file, which is written whole or not at all."""
-    with drawing():
-        save_figure(draw_front(front), path)
+def plot_front(front: "Front", path: str | None = None) -> "Figure":
+    """Draw a front: the least energy found and the proven bound on it, as steps over the makespan.
+
+    Parameters
+    ----------
+    front : Front
+    path : str, optional
+        A .png or .svg file to write as well, whole or not at all.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        On a canvas of its own; matplotlib's current figure stays as it is.
+
+    Raises
+    ------
+    InputError
+        If `path` has another suffix, or cannot be written.
+    """
+    return drawn(lambda: _draw(front), path)
 
 
-def draw_front(front: "Front") -> "Figure":
-    """Return the drawing: the least energy found and the proven bound on it, as steps over the makespan."""
+def _draw(front: "Front") -> "Figure":
     figure = new_figure(8, 5.2)
     axes = figure.subplots()
     hours = [result.makespan or 0.0 for result in front.points]
     energy = [result.energy or 0.0 for result in front.points]
     wide = hours[0] > 0 and hours[-1] > WIDE * hours[0]
-    span = hours[-1] - hours[0] or hours[0] or 1.0  # of a front that is one point too
+    span = hours[-1] - hours[0] or hours[0] or 1.0  # also for a front of a single point
     end = hours[-1] * (1.25 if wide else 1.0) + 0.05 * span
     axes.step([*hours, end], [*energy, energy[-1]], where="post", color=MAKESPAN, linewidth=1.6, zorder=3)
     axes.plot(hours, energy, "o", color=MAKESPAN, markersize=6, clip_on=False, zorder=4, label="best found")
@@ -48,7 +63,7 @@ def draw_front(front: "Front") -> "Figure":
 
 
 def _draw_bounds(axes: "Axes", front: "Front") -> None:
-    """Shade where no allocation can be: below the bound of a run, up to the limit that it had."""
+    """Shade what is proven impossible: below the energy bound of each run, up to its makespan limit."""
     proven = [
         (max(result.makespan or 0.0, result.makespan_limit or 0.0), result.energy_lower_bound or 0.0)
         for result in front.points

@@ -1,4 +1,4 @@
-"""Names beside circles that cover neither each other nor the circles."""
+"""Positions of labels beside circles, without overlaps."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +12,7 @@ SIDES = ((0, 1), (0, -1), (1, 0), (-1, 0))
 
 
 def place_labels(centre: FloatArray, radius: FloatArray, width: FloatArray, height: float) -> FloatArray:
-    """Return the middle of each label, NaN where there is no room for it.
-
-    The largest circles choose first.
+    """Return the centre of each label, NaN where there is no room for it; the largest circles are labelled first.
 
     Parameters
     ----------
@@ -33,7 +31,7 @@ def place_labels(centre: FloatArray, radius: FloatArray, width: FloatArray, heig
         for across, up in SIDES:
             offset = np.array([across * (radius[j] + width[j] / 2 + 2), up * (radius[j] + height / 2 + 1)])
             box = _box(centre[j] + offset, width[j], height)
-            if not any(_meet(box, other) for other in taken) and not _covers(box, centre, radius).any():
+            if not any(_overlap(box, other) for other in taken) and not _touches(box, centre, radius).any():
                 middle[j] = centre[j] + offset
                 taken.append(box)
                 break
@@ -41,11 +39,11 @@ def place_labels(centre: FloatArray, radius: FloatArray, width: FloatArray, heig
 
 
 def visible(centre: FloatArray, radius: FloatArray, room: float) -> NDArray[np.bool_]:
-    """Whether no smaller circle, which would be drawn on top, comes within `room` points of each centre."""
-    apart = np.hypot(*(centre[:, None, :] - centre[None, :, :]).transpose(2, 0, 1))
+    """Return whether each centre is free: no smaller circle, drawn on top, comes within `room` points of it."""
+    distance = np.hypot(*(centre[:, None, :] - centre[None, :, :]).transpose(2, 0, 1))
     rank = np.empty(len(radius), dtype=int)
     rank[np.argsort(-radius, kind="stable")] = np.arange(len(radius))
-    covered = (apart < radius[None, :] + room) & (rank[None, :] > rank[:, None])
+    covered = (distance < radius[None, :] + room) & (rank[None, :] > rank[:, None])
     free: NDArray[np.bool_] = ~covered.any(axis=1)
     return free
 
@@ -55,12 +53,12 @@ def _box(middle: FloatArray, width: float, height: float) -> Box:
     return x - width / 2, y - height / 2, x + width / 2, y + height / 2
 
 
-def _meet(one: Box, other: Box) -> bool:
+def _overlap(one: Box, other: Box) -> bool:
     return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]
 
 
-def _covers(box: Box, centre: FloatArray, radius: FloatArray) -> NDArray[np.bool_]:
-    """Which circles the box touches."""
+def _touches(box: Box, centre: FloatArray, radius: FloatArray) -> NDArray[np.bool_]:
+    """Return which circles the box touches."""
     nearest = np.clip(centre, [box[0], box[1]], [box[2], box[3]])
     touched: NDArray[np.bool_] = np.hypot(*(centre - nearest).T) < radius
     return touched

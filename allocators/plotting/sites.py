@@ -1,4 +1,4 @@
-"""The left half of a drawing: sites, groups and moves, seen along the axis with the least spread."""
+"""The left half of a drawing: tasks, groups and moves, projected along the axis with the least spread."""
 
 from typing import TYPE_CHECKING
 
@@ -7,7 +7,7 @@ import numpy as np
 from alloc.allocators.plotting.colours import MOVE, UNSERVED, colour_range, colours, scale, shades, unserved_tasks
 from alloc.allocators.plotting.labels import place_labels, visible
 from alloc.allocators.plotting.moves import flows, two_axes, wedges
-from alloc.cli.output.console import one_line
+from alloc.problems.text import one_line
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -15,11 +15,11 @@ if TYPE_CHECKING:
     from alloc.allocators import Result
     from alloc.problems.instance import FloatArray, IntArray
 
-MOST_LABELS = 60
-"""Tasks beyond which single ones are not named."""
+MAX_LABELS = 60
+"""Number of tasks above which they are not labelled."""
 
-MOST_AGENTS = 20_000
-"""Agents beyond which a sample of them is drawn: dots and wedges would only cover each other."""
+MAX_AGENTS = 20_000
+"""Number of agents above which a sample is drawn: more dots and wedges would only overlap."""
 
 Plane = tuple[int, int]
 
@@ -27,7 +27,7 @@ Plane = tuple[int, int]
 def drawn_agents(result: "Result") -> "IntArray":
     """Return the agents whose starts and moves are drawn: all, or evenly spaced ones of many."""
     n = result.instance.n
-    return np.unique(np.linspace(0, n - 1, min(n, MOST_AGENTS)).astype(np.intp))
+    return np.unique(np.linspace(0, n - 1, min(n, MAX_AGENTS)).astype(np.intp))
 
 
 def draw_sites(axes: "Axes", result: "Result") -> "tuple[FloatArray, FloatArray]":
@@ -43,20 +43,20 @@ def draw_sites(axes: "Axes", result: "Result") -> "tuple[FloatArray, FloatArray]
 
 
 def _areas(result: "Result", sites: "FloatArray") -> "FloatArray":
-    """Areas of the circles in square points: in proportion to the workloads, never invisible, rarely overlapping."""
+    """Return the areas of the circles in square points: proportional to the workloads, within limits."""
     work = result.instance.workload
     known = sites[~np.isnan(sites[:, 0])]
     largest = float(np.clip(15_000 / len(work), 80, 700))
     if 2 < len(known) <= 2_000:
-        apart = np.hypot(*(known[:, None, :] - known[None, :, :]).transpose(2, 0, 1))
-        np.fill_diagonal(apart, np.inf)
-        share = float(np.median(apart.min(axis=1))) / (float(np.ptp(known, axis=0).max()) or 1.0)
+        distance = np.hypot(*(known[:, None, :] - known[None, :, :]).transpose(2, 0, 1))
+        np.fill_diagonal(distance, np.inf)
+        share = float(np.median(distance.min(axis=1))) / (float(np.ptp(known, axis=0).max()) or 1.0)
         largest = float(np.clip(np.pi * (330 * share) ** 2, 60, largest))  # the half is some 330 points wide
     return np.maximum(12.0, largest * work / max(float(work.max()), 1e-300))
 
 
 def _draw_starts(axes: "Axes", result: "Result", plane: Plane) -> None:
-    """Agents that do not begin at a task: dots, hollow for the idle ones."""
+    """Draw agents that do not start at a task as dots, hollow for idle ones."""
     instance, agents = result.instance, drawn_agents(result)
     start = instance.start_position[agents]
     place = start[:, list(plane)]
@@ -84,7 +84,7 @@ def _draw_moves(axes: "Axes", result: "Result", plane: Plane) -> None:
 
 
 def _draw_tasks(axes: "Axes", result: "Result", sites: "FloatArray", area: "FloatArray") -> None:
-    """Small circles on top of large ones; hollow and crossed out where unserved."""
+    """Draw tasks as circles, small ones on top; unserved ones hollow and crossed out."""
     unserved, known = unserved_tasks(result), ~np.isnan(sites[:, 0])
     order = np.argsort(-area, kind="stable")
     plain = order[(known & ~unserved)[order]]
@@ -104,7 +104,7 @@ def _draw_tasks(axes: "Axes", result: "Result", sites: "FloatArray", area: "Floa
 
 
 def _window(result: "Result", plane: Plane) -> "tuple[FloatArray, FloatArray]":
-    """Ends of the drawing: a quarter wider than high, as is the room for it, with a margin for circles and names."""
+    """Return the limits of both axes: a quarter wider than high, with a margin for circles and labels."""
     places = np.vstack([result.instance.task_position, result.instance.start_position])[:, list(plane)]
     places = places[~np.isnan(places[:, 0])]
     low, high = places.min(axis=0), places.max(axis=0)
@@ -123,8 +123,8 @@ def _finish(axes: "Axes", result: "Result", plane: Plane) -> None:
     axes.set_aspect("equal", adjustable="box")
     axes.set_xlabel("xyz"[plane[0]])
     axes.set_ylabel("xyz"[plane[1]])
-    counts = ", number = agents" if result.instance.m <= MOST_LABELS else ""
-    sample = f"; {MOST_AGENTS} of the agents are drawn" if result.instance.n > MOST_AGENTS else ""
+    counts = ", number = agents" if result.instance.m <= MAX_LABELS else ""
+    sample = f"; {MAX_AGENTS} of the agents are drawn" if result.instance.n > MAX_AGENTS else ""
     axes.set_title(f"circle = task (area = workload{counts}); wedge = move, thin end at the task{sample}", fontsize=9)
     axes.grid(color="0.92", linewidth=0.6)
     axes.set_axisbelow(True)
@@ -135,11 +135,11 @@ def _finish(axes: "Axes", result: "Result", plane: Plane) -> None:
 def name_sites(axes: "Axes", result: "Result", sites: "FloatArray", radius: "FloatArray") -> None:
     """Write ids beside the circles and numbers of agents into them, where there is room.
 
-    The layout must be settled, as names are placed by the distances on paper.
+    The layout must be final, since labels are placed by distances on paper.
     """
-    if result.instance.m > MOST_LABELS:
+    if result.instance.m > MAX_LABELS:
         return
-    size = 8.0 if result.instance.m <= MOST_LABELS // 2 else 6.5
+    size = 8.0 if result.instance.m <= MAX_LABELS // 2 else 6.5
     names = [shortened(name, 12) for name in result.instance.task_ids]
     centre = axes.transData.transform(sites) * 72 / axes.figure.dpi
     width = np.array([0.62 * size * len(name) for name in names])
@@ -154,7 +154,7 @@ def name_sites(axes: "Axes", result: "Result", sites: "FloatArray", radius: "Flo
 
 
 def _group_sizes(result: "Result") -> "IntArray":
-    """Agents on each task."""
+    """Return the number of agents on each task."""
     if result.allocation is None:
         return np.zeros(result.instance.m, dtype=np.intp)
     task = result.allocation.task_of_agent
@@ -180,12 +180,12 @@ def _write(axes: "Axes", text: str, site: "FloatArray", offset: "FloatArray", si
     )
 
 
-def shortened(name: str, most: int) -> str:
-    """Return `name` on one line, cut off after `most` characters."""
+def shortened(name: str, longest: int) -> str:
+    """Return `name` on one line, cut to `longest` characters."""
     name = one_line(name)
-    return name if len(name) <= most else name[: most - 1] + "…"
+    return name if len(name) <= longest else name[: longest - 1] + "…"
 
 
 def plain_text(name: str) -> str:
-    """Return `name` so that matplotlib takes no part of it for mathematics."""
+    """Return `name` escaped, so that matplotlib reads no part of it as mathematics."""
     return name.replace("$", r"\$")

@@ -1,9 +1,9 @@
-"""The one way to draw: figures, their fonts and the warnings that a picture is not worth, and how they are written."""
+"""Settings that all drawings share: figure, fonts, suppressed warnings, and how files are written."""
 
 import io
 import logging
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -26,26 +26,37 @@ FONTS = (
     "Arial Unicode MS",
     "Unifont",
 )
-"""A letter is taken from the first of these that is installed and has it; the first comes with matplotlib."""
+"""Font fallbacks: a glyph comes from the first installed one that has it; the first is shipped with matplotlib."""
 
-UNTOLD = r"Glyph .* missing|Matplotlib currently does not support|constrained_layout not applied"
-"""Warnings that nobody can do anything about: a box stands for a letter, and things lie closer than they should."""
+SUPPRESSED = r"Glyph .* missing|Matplotlib currently does not support|constrained_layout not applied"
+"""Warnings that a user can do nothing about: a missing glyph is drawn as a box, a crowded layout stays crowded."""
 
 
 def check_plot(path: str) -> None:
-    """Raise an `InputError` if no drawing is written under that name."""
+    """Raise an `InputError` if the suffix of `path` is not one that drawings have."""
     from alloc.problems import InputError
 
     if Path(path).suffix.lower() not in SUFFIXES:
         raise InputError(f"must end in {' or '.join(SUFFIXES)}", source=path)
 
 
+def drawn(draw: Callable[[], "Figure"], path: str | None) -> "Figure":
+    """Return the figure that `draw` makes, and write it to `path` if there is one."""
+    if path is not None:
+        check_plot(path)
+    with _style():
+        figure = draw()
+        if path is not None:
+            _save(figure, path)
+    return figure
+
+
 @contextmanager
-def drawing() -> Iterator[None]:
-    """Draw within: letters of all scripts, and not a word of matplotlib's on standard error."""
+def _style() -> Iterator[None]:
+    """Draw inside with fonts for all scripts, and without output of matplotlib on standard error."""
     logger = logging.getLogger("matplotlib")
     level = logger.level
-    logger.setLevel(logging.ERROR)  # it tells of folders that it may not write, from its import on
+    logger.setLevel(logging.ERROR)  # it reports folders that it cannot write to, from its import on
     try:
         import matplotlib
         from matplotlib.font_manager import fontManager
@@ -53,7 +64,7 @@ def drawing() -> Iterator[None]:
         installed = {font.name for font in fontManager.ttflist}
         fonts = [name for name in FONTS if name in installed]
         with warnings.catch_warnings(), matplotlib.rc_context({"font.family": fonts or ["sans-serif"]}):
-            warnings.filterwarnings("ignore", UNTOLD, UserWarning)
+            warnings.filterwarnings("ignore", SUPPRESSED, UserWarning)
             yield
     finally:
         logger.setLevel(level)
@@ -69,8 +80,7 @@ def new_figure(width: float, height: float) -> "Figure":
     return figure
 
 
-def save_figure(figure: "Figure", path: str) -> None:
-    """Write `figure` into a .png or .svg file, whole or not at all."""
+def _save(figure: "Figure", path: str) -> None:
     from alloc.problems.formats import write_bytes_atomically
 
     kind = Path(path).suffix.lower().removeprefix(".")

@@ -1,54 +1,57 @@
-"""The right half of a drawing: when each task is done."""
+"""The right half of a drawing: the completion time of each task."""
 
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from alloc.allocators.plotting.colours import LIMIT, MAKESPAN, UNSERVED, colours, finite_times, unserved_tasks
 from alloc.allocators.plotting.sites import plain_text, shortened
-from alloc.cli.output.console import number
+from alloc.problems.text import number
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
+    from matplotlib.lines import Line2D
 
     from alloc.allocators import Result
+    from alloc.problems.instance import IntArray
 
-MOST_ROWS = 40
-"""Tasks beyond which bars stand upright, without names."""
+MAX_ROWS = 40
+"""Number of tasks above which bars are vertical and without labels."""
 
-MOST_BARS = 1_000
-"""Tasks beyond which a line stands for each."""
+MAX_BARS = 1_000
+"""Number of tasks above which bars are single lines."""
 
 
 def draw_times(axes: "Axes", result: "Result") -> None:
-    """Draw a bar per task, the unserved first, then the last one first, with makespan and lower bound as lines."""
+    """Draw a bar per task, unserved tasks first, then the latest first, with makespan and lower bound as lines."""
     from matplotlib.colors import to_rgba
 
     time, unserved = finite_times(result), unserved_tasks(result)
     order = np.lexsort((-time, ~unserved))
     top = max(float(time.max()), result.makespan or 0.0, result.lower_bound or 0.0) or 1.0
-    height, missing = np.where(unserved, top, time)[order], unserved[order]
+    height, hatched = np.where(unserved, top, time)[order], unserved[order]
     fill = colours(result)[order]
-    fill[missing] = 1.0
-    rows = result.instance.m <= MOST_ROWS
+    fill[hatched] = 1.0
+    rows = result.instance.m <= MAX_ROWS
     thick = 0.8 if result.instance.m <= 150 else 1.0
-    if result.instance.m > MOST_BARS:
-        fill[missing] = to_rgba(UNSERVED, 0.3)
-        axes.vlines(np.arange(result.instance.m), 0, height, colors=cast(Any, fill), linewidth=0.5)
+    if result.instance.m > MAX_BARS:
+        fill[hatched] = to_rgba(UNSERVED, 0.3)
+        axes.vlines(np.arange(result.instance.m), 0, height, colors=list(map(tuple, fill.tolist())), linewidth=0.5)
     else:
         bars = (axes.barh if rows else axes.bar)(np.arange(result.instance.m), height, thick, color=fill)
-        for place in np.flatnonzero(missing):
+        for place in np.flatnonzero(hatched):
             bars[place].set(hatch="////", linewidth=0.8, edgecolor=UNSERVED)
     lines = _lines(axes, result, rows)
     if rows:
         _name_rows(axes, result, order, top)
     else:
         _name_columns(axes, result, top)
-    _legend(axes, lines, any_missing=bool(missing.any()))
+    _legend(axes, lines, any_unserved=bool(hatched.any()))
 
 
-def _lines(axes: "Axes", result: "Result", rows: bool) -> list[Any]:
-    """Makespan and lower bound, with a white edge so that they show on dark bars."""
+def _lines(axes: "Axes", result: "Result", rows: bool) -> "list[Line2D]":
+    """Draw makespan and lower bound, with a white edge to be visible on dark bars."""
     from matplotlib.patheffects import withStroke
 
     draw = axes.axvline if rows else axes.axhline
@@ -67,7 +70,7 @@ def _lines(axes: "Axes", result: "Result", rows: bool) -> list[Any]:
     ]
 
 
-def _name_rows(axes: "Axes", result: "Result", order: Any, top: float) -> None:
+def _name_rows(axes: "Axes", result: "Result", order: "IntArray", top: float) -> None:
     m = result.instance.m
     names = [plain_text(shortened(result.instance.task_ids[j], 14)) for j in order]
     axes.set_yticks(range(m), names, fontsize=8 if m <= 25 else 6.5)
@@ -86,11 +89,11 @@ def _name_columns(axes: "Axes", result: "Result", top: float) -> None:
     axes.set_ylabel("completion time (h)")
 
 
-def _legend(axes: "Axes", lines: list[Any], *, any_missing: bool) -> None:
+def _legend(axes: "Axes", lines: "list[Line2D]", *, any_unserved: bool) -> None:
     from matplotlib.patches import Patch
 
-    entries = list(lines)
-    if any_missing:
+    entries: list[Artist] = list(lines)
+    if any_unserved:
         entries.append(Patch(facecolor="white", edgecolor=UNSERVED, hatch="////", label="unserved"))
     axes.spines[["top", "right"]].set_visible(False)
     if entries:

@@ -1,5 +1,6 @@
 """``alloc compare``."""
 
+import re
 import sys
 import threading
 from typing import TYPE_CHECKING, Annotated
@@ -8,19 +9,28 @@ import typer
 
 from alloc.cli import options
 from alloc.cli.options import Objective, examples
-from alloc.cli.output.console import is_terminal, note, number, percent, say, table, to_json
+from alloc.cli.output.console import is_terminal, note, say, table, to_json
 from alloc.cli.output.files import check_outputs, save
+from alloc.problems.text import number, percent
 
 if TYPE_CHECKING:
+    from alloc.allocators import Allocator
     from alloc.allocators.experiments.compare import Row
 
 EXAMPLES = examples(
     "alloc compare demo.json --methods greedy,ga,cpsat",
     "alloc compare instances/*.json --methods ga,gappo --seeds 5 --time-limit 3 --csv table.csv",
+    "alloc compare demo.json --methods 'ga[population=40],ga[population=400]' --time-limit 1",
     "alloc compare demo.json --methods milp,gappo --objective makespan-energy --seeds 7,8,9 --json",
-    closing="A method that refuses an instance has a row with the reason. Ctrl-C prints what is finished, with exit "
+    closing="A method that refuses an instance has a row with the reason. Ctrl-C prints the finished rows, with exit "
     "code 1.",
 )
+
+BETWEEN_METHODS = re.compile(r",(?![^\[]*\])")
+"""A comma outside of brackets."""
+
+BETWEEN_SETTINGS = re.compile(r",(?=\s*\w+=)")
+"""A comma before the name of the next parameter; others are part of a value."""
 
 
 def register(app: typer.Typer) -> None:
@@ -29,11 +39,13 @@ def register(app: typer.Typer) -> None:
 
 
 def compare_command(
-    instances: Annotated[list[str], typer.Argument(metavar="INSTANCE...", help=f"Instances, each {options.READABLE}.")],
+    instances: options.InstancesArgument,
     methods: Annotated[
         str,
         typer.Option(
-            metavar="NAME,NAME,...", autocompletion=options.complete_methods, help="Methods; see `alloc methods`."
+            metavar="NAME,NAME,...",
+            autocompletion=options.complete_methods,
+            help="Methods; see `alloc methods`. Parameters stand in brackets, as in ga[population=200].",
         ),
     ],
     seeds: Annotated[
@@ -50,7 +62,7 @@ def compare_command(
     json: options.JsonOption = False,
 ) -> None:
     """Run several methods on several instances and seeds, and print a table."""
-    from alloc.allocators import Budget, describe
+    from alloc.allocators import Budget
     from alloc.allocators.experiments.compare import compare, share_bounds
     from alloc.allocators.runtime.interrupts import signals_set
     from alloc.problems.formats import is_standard_output, read_instance
@@ -58,18 +70,15 @@ def compare_command(
     check_outputs(("--csv", csv), read=[("INSTANCE", instance) for instance in instances])
     if json and csv is not None and is_standard_output(csv):
         raise typer.BadParameter("and --json cannot both be standard output", param_hint="'--csv'")
-    names, numbers = _names(methods), _seeds(seeds)
-    for name in names:
-        if name != "auto":
-            describe(name)
+    wanted, numbers = _methods(methods), _seeds(seeds)
     limit = options.time_limit(time_limit, iterations)
     Budget(limit, iterations, target_gap)
     problems = [read_instance(instance) for instance in instances]
-    stop, rows, total = threading.Event(), [], len(problems) * len(names)
+    stop, rows, total = threading.Event(), [], len(problems) * len(wanted)
     with signals_set(stop):
         for row in compare(
             problems,
-            names,
+            wanted,
             numbers,
             objective=objective.value,
             time_limit_s=limit,
@@ -88,11 +97,21 @@ def compare_command(
     raise typer.Exit(0 if complete and served else 1)
 
 
-def _names(text: str) -> list[str]:
-    names = list(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
-    if not names:
+def _methods(text: str) -> "dict[str, str | Allocator]":
+    """Return the methods by how they are written; those with parameters in brackets are loaded with them."""
+    from alloc.allocators import describe, load
+
+    found: dict[str, str | Allocator] = {}
+    for label in dict.fromkeys(part.strip() for part in BETWEEN_METHODS.split(text) if part.strip()):
+        name, bracket, settings = label.partition("[")
+        if bracket and not settings.endswith("]"):
+            raise typer.BadParameter(f"{label!r} must be like ga[population=200]", param_hint="'--methods'")
+        if name != "auto":
+            describe(name)
+        found[label] = load(name, **options.values(BETWEEN_SETTINGS.split(settings[:-1]))) if bracket else name
+    if not found:
         raise typer.BadParameter("names no method; see `alloc methods`", param_hint="'--methods'")
-    return names
+    return found
 
 
 def _seeds(text: str) -> list[int]:
@@ -109,7 +128,7 @@ def _seeds(text: str) -> list[int]:
 
 
 def _show_done(row: "Row", count: int, total: int) -> None:
-    """On a terminal, tell each row as it comes; the table follows at the end."""
+    """On a terminal, print each row as soon as it is known; the table follows at the end."""
     if is_terminal(sys.stderr):
         outcome = row.reason or f"T {number(row.makespan_mean)} h, gap {percent(row.gap_mean)}"
         say(f"[{count}/{total}] {row.instance}, {row.method}: {outcome}")
@@ -153,7 +172,7 @@ def _cells(row: "Row") -> list[str]:
 
 
 def _csv(rows: "list[Row]") -> str:
-    """One line per row under the names of its fields; empty where there is no value."""
+    """Return a header with the names of the fields, and a line per row; None is empty."""
     import csv
     import io
     from dataclasses import fields

@@ -3,7 +3,7 @@
 import math
 import sys
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, TypedDict
 
 import typer
 
@@ -20,8 +20,8 @@ EXAMPLES = examples(
     "alloc evaluate demo.json best.json",
     "alloc evaluate demo.json best.json --json",
     "alloc solve demo.json --json | alloc evaluate demo.json -",
-    closing="The bounds in a result hold for the instance that it was found on: they are shown where agents and scores "
-    "are the same. Exit code 1 if a task is unserved or an agent is sent where it cannot go.",
+    closing="The bounds in a result file are shown if agents and scores agree with this instance. Exit code 1 if a "
+    "task is unserved or an agent is assigned to a task that it cannot take.",
 )
 
 SCORES = (
@@ -38,7 +38,18 @@ SCORES = (
     "violations",
     "assignment",
 )
-"""Fields of a result that do not tell of a run."""
+"""Fields of a result that are about the allocation, not about the run."""
+
+
+class TaskScore(TypedDict):
+    """One entry of ``tasks`` in the JSON; the time is None where the task is unserved."""
+
+    id: str
+    workload: float
+    agents: int
+    ability: float
+    coverage: float
+    completion_time: float | None
 
 
 def register(app: typer.Typer) -> None:
@@ -54,7 +65,7 @@ def evaluate_command(
     ],
     json: options.JsonOption = False,
 ) -> None:
-    """Score an allocation, whoever made it."""
+    """Score an allocation, wherever it comes from."""
     problem, answer, claims = read_pair(instance, allocation)
     assert answer is not None
     result = _scored(problem, answer)
@@ -62,7 +73,7 @@ def evaluate_command(
         if _is_of(result, claims):
             result = _bounded(result, claims)
         else:
-            note(f"{allocation}: its scores are not those on this instance, so that its bounds are left out")
+            note(f"{allocation}: its scores do not agree with this instance, so its bounds are left out")
     score = result.evaluation
     assert score is not None
     if json:
@@ -75,7 +86,7 @@ def evaluate_command(
 
 
 def _scored(problem: "Instance", allocation: "Allocation") -> "Result":
-    """Dress an allocation from elsewhere as a result, so that its scores read the same."""
+    """Return the scores of an allocation as a result."""
     from alloc.allocators import Result, StopReason
     from alloc.problems import Objective, evaluate, makespan_lower_bound
 
@@ -95,29 +106,31 @@ def _scored(problem: "Instance", allocation: "Allocation") -> "Result":
     )
 
 
-def _is_of(result: "Result", claims: dict[str, Any]) -> bool:
-    """Whether `claims` can be of a result of this very instance: the same agents, and the same figures of the whole."""
-    found = result.to_dict()
+def _is_of(result: "Result", claims: dict[str, object]) -> bool:
+    """Return whether the fields `claims` of a result file fit `result`: the same agents and the same scores."""
+    found, assignment = result.to_dict(), claims.get("assignment")
     same = ("makespan", "energy", "distance", "battery_remaining_percent", "reward")
     return (
         claims.get("instance") == found["instance"]
-        and claims["assignment"].keys() == found["assignment"].keys()
+        and isinstance(assignment, dict)
+        and assignment.keys() == found["assignment"].keys()
         and all(_is_close(claims.get(name), found[name]) for name in same)
     )
 
 
-def _is_close(one: Any, other: float | None) -> bool:
+def _is_close(one: object, other: float | None) -> bool:
     number = _number(one)
     return one is other if number is None or other is None else math.isclose(number, other, rel_tol=1e-9)
 
 
-def _number(value: Any) -> float | None:
-    is_number = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
-    return float(value) if is_number else None
+def _number(value: object) -> float | None:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= sys.float_info.max:
+        return None
+    return float(value)
 
 
-def _bounded(result: "Result", claims: dict[str, Any]) -> "Result":
-    """Return `result` with the bounds that the run proved, but for those above what they are to bound."""
+def _bounded(result: "Result", claims: dict[str, object]) -> "Result":
+    """Return `result` with the bounds of a result file, except those that exceed the value they bound."""
     bounds = {name: _number(claims.get(name)) for name in ("lower_bound", "energy_lower_bound", "makespan_limit")}
     least, energy = bounds["lower_bound"], bounds["energy_lower_bound"]
     if least is not None and result.makespan is not None and least <= result.makespan * (1 + 1e-9):
@@ -127,13 +140,13 @@ def _bounded(result: "Result", claims: dict[str, Any]) -> "Result":
     return result
 
 
-def _scores(result: "Result") -> dict[str, Any]:
+def _scores(result: "Result") -> dict[str, object]:
     fields = result.to_dict()
     return {name: fields[name] for name in SCORES}
 
 
-def _tasks(result: "Result") -> list[dict[str, Any]]:
-    """One entry per task, in the order of the instance."""
+def _tasks(result: "Result") -> list[TaskScore]:
+    """Return the scores of each task, in the order of the instance."""
     import numpy as np
 
     problem, score, allocation = result.instance, result.evaluation, result.allocation
@@ -156,8 +169,9 @@ def _tasks(result: "Result") -> list[dict[str, Any]]:
 
 
 def _tell(result: "Result") -> None:
-    from alloc.cli.output.console import number, table
-    from alloc.cli.output.report import figures, holdup
+    from alloc.allocators.summary import bottleneck_lines, figures
+    from alloc.cli.output.console import table
+    from alloc.problems.text import number
 
     score = result.evaluation
     assert score is not None
@@ -173,7 +187,7 @@ def _tell(result: "Result") -> None:
         for entry in _tasks(result)
     ]
     say(table(["task", "workload", "agents", "ability W", "W - h", "done at (h)"], rows))
-    say("\n".join(["", f"{result.instance.name}:", *figures(result), *holdup(result)]))
+    say("\n".join(["", f"{result.instance.name}:", *figures(result), *bottleneck_lines(result)]))
     for violation in score.violations:
         agent, task = result.instance.agent_ids[violation.agent], result.instance.task_ids[violation.task]
         say(f"Violation: agent {agent} cannot take task {task}: {violation.reason}.")

@@ -21,7 +21,7 @@ EXAMPLES = examples(
     closing="SPREAD is one value for all, LOW:HIGH for a uniform draw, or none for no limit.",
 )
 
-SEED = Annotated[int, typer.Option(min=0, help="Source of all randomness; with --count the first of several.")]
+SEED = Annotated[int, typer.Option(min=0, help="Seed of all random numbers; with --count the first of several.")]
 SPREADS = ("communication_range", "battery", "speed", "priority")
 COVERING = ("agents", "tasks", "ability_min", "ability_max", "workload", "integer")
 
@@ -63,8 +63,8 @@ class Distribution(StrEnum):
     DIRICHLET = "dirichlet"
 
 
-def _option(text: str, default: str, *names: str, **more: Any) -> Any:
-    return typer.Option(*names, help=text, show_default=default, **more)
+def _option(text: str, default: str, *names: str, metavar: str | None = None) -> object:
+    return typer.Option(*names, help=text, show_default=default, metavar=metavar)
 
 
 def register(app: typer.Typer) -> None:
@@ -82,7 +82,7 @@ def generate_command(
         ),
     ],
     seed: SEED = 0,
-    count: Annotated[int, typer.Option(min=1, help="How many, with the seeds that follow.")] = 1,
+    count: Annotated[int, typer.Option(min=1, help="Number of instances, with consecutive seeds.")] = 1,
     output: Annotated[
         str,
         typer.Option(
@@ -115,7 +115,7 @@ def generate_command(
     energy_per_distance: Annotated[float | None, _option("Energy per unit of distance.", "6")] = None,
     tau: Annotated[float | None, _option("Base of the reward (3).", "0.5")] = None,
 ) -> None:
-    """Write instances like the paper's, random ones, or those of machine covering."""
+    """Generate instances: the scenarios of the paper, random ones, or machine covering."""
     wanted = {name: value for name, value in locals().items() if value is not None and name not in FIXED}
     for name in wanted:
         if family is not Family.RANDOM and not (family is Family.COVERING and name in COVERING):
@@ -140,8 +140,8 @@ def _instance(family: Family, wanted: dict[str, Any], seed: int) -> "Instance":
         return _covering(seed=seed, **wanted)
     if family is not Family.RANDOM:
         return paper(int(family.removeprefix("paper-")), seed)
-    values = {name: _spread(value, name) if name in SPREADS else value for name, value in wanted.items()}
-    return random_instance(Parameters(**values), seed)
+    spreads: dict[str, Any] = {name: _spread(value, name) for name, value in wanted.items() if name in SPREADS}
+    return random_instance(Parameters(**{**wanted, **spreads}), seed)
 
 
 def _covering(

@@ -1,6 +1,6 @@
 """``alloc methods``."""
 
-from typing import Annotated, Any
+from typing import Annotated, TypedDict
 
 import typer
 
@@ -12,8 +12,27 @@ EXAMPLES = examples(
     "alloc methods",
     "alloc methods --json",
     "alloc methods --prepare",
-    closing="Some methods compile their loops when they are first used: --prepare does it for all of them at once.",
+    closing="Some methods compile loops when first used; --prepare does this for all of them.",
 )
+
+
+class Fact(TypedDict, total=False):
+    """One entry of the JSON; with ``error`` the plugin cannot be loaded."""
+
+    name: str
+    error: str
+    summary: str
+    kind: str
+    objectives: list[str]
+    finite_speeds: bool
+    makespan_slack: bool
+    proves: bool
+    warm_start: bool
+    anytime: bool
+    options: list[str]
+    installed: bool
+    missing: list[str]
+    citation: str
 
 
 def register(app: typer.Typer) -> None:
@@ -24,10 +43,10 @@ def register(app: typer.Typer) -> None:
 def methods_command(
     json: options.JsonOption = False,
     prepare: Annotated[
-        bool, typer.Option("--prepare", help="Compile what the methods need, so that no first run waits for it.")
+        bool, typer.Option("--prepare", help="Compile the loops of all methods now instead of in their first runs.")
     ] = False,
 ) -> None:
-    """List the methods, what each can do, and what is missing for it."""
+    """List the methods, what each can do, and which packages it still needs."""
     from alloc.allocators import names
 
     if prepare:
@@ -46,7 +65,7 @@ def methods_command(
 
 
 def _prepare() -> None:
-    """Load each method that is installed; a broken plugin keeps nobody waiting."""
+    """Load each installed method, which compiles its loops; a plugin that fails gives a note."""
     from alloc.allocators import describe, load, names
     from alloc.problems import InputError
 
@@ -58,8 +77,8 @@ def _prepare() -> None:
             note(str(error))
 
 
-def _facts(name: str) -> dict[str, Any]:
-    """One broken plugin must not hide the other methods."""
+def _facts(name: str) -> Fact:
+    """Describe a method; a plugin that fails has an entry too, with the error."""
     from alloc.allocators import describe
     from alloc.problems import InputError
 
@@ -84,7 +103,7 @@ def _facts(name: str) -> dict[str, Any]:
     }
 
 
-def _row(fact: dict[str, Any]) -> list[str]:
+def _row(fact: Fact) -> list[str]:
     if "error" in fact:
         return [fact["name"], *"-----", "broken", fact["error"]]
     return [

@@ -1,6 +1,7 @@
 """``alloc pareto``."""
 
 import sys
+from collections.abc import Callable
 from functools import cache
 from typing import TYPE_CHECKING, Annotated
 
@@ -8,8 +9,9 @@ import typer
 
 from alloc.cli import options
 from alloc.cli.options import examples
-from alloc.cli.output.console import is_terminal, note, number, percent, say, table, to_json
-from alloc.cli.output.files import check_outputs, read_known, save
+from alloc.cli.output.console import is_terminal, note, say, table, to_json
+from alloc.cli.output.files import check_outputs, check_picture, read_known, save
+from alloc.problems.text import number, percent
 
 if TYPE_CHECKING:
     from alloc.allocators import Result
@@ -33,33 +35,31 @@ def pareto_command(
     instance: options.InstanceArgument,
     method: Annotated[
         str,
-        typer.Option(autocompletion=options.complete_methods, help="A method that makes use of slack, or auto."),
+        typer.Option(
+            autocompletion=options.complete_methods, help="A method with slack (see `alloc methods`), or auto."
+        ),
     ] = "auto",
     points: Annotated[int, typer.Option(min=1, max=10_000, help="Runs, one for each point of the front.")] = 10,
     time_limit: options.TimeLimitOption = None,
     iterations: options.IterationsOption = None,
-    seed: Annotated[int, typer.Option(min=0, max=2**63 - 1, help="Source of all randomness.")] = 0,
+    seed: options.SeedOption = 0,
     start: Annotated[
         str | None,
-        typer.Option(metavar="FILE", help="An allocation, a result or an earlier front to begin with."),
+        typer.Option(metavar="FILE", help="An allocation, a result or an earlier front to start from."),
     ] = None,
     threads: options.ThreadsOption = None,
     output: Annotated[
         str | None, typer.Option(metavar="FILE", help="Write the front here as JSON; - is standard output.")
     ] = None,
-    plot: Annotated[str | None, typer.Option(metavar="FILE", help="Draw the front as .png or .svg.")] = None,
+    plot: options.PlotOption = None,
     json: options.JsonOption = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print no table, no notes, no progress.")] = False,
+    quiet: options.QuietOption = False,
 ) -> None:
-    """Trace the front of makespan against energy: what each hour saved costs."""
+    """Trace the Pareto front of makespan and energy: how much energy each hour saved costs."""
     from alloc.allocators.pareto import pareto
 
-    read = [("INSTANCE", instance)]
-    check_outputs(("--output", output), ("--plot", plot), read=read)
-    if plot is not None:
-        from alloc.allocators.plotting.style import check_plot
-
-        check_plot(plot)
+    check_outputs(("--output", output), ("--plot", plot), read=[("INSTANCE", instance)])
+    check_picture(plot)
     problem, starts = read_known(instance, start, quiet=quiet)
     front = pareto(
         problem,
@@ -72,9 +72,11 @@ def pareto_command(
         threads=threads,
         on_point=None if quiet else _show_point,
     )
-    then = [] if quiet else [lambda: _tell(front, with_table=not json)]
+    then: list[Callable[[], object]] = [] if quiet else [lambda: _tell(front, with_table=not json)]
     if plot is not None:
-        then.append(lambda: _draw(front, plot))
+        from alloc.allocators.plotting import plot_front
+
+        then.append(lambda: plot_front(front, plot))
     text = cache(lambda: to_json(front.to_dict()))
     save(text, output, text if json else None, then)
     raise typer.Exit(0 if front.points and front.points[0].makespan is not None else 1)
@@ -87,14 +89,8 @@ def _tell(front: "Front", *, with_table: bool) -> None:
         note(line)
 
 
-def _draw(front: "Front", path: str) -> None:
-    from alloc.allocators.plotting.front import save_front
-
-    save_front(front, path)
-
-
 def _show_point(result: "Result") -> None:
-    """On a terminal, tell each point as it comes; the table follows at the end."""
+    """On a terminal, print each point as soon as it is known; the table follows at the end."""
     if is_terminal(sys.stderr):
         say(f"T {number(result.makespan)} h, energy {number(result.energy)}, gap {percent(result.energy_gap)}")
 
@@ -120,7 +116,7 @@ def _table(front: "Front") -> str:
 
 
 def _change(value: float | None, base: float | None, of: float | None = None) -> str:
-    """Return ``value - base`` as a part of `of`, else of `base`."""
+    """Return ``value - base`` as a share of `of`, by default of `base`."""
     whole = base if of is None else of
     if value is None or base is None or not whole:
         return "-"

@@ -1,14 +1,15 @@
 """``alloc solve``."""
 
+from collections.abc import Callable
 from functools import cache
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from alloc.cli import options
 from alloc.cli.options import Objective, examples
 from alloc.cli.output.console import note, say, to_json
-from alloc.cli.output.files import check_outputs, read_pair, save
+from alloc.cli.output.files import check_outputs, check_picture, read_pair, save
 
 if TYPE_CHECKING:
     from alloc.allocators import Result
@@ -20,8 +21,32 @@ EXAMPLES = examples(
     "alloc solve demo.json --objective makespan-energy --makespan-slack 0.05",
     "alloc solve demo.json --start best.json --target-gap 0.01",
     "alloc generate paper-1 --seed 7 --output - | alloc solve - --method cpsat --json",
-    closing="Ctrl-C ends a run as its time limit does: the best so far is printed and saved.",
+    closing="Ctrl-C ends a run as its time limit does: the best allocation so far is printed and saved.",
 )
+
+MethodOption = Annotated[
+    str,
+    typer.Option(autocompletion=options.complete_methods, help="One of `alloc methods`, or auto, which picks one."),
+]
+SlackOption = Annotated[
+    float,
+    typer.Option(min=0, help="With energy: accept makespans this much above the shortest one found; 0.02 is 2 %."),
+]
+LimitOption = Annotated[
+    float | None,
+    typer.Option(metavar="HOURS", help="With energy: accept makespans up to this one.", show_default=False),
+]
+StartOption = Annotated[
+    str | None,
+    typer.Option(metavar="FILE", help="An allocation or a result to start from; the answer is never worse."),
+]
+PolicyOption = Annotated[str | None, typer.Option(metavar="FILE", help="A trained policy, for learned methods.")]
+DeviceOption = Annotated[
+    str | None, typer.Option(help="Where a learned method computes: cpu or cuda.", show_default="cpu")
+]
+OutputOption = Annotated[
+    str | None, typer.Option(metavar="FILE", help="Write the result here as JSON; - is standard output.")
+]
 
 
 def register(app: typer.Typer) -> None:
@@ -31,49 +56,30 @@ def register(app: typer.Typer) -> None:
 
 def solve_command(
     instance: options.InstanceArgument,
-    method: Annotated[
-        str,
-        typer.Option(autocompletion=options.complete_methods, help="One of `alloc methods`, or auto, which picks one."),
-    ] = "auto",
+    method: MethodOption = "auto",
     objective: options.ObjectiveOption = Objective.MAKESPAN,
     time_limit: options.TimeLimitOption = None,
     iterations: options.IterationsOption = None,
     target_gap: options.TargetGapOption = None,
-    makespan_slack: Annotated[
-        float,
-        typer.Option(min=0, help="With energy: how much slower than the fastest found is as good; 0.02 is 2 %."),
-    ] = 0.0,
-    makespan_limit: Annotated[
-        float | None,
-        typer.Option(metavar="HOURS", help="With energy: what is no slower than this is as good.", show_default=False),
-    ] = None,
-    seed: Annotated[int, typer.Option(min=0, max=2**63 - 1, help="Source of all randomness.")] = 0,
-    start: Annotated[
-        str | None,
-        typer.Option(metavar="FILE", help="An allocation or a result to begin with; the answer is never worse."),
-    ] = None,
-    policy: Annotated[str | None, typer.Option(metavar="FILE", help="A trained policy, for learned methods.")] = None,
+    makespan_slack: SlackOption = 0.0,
+    makespan_limit: LimitOption = None,
+    seed: options.SeedOption = 0,
+    start: StartOption = None,
+    settings: options.SettingsOption = None,
+    policy: PolicyOption = None,
     threads: options.ThreadsOption = None,
-    device: Annotated[
-        str | None, typer.Option(help="Where a learned method computes: cpu or cuda.", show_default="cpu")
-    ] = None,
-    output: Annotated[
-        str | None, typer.Option(metavar="FILE", help="Write the result here as JSON; - is standard output.")
-    ] = None,
-    plot: Annotated[str | None, typer.Option(metavar="FILE", help="Draw the answer as .png or .svg.")] = None,
+    device: DeviceOption = None,
+    output: OutputOption = None,
+    plot: options.PlotOption = None,
     json: options.JsonOption = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print no summary, no notes, no progress.")] = False,
+    quiet: options.QuietOption = False,
 ) -> None:
     """Allocate the agents of one instance to its tasks."""
     from alloc.allocators import solve
     from alloc.cli.output.progress import Progress
 
-    read = [("INSTANCE", instance), ("--policy", policy)]
-    check_outputs(("--output", output), ("--plot", plot), read=read)
-    if plot is not None:
-        from alloc.allocators.plotting.style import check_plot
-
-        check_plot(plot)
+    check_outputs(("--output", output), ("--plot", plot), read=[("INSTANCE", instance), ("--policy", policy)])
+    check_picture(plot)
     problem, first, _ = read_pair(instance, start, quiet=quiet)
     with Progress(wanted=not quiet) as progress:
         result = solve(
@@ -89,28 +95,39 @@ def solve_command(
             makespan_slack=makespan_slack,
             makespan_limit=makespan_limit,
             on_improvement=progress.update,
-            policy=policy,
-            device=device,
+            **{**_settings(settings), "policy": policy, "device": device},
         )
-    then = [] if quiet else [lambda: _tell(result, summary=not json)]
-    if plot is not None:
-        then.append(lambda: _draw(result, plot))
-    text = cache(lambda: to_json(result.to_dict()))
-    save(text, output, text if json else None, then)
+    _save(result, output, plot, json=json, quiet=quiet)
     raise typer.Exit(0 if result.evaluation is not None and not result.evaluation.unserved_tasks else 1)
 
 
-def _draw(result: "Result", path: str) -> None:
-    from alloc.allocators.plotting.figure import save_plot
+def _settings(settings: list[str] | None) -> dict[str, Any]:
+    """Return the parameters of the method; what has an option of its own is none of them."""
+    from inspect import signature
 
-    save_plot(result, path)
+    from alloc.allocators import solve
+
+    found = options.values(settings)
+    for name in found:
+        if name in ("policy", "device", *signature(solve).parameters):
+            raise typer.BadParameter(f"{name!r} is no parameter of a method; it has an option", param_hint="'--set'")
+    return found
+
+
+def _save(result: "Result", output: str | None, plot: str | None, *, json: bool, quiet: bool) -> None:
+    """Write, print and draw the result, as asked for."""
+    then: list[Callable[[], object]] = [] if quiet else [lambda: _tell(result, summary=not json)]
+    if plot is not None:
+        from alloc.allocators import plotting
+
+        then.append(lambda: plotting.plot(result, plot))
+    text = cache(lambda: to_json(result.to_dict()))
+    save(text, output, text if json else None, then)
 
 
 def _tell(result: "Result", *, summary: bool) -> None:
     if summary:
-        from alloc.cli.output.report import summary as words
-
-        say(words(result))
+        say(str(result))
     for line in result.notes:
         note(line)
     if result.evaluation is not None and result.evaluation.reward_saturated:

@@ -4,62 +4,35 @@ import signal
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from types import FrameType
+from typing import TYPE_CHECKING
 
 import typer
 
-from alloc.cli.commands.training import (
-    check_free,
-    check_suffix,
-    learner_parameters,
-    new_trainer,
-    read_instances,
-    training_parameters,
-)
-from alloc.cli.options import examples
-from alloc.cli.output.console import STANDARD, complain, counted, note, number, say
-from alloc.cli.output.files import check_output, check_outputs
+from alloc.cli.commands import train_options as options
+from alloc.cli.commands.train_options import Engine, Reward, Turn
+from alloc.cli.commands.training import check_training_files, learner_parameters, note_held_out, read_instances
+from alloc.cli.options import SeedOption, examples
+from alloc.cli.output.console import complain, note, say
+from alloc.problems import TrainingError
+from alloc.problems.text import counted, number
 
 if TYPE_CHECKING:
     from alloc.allocators.learned.training.limits import Limits
     from alloc.allocators.learned.training.report import Report
     from alloc.allocators.learned.training.trainer import Trainer
+    from alloc.problems import Instance
 
 EXAMPLES = examples(
     "alloc train gappo --output policy.safetensors --steps 2000000",
     "alloc train gappo --output policy.safetensors --steps 2000000 --resume",
     "alloc train ppo --output mine.safetensors --instances my-instances --init policy.safetensors --minutes 10",
     "alloc solve demo.json --method gappo --policy policy.safetensors",
-    closing="Ctrl-C ends the training; what the last whole generation brought is stored, and --resume goes on from it "
-    "to the same curve, also after a crash. With --steps or --iterations the same seed trains the same policy, on any "
-    "engine; with --minutes alone the schedules follow the clock.",
+    closing="Ctrl-C ends the training; the last complete generation is stored, and --resume continues from it to the "
+    "same curve, also after a crash. With --steps or --iterations the same seed trains the same policy, on any engine; "
+    "with --minutes alone the schedules follow the clock.",
 )
-
-STEPS = 500_000
-
-
-class Turn(StrEnum):
-    """As `alloc.problems.game.Turn`, without torch; a test compares the two."""
-
-    BIDDING = "bidding"
-    SIMULTANEOUS = "simultaneous"
-
-
-class Reward(StrEnum):
-    """As `alloc.problems.game.Reward`."""
-
-    MAKESPAN = "makespan"
-    COVERAGE = "coverage"
-
-
-class Engine(StrEnum):
-    """As `alloc.allocators.parallel.engines.ENGINES`."""
-
-    SERIAL = "serial"
-    PROCESSES = "processes"
-    RAY = "ray"
 
 
 def register(app: typer.Typer) -> None:
@@ -68,156 +41,98 @@ def register(app: typer.Typer) -> None:
 
 
 def train_command(
-    method: Annotated[str, typer.Argument(metavar="METHOD", help="What to train: gappo, ppo, a2c, dqn or ddpg.")],
-    output: Annotated[str, typer.Option(metavar="FILE", help="Policy file to write: the best networks up to now.")],
-    steps: Annotated[
-        int | None,
-        typer.Option(
-            min=1,
-            help="Decisions of agents, those of the whole population and before --resume included.",
-            show_default=f"{STEPS}; none where --minutes or --iterations is given",
-        ),
-    ] = None,
-    minutes: Annotated[
-        float | None, typer.Option(min=0, help="Minutes of training, those before --resume included.")
-    ] = None,
-    iterations: Annotated[int | None, typer.Option(min=0, help="Generations, those before --resume included.")] = None,
-    patience: Annotated[
-        int | None, typer.Option(min=1, help="Stop after so many generations without better networks.")
-    ] = None,
-    family: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME",
-            help="Instances to train on: mixed, paper (small ones like the paper's), elsewhere, real, heavy-tailed, "
-            "clustered, depots, short-range, travel, battery, priority, unbalanced or varied; may be repeated.",
-            show_default="mixed",
-        ),
-    ] = None,
-    instances: Annotated[
-        str | None,
-        typer.Option(
-            metavar="FILE|DIR",
-            help="Train on these instances instead; with five or more, a fifth of them, drawn at random, "
-            "judges the networks and is not trained on.",
-        ),
-    ] = None,
-    init: Annotated[
-        str | None, typer.Option(metavar="POLICY", help="Start from the networks of this policy file.")
-    ] = None,
-    population: Annotated[
-        int | None, typer.Option(min=1, help="Networks that are trained and bred; for gappo only.", show_default="4")
-    ] = None,
-    lesson: Annotated[
-        int, typer.Option(min=1, help="Decisions of agents between two generations, for each network.")
-    ] = 20_000,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="NAME=VALUE",
-            help="A hyperparameter of the method, such as clip_coef=0.1; may be repeated. A name that the method does "
-            "not have, such as in help=, is answered by all that it has, and their defaults.",
-        ),
-    ] = None,
-    turn: Annotated[Turn, typer.Option(help="Who moves: the best bids, or all agents at once.")] = Turn.BIDDING,
-    reward: Annotated[Reward, typer.Option(help="Makespan, or the paper's coverage (3).")] = Reward.MAKESPAN,
-    seed: Annotated[int, typer.Option(min=0, max=2**63 - 1, help="Source of all randomness.")] = 0,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint.")] = False,
-    checkpoint: Annotated[
-        str | None,
-        typer.Option(metavar="FILE", help="The whole run, for --resume.", show_default="OUTPUT with .checkpoint"),
-    ] = None,
-    log: Annotated[
-        str | None,
-        typer.Option(metavar="FILE", help="A CSV line for each generation.", show_default="OUTPUT with .csv"),
-    ] = None,
-    tensorboard: Annotated[
-        str | None, typer.Option(metavar="DIR", help="Also write event files for TensorBoard there.")
-    ] = None,
-    engine: Annotated[Engine, typer.Option(help="Where the networks of the population learn.")] = Engine.SERIAL,
-    workers: Annotated[
-        int | None,
-        typer.Option(min=1, max=1024, help="For --engine processes.", show_default="all processors"),
-    ] = None,
-    address: Annotated[
-        str | None,
-        typer.Option(
-            help="For --engine ray: head of the cluster.", show_default="RAY_ADDRESS, else the cluster on this machine"
-        ),
-    ] = None,
-    threads: Annotated[
-        int,
-        typer.Option(min=1, max=1024, help="Threads of torch; the tensors are small, and more than one rarely pays."),
-    ] = 1,
+    method: options.MethodArgument,
+    output: options.OutputOption,
+    steps: options.StepsOption = None,
+    minutes: options.MinutesOption = None,
+    iterations: options.GenerationsOption = None,
+    patience: options.PatienceOption = None,
+    family: options.FamilyOption = None,
+    instances: options.TrainingInstancesOption = None,
+    init: options.InitOption = None,
+    population: options.PopulationOption = None,
+    generation_steps: options.GenerationStepsOption = 20_000,
+    lesson: options.FormerGenerationStepsOption = None,
+    settings: options.HyperparametersOption = None,
+    turn: options.TurnOption = Turn.BIDDING,
+    reward: options.RewardOption = Reward.MAKESPAN,
+    seed: SeedOption = 0,
+    resume: options.ResumeOption = False,
+    checkpoint: options.CheckpointOption = None,
+    log: options.LogOption = None,
+    tensorboard: options.TensorBoardOption = None,
+    engine: options.EngineOption = Engine.SERIAL,
+    workers: options.WorkersOption = None,
+    address: options.AddressOption = None,
+    threads: options.TorchThreadsOption = 1,
 ) -> None:
     """Train a learned method, with a checkpoint after each generation."""
-    check_output(output)
-    kept = checkpoint or str(Path(output).with_suffix(".checkpoint"))
-    lines = log or str(Path(output).with_suffix(".csv"))
-    check_outputs(("--output", output), ("--checkpoint", kept), ("--log", lines), read=[("--init", init)])
-    if STANDARD in (output, kept, lines):
-        raise typer.BadParameter("policy, checkpoint and log must be files", param_hint="'--output'")
-    # from cheap to dear: nobody need wait for torch to be told of a mistake that can be seen without it
-    families = family or ["mixed"]
-    learner = learner_parameters(method, families, settings or [])
-    if population is not None and method != "gappo":
-        raise typer.BadParameter(f"{method} trains one network; gappo breeds several", param_hint="'--population'")
-    from alloc.allocators.parallel.engine import EngineError
+    from alloc.allocators.learned.training.run import train
     from alloc.allocators.parallel.engines import check_engine, make_engine
 
+    # what needs neither torch nor a cluster is checked first
+    hyperparameters = learner_parameters(method, family or ["mixed"], settings or [], population)
     check_engine(engine.value, workers, address)
     problems = None if instances is None else read_instances(instances)
-    if init is not None:
-        from alloc.allocators.learned.files.policy_header import read_header
-
-        read_header(init)
-    policy, run = Path(output), Path(kept)
-    check_free(policy, run, Path(lines), resume=resume)
-    check_suffix(policy)
-    from alloc.allocators.learned.training.limits import Limits
-    from alloc.allocators.learned.training.log import summary_writer
-    from alloc.allocators.learned.training.loop import run_training
-    from alloc.allocators.learned.training.run_files import RunFiles
-
-    if tensorboard is not None:
-        summary_writer()  # a writer of its own would hide what is in the folder
-    parameters = training_parameters(
-        method,
-        learner,
-        families=families,
-        lesson=lesson,
-        population=population,
-        turn=turn.value,
-        reward=reward.value,
-        init=init,
-    )
-    trainer = new_trainer(parameters, seed, problems, init, run if resume else None)
-    if steps is None and minutes is None and iterations is None:
-        steps = STEPS
-    limits = Limits(steps, iterations, minutes, patience)
-    with make_engine(engine.value, workers, address, threads) as where:
-        try:
-            with _interrupts():
-                run_training(
-                    trainer,
-                    RunFiles.beside(policy, run, lines, tensorboard),
-                    limits,
-                    engine=where,
-                    on_report=lambda report: _tell(report, trainer, limits),
-                )
-        except KeyboardInterrupt:
-            note(f"interrupted; {kept} holds {counted(trainer.generation, 'generation')}")
-        except EngineError as error:
-            complain(
-                f"{error}; {kept} holds {counted(trainer.generation, 'generation')}, and --resume goes on from them"
-            )
-            raise typer.Exit(1) from None
-    _close(trainer, policy)
+    check_training_files(output, checkpoint, log, tensorboard, init, resume=resume)
+    run = _Progress(checkpoint or str(Path(output).with_suffix(".checkpoint")), problems)
+    with make_engine(engine.value, workers, address, threads) as where, _interrupts(run):
+        train(
+            method,
+            output,
+            steps=steps,
+            minutes=minutes,
+            iterations=iterations,
+            patience=patience,
+            families=family or ["mixed"],
+            instances=problems,
+            init=init,
+            population=population,
+            decisions=lesson or generation_steps,
+            parameters=hyperparameters,
+            turn=turn.value,
+            reward=reward.value,
+            seed=seed,
+            resume=resume,
+            checkpoint=checkpoint,
+            log=log,
+            tensorboard=tensorboard,
+            engine=where,
+            on_start=run.begin,
+            on_report=run.report,
+        )
+    _close(run, output)
 
 
-def _close(trainer: "Trainer", policy: Path) -> None:
-    if trainer.generation == 0:
+class _Progress:
+    """What a training has reached, and a line for each generation."""
+
+    def __init__(self, checkpoint: str, instances: "list[Instance] | None") -> None:
+        self.checkpoint, self._instances = checkpoint, instances
+        self.trainer: Trainer | None = None
+        self._limits: Limits | None = None
+
+    @property
+    def stored(self) -> str:
+        """How many generations the checkpoint holds."""
+        return f"{self.checkpoint} holds {counted(self.trainer.generation if self.trainer else 0, 'generation')}"
+
+    def begin(self, trainer: "Trainer", limits: "Limits") -> None:
+        """Take note of a run before its first generation."""
+        self.trainer, self._limits = trainer, limits
+        if self._instances is not None:
+            note_held_out(self._instances)
+
+    def report(self, report: "Report") -> None:
+        """Print the line of a generation."""
+        assert self.trainer is not None
+        assert self._limits is not None
+        _tell(report, self.trainer, self._limits)
+
+
+def _close(run: _Progress, policy: str) -> None:
+    trainer = run.trainer
+    if trainer is None or trainer.generation == 0:
         note(f"no generation is complete, and {policy} is not written")
         raise typer.Exit(1)
     best = trainer.history[trainer.best_generation - 1]
@@ -228,20 +143,24 @@ def _close(trainer: "Trainer", policy: Path) -> None:
 
 
 @contextmanager
-def _interrupts() -> Iterator[None]:
-    """Let SIGTERM do what Ctrl-C does: what is on disk is whole at any moment, so that neither has to wait."""
+def _interrupts(run: _Progress) -> Iterator[None]:
+    """End a training by Ctrl-C or SIGTERM, and say what is stored; files are complete at any moment, so neither waits."""
 
-    def interrupt(*_: Any) -> None:
+    def interrupt(_number: int, _frame: FrameType | None) -> None:
         raise KeyboardInterrupt
 
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGTERM, interrupt)
+    main = threading.current_thread() is threading.main_thread()
+    before = signal.signal(signal.SIGTERM, interrupt) if main else None
     try:
         yield
+    except KeyboardInterrupt:
+        note(f"interrupted; {run.stored}")
+    except TrainingError as error:
+        complain(f"{error.__cause__ or error}; {run.stored}, and --resume continues from there")
+        raise typer.Exit(1) from None
     finally:
-        signal.signal(signal.SIGTERM, before)
+        if main:
+            signal.signal(signal.SIGTERM, before)
 
 
 def _tell(report: "Report", trainer: "Trainer", limits: "Limits") -> None:

@@ -1,54 +1,76 @@
-"""What `alloc train` and `alloc tune` are asked for; whatever can be checked without torch is."""
+"""What ``alloc train`` and ``alloc tune`` ask of the library; what needs no torch is checked before it is loaded."""
 
-import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
 
-from alloc.cli.output.console import note
+from alloc.cli.options import assignments
+from alloc.cli.output.console import STANDARD, note
+from alloc.cli.output.files import check_output, check_outputs
 
 if TYPE_CHECKING:
     from alloc.allocators.learned.algorithms.hyperparameters import Hyperparameters
     from alloc.allocators.learned.training.parameters import TrainingParameters
-    from alloc.allocators.learned.training.trainer import Trainer
     from alloc.problems import Instance
-    from alloc.problems.game import Board
 
-MOST_NAMES = 10
-"""Instances that are named at the most."""
+MAX_NAMES = 10
+"""Number of instances that a note lists at most."""
 
 
-def learner_parameters(method: str, families: Sequence[str], settings: Sequence[str] = ()) -> "Hyperparameters":
-    """Return the hyperparameters that the options ask for.
+def check_training_files(
+    output: str, checkpoint: str | None, log: str | None, tensorboard: str | None, init: str | None, *, resume: bool
+) -> None:
+    """Raise an `InputError` if a file cannot be written, would be lost, or is not what it should be.
+
+    No file may be named twice; TensorBoard must be installed where event files are asked for.
+    """
+    from alloc.allocators.learned.files.policy_header import read_header
+    from alloc.allocators.learned.files.run_files import RunFiles
+    from alloc.allocators.learned.files.training_log import summary_writer
+
+    check_output(output)
+    files = RunFiles.beside(output, checkpoint, log)
+    state, lines = str(files.checkpoint), str(files.log)
+    check_outputs(("--output", output), ("--checkpoint", state), ("--log", lines), read=[("--init", init)])
+    if STANDARD in (output, state, lines):
+        raise typer.BadParameter("policy, checkpoint and log must be files", param_hint="'--output'")
+    if init is not None:
+        read_header(init)
+    files.check(resume=resume)
+    if tensorboard is not None:
+        summary_writer()  # the class alone: a writer would hide what is in the folder
+
+
+def learner_parameters(
+    method: str, families: Sequence[str], settings: Sequence[str] = (), population: int | None = None
+) -> "Hyperparameters":
+    """Return the hyperparameters that the options set.
 
     Raises
     ------
     InputError
         If there is no such method, family or hyperparameter, or one is out of range.
+    BadParameter
+        If the method has no population.
     """
     from alloc.allocators.learned.algorithms.registry import method_parameters
     from alloc.allocators.learned.training.families import FAMILIES
     from alloc.problems import InputError
     from alloc.problems.errors import nearest
 
-    parameters = method_parameters(method, _pairs(settings))
+    parameters = method_parameters(method, assignments(settings))
     for name in families:
         if name not in FAMILIES:
             raise InputError(f"no such family: {name!r}{nearest(name, FAMILIES)}", "family")
+    if population is not None and method != "gappo":
+        raise typer.BadParameter(f"{method} trains one network; gappo breeds several", param_hint="'--population'")
     return parameters
 
 
-def _pairs(settings: Sequence[str]) -> dict[str, str]:
-    for setting in settings:
-        if "=" not in setting:
-            raise typer.BadParameter(f"{setting!r} is not NAME=VALUE", param_hint="'--set'")
-    return dict(setting.split("=", 1) for setting in settings)
-
-
 def read_instances(name: str) -> "list[Instance]":
-    """Read an instance, or all that lie in a folder."""
+    """Read an instance, or all instances in a folder."""
     from alloc.problems import InputError
     from alloc.problems.formats import read_instance
 
@@ -61,80 +83,18 @@ def read_instances(name: str) -> "list[Instance]":
     return [read_instance(str(path)) for path in found]
 
 
-def check_free(policy: Path, checkpoint: Path, log: Path, *, resume: bool) -> None:
-    """Raise an `InputError` where training would replace what it did not write, or a run that is not gone on with.
-
-    A run without a generation is nothing to be kept.
-    """
-    from alloc.problems import InputError
-
-    if resume and not checkpoint.exists():
-        raise InputError("no such checkpoint; leave --resume out to begin one", source=str(checkpoint))
-    if not resume and _is_filled(checkpoint):
-        if not zipfile.is_zipfile(checkpoint):
-            message = "is there already, and no checkpoint; name another by --checkpoint, or remove it"
-            raise InputError(message, source=str(checkpoint))
-        if policy.exists() or _generations(checkpoint):
-            message = "holds a training run; go on with --resume, or name another by --checkpoint"
-            raise InputError(message, source=str(checkpoint))
-    if _is_filled(policy) and not _is_policy(policy):
-        message = "is there already, and no policy file; name another by --output, or remove it"
-        raise InputError(message, source=str(policy))
-    if _is_filled(policy) and not resume:
-        message = "holds a policy, and no checkpoint to go on from is beside it; name another by --output, or remove it"
-        raise InputError(message, source=str(policy))
-    if _is_filled(log) and not _is_log(log):
-        message = "is there already, and no log of a training; name another by --log, or remove it"
-        raise InputError(message, source=str(log))
-
-
-def check_suffix(policy: Path) -> None:
-    """Raise an `InputError` where the name of a policy file says that it is of another kind."""
-    from alloc.problems import InputError
-
-    if policy.suffix.lower() not in ("", ".safetensors"):
-        message = f"has the suffix {policy.suffix!r}, but policies are safetensors; end it in .safetensors"
-        raise InputError(message, source=str(policy))
-
-
-def _is_filled(path: Path) -> bool:
-    return path.is_file() and path.stat().st_size > 0
-
-
-def _is_log(path: Path) -> bool:
-    beginning = b"generation,decisions,"
-    with path.open("rb") as file:
-        return file.read(len(beginning)) == beginning
-
-
-def _generations(checkpoint: Path) -> int:
-    from alloc.allocators.learned.files.checkpoint import generations_in
-
-    return generations_in(checkpoint)
-
-
-def _is_policy(path: Path) -> bool:
-    from alloc.allocators.learned.files.policy_header import read_header
-    from alloc.problems import InputError
-
-    try:
-        return "networks" in read_header(path)
-    except InputError:
-        return False
-
-
 def training_parameters(
     method: str,
     learner: "Hyperparameters",
     *,
     families: Sequence[str],
-    lesson: int,
+    generation_steps: int,
     population: int | None = None,
     turn: str = "bidding",
     reward: str = "makespan",
     init: str | None = None,
 ) -> "TrainingParameters":
-    """Return what the options ask for, the networks as large as those of `init`."""
+    """Return the parameters that the options set; the networks are as large as those of `init`."""
     from alloc.allocators.learned.files.policy_file import load_policy
     from alloc.allocators.learned.network.actor_critic import NetworkSize
     from alloc.allocators.learned.training.curriculum import Curriculum
@@ -144,7 +104,7 @@ def training_parameters(
     return TrainingParameters(
         method=method,
         population=(population or 4) if method == "gappo" else 1,
-        decisions=lesson,
+        decisions=generation_steps,
         network=NetworkSize() if init is None else load_policy(init, None)[0].size,
         learner=learner,
         curriculum=Curriculum(tuple(families)),
@@ -152,34 +112,8 @@ def training_parameters(
     )
 
 
-def new_trainer(
-    parameters: "TrainingParameters",
-    seed: int,
-    instances: "Sequence[Instance] | None",
-    init: str | None,
-    checkpoint: Path | None,
-) -> "Trainer":
-    """Return a trainer on these instances, that begins with the networks of `init` or goes on from `checkpoint`."""
-    from dataclasses import replace
-
-    from alloc.allocators.learned.files.policy_file import load_policy
-    from alloc.allocators.learned.training.trainer import Trainer
-    from alloc.allocators.learned.training.validation import games_on
-
-    boards: list[Board] | None = None
-    if instances is not None:
-        curriculum, boards = games_on(instances, parameters.curriculum)
-        parameters = replace(parameters, curriculum=curriculum)
-    weights = [] if init is None else [network.state_dict() for network in load_policy(init, None)]
-    trainer = Trainer(parameters, seed, boards, weights)
-    if checkpoint is not None:
-        trainer.resume(checkpoint)
-    if instances is not None:
-        _tell_held_out(instances)
-    return trainer
-
-
-def _tell_held_out(instances: "Sequence[Instance]") -> None:
+def note_held_out(instances: "Sequence[Instance]") -> None:
+    """Say which instances the policies are judged on."""
     from alloc.allocators.learned.training.validation import hold_out
 
     train, held = hold_out(instances)
@@ -187,8 +121,8 @@ def _tell_held_out(instances: "Sequence[Instance]") -> None:
     if idle:
         note(f"{idle} of {len(instances)} instances left out: there is no work to do")
     if train == held:
-        note("the networks are judged on the instances that they learn from; with five or more, a fifth is held out")
+        note("validation is on the instances of the training; with five or more, a fifth is held out")
     else:
-        names = ", ".join(instance.name for instance in held[:MOST_NAMES])
-        more = f" and {len(held) - MOST_NAMES} more" if len(held) > MOST_NAMES else ""
-        note(f"{len(held)} of {len(instances)} instances held out to judge the networks: {names}{more}")
+        names = ", ".join(instance.name for instance in held[:MAX_NAMES])
+        more = f" and {len(held) - MAX_NAMES} more" if len(held) > MAX_NAMES else ""
+        note(f"{len(held)} of {len(instances)} instances held out for validation: {names}{more}")

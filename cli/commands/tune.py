@@ -7,8 +7,9 @@ import typer
 
 from alloc.cli.commands.training import learner_parameters, training_parameters
 from alloc.cli.options import examples
-from alloc.cli.output.console import note, number, say
+from alloc.cli.output.console import note, say
 from alloc.cli.output.files import check_output
+from alloc.problems.text import number
 
 if TYPE_CHECKING:
     import optuna
@@ -16,8 +17,8 @@ if TYPE_CHECKING:
 EXAMPLES = examples(
     "alloc tune ppo --study ppo.db --trials 40 --steps 200000",
     "alloc tune ppo --study ppo.db --trials 80 --steps 200000",
-    closing="The second line goes on from the first; several processes may work at one study. It ends with the options "
-    "that `alloc train` takes.",
+    closing="The second line continues the first; several processes may share a study. At the end, the options for "
+    "`alloc train` are printed.",
 )
 
 
@@ -28,22 +29,22 @@ def register(app: typer.Typer) -> None:
 
 def tune_command(
     method: Annotated[str, typer.Argument(metavar="METHOD", help="What to tune: gappo, ppo, a2c, dqn or ddpg.")],
-    study: Annotated[
-        str, typer.Option(metavar="FILE", help="SQLite file of the study; one that exists is gone on with.")
-    ],
-    trials: Annotated[int, typer.Option(min=1, help="Trainings, those in the file included.")] = 40,
+    study: Annotated[str, typer.Option(metavar="FILE", help="SQLite file of the study; an existing one is continued.")],
+    trials: Annotated[int, typer.Option(min=1, help="Trainings, including those in the file.")] = 40,
     steps: Annotated[int, typer.Option(min=1, help="Decisions of agents in each.")] = 100_000,
     family: Annotated[
         list[str] | None,
         typer.Option(metavar="NAME", help="As for `alloc train`; may be repeated.", show_default="mixed"),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, help="Source of all randomness.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, help="Seed of all random numbers.")] = 0,
 ) -> None:
-    """Tune the hyperparameters of a learned method by validation."""
+    """Tune the hyperparameters of a learned method on validation games."""
     check_output(study)
     families = family or ["mixed"]
     learner = learner_parameters(method, families)
-    parameters = training_parameters(method, learner, families=families, lesson=max(1, min(20_000, steps // 5)))
+    parameters = training_parameters(
+        method, learner, families=families, generation_steps=max(1, min(20_000, steps // 5))
+    )
     import torch
 
     torch.set_num_threads(1)

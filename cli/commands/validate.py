@@ -1,12 +1,13 @@
 """``alloc validate``."""
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, TypedDict
 
 import typer
 
 from alloc.cli import options
 from alloc.cli.options import examples
-from alloc.cli.output.console import complain, counted, number, percent, say, write_json
+from alloc.cli.output.console import complain, say, write_json
+from alloc.problems.text import counted, number, percent
 
 if TYPE_CHECKING:
     from alloc.problems import Instance
@@ -15,8 +16,23 @@ EXAMPLES = examples(
     "alloc validate demo.json",
     "alloc validate instances/*.json",
     "alloc validate demo.npz --json",
-    closing="Exit code 2 if a file is no valid instance; its one line says where and how to mend it.",
+    closing="Exit code 2 if a file is no valid instance; one line says where and how to correct it.",
 )
+
+
+class Facts(TypedDict):
+    """One entry of the JSON."""
+
+    file: str
+    name: str
+    agents: int
+    tasks: int
+    total_ability: float
+    total_workload: float
+    reach_density: float
+    travel_time: bool
+    fewest_unserved: int
+    lower_bound: float | None
 
 
 def register(app: typer.Typer) -> None:
@@ -25,17 +41,18 @@ def register(app: typer.Typer) -> None:
 
 
 def validate_command(
-    instances: Annotated[list[str], typer.Argument(metavar="INSTANCE...", help=f"Instances, each {options.READABLE}.")],
+    instances: options.InstancesArgument,
     json: options.JsonOption = False,
 ) -> None:
-    """Check instances, and say what is in them."""
+    """Check instances, and print a summary of each."""
     from alloc.problems import InputError
     from alloc.problems.formats import read_instance
 
-    facts, wrong = [], 0
+    facts: list[Facts] = []
+    wrong = 0
     for name in instances:
         try:
-            facts.append({"file": name, **_facts(read_instance(name))})
+            facts.append(_facts(name, read_instance(name)))
         except InputError as error:
             wrong += 1
             complain(str(error))
@@ -47,11 +64,12 @@ def validate_command(
     raise typer.Exit(2 if wrong else 0)
 
 
-def _facts(instance: "Instance") -> dict[str, Any]:
+def _facts(file: str, instance: "Instance") -> Facts:
     from alloc.problems import fewest_unserved, makespan_lower_bound
 
     unserved = fewest_unserved(instance)
     return {
+        "file": file,
         "name": instance.name,
         "agents": instance.n,
         "tasks": instance.m,
@@ -64,7 +82,7 @@ def _facts(instance: "Instance") -> dict[str, Any]:
     }
 
 
-def _words(fact: dict[str, Any]) -> str:
+def _words(fact: Facts) -> str:
     served = "every task can be served"
     if fact["fewest_unserved"]:
         served = f"at least {fact['fewest_unserved']} of the tasks cannot be served"

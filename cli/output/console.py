@@ -1,18 +1,20 @@
-"""What goes where: JSON and files asked for go to standard output, everything else to standard error."""
+"""Standard output, which takes JSON and files named ``-``, and standard error, which takes everything else."""
 
 import errno
 import json
 import os
 import sys
 from collections.abc import Sequence
-from typing import Any, TextIO
+from typing import TextIO
+
+from alloc.problems.text import one_line
 
 STANDARD = "-"
-"""The name of standard input and standard output where a file is asked for."""
+"""The file name that stands for standard input and standard output."""
 
 
 def write_out(text: str) -> None:
-    """Write to standard output; a reader that has gone away, as in ``| head``, is no error.
+    """Write to standard output; a reader that has closed it, as in ``| head``, is no error.
 
     Raises
     ------
@@ -30,7 +32,7 @@ def say(text: str) -> None:
 
 
 def note(text: str) -> None:
-    """Write one line that the user should know, to standard error."""
+    """Write a note of one line to standard error."""
     say(f"note: {one_line(text)}")
 
 
@@ -39,47 +41,25 @@ def complain(text: str) -> None:
     say(f"alloc: {one_line(text)}")
 
 
-def write_json(value: Any) -> None:
+def write_json(value: object) -> None:
     """Write `value` as JSON to standard output."""
     write_out(to_json(value))
 
 
-def to_json(value: Any) -> str:
-    """Return `value` as JSON that any reader takes: no NaN, ASCII alone, a line break at the end."""
+def to_json(value: object) -> str:
+    """Return `value` as strict JSON: without NaN, in ASCII, with a line break at the end."""
     if isinstance(value, dict) and value:
         entries = (f"  {json.dumps(str(key))}: {_entry(item)}" for key, item in value.items())
         return "{\n" + ",\n".join(entries) + "\n}\n"
     return json.dumps(value, indent=2, allow_nan=False) + "\n"
 
 
-def _entry(value: Any) -> str:
-    """One entry of an object; a large flat one by the quick encoder, which does not indent by itself."""
+def _entry(value: object) -> str:
+    """Return the JSON of one value; a flat object by the C encoder, which is fast but does not indent."""
     if isinstance(value, dict) and value and set(map(type, value.values())) <= {str, type(None)}:
         flat = json.dumps(value, separators=(",\n    ", ": "))
         return "{\n    " + flat[1:-1] + "\n  }"
     return json.dumps(value, indent=2, allow_nan=False).replace("\n", "\n  ")
-
-
-def one_line(text: str) -> str:
-    """Return `text` with line breaks and control characters turned into blanks."""
-    return " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
-
-
-def number(value: float | None, digits: int = 6) -> str:
-    """Return `value` for people; a dash where there is none."""
-    return "-" if value is None else f"{value:.{digits}g}"
-
-
-def counted(count: int, noun: str) -> str:
-    """Return a number of things: ``1 task``, ``2 tasks``."""
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
-
-
-def percent(share: float | None) -> str:
-    """Return a share of one for people; a dash where there is none."""
-    if share is None:
-        return "-"
-    return "0 %" if share < 5e-7 else f"{100 * share:.{2 if share < 0.1 else 3}g} %"
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]], *, left: int = 1) -> str:
@@ -103,10 +83,10 @@ def table(header: Sequence[str], rows: Sequence[Sequence[str]], *, left: int = 1
 
 
 def is_terminal(stream: TextIO | None) -> bool:
-    """Whether someone looks at `stream`; what a program puts in its place need not know."""
-    ask = getattr(stream, "isatty", None)
+    """Return whether `stream` is a terminal; an object without `isatty` is none."""
+    isatty = getattr(stream, "isatty", None)
     try:
-        return ask is not None and bool(ask())
+        return isatty is not None and bool(isatty())
     except ValueError:  # it is closed
         return False
 
@@ -124,24 +104,24 @@ def _write(stream: TextIO | None, text: str) -> None:
     except BrokenPipeError:
         _silence(stream)
     except (OSError, ValueError) as error:
-        _silence(stream)  # what cannot be written now must not fail once more at the exit
+        _silence(stream)  # avoids a second failure when the interpreter flushes at exit
         if stream is sys.stdout:
             number, words = (error.errno, error.strerror) if isinstance(error, OSError) else (errno.EBADF, "is closed")
             raise OSError(number, words, "standard output") from error
 
 
 def flush(stream: TextIO) -> None:
-    """Flush `stream`, if it is of those that can be."""
+    """Flush `stream`, if it has `flush`."""
     if hasattr(stream, "flush"):
         stream.flush()
 
 
 def _silence(stream: TextIO) -> None:
-    """Send what is still to be written nowhere, so that the run and its exit code go on undisturbed."""
+    """Redirect `stream` to the null device, so that the run goes on and keeps its exit code."""
     try:
         descriptor = stream.fileno()
     except (AttributeError, OSError, ValueError):
-        return  # it is closed, or no file of the system's
+        return  # it is closed, or not a file of the operating system
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, descriptor)
     os.close(nowhere)

@@ -1,8 +1,8 @@
-"""Files that commands read, and those that they are to write, looked at before a long run."""
+"""Files that commands read and write; what is to be written is checked before a long run."""
 
 import os
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from alloc.cli.output.console import STANDARD, note, say, write_out
 
@@ -12,10 +12,10 @@ if TYPE_CHECKING:
 
 def read_pair(
     instance: str, allocation: str | None, *, quiet: bool = False
-) -> "tuple[Instance, Allocation | None, dict[str, Any]]":
-    """Read an instance, and an allocation of it if there is one; another instance's name is worth a note.
+) -> "tuple[Instance, Allocation | None, dict[str, object]]":
+    """Read an instance, and an allocation of it if there is one, with a note if that names another instance.
 
-    The third is what a result says of its allocation, as `read_claims` returns it.
+    The third is what a result file states about its allocation, as `read_claims` returns it.
     """
     from alloc.problems import InputError
     from alloc.problems.formats import read_claims, read_instance
@@ -32,7 +32,7 @@ def read_pair(
 
 
 def read_known(instance: str, front: str | None, *, quiet: bool = False) -> "tuple[Instance, list[Allocation]]":
-    """Read an instance, and all allocations of it in a file: one, or those of a front."""
+    """Read an instance, and all allocations of it in a file: a single one, or those of a front."""
     from alloc.problems import InputError
     from alloc.problems.formats import read_allocations, read_instance
 
@@ -51,26 +51,26 @@ def save(
     found: Callable[[], str],
     output: str | None,
     shown: Callable[[], str] | None = None,
-    then: Iterable[Callable[[], None]] = (),
+    then: Iterable[Callable[[], object]] = (),
 ) -> None:
-    """Write what a run found to the file asked for, show it on standard output, and do the rest that was asked for.
+    """Write the answer of a run to a file and to standard output, then take further steps such as drawing it.
 
-    Where a part of it fails, the others are done all the same, and what was found and is nowhere yet goes to standard
-    output, or to standard error where that fails.
+    If a step fails, the others are still taken. An answer that could not be written anywhere is printed to standard
+    output, or to standard error if that fails.
 
     Parameters
     ----------
     found, shown : callable
-        Return the text for `output` and that for standard output, if any; called where it is needed.
+        Return the text for `output` and that for standard output, if any; called when needed.
     output : str or None
         A file, or ``-``.
     then : iterable of callable
-        What tells and draws it afterwards.
+        Further steps, such as printing a summary and drawing.
 
     Raises
     ------
     InputError, OSError
-        The first failure, once all else is done.
+        The first failure, after all other steps.
     """
     from alloc.problems.formats import is_standard_output, write_text_atomically
 
@@ -85,13 +85,13 @@ def save(
     is_kept = None in failures
     failures += [_failure(step) for step in then]
     for failure in filter(None, failures):
-        # standard output that has failed once takes nothing more
+        # standard output that has failed once is not tried again
         if not is_kept and (printed is not None or _failure(lambda: write_out(found())) is not None):
             say(found())
         raise failure
 
 
-def _failure(step: Callable[[], None]) -> Exception | None:
+def _failure(step: Callable[[], object]) -> Exception | None:
     """Take a step, and return why it failed, None where it did not."""
     try:
         step()
@@ -101,13 +101,13 @@ def _failure(step: Callable[[], None]) -> Exception | None:
 
 
 Named = tuple[str, str | None]
-"""An argument or option, and the file that it names, if any."""
+"""Name of an argument or option, and its file, if any."""
 
 
 def check_outputs(*written: Named, read: Iterable[Named] = ()) -> None:
-    """Raise an `InputError` if a file cannot be written, or is one that is read or that another option writes.
+    """Raise an `InputError` if a file cannot be written, or is also read, or written by another option.
 
-    What is replaced on purpose, as by ``--start FILE --output FILE``, is not to be in `read`.
+    A file that may be replaced on purpose, as by ``--start FILE --output FILE``, does not belong in `read`.
     """
     from alloc.problems import InputError
 
@@ -122,14 +122,22 @@ def check_outputs(*written: Named, read: Iterable[Named] = ()) -> None:
 
 
 def _parts(name: str) -> list[str]:
-    """Return the places of the files that an instance may be read from; all of its tables if it is a folder."""
+    """Return the paths that an instance may be read from: itself, and its tables if it is a folder."""
     tables = ("agents.csv", "tasks.csv", "instance.json") if os.path.isdir(name) else ()
     return [os.path.realpath(name), *(os.path.realpath(os.path.join(name, table)) for table in tables)]
 
 
 def _may_be_replaced(name: str) -> bool:
-    """Whether it is a file, or will be: a device such as /dev/null may be written by many."""
+    """Return whether it is a regular file, or will be: a device such as /dev/null may be written twice."""
     return os.path.isfile(name) or not os.path.exists(name)
+
+
+def check_picture(path: str | None) -> None:
+    """Raise an `InputError` if there is a picture to draw, and its suffix is not one of a picture."""
+    if path is not None:
+        from alloc.allocators.plotting import check_plot
+
+        check_plot(path)
 
 
 def check_output(name: str | None) -> None:

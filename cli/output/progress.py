@@ -1,4 +1,4 @@
-"""The live line of a long run: seconds, best makespan, gap and energy."""
+"""The progress line of a long run: seconds, best makespan, gap and energy."""
 
 import os
 import shutil
@@ -8,7 +8,8 @@ import time
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from alloc.cli.output.console import counted, flush, is_terminal, number, percent
+from alloc.cli.output.console import flush, is_terminal
+from alloc.problems.text import counted, number, percent
 
 if TYPE_CHECKING:
     from alloc.allocators import Improvement
@@ -19,12 +20,12 @@ CLEAR = "\r\x1b[K"
 
 
 class Progress:
-    """Shows a line on standard error from the first second on, and clears it at the end.
+    """Shows a progress line on standard error after the first second, and clears it at the end.
 
     Parameters
     ----------
     wanted : bool
-        False, or a standard error that is no terminal or one that cannot clear a line (``TERM=dumb``), shows nothing.
+        Nothing is shown if False, or if standard error is no terminal or cannot clear a line (``TERM=dumb``).
     """
 
     def __init__(self, wanted: bool = True) -> None:
@@ -47,7 +48,7 @@ class Progress:
             self._thread.join()
 
     def update(self, best: "Improvement") -> None:
-        """Take the best so far; meant for `on_improvement`."""
+        """Set the best allocation so far; a callback for `on_improvement`."""
         self._best = best
 
     def _show(self) -> None:
@@ -62,7 +63,7 @@ class Progress:
 
 
 def progress_line(elapsed_s: float, best: "Improvement | None") -> str:
-    """Return the line at this moment."""
+    """Return the text of the line."""
     if best is None:
         return f"{elapsed_s:6.1f} s  no allocation yet; the first run of some methods compiles them"
     score = best.evaluation
@@ -78,4 +79,4 @@ def _put(text: str) -> None:
         sys.stderr.write(text)
         flush(sys.stderr)
     except (OSError, ValueError):
-        return  # the terminal has gone; the run goes on
+        return  # the terminal is closed; the run goes on

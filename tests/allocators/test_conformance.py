@@ -10,8 +10,8 @@ from alloc.allocators import Budget, RefusedError, load
 from alloc.allocators.conformance import AllocatorConformance
 from alloc.allocators.conformance.cases import CASES
 from alloc.allocators.contract.tolerance import MakespanTolerance
+from alloc.allocators.refusal import refuse
 from alloc.allocators.registry import BUILT_IN
-from alloc.allocators.solve import refuse
 from alloc.problems import InputError, Objective
 
 

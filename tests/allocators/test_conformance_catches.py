@@ -303,7 +303,7 @@ DEFECTS = [
     (Unseeded, "test_same_seed_gives_same_answer", (MAKESPAN,)),
     (CountsNothing, "test_same_seed_gives_same_answer", (MAKESPAN,)),
     (Forgetful, "test_start_is_never_lost", (MAKESPAN,)),
-    (Astray, "test_broken_start_is_mended", ()),
+    (Astray, "test_broken_start_is_repaired", ()),
     (Chatterer, "test_improvements_improve", (MAKESPAN,)),
     (Stubborn, "test_callback_can_end_the_run", ()),
     (Slow, "test_time_limit_is_held", (0.0,)),
@@ -312,11 +312,11 @@ DEFECTS = [
     (CountsNothing, "test_empty_budget_gives_an_answer", ({"iterations": 0},)),
     (Deaf, "test_stop_event_ends_the_run", (0.0,)),
     (FailsAtTheEnd, "test_answer_is_sound", ("integer", MAKESPAN)),
-    (Shared, "test_threads_do_not_meet", (2,)),
-    (Shared, "test_threads_do_not_meet", (8,)),
-    (SeedsForAWhile, "test_threads_do_not_meet", (2,)),
-    (SetsTorchThreadsForAWhile, "test_threads_do_not_meet", (2,)),
-    (SetsEnvironmentForAWhile, "test_threads_do_not_meet", (2,)),
+    (Shared, "test_threads_do_not_interfere", (2,)),
+    (Shared, "test_threads_do_not_interfere", (8,)),
+    (SeedsForAWhile, "test_threads_do_not_interfere", (2,)),
+    (SetsTorchThreadsForAWhile, "test_threads_do_not_interfere", (2,)),
+    (SetsEnvironmentForAWhile, "test_threads_do_not_interfere", (2,)),
     (Meddler, "test_nothing_else_changes", ("integer",)),
     (DrawsGlobally, "test_nothing_else_changes", ("integer",)),
     (SeedsGlobally, "test_nothing_else_changes", ("integer",)),
@@ -325,7 +325,7 @@ DEFECTS = [
     (Talker, "test_nothing_else_changes", ("integer",)),
     (NativeTalker, "test_nothing_else_changes", ("integer",)),
 ]
-CHECKS = {name for name in vars(AllocatorConformance) if name.startswith("test_")}
+CHECKS = {name for name in dir(AllocatorConformance) if name.startswith("test_")}
 
 
 class Suite(AllocatorConformance):

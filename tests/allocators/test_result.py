@@ -1,12 +1,18 @@
-"""What is derived from scores and bounds, and the format."""
+"""What is derived from scores and bounds, the format, and reading it back."""
 
 import json
+import sys
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from strategies import allocated
 
-from alloc.allocators import Result, Status, StopReason
+from alloc.allocators import MakespanTolerance, Result, Status, StopReason, TracePoint, read_result
 from alloc.allocators.contract.tolerance import relative_gap
-from alloc.problems import Allocation, Instance, Objective, evaluate
+from alloc.problems import Allocation, InputError, Instance, MissingPackageError, Objective, evaluate
 
 
 def result(tasks: list[int], bound: float | None, energy_bound: float | None = None, goal: str = "makespan") -> Result:
@@ -76,3 +82,114 @@ def test_unserved_tasks_have_names() -> None:
     assert document["unserved_tasks"] == ["t2"]
     assert (document["makespan"], document["gap"]) == (None, None)
     assert document["served_makespan"] == pytest.approx(4 / 6)
+
+
+@st.composite
+def results(draw: st.DrawFn) -> Result:
+    """Draw a result of any status, with or without bounds, slack and a trace."""
+    instance, allocation = draw(allocated())
+    objective = draw(st.sampled_from(Objective))
+    found, score = draw(st.sampled_from([(None, None), (allocation, evaluate(instance, allocation))]))
+    makespan = None if score is None else score.makespan
+    slack = draw(st.sampled_from([0.0, 0.5])) if objective is Objective.MAKESPAN_ENERGY else 0.0
+    share = st.sampled_from([0.0, 0.5, 1.0])
+    return Result(
+        instance=instance,
+        method=draw(st.sampled_from(["ga", "milp"])),
+        objective=objective,
+        seed=draw(st.integers(0, 2**63 - 1)),
+        allocation=found,
+        evaluation=score,
+        lower_bound=None if makespan is None else makespan * draw(share),
+        energy_lower_bound=None if makespan is None else score.energy * draw(share),
+        stop_reason=draw(st.sampled_from(StopReason)),
+        runtime_s=draw(st.floats(0, 1e6)),
+        trace=tuple(
+            draw(st.lists(st.builds(TracePoint, st.floats(0, 9), st.none() | st.floats(0, 9), st.floats(0, 9))))
+        ),
+        makespan_limit=None if makespan is None or slack == 0 else (1 + slack) * makespan,
+        tolerance=MakespanTolerance(slack),
+    )
+
+
+@given(results())
+def test_documents_are_read_back(before: Result) -> None:
+    """Writing a result as a document or a JSON text and reading it back gives the same result."""
+    for document in (before.to_dict(), json.loads(json.dumps(before.to_dict()))):
+        after = Result.from_dict(document, before.instance)
+        assert after.to_dict() == before.to_dict()
+        assert (after.allocation, after.trace, after.status) == (before.allocation, before.trace, before.status)
+
+
+def test_files_are_read_back(tmp_path: Path) -> None:
+    """A file gives the same result, with a seed too large for a float."""
+    path = tmp_path / "result.json"
+    before = replace(result([0, 1, -1], 1.0), seed=2**63 - 1)
+    path.write_text(json.dumps(before.to_dict()))
+    assert read_result(path, before.instance).to_dict() == before.to_dict()
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "place"),
+    [
+        ("format", "alloc-instance/1", "format"),
+        ("status", "optimal", "status"),
+        ("status", "good", "status"),
+        ("makespan", 1.0, "makespan"),
+        ("energy", None, "energy"),
+        ("assignment", {"a9": "t1"}, "assignment"),
+        ("assignment", None, "assignment"),
+        ("lower_bound", "1", "lower_bound"),
+        ("lower_bound", float("nan"), "lower_bound"),
+        ("seed", 1.5, "seed"),
+        ("seed", None, "seed"),
+        ("trace", [{"time_s": -1, "makespan": 1, "energy": 1}], "trace[0].time_s"),
+        ("trace", [3], "trace[0]"),
+    ],
+)
+def test_wrong_documents_are_refused(tmp_path: Path, field: str, value: object, place: str) -> None:
+    """Each wrong field is named, and so is the file."""
+    good = result([0, 1, -1], 1.0)
+    document = {**good.to_dict(), field: value}
+    with pytest.raises(InputError) as caught:
+        Result.from_dict(document, good.instance)
+    assert caught.value.place.startswith(place)
+    path = tmp_path / "result.json"
+    path.write_text(json.dumps(document))
+    with pytest.raises(InputError, match=r"result\.json"):
+        read_result(path, good.instance)
+
+
+def test_another_instance_is_refused() -> None:
+    """A result does not pass for one of an instance on which its allocation scores otherwise."""
+    document = result([0, 1, -1], 1.0).to_dict()
+    with pytest.raises(InputError, match=r"makespan: is 1\.33"):
+        Result.from_dict(document, Instance(ability=[3, 2, 1], workload=[8, 2]))
+
+
+def test_printing_gives_the_summary() -> None:
+    """The text has status, makespan and bottleneck, and is that of the command line."""
+    text = str(result([0, 1, -1], 1.0))
+    assert text.startswith("three (3 agents, 2 tasks), test: every task is served; not proven to be the best\n")
+    assert "makespan  1.33333 h (at least 1 h, gap 25 %)" in text
+    assert "Last: task t1 at 1.33333 h" in text
+
+
+def test_the_table_has_a_row_per_agent() -> None:
+    """Where each agent goes, how far that is, and when its task is done; nothing where there is no allocation."""
+    pytest.importorskip("pandas")
+    found = result([0, 1, -1], 1.0)
+    frame = found.to_frame()
+    assert frame["agent"].tolist() == ["a1", "a2", "a3"]
+    assert frame["task"].tolist()[:2] == ["t1", "t2"]
+    assert frame["distance"].tolist() == [0.0, 1.0, 0.0]
+    assert frame["completion_time"].tolist()[:2] == pytest.approx([4 / 3, 1.0])
+    assert frame.isna().to_numpy()[2].tolist() == [False, True, False, False, True]
+    assert replace(found, allocation=None, evaluation=None).to_frame().empty
+
+
+def test_the_table_needs_pandas(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without pandas the error says what to install."""
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(MissingPackageError, match="pip install pandas"):
+        result([0, 1, -1], 1.0).to_frame()

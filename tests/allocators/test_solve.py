@@ -159,8 +159,8 @@ def test_callbacks_may_end_a_run(instance: Instance) -> None:
 
 
 def test_options_need_a_name(instance: Instance) -> None:
-    """Options for a loaded allocator would be lost: an error instead."""
-    with pytest.raises(InputError, match="takes no options, got policy"):
+    """An allocator has its parameters already: more of them are an error, not lost."""
+    with pytest.raises(InputError, match="with its own parameters; set policy where it is made"):
         solve(instance, load("greedy"), policy="x.safetensors")
     with pytest.raises(InputError, match="takes no option 'policy'"):
         solve(instance, "greedy", policy="x.safetensors")

@@ -126,7 +126,7 @@ def measure(task: Task, *, first_only: bool = False) -> Row:
         unserved=len(score.unserved_tasks),
         seconds=result.runtime_s,
         first_seconds=first.time_s,
-        first_makespan=first.evaluation.served_makespan,
+        first_makespan=np.nan if first.makespan is None else first.makespan,
         bound=result.lower_bound or 0.0,
         busy=(time.process_time() - spent) / max(time.monotonic() - begin, 1e-9),
     )

@@ -9,8 +9,6 @@ from typing import Any
 import pytest
 
 from alloc.cli.main import main
-from alloc.problems import Instance
-from alloc.problems.formats import write_instance
 
 
 @dataclass(frozen=True)
@@ -40,27 +38,3 @@ def alloc(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, t
         return Ran(code, captured.out, captured.err)
 
     return run
-
-
-@pytest.fixture
-def small(tmp_path: Path) -> Instance:
-    """Five agents, three tasks, in small.json; the optimum is 13 / 11 h."""
-    instance = Instance(
-        name="small",
-        ability=[5, 2, 1, 8, 3],
-        workload=[3, 13, 4],
-        task_position=[[0, 0], [1, 0], [0, 2]],
-        start_task=[0, 0, 1, 1, 2],
-        battery=[20] * 5,
-        energy_per_distance=6,
-    )
-    write_instance(instance, tmp_path / "small.json")
-    return instance
-
-
-@pytest.fixture
-def unservable(tmp_path: Path) -> Instance:
-    """Nobody can take t2; in unservable.json."""
-    instance = Instance(name="unservable", ability=[2, 3], workload=[4, 6], allowed_tasks=[[0], [0]])
-    write_instance(instance, tmp_path / "unservable.json")
-    return instance

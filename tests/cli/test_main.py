@@ -160,6 +160,9 @@ def test_bad_usage_is_one_line(alloc, small, arguments):
         (("train", "ppo", "--output", "p", "--set", "clip_coef=x"), "--set: clip_coef must be like"),
         (("train", "ppo", "--output", "p", "--workers", "2"), "--workers: belongs to the engine processes"),
         (("train", "ppo", "--output", "p", "--family", "x"), "--family: no such family"),
+        (("solve", "small.json", "--set", "hearing"), "Invalid value for '--set': 'hearing' is not NAME=VALUE"),
+        (("solve", "small.json", "--set", "seed=3"), "Invalid value for '--set': 'seed' is no parameter of a method"),
+        (("solve", "small.json", "--method", "ga", "--set", "hearing=3"), "--set hearing: method 'ga' takes no"),
     ],
 )
 def test_the_parameters_of_the_library_are_told_as_options(alloc, small, arguments, begin):
@@ -167,6 +170,42 @@ def test_the_parameters_of_the_library_are_told_as_options(alloc, small, argumen
     ran = alloc(*arguments)
     assert ran.code == 2
     assert ran.err.startswith(f"alloc: {begin}")
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("3", 3),
+        ("-0.5", -0.5),
+        ("1e3", 1000.0),
+        ("true", True),
+        ("False", False),
+        ("none", None),
+        ("2,3.5", (2, 3.5)),
+        ("4,", (4,)),
+        ("uniform", "uniform"),
+        ("a,b", "a,b"),
+        ("a=b", "a=b"),
+        ("", ""),
+    ],
+)
+def test_values_of_set_are_numbers_or_text(text, value):
+    """What --set takes is a number, several, a truth value or nothing where it looks like that, else text."""
+    (found,) = options.values([f"name={text}"]).values()
+    assert (found, type(found)) == (value, type(value))
+
+
+def test_set_reaches_the_method(alloc, small, monkeypatch):
+    """--set NAME=VALUE, which may be repeated, arrives at `solve` beside the options that have their own name."""
+    given = {}
+
+    def record(*arguments, **settings):
+        given.update(settings)
+        raise RefusedError("enough")
+
+    monkeypatch.setattr("alloc.allocators.solve", record)
+    alloc("solve", "small.json", "--method", "ga", "--set", "population=50", "--set", "rate=0.5", "--policy", "p")
+    assert (given["population"], given["rate"], given["policy"]) == (50, 0.5, "p")
 
 
 def test_places_in_a_file_are_no_options(alloc):
@@ -217,7 +256,12 @@ def instance_of(agent: bytes, task: bytes = b'"workload": 1') -> bytes:
 def test_malformed_files_are_one_line_with_the_file(alloc, tmp_path, command, content):
     """A malformed instance gives exit code 2 and one line that names the file, whatever the command."""
     Path("bad.json").write_bytes(content)
-    more = {"convert": ["out.npz"], "evaluate": ["x.json"], "compare": ["--methods", "greedy"]}.get(command, ["--json"])
+    more = {
+        "convert": ["out.npz"],
+        "evaluate": ["x.json"],
+        "plot": ["x.json", "--output", "p.png"],
+        "compare": ["--methods", "greedy"],
+    }.get(command, ["--json"])
     ran = alloc(command, "bad.json", *more)
     assert (ran.code, ran.out) == (2, "")
     assert ran.err.startswith("alloc: bad.json: ")

@@ -28,7 +28,7 @@ class Slow(Allocator):
             pass
         return Proposal()
 
-registry.BUILT_IN["slow"], registry._TARGETS["slow"] = Slow.method, "__main__:Slow"
+registry.BUILT_IN["slow"], registry.TARGETS["slow"] = Slow.method, "__main__:Slow"
 module = importlib.import_module("alloc.allocators.solve")
 inner = module.signals_set
 

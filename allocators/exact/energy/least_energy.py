@@ -113,11 +113,12 @@ def _search_travelling(search: Search) -> None:
 
     Loaded when it is needed, as most runs do without.
     """
-    from alloc.allocators.heuristic.local_search.annealing_state import Chain
+    from alloc.allocators.heuristic.local_search.annealing_state import AnnealingState
     from alloc.allocators.heuristic.local_search.clock import Clock
-    from alloc.allocators.heuristic.local_search.improve import Parameters, lessen_energy
+    from alloc.allocators.heuristic.local_search.improve import reduce_energy
+    from alloc.allocators.heuristic.local_search.parameters import LocalSearchParameters
 
-    parameters = Parameters()
+    parameters = LocalSearchParameters()
     seconds = min(TRAVEL_SHARE * search.remaining_s, MAX_TRAVEL_S)
-    chain = Chain(search.instance, search.seed, parameters.near)
-    lessen_energy(search, chain, parameters, Clock(search, search.elapsed_s + seconds))
+    state = AnnealingState(search.instance, search.seed, parameters.neighbours)
+    reduce_energy(search, state, parameters, Clock(search, search.elapsed_s + seconds))

@@ -1,37 +1,52 @@
-"""Local search: two groups at a time share their agents out anew, until the budget ends."""
+"""Local search: simulated annealing over exchanges between two groups, until the budget ends."""
+
+from typing import ClassVar
 
 from alloc.allocators.contract.base import Allocator, Proposal
+from alloc.allocators.contract.parameters import with_settings
 from alloc.allocators.contract.search import Search
 from alloc.allocators.heuristic.greedy.list_schedule import greedy
-from alloc.allocators.heuristic.local_search.improve import Parameters, improve
-from alloc.allocators.heuristic.local_search.warm_up import warm_up
+from alloc.allocators.heuristic.local_search.annealing_state import compile_loops
+from alloc.allocators.heuristic.local_search.improve import improve
+from alloc.allocators.heuristic.local_search.parameters import LocalSearchParameters
 from alloc.allocators.registry import BUILT_IN
 from alloc.problems import Allocation, serve_all
 
 
 class LocalSearch(Allocator):
-    """Simulated annealing over exchanges, each of which is the best of exponentially many.
+    """Simulated annealing in a very large neighbourhood.
 
-    An exchange takes the agents of two tasks, or of a task and the idle ones, and shares them out anew at the least
-    price: the distance flown, a penalty for what either task lacks of what it needs by the makespan aimed at, and a
-    random price per agent that falls as the run goes on. Which agents go where is decided exactly, by dynamic
-    programming over sums of abilities where they are whole numbers, and else by trying all sets. An iteration is a
-    thousand exchanges.
+    An exchange reassigns the agents of two tasks, or of one task and the idle agents, at the least cost: the distance,
+    a penalty for the ability that either task lacks for the target makespan, and random noise per agent that decreases
+    during the run. The assignment is exact, by dynamic programming over sums of abilities where they are integers, and
+    by enumeration of subsets elsewhere. An iteration is a thousand exchanges.
+
+    Parameters
+    ----------
+    parameters : LocalSearchParameters, optional
+    **settings
+        Fields of `LocalSearchParameters`, such as ``exchanges``, in place of those of `parameters`.
+
+    Raises
+    ------
+    InputError
+        If a setting is unknown or out of range.
 
     References
     ----------
-    Very large neighbourhoods: Ahuja, Ergun, Orlin and Punnen (2002), doi:10.1016/S0166-218X(01)00338-9. Random prices:
-    Charon and Hudry (1993), the noising method, doi:10.1016/0167-6377(93)90023-A.
+    Very large neighbourhoods: Ahuja, Ergun, Orlin and Punnen (2002), doi:10.1016/S0166-218X(01)00338-9. Noise on
+    costs: Charon and Hudry (1993), doi:10.1016/0167-6377(93)90023-A.
     """
 
     method = BUILT_IN["local-search"]
-    parameters = Parameters()
+    parameters_type: ClassVar[type] = LocalSearchParameters
 
-    def __init__(self) -> None:
-        warm_up()
+    def __init__(self, parameters: LocalSearchParameters | None = None, **settings: object) -> None:
+        self.parameters = with_settings(LocalSearchParameters, parameters, settings)
+        compile_loops()
 
     def allocate(self, search: Search) -> Proposal:
-        """Improve the start, or else the greedy plan; every improvement has been submitted by then."""
+        """Improve the start allocation, or else the greedy one, and submit every improvement."""
         instance = search.instance
         if not (instance.workload > 0).any():
             return Proposal(Allocation.idle(instance))

@@ -1,202 +1,152 @@
-"""One chain of exchanges: an instance laid out for the compiled loops, an aim, and the plan that is changed."""
+"""The state of simulated annealing: a plan, its target makespan, and the arrays for the compiled loops."""
 
 import numpy as np
-from scipy.spatial import KDTree
 
-from alloc.allocators.heuristic.local_search.anneal import Near, anneal
-from alloc.allocators.heuristic.local_search.instance_arrays import TABLE_LIMIT, Ground, Small, survey
-from alloc.allocators.heuristic.local_search.kernels import fill_table, settle
+from alloc.allocators.heuristic.local_search.annealing import anneal
+from alloc.allocators.heuristic.local_search.candidates import arrays_and_candidates, mean_candidate_distance
+from alloc.allocators.heuristic.local_search.instance_arrays import Int32Array
+from alloc.allocators.heuristic.local_search.moves import recompute
 from alloc.allocators.heuristic.local_search.plan import (
     BEST,
-    CHANGED,
-    CROWDED,
-    FLOWN,
-    SHORTS,
-    Plan,
+    CURRENT,
+    FULL_GROUP,
+    N_MOVES,
+    N_SHORT,
     Weights,
-    lay_out,
-    room_to_work,
+    group_slots,
+    idle_plan,
+    workspace,
 )
 from alloc.problems import IDLE, Allocation, Instance
-from alloc.problems.instance import FloatArray
 
 ROUNDING = 1e-12
-"""Relative part of a need that is forgiven, for what sums of floats may be off."""
-
-MOST_ROWS = 100_000
-"""Origins up to which each has its own near tasks; beyond, those of its nearest task."""
+"""Relative part by which demands are lowered, against rounding errors of sums."""
 
 
-class Chain:
-    """A plan, an aim in hours, and what is needed to improve it.
+class AnnealingState:
+    """A plan that exchanges improve for a target makespan.
 
     Parameters
     ----------
     instance : Instance
     seed : int
-    near : int
-        Candidates per origin and per task.
+    neighbours : int
+        Candidate tasks per origin and per task.
+
+    Attributes
+    ----------
+    candidate_distance : float
+        Mean distance from an origin to its candidates, the unit of noise on distances.
+    mean_ability : float
+        In the unit of `arrays`.
     """
 
-    def __init__(self, instance: Instance, seed: int, near: int) -> None:
+    def __init__(self, instance: Instance, seed: int, neighbours: int) -> None:
         self.instance = instance
-        self.ground, self.near = measure(instance, near)
-        self.scratch = room_to_work(seed)
+        self.arrays, self.candidates = arrays_and_candidates(instance, neighbours)
+        self.workspace = workspace(seed)
         m, n = instance.m, instance.n
-        state = np.random.default_rng(seed).integers(1, 2**63, 1, dtype=np.uint64)
-        self.hours = 1.0
-        self._served = np.ones(instance.m, dtype=bool)
-        self._least_room = np.full(m + 1, min(n, max(16, 2 * n // m)), dtype=np.int64)
-        self.plan = _empty_plan(n, m, state)
-        largest = float(self.ground.ability.max())
-        self.sums = largest if self.ground.whole else np.inf
-        self.step = near_distance(self.ground, self.near)
+        random = np.random.default_rng(seed).integers(1, 2**63, 1, dtype=np.uint64)
+        self.makespan = 1.0
+        self._is_served = np.ones(instance.m, dtype=bool)
+        self._least_slots = np.full(m + 1, min(n, max(16, 2 * n // m)), dtype=np.int64)
+        self.plan = idle_plan(n, m, random)
+        self.candidate_distance = mean_candidate_distance(self.arrays, self.candidates)
+        self.mean_ability = float(self.arrays.ability.mean())
+        self._integer_ability = float(self.arrays.ability.max()) if self.arrays.integer_ability else np.inf
 
     @property
-    def short(self) -> int:
-        """Number of tasks that lack something."""
-        return int(self.plan.counter[SHORTS])
+    def n_short(self) -> int:
+        """Number of tasks with a shortfall."""
+        return int(self.plan.counter[N_SHORT])
 
-    def begin(self, allocation: Allocation, hours: float) -> None:
-        """Go on from an allocation, and aim at a makespan."""
+    def begin(self, allocation: Allocation, makespan: float) -> None:
+        """Continue from an allocation, with a target makespan in hours."""
         idle = self.instance.m
-        task = np.where(allocation.task_of_agent == IDLE, idle, allocation.task_of_agent).astype(np.int32)
-        task[np.append(self.instance.workload == 0, False)[task]] = idle
-        self._served = np.isin(np.arange(idle), task)
-        self._place(task)
-        self.aim(hours)
+        group = np.where(allocation.task_of_agent == IDLE, idle, allocation.task_of_agent).astype(np.int32)
+        group[np.append(self.instance.workload == 0, False)[group]] = idle
+        self._is_served = np.isin(np.arange(idle), group)
+        self._set_groups(group)
+        self.set_target(makespan)
 
-    def aim(self, hours: float) -> None:
-        """Aim at another makespan with the same plan."""
-        ground, need = self.ground, self.plan.need
-        self.hours = hours
+    def set_target(self, makespan: float) -> None:
+        """Keep the plan, and set another target makespan; no plan is the best then."""
+        arrays, demand = self.arrays, self.plan.demand
+        self.makespan = makespan
         with np.errstate(over="ignore"):
-            exact = self.instance.workload / (hours * ground.unit) * (1 - ROUNDING)
-        exact[~self._served] = 0.0
-        need[:-1] = np.minimum(np.ceil(exact) if ground.whole else exact, 1e300)
-        settle(ground, self.plan, hours)
-        self.plan.figure[BEST] = np.inf
-        self.plan.counter[CHANGED] = self.instance.n + 1  # nothing is kept yet
+            exact = self.instance.workload / (makespan * arrays.ability_unit) * (1 - ROUNDING)
+        exact[~self._is_served] = 0.0
+        demand[:-1] = np.minimum(np.ceil(exact) if arrays.integer_ability else exact, 1e300)
+        self.recompute()
+        self.plan.distance[BEST] = np.inf
+        self.plan.counter[N_MOVES] = self.instance.n + 1  # so that all of the first best plan is written
 
-    def run(self, steps: int, weights: Weights, cooling: float) -> float:
-        """Make exchanges; return the noise reached."""
-        noise: float = anneal(self.ground, self.plan, self.scratch, self.near, self.hours, steps, weights, cooling)
-        if self.plan.counter[CROWDED]:
-            self._grow()
+    def weights(self, distance: float, noise: float, short_task: float, shortfall: float) -> Weights:
+        """Return the weights of exchanges; see `Weights`."""
+        return Weights(distance, noise, short_task, shortfall, 2.0, self._integer_ability)
+
+    def run(self, steps: int, weights: Weights, cooling: float = 1.0) -> float:
+        """Make exchanges; return the last noise."""
+        noise: float = anneal(
+            self.arrays, self.plan, self.workspace, self.candidates, self.makespan, steps, weights, cooling
+        )
+        if self.plan.counter[FULL_GROUP]:
+            self._add_slots()
         return noise
 
-    def refresh(self) -> None:
-        """Work loads and distances out anew, against rounding that adds up."""
-        settle(self.ground, self.plan, self.hours)
+    def recompute(self) -> None:
+        """Compute supplies and distance from scratch, which removes accumulated rounding errors."""
+        recompute(self.arrays, self.plan, self.makespan)
 
     @property
     def allocation(self) -> Allocation:
-        """The plan as it is."""
-        return _as_allocation(self.plan.task, self.instance.m)
+        """The current plan."""
+        return _as_allocation(self.plan.group_of_agent, self.instance.m)
 
     @property
     def best(self) -> Allocation | None:
-        """The plan of least distance since the aim was set that lacks nothing, if any."""
-        return _as_allocation(self.plan.best, self.instance.m) if self.best_distance < np.inf else None
+        """The plan of least distance without a shortfall since the target was set, if any."""
+        return _as_allocation(self.plan.best_group, self.instance.m) if self.best_distance < np.inf else None
 
     @property
     def best_distance(self) -> float:
         """Distance of `best`, ``inf`` for none."""
-        return float(self.plan.figure[BEST])
+        return float(self.plan.distance[BEST])
 
     @property
     def distance(self) -> float:
-        """Distance of the plan as it is."""
-        return float(self.plan.figure[FLOWN])
+        """Distance of the current plan."""
+        return float(self.plan.distance[CURRENT])
 
-    def longest(self) -> float:
-        """Hours that the plan takes as it is, where travel takes no time."""
-        work = self.plan.need[:-1] > 0
+    @property
+    def current_makespan(self) -> float:
+        """Makespan of the current plan in hours, where travel takes no time."""
+        work = self.plan.demand[:-1] > 0
         with np.errstate(divide="ignore"):
-            return float((self.instance.workload[work] / self.plan.load[:-1][work]).max() / self.ground.unit)
+            longest = (self.instance.workload[work] / self.plan.supply[:-1][work]).max()
+        return float(longest / self.arrays.ability_unit)
 
-    def _place(self, task: Small) -> None:
-        """Lay the groups out anew."""
-        slot, begin, size, at = lay_out(task, self.instance.m + 1, self._least_room)
-        self.plan.task[:] = task
-        self.plan = self.plan._replace(slot=slot, begin=begin, size=size, at=at)
+    def _set_groups(self, group: Int32Array) -> None:
+        slot, begin, size, position = group_slots(group, self.instance.m + 1, self._least_slots)
+        self.plan.group_of_agent[:] = group
+        self.plan = self.plan._replace(slot=slot, begin=begin, size=size, position=position)
 
-    def _grow(self) -> None:
-        """Give full groups more room."""
-        self.plan.counter[CROWDED] = 0
-        room = np.diff(self.plan.begin)
-        full = self.plan.size >= room
-        self._least_room = np.where(full, np.minimum(2 * room, self.instance.n), room)
-        self._place(self.plan.task.copy())
-
-
-def _as_allocation(task: Small, idle: int) -> Allocation:
-    return Allocation(np.where(task == idle, IDLE, task))
+    def _add_slots(self) -> None:
+        """Double the slots of full groups."""
+        self.plan.counter[FULL_GROUP] = 0
+        capacity = np.diff(self.plan.begin)
+        is_full = self.plan.size >= capacity
+        self._least_slots = np.where(is_full, np.minimum(2 * capacity, self.instance.n), capacity)
+        self._set_groups(self.plan.group_of_agent.copy())
 
 
-def _empty_plan(n: int, m: int, random: "np.ndarray[tuple[int], np.dtype[np.uint64]]") -> Plan:
-    small = np.int32
-    return Plan(
-        task=np.full(n, m, dtype=small),
-        slot=np.zeros(0, dtype=small),
-        begin=np.zeros(m + 2, dtype=np.int64),
-        size=np.zeros(m + 1, dtype=small),
-        at=np.zeros(n, dtype=small),
-        need=np.zeros(m + 1),
-        load=np.zeros(m + 1),
-        short=np.zeros(m, dtype=small),
-        short_at=np.full(m, -1, dtype=small),
-        best=np.full(n, m, dtype=small),
-        journal=np.zeros(n, dtype=small),
-        counter=np.zeros(3, dtype=np.int64),
-        figure=np.zeros(2),
-        random=random,
-    )
+def _as_allocation(group: Int32Array, idle: int) -> Allocation:
+    return Allocation(np.where(group == idle, IDLE, group))
 
 
-def measure(instance: Instance, near: int) -> tuple[Ground, Near]:
-    """Lay an instance out for the compiled loops, with `near` candidates per origin and task."""
-    ground = survey(instance)
-    origins, m = len(ground.place), instance.m
-    near = min(near, m)
-    of_task = _nearest_tasks(ground.goal, ground.goal, near)
-    if origins * m <= TABLE_LIMIT:
-        table = np.empty((origins, m))
-        fill_table(ground, table)
-        ground = ground._replace(table=table)
-        row, of_origin = np.arange(origins), _nearest_in(table, near)
-    elif origins <= MOST_ROWS:
-        row, of_origin = np.arange(origins), _nearest_tasks(ground.place, ground.goal, near)
-    else:
-        row, of_origin = np.maximum(0, _nearest_tasks(ground.place, ground.goal, 1)[:, 0]), of_task
-    return ground, Near(row.astype(np.int32), of_origin, of_task)
-
-
-def _nearest_in(table: FloatArray, near: int) -> Small:
-    """Return the nearest tasks of each origin, ties at random, -1 where fewer are in reach."""
-    shuffle = np.random.default_rng(0).permutation(table.shape[1])
-    shuffled = table[:, shuffle]
-    order = np.argpartition(shuffled, near - 1, axis=1)[:, :near]
-    out = np.take_along_axis(shuffled, order, axis=1) == np.inf
-    return np.where(out, -1, shuffle[order]).astype(np.int32)
-
-
-def _nearest_tasks(place: FloatArray, goal: FloatArray, near: int) -> Small:
-    """Return the nearest tasks of each place, -1 where the place is unknown or there are too few."""
-    known, here = np.flatnonzero(~np.isnan(goal[:, 0])), ~np.isnan(place[:, 0])
-    found = np.full((len(place), near), -1, dtype=np.int32)
-    if len(known) and here.any():
-        _, index = KDTree(goal[known]).query(place[here], k=np.arange(1, near + 1))
-        found[here] = np.append(known, -1)[np.minimum(index, len(known))]
-    return found
-
-
-def near_distance(ground: Ground, near: Near) -> float:
-    """Return the mean distance from an origin to its near tasks, over a sample; 1 if there is none."""
-    rows = np.arange(0, len(ground.place), max(1, len(ground.place) // 1000))
-    tasks = near.of_origin[near.row[rows]]
-    with np.errstate(over="ignore", invalid="ignore"):
-        step = ground.place[rows][:, None, :] - ground.goal[tasks]
-        distance = np.sqrt((step * step).sum(axis=2))[tasks >= 0] * ground.scale
-    distance = distance[np.isfinite(distance) & (distance > 0)]
-    return float(distance.mean()) if len(distance) else 1.0
+def compile_loops() -> None:
+    """Call every compiled loop once, so that none is compiled during a run."""
+    instance = Instance(ability=[1.0, 2.0], workload=[1.0, 1.0], task_position=np.eye(2), start_task=[0, 1])
+    state = AnnealingState(instance, 0, 1)
+    state.begin(Allocation([1, 0]), 1.0)
+    state.run(1, state.weights(1.0, 0.0, 1.0, 1.0))

@@ -1,15 +1,24 @@
-"""How far a search is in a part of its budget."""
+"""Progress within a part of a search's budget."""
 
 import math
 
 from alloc.allocators.contract.search import Search
 
 LONG_S, LONG_ITERATIONS = 5.0, 1000
-"""Seconds and iterations beyond which a budget is long."""
+"""Seconds and iterations above which a budget is long."""
 
 
 class Clock:
-    """How much of a part of the budget is gone, in time or iterations, whichever is further."""
+    """A part of a search's budget that begins now, in time and in iterations; whichever ends first counts.
+
+    Parameters
+    ----------
+    search : Search
+    until_s : float
+        Where the part ends, on `Search.elapsed_s`.
+    until_iteration : float
+        Where the part ends, on `Search.iteration`.
+    """
 
     def __init__(self, search: Search, until_s: float = math.inf, until_iteration: float = math.inf) -> None:
         budget = search.budget
@@ -19,7 +28,7 @@ class Clock:
         self.begin_s, self.begin_iteration = search.elapsed_s, search.iteration
 
     def part(self, share: float) -> "Clock":
-        """Return a clock for the first part of what is left."""
+        """Return a clock for the first `share` of what is left."""
         search = self.search
         seconds = search.elapsed_s + share * (self.until_s - search.elapsed_s)
         iterations = (
@@ -31,26 +40,26 @@ class Clock:
 
     @property
     def is_endless(self) -> bool:
-        """Whether nothing but a stop from outside ends it."""
+        """Whether only a stop request ends it."""
         return min(self.until_s, self.until_iteration) == math.inf
 
     @property
     def is_long(self) -> bool:
-        """Whether there is time for a short cycle of cooling down before the real one."""
+        """Whether there is time for a short annealing cycle before the main one."""
         search = self.search
         return self.until_s - search.elapsed_s > LONG_S and self.until_iteration - search.iteration > LONG_ITERATIONS
 
     @property
     def progress(self) -> float:
-        """From 0 to 1."""
+        """Used share of this part, from 0 to 1."""
         search = self.search
         seconds = (search.elapsed_s - self.begin_s) / max(1e-9, self.until_s - self.begin_s)
         iterations = (search.iteration - self.begin_iteration) / max(1, self.until_iteration - self.begin_iteration)
         return min(1.0, max(seconds, iterations))
 
     @property
-    def left(self) -> float:
-        """Iterations that are left, if they go on as quickly as they did."""
+    def iterations_left(self) -> float:
+        """Iterations that are left, at the pace so far."""
         search = self.search
         pace_s = (search.elapsed_s - self.begin_s) / max(1, search.iteration - self.begin_iteration)
         in_time = (self.until_s - search.elapsed_s) / max(pace_s, 1e-9) if self.until_s < math.inf else math.inf
@@ -58,6 +67,6 @@ class Clock:
 
     @property
     def is_over(self) -> bool:
-        """Whether it is time to end."""
+        """Whether this part has ended, or the search should stop."""
         search = self.search
         return search.elapsed_s >= self.until_s or search.iteration >= self.until_iteration or search.should_stop()

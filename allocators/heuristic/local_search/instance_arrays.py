@@ -1,4 +1,4 @@
-"""What the compiled loops know of an instance: abilities, places and limits, as plain arrays."""
+"""An instance as plain arrays, for the compiled loops."""
 
 from typing import NamedTuple
 
@@ -8,102 +8,104 @@ from numpy.typing import NDArray
 from alloc.problems.distances.reach import TOLERANCE, Reach
 from alloc.problems.instance import FloatArray, Instance
 
-Small = NDArray[np.int32]
+Int32Array = NDArray[np.int32]
 
 TABLE_LIMIT = 2_000_000
-"""Pairs of origin and task up to which distances are kept; beyond, each is measured when it is asked for."""
+"""Pairs of origin and task up to which distances are tabulated; beyond, each is computed when it is needed."""
 
 UNITS = (1.0, 0.5, 0.2, 0.1, 0.05, 0.01, 0.001)
-"""Steps that abilities may come in, the largest first."""
+"""Units in which abilities may be integers, the largest first."""
 
-LARGEST_WHOLE = 2.0**40
-"""Sum of abilities, in steps, up to which sums of them are worked out over whole numbers."""
+LARGEST_INTEGER_SUM = 2.0**40
+"""Sum of abilities, in units, up to which they are treated as integers."""
 
 
-class Ground(NamedTuple):
-    """The unchanging part of a search.
+class InstanceArrays(NamedTuple):
+    """The constant data of a search. An origin is a starting location with its limits, shared by one or more agents.
 
     Attributes
     ----------
     ability : ndarray, shape (n,)
-        Work per hour, in `unit`.
-    slow : ndarray, shape (n,)
-        Hours per unit of distance.
+        Work per hour, in `ability_unit`.
+    hours_per_distance : ndarray, shape (n,)
+        Reciprocal of the speed.
     origin : ndarray of int, shape (n,)
-        Row of each agent in what follows.
-    table : ndarray, shape (origins, m) or (0, 0)
-        Distances, ``inf`` where a task is out of reach; empty where there are too many.
-    place, goal : ndarray, shape (origins, 3) and (m, 3)
-        Coordinates, in `scale`; NaN where unknown.
-    farthest, battery : ndarray, shape (origins,)
+        Origin of each agent.
+    distance : ndarray, shape (origins, m) or (0, 0)
+        Distances, ``inf`` where a task is out of reach; empty where there are more than `TABLE_LIMIT`.
+    origin_position, task_position : ndarray, shape (origins, 3) and (m, 3)
+        Coordinates, in `distance_unit`; NaN where unknown.
+    longest_distance, battery : ndarray, shape (origins,)
         Limits on distance and on energy, tolerance included.
-    first, listed : ndarray of int, shape (origins + 1,) and (total,)
-        Tasks that the agents of each origin may do, sorted; an origin without any may do all.
-    scale, energy_per_distance, unit : float
-    whole : bool
-        Whether all abilities are whole numbers in `unit`, and travel takes no time.
-    instant : bool
+    list_begin, listed_task : ndarray of int, shape (origins + 1,) and (total,)
+        Tasks that agents of each origin may do, sorted, as a compressed sparse row; an empty row allows all tasks.
+    distance_unit, energy_per_distance, ability_unit : float
+    integer_ability : bool
+        Whether all abilities are integers in `ability_unit`, and travel takes no time.
+    instant_travel : bool
         Whether travel takes no time.
     """
 
     ability: FloatArray
-    slow: FloatArray
-    origin: Small
-    table: FloatArray
-    place: FloatArray
-    goal: FloatArray
-    farthest: FloatArray
+    hours_per_distance: FloatArray
+    origin: Int32Array
+    distance: FloatArray
+    origin_position: FloatArray
+    task_position: FloatArray
+    longest_distance: FloatArray
     battery: FloatArray
-    first: NDArray[np.int64]
-    listed: Small
-    scale: float
+    list_begin: NDArray[np.int64]
+    listed_task: Int32Array
+    distance_unit: float
     energy_per_distance: float
-    unit: float
-    whole: bool
-    instant: bool
+    ability_unit: float
+    integer_ability: bool
+    instant_travel: bool
 
 
-def survey(instance: Instance) -> Ground:
-    """Gather what is needed of `instance`, without distances yet."""
+def instance_arrays(instance: Instance) -> InstanceArrays:
+    """Return the arrays of `instance`, with an empty table of distances."""
     reach = instance.reach
-    first, listed = _lists(reach)
-    unit = None if instance.has_travel_time else _unit(instance.ability)
-    step = float(np.mean(instance.ability)) if unit is None else unit
-    return Ground(
-        ability=np.ascontiguousarray(instance.ability / step if unit is None else np.round(instance.ability / step)),
-        slow=1.0 / instance.speed,
+    list_begin, listed_task = _task_lists(reach)
+    unit = None if instance.has_travel_time else _common_unit(instance.ability)
+    scale = float(np.mean(instance.ability)) if unit is None else unit
+    scaled = instance.ability / scale
+    return InstanceArrays(
+        ability=np.ascontiguousarray(scaled if unit is None else np.round(scaled)),
+        hours_per_distance=1.0 / instance.speed,
         origin=reach.origin.astype(np.int32),
-        table=np.zeros((0, 0)),
-        place=np.ascontiguousarray(reach.place / reach.unit),
-        goal=np.ascontiguousarray(reach.goal / reach.unit),
-        farthest=reach.communication_range + TOLERANCE,
+        distance=np.zeros((0, 0)),
+        origin_position=np.ascontiguousarray(reach.place / reach.unit),
+        task_position=np.ascontiguousarray(reach.goal / reach.unit),
+        longest_distance=reach.communication_range + TOLERANCE,
         battery=reach.battery + TOLERANCE,
-        first=first,
-        listed=listed,
-        scale=reach.unit,
+        list_begin=list_begin,
+        listed_task=listed_task,
+        distance_unit=reach.unit,
         energy_per_distance=reach.energy_per_distance,
-        unit=step,
-        whole=unit is not None,
-        instant=not instance.has_travel_time,
+        ability_unit=scale,
+        integer_ability=unit is not None,
+        instant_travel=not instance.has_travel_time,
     )
 
 
-def _lists(reach: Reach) -> tuple[NDArray[np.int64], Small]:
-    """Lists of tasks by origin, one behind the other; an agent that may do nothing gets a task that there is not."""
+def _task_lists(reach: Reach) -> tuple[NDArray[np.int64], Int32Array]:
+    """Return the lists of tasks by origin, concatenated; one without any task gets the task m, which does not exist."""
     if not len(reach.lists):
         return np.zeros(len(reach.place) + 1, dtype=np.int64), np.zeros(0, dtype=np.int32)
-    nowhere, everywhere = np.array([len(reach.goal)]), np.zeros(0, dtype=np.intp)
-    lists = [row if len(row) else nowhere for row in reach.lists]
-    rows = [lists[number] if number >= 0 else everywhere for number in reach.list_of.tolist()]
-    first = np.concatenate([[0], np.cumsum([len(row) for row in rows])])
-    return first, np.concatenate(rows).astype(np.int32)
+    no_task, any_task = np.array([len(reach.goal)]), np.zeros(0, dtype=np.intp)
+    lists = [row if len(row) else no_task for row in reach.lists]
+    rows = [lists[number] if number >= 0 else any_task for number in reach.list_of.tolist()]
+    begin = np.concatenate([[0], np.cumsum([len(row) for row in rows])])
+    return begin, np.concatenate(rows).astype(np.int32)
 
 
-def _unit(ability: FloatArray) -> float | None:
-    """Return the largest step at hand of which all abilities are multiples, or None."""
-    for step in UNITS:
-        steps = ability / step
-        whole = np.round(steps)
-        if whole.min() >= 1 and whole.sum() < LARGEST_WHOLE and (np.abs(steps - whole) <= 1e-9 * whole).all():
-            return float(np.gcd.reduce(whole.astype(np.int64))) * step
+def _common_unit(ability: FloatArray) -> float | None:
+    """Return the largest unit, a multiple of one of `UNITS`, in which all abilities are integers, or None."""
+    for unit in UNITS:
+        multiple = ability / unit
+        integer = np.round(multiple)
+        is_small = integer.min() >= 1 and integer.sum() < LARGEST_INTEGER_SUM
+        if is_small and (np.abs(multiple - integer) <= 1e-9 * integer).all():
+            return float(np.gcd.reduce(integer.astype(np.int64))) * unit
     return None

@@ -1,139 +1,189 @@
-"""The state of a search: who is in which group, and what each group brings."""
+"""The plan of a search, its workspace and its weights, as arrays that compiled loops change in place."""
 
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from alloc.allocators.heuristic.local_search.instance_arrays import Small
+from alloc.allocators.heuristic.local_search.instance_arrays import Int32Array
 from alloc.problems.instance import FloatArray
 
-MOST_FREE = 32
-"""Agents of two groups that are shared out anew at once, where sums of abilities are whole numbers."""
+POOL_BY_SUMS = 32
+"""Agents in one exchange where sums of abilities are integers."""
 
-MOST_TRIED = 12
-"""The same where every set of them is tried."""
+POOL_ENUMERATED = 12
+"""Agents in one exchange where all subsets are enumerated."""
 
-MOST_HALVED = 16
-"""The same where there are more, travel takes no time, and only sets that are just enough are tried; halves and space
-must fit."""
+POOL_BY_HALVES = 16
+"""Agents in one exchange by meeting in the middle; the subsets of both halves must fit into the workspace."""
 
-TABLE_SIZE = 4096
+NOISE_SIZE = 4096
 """Random numbers that are drawn beforehand."""
 
 MOST_SUMS = 1 << 14
-"""Sums of abilities that are told apart."""
+"""Sums of abilities that the dynamic programme distinguishes."""
 
-SHORTS, CHANGED, CROWDED = 0, 1, 2
-FLOWN, BEST = 0, 1
+N_SHORT, N_MOVES, FULL_GROUP = 0, 1, 2
+"""Entries of `Plan.counter`."""
+
+CURRENT, BEST = 0, 1
+"""Entries of `Plan.distance`."""
 
 
 class Plan(NamedTuple):
-    """One allocation, changed in place by the compiled loops; the idle ones are group m.
+    """One allocation; the idle agents are group m.
 
     Attributes
     ----------
-    task : ndarray of int, shape (n,)
-        Group of each agent.
+    group_of_agent : ndarray of int, shape (n,)
+        Task of each agent, or m.
     slot : ndarray of int
-        Members of all groups, with room to grow.
+        Members of all groups, with free slots behind those of each group.
     begin : ndarray of int, shape (m + 2,)
-        Where the room of each group begins in `slot`.
+        Where the slots of each group begin.
     size : ndarray of int, shape (m + 1,)
         Members of each group.
-    at : ndarray of int, shape (n,)
-        Place of each agent in its group.
-    need, load : ndarray, shape (m + 1,)
-        Ability that each task needs, and has, to be done in time.
-    short, short_at : ndarray of int, shape (m,)
-        Tasks that lack something, and the place of each on that list, -1 for none.
-    best, journal : ndarray of int, shape (n,)
-        The best assignment so far, and the agents that moved since.
+    position : ndarray of int, shape (n,)
+        Index of each agent within its group.
+    demand, supply : ndarray, shape (m + 1,)
+        Ability that each task needs to be done within the target makespan, and that its group has.
+    short_task, short_position : ndarray of int, shape (m,)
+        List of the tasks whose supply is below their demand, and the position of each task on it, -1 for none.
+    best_group, journal : ndarray of int, shape (n,)
+        The best assignment so far, and the agents that have moved since it was saved.
     counter : ndarray of int, shape (3,)
-        Tasks short; moves since the best; whether a group was full.
-    figure : ndarray, shape (2,)
-        Distance flown, now and in the best.
+        Tasks with a shortfall; moves since the best was saved; whether a group has run out of slots.
+    distance : ndarray, shape (2,)
+        Total distance, of this plan and of the best.
     random : ndarray of uint64, shape (1,)
+        State of the random numbers.
     """
 
-    task: Small
-    slot: Small
+    group_of_agent: Int32Array
+    slot: Int32Array
     begin: NDArray[np.int64]
-    size: Small
-    at: Small
-    need: FloatArray
-    load: FloatArray
-    short: Small
-    short_at: Small
-    best: Small
-    journal: Small
+    size: Int32Array
+    position: Int32Array
+    demand: FloatArray
+    supply: FloatArray
+    short_task: Int32Array
+    short_position: Int32Array
+    best_group: Int32Array
+    journal: Int32Array
     counter: NDArray[np.int64]
-    figure: FloatArray
+    distance: FloatArray
     random: NDArray[np.uint64]
 
 
-class Scratch(NamedTuple):
-    """Room for one exchange, and random numbers of a logistic distribution."""
+class Workspace(NamedTuple):
+    """Buffers of one exchange between a task and another one, and logistic noise.
 
-    agent: Small
-    here: FloatArray
-    there: FloatArray
-    flight: FloatArray
-    price: FloatArray
+    Attributes
+    ----------
+    agent : ndarray of int
+        The pool: agents that are reassigned.
+    ability, other_ability : ndarray
+        What each contributes to the task, and to the other one.
+    distance, cost : ndarray
+        By how much the task is farther than the other one, as it is, and weighted with noise.
+    sum_cost, sum_set : ndarray, shape (2 * MOST_SUMS,)
+        Least cost for each sum of abilities, and a subset that has it, as bits; two rows of the dynamic programme.
+    subset_ability, subset_other_ability, subset_cost, subset_bits : ndarray
+        Subsets of the pool, or of its halves.
+    logistic : ndarray, shape (NOISE_SIZE,)
+    """
+
+    agent: Int32Array
+    ability: FloatArray
+    other_ability: FloatArray
+    distance: FloatArray
     cost: FloatArray
-    sets: NDArray[np.uint64]
-    trial_here: FloatArray
-    trial_there: FloatArray
-    trial_cost: FloatArray
-    trial_set: NDArray[np.int64]
+    sum_cost: FloatArray
+    sum_set: NDArray[np.uint64]
+    subset_ability: FloatArray
+    subset_other_ability: FloatArray
+    subset_cost: FloatArray
+    subset_bits: NDArray[np.int64]
     logistic: FloatArray
 
 
 class Weights(NamedTuple):
-    """What counts in one exchange.
+    """Weights of the cost of an exchange.
 
     Attributes
     ----------
     distance, noise : float
-        Factors of distances and of random prices.
-    charge, lack : float
-        Penalty of a task that lacks something, and of each unit that it lacks.
-    spare : float
-        Surplus beyond what is needed that is looked at, in units of ability.
-    sums : float
-        The largest ability where sums of abilities are whole numbers and few, else infinite.
+        Of the distance, and of the noise on the cost of each agent.
+    short_task, shortfall : float
+        Penalty of each task with a shortfall, and of each unit of ability that is missing.
+    surplus : float
+        Ability beyond the demand up to which sums are considered.
+    integer_ability : float
+        The largest ability where abilities are integers, else ``inf``.
     """
 
     distance: float
     noise: float
-    charge: float
-    lack: float
-    spare: float
-    sums: float
+    short_task: float
+    shortfall: float
+    surplus: float
+    integer_ability: float
 
 
-def lay_out(task: Small, groups: int, least: NDArray[np.int64]) -> tuple[Small, NDArray[np.int64], Small, Small]:
-    """Return `slot`, `begin`, `size` and `at` of an assignment, with room for `least` members in each group."""
-    size = np.bincount(task, minlength=groups)
-    room = np.maximum(least, 2 * size)
-    room[-1] = len(task)
-    begin = np.concatenate([[0], np.cumsum(room)])
-    order = np.argsort(task, kind="stable")
-    at = np.empty(len(task), dtype=np.int32)
-    at[order] = np.arange(len(task)) - np.repeat(np.cumsum(size) - size, size)
+def group_slots(
+    group_of_agent: Int32Array, groups: int, least: NDArray[np.int64]
+) -> tuple[Int32Array, NDArray[np.int64], Int32Array, Int32Array]:
+    """Return `slot`, `begin`, `size` and `position` of an assignment, with at least `least` slots for each group."""
+    n = len(group_of_agent)
+    size = np.bincount(group_of_agent, minlength=groups)
+    capacity = np.maximum(least, 2 * size)
+    capacity[-1] = n
+    begin = np.concatenate([[0], np.cumsum(capacity)])
+    order = np.argsort(group_of_agent, kind="stable")
+    position = np.empty(n, dtype=np.int32)
+    position[order] = np.arange(n) - np.repeat(np.cumsum(size) - size, size)
     slot = np.full(begin[-1], -1, dtype=np.int32)
-    slot[begin[task] + at] = np.arange(len(task))
-    return slot, begin, size.astype(np.int32), at
+    slot[begin[group_of_agent] + position] = np.arange(n)
+    return slot, begin, size.astype(np.int32), position
 
 
-def room_to_work(seed: int) -> Scratch:
-    """Return room for exchanges, with random numbers from `seed`."""
-    uniform = np.random.default_rng(seed).uniform(1e-9, 1 - 1e-9, TABLE_SIZE)
-    cost, sets = np.empty(2 * MOST_SUMS), np.empty(2 * MOST_SUMS, dtype=np.uint64)
-    here, there, flight, price = (np.empty(2 * MOST_FREE) for _ in range(4))
-    trial_here, trial_there, trial_cost = (np.empty(1 << MOST_TRIED) for _ in range(3))
-    trial_set = np.empty(1 << MOST_TRIED, dtype=np.int64)
-    agent, logistic = np.empty(2 * MOST_FREE, dtype=np.int32), np.log(uniform / (1 - uniform))
-    return Scratch(
-        agent, here, there, flight, price, cost, sets, trial_here, trial_there, trial_cost, trial_set, logistic
+def idle_plan(n: int, m: int, random: NDArray[np.uint64]) -> Plan:
+    """Return a plan in which all agents are idle, without slots yet."""
+    int32 = np.int32
+    return Plan(
+        group_of_agent=np.full(n, m, dtype=int32),
+        slot=np.zeros(0, dtype=int32),
+        begin=np.zeros(m + 2, dtype=np.int64),
+        size=np.zeros(m + 1, dtype=int32),
+        position=np.zeros(n, dtype=int32),
+        demand=np.zeros(m + 1),
+        supply=np.zeros(m + 1),
+        short_task=np.zeros(m, dtype=int32),
+        short_position=np.full(m, -1, dtype=int32),
+        best_group=np.full(n, m, dtype=int32),
+        journal=np.zeros(n, dtype=int32),
+        counter=np.zeros(3, dtype=np.int64),
+        distance=np.zeros(2),
+        random=random,
+    )
+
+
+def workspace(seed: int) -> Workspace:
+    """Return buffers for exchanges, with noise from `seed`."""
+    uniform = np.random.default_rng(seed).uniform(1e-9, 1 - 1e-9, NOISE_SIZE)
+    ability, other_ability, distance, cost = (np.empty(2 * POOL_BY_SUMS) for _ in range(4))
+    subset_ability, subset_other_ability, subset_cost = (np.empty(1 << POOL_ENUMERATED) for _ in range(3))
+    return Workspace(
+        agent=np.empty(2 * POOL_BY_SUMS, dtype=np.int32),
+        ability=ability,
+        other_ability=other_ability,
+        distance=distance,
+        cost=cost,
+        sum_cost=np.empty(2 * MOST_SUMS),
+        sum_set=np.empty(2 * MOST_SUMS, dtype=np.uint64),
+        subset_ability=subset_ability,
+        subset_other_ability=subset_other_ability,
+        subset_cost=subset_cost,
+        subset_bits=np.empty(1 << POOL_ENUMERATED, dtype=np.int64),
+        logistic=np.log(uniform / (1 - uniform)),
     )

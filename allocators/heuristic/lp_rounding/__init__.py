@@ -1,1 +1,1 @@
-"""A linear programme over classes of agents, rounded."""
+"""A linear relaxation over classes of agents, rounded."""

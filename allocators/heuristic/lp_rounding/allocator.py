@@ -1,69 +1,72 @@
-"""A linear programme over classes of agents, rounded by a matching, and mended by local search."""
+"""Linear relaxation over classes of agents, rounded by a matching, and repaired by local search."""
 
-import math
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
-from scipy.optimize import OptimizeResult, linprog
-from scipy.sparse import csr_array, hstack, vstack
 
 from alloc.allocators.contract.base import Allocator, Proposal
 from alloc.allocators.contract.budget import Budget
+from alloc.allocators.contract.parameters import CheckedParameters, bounded, with_settings
 from alloc.allocators.contract.search import Search
 from alloc.allocators.heuristic.greedy.list_schedule import greedy
-from alloc.allocators.heuristic.local_search import improve as local
-from alloc.allocators.heuristic.local_search.annealing_state import Chain
-from alloc.allocators.heuristic.local_search.plan import Weights
-from alloc.allocators.heuristic.local_search.warm_up import warm_up
-from alloc.allocators.heuristic.lp_rounding.rounding import round_fractions
+from alloc.allocators.heuristic.local_search.annealing_state import AnnealingState, compile_loops
+from alloc.allocators.heuristic.local_search.improve import improve
+from alloc.allocators.heuristic.local_search.parameters import LocalSearchParameters
+from alloc.allocators.heuristic.lp_rounding.relaxation import Relaxation
 from alloc.allocators.registry import BUILT_IN
-from alloc.allocators.runtime.interrupts import run_native
-from alloc.problems import Allocation, Instance, Objective, agent_classes, serve_all
-from alloc.problems.bounds import LP_PAIRS_PER_SECOND, LP_SIZE_LIMIT, scale_to_one, typical_distance
-from alloc.problems.instance import FloatArray
+from alloc.problems import Allocation, Instance, Objective, serve_all
+from alloc.problems.bounds import LP_PAIRS_PER_SECOND, LP_SIZE_LIMIT
 
-SAFETY = 1e-9
-"""Relative amount by which a makespan is raised above what the programme reached, to be feasible in floats."""
-
-MOST_STEPS = 8
-"""Programmes on the way to the least fractional makespan; one is enough where travel takes no time."""
+UNHURRIED_S = 10.0
+"""Time limit that `LpRound.refusal` assumes where there is none."""
 
 
 @dataclass(frozen=True)
-class Parameters:
-    """Of rounding and mending.
+class LpRoundParameters(CheckedParameters):
+    """Parameters of rounding, of repair, and of the local search after them.
 
     Attributes
     ----------
-    slack : tuple of float
-        Makespans aimed at one after the other, until one is met: relative excess over the least fractional one.
-    tries : int
-        Iterations of local search, at most, for each.
-    warm, cold : float
-        First and last noise of the mending, as of `local-search`; far below its own, so that what the programme chose
-        stands where it can.
-    hot : float
-        First noise of the exchanges that use what is left of the budget, where energy counts.
-    share : float
-        Most of the time left that a programme may take.
+    makespan_excess : tuple of float
+        Target makespans, tried in this order until one is met: relative excess over the least fractional makespan.
+    repair_iterations : int
+        Most iterations of local search for each target.
+    repair_noise, repair_final_noise : float
+        First and last noise of the repair, relative to the mean distance to a candidate task; far below that of
+        `local-search`, so that most of the rounded allocation stays as it is.
+    initial_noise : float
+        First noise of the local search in the rest of the budget, where energy counts.
+    time_share : float
+        Largest share of the remaining time that one linear programme may take.
     """
 
-    slack: tuple[float, ...] = (0.0, 0.001, 0.003, 0.01, 0.03)
-    tries: int = 60
-    warm: float = 0.03
-    cold: float = 0.007
-    hot: float = 0.09
-    share: float = 0.4
+    makespan_excess: tuple[float, ...] = bounded((0.0, 0.001, 0.003, 0.01, 0.03), low=0)
+    repair_iterations: int = bounded(60, low=0)
+    repair_noise: float = bounded(0.03, low=0, above=True)
+    repair_final_noise: float = bounded(0.007, low=0, above=True)
+    initial_noise: float = bounded(0.09, low=0, above=True)
+    time_share: float = bounded(0.4, low=0, high=1, above=True)
 
 
 class LpRound(Allocator):
-    """Relax, round, mend.
+    """Relax, round and repair.
 
-    The programme shares fractions of agents out so that the last task is done as early as possible, then, where energy
-    counts, so that they fly least in that time. Its corners have few fractions; they are rounded by Shmoys and Tardos's
-    matching, which takes at most one agent too many from each task. Exchanges of the local search then make up for
-    that, at a makespan a little above that of the programme if need be, and use what is left of the budget. An
-    iteration is one of the local search.
+    A linear programme distributes fractions of agents so that the makespan is least; where energy counts, a second one
+    minimises the distance within it. Its vertices have few fractions, which are rounded by the matching of Shmoys and
+    Tardos: no task loses more than one agent. Exchanges of the local search then restore what is missing, at a slightly
+    larger makespan if necessary, and use the rest of the budget. An iteration is one of the local search.
+
+    Parameters
+    ----------
+    parameters : LpRoundParameters, optional
+    **settings
+        Fields of `LpRoundParameters`, such as ``repair_iterations``, in place of those of `parameters`.
+
+    Raises
+    ------
+    InputError
+        If a setting is unknown or out of range.
 
     References
     ----------
@@ -71,145 +74,63 @@ class LpRound(Allocator):
     """
 
     method = BUILT_IN["lp-round"]
-    parameters = Parameters()
+    parameters_type: ClassVar[type] = LpRoundParameters
 
-    def __init__(self) -> None:
-        warm_up()
+    def __init__(self, parameters: LpRoundParameters | None = None, **settings: object) -> None:
+        self.parameters = with_settings(LpRoundParameters, parameters, settings)
+        compile_loops()
 
     def refusal(self, instance: Instance, objective: Objective, budget: Budget) -> str | None:
-        """A linear programme cannot be told to stop early with an answer."""
-        seconds = 10.0 if budget.time_limit_s is None else max(1.0, budget.time_limit_s)
+        """Refuse linear programmes that do not fit into the budget: stopped early, they give no answer."""
+        seconds = UNHURRIED_S if budget.time_limit_s is None else max(1.0, budget.time_limit_s)
         most = min(LP_SIZE_LIMIT, int(LP_PAIRS_PER_SECOND * seconds))
-        alike = len(np.unique(instance.ability)) * (len(instance.reach.place) if objective != "makespan" else 1)
-        pairs = min(instance.n, alike) * instance.m if not instance.has_travel_time else instance.n * instance.m
+        classes = len(np.unique(instance.ability)) * (len(instance.reach.place) if objective != "makespan" else 1)
+        pairs = min(instance.n, classes) * instance.m if not instance.has_travel_time else instance.n * instance.m
         if pairs > most:
             return f"a linear programme of up to {pairs} pairs of agents and tasks; in this time it can solve {most}"
         return None
 
     def allocate(self, search: Search) -> Proposal:
-        """Relax, round and mend until the search says stop; every improvement has been submitted by then."""
+        """Relax, round and repair, then improve until the search should stop; submit every improvement."""
         instance = search.instance
         if not (instance.workload > 0).any():
             return Proposal(Allocation.idle(instance))
         search.submit(serve_all(instance, greedy(instance, search)))
         if search.should_stop():
             return Proposal()
-        economical = search.objective is Objective.MAKESPAN_ENERGY
-        programme = Programme(instance, by_place=economical, time_share=self.parameters.share)
-        hours = programme.least_hours(search)
-        if hours is not None and (economical or not search.fast_enough):
-            chain = Chain(instance, search.seed, local.Parameters().near)
-            for slack in self.parameters.slack:
-                if search.should_stop() or self._met(search, programme, chain, hours * (1 + slack)):
+        energy_counts = search.objective is Objective.MAKESPAN_ENERGY
+        relaxation = Relaxation(instance, by_place=energy_counts, time_share=self.parameters.time_share)
+        makespan = relaxation.least_makespan(search)
+        if makespan is not None and (energy_counts or not search.fast_enough):
+            state = AnnealingState(instance, search.seed, LocalSearchParameters().neighbours)
+            for excess in self.parameters.makespan_excess:
+                if search.should_stop() or self._round_and_repair(search, relaxation, state, makespan * (1 + excess)):
                     break
-        known = local.Parameters(hot=self.parameters.hot, cold=self.parameters.cold)
-        local.improve(search, parameters=known if economical else None)
+        parameters = self.parameters
+        gentle = LocalSearchParameters(
+            initial_noise=parameters.initial_noise, final_noise=parameters.repair_final_noise
+        )
+        improve(search, parameters=gentle if energy_counts else None)
         return Proposal()
 
-    def _met(self, search: Search, programme: "Programme", chain: Chain, hours: float) -> bool:
-        """Round a plan for `hours`, mend it, and submit what comes out; whether it keeps to them."""
-        rounded = programme.rounded(search, hours)
+    def _round_and_repair(self, search: Search, relaxation: Relaxation, state: AnnealingState, makespan: float) -> bool:
+        """Round an allocation for a target makespan, repair it, and submit it; return whether it meets the target."""
+        rounded = relaxation.rounded(search, makespan)
         if rounded is None:
             return False
         search.submit(rounded)
-        chain.begin(rounded, max(hours, search.lower_bound))
-        parameters, scale = self.parameters, local.Parameters()
-        lack = chain.step * scale.lack / float(chain.ground.ability.mean())
-        for step in range(parameters.tries):
+        state.begin(rounded, max(makespan, search.lower_bound))
+        parameters, local, unit = self.parameters, LocalSearchParameters(), state.candidate_distance
+        shortfall = unit * local.shortfall_penalty / state.mean_ability
+        cooling = parameters.repair_final_noise / parameters.repair_noise
+        for step in range(parameters.repair_iterations):
             if search.should_stop():
                 break
-            noise = chain.step * parameters.warm * (parameters.cold / parameters.warm) ** (step / parameters.tries)
-            weights = Weights(float(programme.by_place), noise, scale.charge * chain.step, lack, 2.0, chain.sums)
-            chain.run(scale.exchanges, weights, 1.0)
+            noise = unit * parameters.repair_noise * cooling ** (step / parameters.repair_iterations)
+            weights = state.weights(float(relaxation.by_place), noise, local.short_task_penalty * unit, shortfall)
+            state.run(local.exchanges, weights)
             search.iteration += 1
-            if chain.best is not None and not programme.by_place:
+            if state.best is not None and not relaxation.by_place:
                 break
-        search.submit(chain.best or chain.allocation)
-        return chain.best is not None
-
-
-class Programme:
-    """Fractions of agents per class and task.
-
-    Parameters
-    ----------
-    instance : Instance
-    by_place : bool
-        Whether agents are told apart by place, as energy asks for.
-    time_share : float
-        Most of the time left that a programme may take.
-    """
-
-    def __init__(self, instance: Instance, *, by_place: bool, time_share: float) -> None:
-        self.instance, self.by_place, self.time_share = instance, by_place, time_share
-        self.classes = agent_classes(instance, by_place=by_place)
-        self.kind, goal = np.nonzero(self.classes.mask[:, instance.workload > 0])
-        self.work = np.flatnonzero(instance.workload > 0)
-        self.goal, self.task = goal, self.work[goal]
-        self.distance = self.classes.distance[self.kind, self.task]
-        columns = np.arange(len(self.kind))
-        ones = np.ones(len(self.kind))
-        self.used = csr_array((ones, (self.kind, columns)), shape=(self.classes.size, len(columns)))
-
-    def share(self, hours: float) -> FloatArray:
-        """Return what part of its task one agent of each pair does in time, at most all of it."""
-        with np.errstate(over="ignore", invalid="ignore"):
-            at_work = np.maximum(0.0, hours - self.distance / self.classes.speed[self.kind])
-            done = self.classes.ability[self.kind] * at_work / self.instance.workload[self.task]
-        return np.minimum(1.0, np.nan_to_num(done, nan=0.0))
-
-    def least_hours(self, search: Search) -> float | None:
-        """Return about the least makespan of a fractional plan, None where it is not at hand."""
-        hours = search.lower_bound
-        for _ in range(MOST_STEPS):
-            cover = self._cover(self.share(hours))
-            matrix = vstack(
-                [
-                    hstack([-cover, csr_array(np.ones((len(self.work), 1)))]),
-                    hstack([self.used, csr_array((self.classes.size, 1))]),
-                ]
-            )
-            limits = np.concatenate([np.zeros(len(self.work)), self.classes.count])
-            answer = _solve(search, np.append(np.zeros(len(self.kind)), -1.0), matrix, limits, self.time_share)
-            part = 0.0 if answer is None else float(-answer.fun)
-            if part <= 0:
-                return None  # some task is out of reach, or there was no time
-            if part >= 1 - SAFETY:
-                return hours * (1 + SAFETY)
-            hours /= part
-        return hours
-
-    def rounded(self, search: Search, hours: float) -> Allocation | None:
-        """Return a fractional plan that takes `hours` and flies least, made whole; None where it is not at hand."""
-        share = self.share(hours)
-        rng = np.random.default_rng(search.seed)
-        by_distance = self.distance * scale_to_one(typical_distance(self.distance))
-        cost = by_distance if self.by_place else rng.random(len(share))  # any corner is as good as another
-        matrix = vstack([-self._cover(share), self.used])
-        limits = np.concatenate([np.full(len(self.work), SAFETY - 1), self.classes.count])
-        answer = _solve(search, cost, matrix, limits, self.time_share)
-        if answer is None:
-            return None
-        amount = np.maximum(0.0, answer.x)
-        whole = round_fractions(self.kind, self.task, amount, share, cost, self.classes.count)
-        counts = np.zeros(self.classes.mask.shape, dtype=np.intp)
-        counts[self.kind, self.task] = whole
-        return serve_all(self.instance, self.classes.spread(counts))
-
-    def _cover(self, share: FloatArray) -> csr_array:
-        return csr_array((share, (self.goal, np.arange(len(share)))), shape=(len(self.work), len(share)))
-
-
-def _solve(
-    search: Search, cost: FloatArray, matrix: csr_array, limits: FloatArray, share: float
-) -> OptimizeResult | None:
-    """Minimise ``cost @ x`` with ``matrix @ x <= limits`` and x >= 0; None where time does not allow it."""
-    seconds = share * search.remaining_s
-    options = {} if seconds == math.inf else {"time_limit": seconds}
-
-    def work() -> OptimizeResult:
-        return linprog(cost, matrix, limits, method="highs", options=options)
-
-    counted = search.budget.time_limit_s is None and search.budget.iterations is not None
-    answer = run_native(work, lambda: search.interrupted if counted else search.should_stop(), lambda: None)
-    return answer if answer is not None and answer.status == 0 else None
+        search.submit(state.best or state.allocation)
+        return state.best is not None

@@ -1,4 +1,4 @@
-"""Fractions of agents on tasks to whole ones: floors, then a matching of those left with slots of the tasks."""
+"""Rounding of fractional allocations: floors, then a matching of the remaining agents with slots of the tasks."""
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -6,62 +6,62 @@ from scipy.optimize import linear_sum_assignment
 from alloc.problems.instance import FloatArray, IntArray
 
 CLOSE = 1e-7
-"""Distance from a whole number that counts as none, as solvers leave it."""
+"""Distance from an integer that is a rounding error of the solver."""
 
 
 def round_fractions(
-    kind: IntArray, task: IntArray, amount: FloatArray, worth: FloatArray, cost: FloatArray, count: IntArray
+    agent_class: IntArray, task: IntArray, amount: FloatArray, share: FloatArray, cost: FloatArray, count: IntArray
 ) -> IntArray:
-    """Round a fractional plan so that no task loses more than one agent, the largest of its fractions.
+    """Round a fractional allocation so that no task loses more than one agent, that with the largest share.
 
-    Whole parts stay. The fractions on each task, largest ability first, fill slots of one agent each; every slot but
-    the last is full, so that a matching of slots with agents exists that costs no more than the fractions did.
+    Integer parts are kept. The fractions on each task, largest share first, fill slots of one agent each; every slot
+    but the last is full, so that there is a matching of slots with agents that costs no more than the fractions.
 
     Parameters
     ----------
-    kind, task : ndarray of int, shape (p,)
+    agent_class, task : ndarray of int, shape (p,)
         Class of agents and task of each pair.
     amount : ndarray, shape (p,)
         Agents of the class on the task, >= 0.
-    worth, cost : ndarray, shape (p,)
-        What one such agent brings to the task, and costs.
+    share, cost : ndarray, shape (p,)
+        Share of the task that one such agent completes, and its cost.
     count : ndarray of int, shape (k,)
         Agents in each class.
 
     Returns
     -------
     ndarray of int, shape (p,)
-        Whole agents of the class on the task.
+        Agents of the class on the task.
 
     References
     ----------
     Shmoys and Tardos (1993), doi:10.1007/BF01585178; Bezakova and Dani (2005), doi:10.1145/1120680.1120683, for
     covering.
     """
-    whole = np.floor(amount + CLOSE).astype(np.intp)
-    left = count - np.bincount(kind, weights=whole, minlength=len(count)).astype(np.intp)
-    fraction = np.where(amount - whole > CLOSE, amount - whole, 0.0)
-    pair, slot, part = _slots(task, fraction, worth)
-    copies = np.minimum(left, np.bincount(kind[pair], minlength=len(count)))
+    integer = np.floor(amount + CLOSE).astype(np.intp)
+    left = count - np.bincount(agent_class, weights=integer, minlength=len(count)).astype(np.intp)
+    fraction = np.where(amount - integer > CLOSE, amount - integer, 0.0)
+    pair, slot, part = _slots(task, fraction, share)
+    copies = np.minimum(left, np.bincount(agent_class[pair], minlength=len(count)))
     agent = np.repeat(np.arange(len(count)), copies)
     if not len(pair) or not len(agent):
-        return whole
-    high = 1.0 + 2 * len(pair) * float(np.abs(cost[pair]).max())
+        return integer
+    reward = 1.0 + 2 * len(pair) * float(np.abs(cost[pair]).max())  # more than all costs: a filled slot comes first
     full = np.bincount(slot, weights=part) > 1 - 2 * CLOSE  # all of these can be filled at once, and must be
-    price = np.zeros((slot.max() + 1, len(count)))
-    lookup = np.full(price.shape, -1, dtype=np.intp)
-    price[slot, kind[pair]] = cost[pair] - high * (1 + full[slot])
-    lookup[slot, kind[pair]] = pair
-    row, column = linear_sum_assignment(price[:, agent])
+    matrix = np.zeros((slot.max() + 1, len(count)))
+    lookup = np.full(matrix.shape, -1, dtype=np.intp)
+    matrix[slot, agent_class[pair]] = cost[pair] - reward * (1 + full[slot])
+    lookup[slot, agent_class[pair]] = pair
+    row, column = linear_sum_assignment(matrix[:, agent])
     chosen = lookup[row, agent[column]]
-    np.add.at(whole, chosen[chosen >= 0], 1)
-    return whole
+    np.add.at(integer, chosen[chosen >= 0], 1)
+    return integer
 
 
-def _slots(task: IntArray, fraction: FloatArray, worth: FloatArray) -> tuple[IntArray, IntArray, FloatArray]:
-    """Fill the slots of each task with fractions, most worth first; return pairs, slots, and how much is there."""
+def _slots(task: IntArray, fraction: FloatArray, share: FloatArray) -> tuple[IntArray, IntArray, FloatArray]:
+    """Fill the slots of each task with fractions, largest share first; return pairs, slots and amounts."""
     some = np.flatnonzero(fraction > 0)
-    order = some[np.lexsort((-worth[some], task[some]))]
+    order = some[np.lexsort((-share[some], task[some]))]
     pairs: list[int] = []
     slots: list[int] = []
     parts: list[float] = []

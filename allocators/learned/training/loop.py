@@ -2,10 +2,10 @@
 
 from collections.abc import Callable
 
+from alloc.allocators.learned.files.run_files import RunFiles
+from alloc.allocators.learned.files.training_log import TrainingLog
 from alloc.allocators.learned.training.limits import Limits
-from alloc.allocators.learned.training.log import TrainingLog
 from alloc.allocators.learned.training.report import Report
-from alloc.allocators.learned.training.run_files import RunFiles
 from alloc.allocators.learned.training.trainer import Trainer
 from alloc.allocators.parallel.engine import Engine, never_stop
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 from alloc.allocators.learned.algorithms.hyperparameters import Hyperparameters
 from alloc.allocators.learned.algorithms.registry import method_parameters
 from alloc.allocators.learned.files.policy_header import read_header
+from alloc.allocators.learned.files.run_files import RunFiles
 from alloc.allocators.learned.training.families import check_families
-from alloc.allocators.learned.training.run_files import RunFiles
 from alloc.allocators.parallel.engine import Engine, EngineError, never_stop
 from alloc.problems import InputError, Instance, TrainingError
 
@@ -121,8 +121,8 @@ def train(
         read_header(init)
     files = RunFiles.beside(output, checkpoint, log, tensorboard)
     files.check(resume=resume)
+    from alloc.allocators.learned.files.training_log import summary_writer
     from alloc.allocators.learned.training.limits import Limits
-    from alloc.allocators.learned.training.log import summary_writer
     from alloc.allocators.learned.training.loop import run_training
     from alloc.allocators.learned.training.setup import new_trainer
 

@@ -37,7 +37,8 @@ def test_keeps_the_best(instance: Instance) -> None:
     one, worse, two = Allocation([0, 1, -1]), Allocation([-1, 1, 0]), Allocation([0, 1, 0])
     for allocation in (one, worse, two, one):
         run.submit(allocation)
-    assert [step.allocation for step in run.trace] == [one, two] == [step.allocation for step in told]
+    assert [step.allocation for step in told] == [one, two]
+    assert run.trace == [step.figures for step in told]
     assert run.best is told[-1]
     assert run.best.evaluation.makespan == 1.0
     assert run.gap == 0.0
@@ -121,8 +122,8 @@ def test_a_find_comes_back_when_the_fastest_gets_faster() -> None:
     run = Search(instance, Objective.MAKESPAN_ENERGY, Budget(None), tolerance=MakespanTolerance(slack=0.5))
     for plan in ([-1, -1, 0], [-1, 0, -1], [0, -1, -1], [0, 0, 0], [0, -1, 0]):
         run.submit(Allocation(plan))  # T = 4, 2, 1, 4/7, 0.8
-    assert [step.evaluation.makespan for step in run.trace] == pytest.approx([4, 2, 1, 4 / 7, 0.8])
-    assert [step.evaluation.energy for step in run.trace] == [1, 3, 3, 7, 4]
+    assert [point.makespan for point in run.trace] == pytest.approx([4, 2, 1, 4 / 7, 0.8])
+    assert [point.energy for point in run.trace] == [1, 3, 3, 7, 4]
     times = [step.time_s for step in run.trace]
     assert times == sorted(times)
 

@@ -103,7 +103,7 @@ def test_iterations_count_models_and_repeat(exact):
     runs = [solve(instance, exact, time_limit_s=None, iterations=3, seed=5) for _ in range(2)]
     assert runs[0].allocation == runs[1].allocation
     assert runs[0].lower_bound == runs[1].lower_bound
-    assert [step.evaluation.makespan for step in runs[0].trace] == [step.evaluation.makespan for step in runs[1].trace]
+    assert [step.makespan for step in runs[0].trace] == [step.makespan for step in runs[1].trace]
 
 
 def test_no_iterations_still_give_a_plan(exact):

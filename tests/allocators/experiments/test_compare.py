@@ -24,7 +24,7 @@ class BySeed(Allocator):
 @pytest.fixture(autouse=True)
 def by_seed(monkeypatch):
     monkeypatch.setitem(registry.BUILT_IN, "by-seed", BySeed.method)
-    monkeypatch.setattr(registry, "_TARGETS", {**registry._TARGETS, "by-seed": f"{__name__}:BySeed"})
+    monkeypatch.setattr(registry, "TARGETS", {**registry.TARGETS, "by-seed": f"{__name__}:BySeed"})
     monkeypatch.setitem(__import__("sys").modules, __name__, __import__("types").SimpleNamespace(BySeed=BySeed))
 
 

@@ -1,26 +1,22 @@
-import os
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 
 from alloc.allocators import solve
-from alloc.allocators.plotting.figure import draw
+from alloc.allocators.pareto import pareto
+from alloc.allocators.plotting import plot, plot_front
 from alloc.allocators.plotting.labels import place_labels, visible
 from alloc.allocators.plotting.moves import flows, two_axes, wedges
-from alloc.problems import Allocation, Family, Instance, random_instance
-from alloc.problems.formats import write_instance
+from alloc.problems import Allocation, Family, InputError, Instance, random_instance
 
 
 def axes_of(instance: Instance):
-    return draw(solve(instance, "greedy", handle_signals=False)).axes
+    return plot(solve(instance, "greedy", handle_signals=False)).axes
 
 
 def test_sites_and_times_are_drawn(small):
     """With positions there are sites, times and a colour scale; bars are as long as the tasks take, the last first."""
     result = solve(small, "greedy", handle_signals=False)
-    sites, times, _ = draw(result).axes
+    sites, times, _ = plot(result).axes
     widths = [bar.get_width() for bar in times.patches]
     assert widths == sorted(result.evaluation.completion_time.tolist(), reverse=True)
     assert {text.get_text() for text in sites.texts} >= {"t1", "t2", "t3"}
@@ -52,7 +48,7 @@ def test_unserved_tasks_are_hatched(unservable):
 )
 def test_odd_instances_are_drawn(more):
     """Unknown or equal places, huge worlds and names that look like mathematics do no harm."""
-    figure = draw(solve(Instance(ability=[1, 2, 3], workload=[1, 2], **more), "greedy", handle_signals=False))
+    figure = plot(solve(Instance(ability=[1, 2, 3], workload=[1, 2], **more), "greedy", handle_signals=False))
     figure.canvas.draw()
     assert figure.axes
 
@@ -100,20 +96,16 @@ def test_labels_keep_clear_of_each_other_and_of_circles():
     assert visible(np.zeros((2, 2)), radius[:2], 3.0).tolist() == [False, True]
 
 
-def test_names_of_every_script_on_one_line(alloc, tmp_path):
-    """Letters that the font lacks and line breaks in names trouble neither the picture nor the terminal."""
-    instance = Instance(name="two\nlines", task_ids=["日本", "a\nb"], ability=[1, 2], workload=[1, 2])
-    (times,) = axes_of(instance)
+def test_names_of_every_script_on_one_line():
+    """Glyphs that the font lacks and line breaks in names harm nothing: each label is one line."""
+    (times,) = axes_of(Instance(name="two\nlines", task_ids=["日本", "a\nb"], ability=[1, 2], workload=[1, 2]))
     assert {label.get_text() for label in times.get_yticklabels()} == {"日本", "a b"}
-    write_instance(instance, tmp_path / "names.json")
-    ran = alloc("solve", "names.json", "--method", "greedy", "--plot", "names.png", "-q")
-    assert (ran.code, ran.err) == (0, "")
 
 
 def test_very_many_agents_and_tasks_are_drawn_by_a_sample():
     """Beyond what can be told apart on paper, dots and wedges are of some agents, and lines stand for the tasks."""
     instance = random_instance(Family(agents=30_000, tasks=1_200, starts="own"), 0)
-    figure = draw(solve(instance, "greedy"))
+    figure = plot(solve(instance, "greedy"))
     sites, times = figure.axes[:2]
     assert "20000 of the agents" in sites.get_title()
     assert len(sites.collections[0].get_offsets()) <= 20_000
@@ -121,20 +113,28 @@ def test_very_many_agents_and_tasks_are_drawn_by_a_sample():
 
 
 @pytest.mark.parametrize("suffix", ["png", "svg"])
-def test_names_of_every_script_are_drawn_without_a_word(small, tmp_path, suffix):
-    """With places, whose names are set by their width, and on fronts too, nothing but what is asked for is told."""
-    ids = ["日本語のタスク", "한국어", "हिन्दी عربي"]
-    instance = Instance(
-        name="日本", task_ids=ids, ability=[1, 2, 3, 4], workload=[1, 2, 3], task_position=[[0, 0], [1, 0], [0, 1]],
-        start_task=[0, 1, 2, 0],
-    )  # fmt: skip
-    write_instance(instance, tmp_path / "names.json")
-    for arguments in (
-        ("solve", "names.json", "--method", "greedy"),
-        ("pareto", "names.json", "--points", "1", "--iterations", "1"),
-    ):
-        command = [sys.executable, "-m", "alloc.cli", *arguments, "-q", "--plot", f"picture.{suffix}"]
-        home = {**os.environ, "HOME": "/nowhere", "MPLCONFIGDIR": "/nowhere", "PYTHONWARNINGS": "always::UserWarning"}
-        ran = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, env=home)
-        assert (ran.returncode, ran.stdout, ran.stderr) == (0, "", "")
-        assert (tmp_path / f"picture.{suffix}").stat().st_size > 5_000
+def test_plot_writes_the_figure_that_it_returns(small, tmp_path, suffix):
+    """With a path the drawing is written too, and figures made by pyplot stay as they are."""
+    from matplotlib import pyplot
+
+    before = pyplot.get_fignums()
+    path = tmp_path / f"picture.{suffix}"
+    figure = plot(solve(small, "greedy", handle_signals=False), str(path))
+    assert len(figure.axes) == 3
+    assert path.stat().st_size > 5_000
+    assert pyplot.get_fignums() == before
+
+
+def test_other_suffixes_are_refused_before_drawing(small, tmp_path):
+    """Only .png and .svg are written; the error names the file, and nothing is left behind."""
+    with pytest.raises(InputError, match=r"picture\.gif: must end in \.png or \.svg"):
+        plot(solve(small, "greedy", handle_signals=False), str(tmp_path / "picture.gif"))
+    assert not (tmp_path / "picture.gif").exists()
+
+
+def test_a_front_is_drawn_as_steps_with_its_bounds(small):
+    """The public verb for fronts returns a figure with the points found and the region proven impossible."""
+    front = pareto(small, "milp", points=3, iterations=50, handle_signals=False)
+    (axes,) = plot_front(front).axes
+    assert axes.lines[1].get_xdata().tolist() == [result.makespan for result in front.points]
+    assert {"best found", "proven impossible"} == {text.get_text() for text in axes.get_legend().get_texts()}

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from alloc.cli.commands.compare import _seeds
+from alloc.cli.commands.compare import _methods, _seeds
 
 
 def test_table_has_a_row_per_instance_and_method(alloc, small, unservable):
@@ -75,3 +75,19 @@ def test_interrupted_comparison_prints_what_is_finished(alloc, small):
     assert all(row["unserved"] == 0 for row in ran.json["rows"])
     assert ("small", "greedy") in done
     assert ("hard", "ga") not in done
+
+
+def test_methods_with_parameters_in_brackets(monkeypatch):
+    """Commas within brackets separate parameters and parts of values; the rows carry the text as it is written."""
+    loaded = []
+    monkeypatch.setattr("alloc.allocators.load", lambda name, **settings: loaded.append((name, settings)) or name)
+    found = _methods("greedy, ga[population=40,rates=0.1,0.2,elite=true],auto,ga[population=400]")
+    assert list(found) == ["greedy", "ga[population=40,rates=0.1,0.2,elite=true]", "auto", "ga[population=400]"]
+    assert loaded == [("ga", {"population": 40, "rates": (0.1, 0.2), "elite": True}), ("ga", {"population": 400})]
+
+
+@pytest.mark.parametrize("methods", ["ga[population=3", "ga[population=3]x", "ga[population]", "ga[nonsense=3]"])
+def test_wrong_brackets_are_bad_usage(alloc, small, methods):
+    """What is not NAME[PARAMETER=VALUE,...], or names no parameter of the method, is one line and exit code 2."""
+    ran = alloc("compare", "small.json", "--methods", methods)
+    assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)

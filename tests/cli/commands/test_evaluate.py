@@ -97,7 +97,7 @@ def test_the_bound_of_another_instance_is_left_out(alloc, small, change):
         document["energy"] += 1
         Path("r.json").write_text(json.dumps(document))
     ran = alloc("evaluate", "other.json", "r.json", "--json")
-    assert "r.json: its scores are not those on this instance, so that its bounds are left out" in ran.err
+    assert "r.json: its scores do not agree with this instance, so its bounds are left out" in ran.err
     assert ran.json["lower_bound"] == makespan_lower_bound(other)
 
 

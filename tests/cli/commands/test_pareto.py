@@ -6,8 +6,8 @@ import pytest
 from matplotlib.testing.compare import compare_images
 
 from alloc.allocators.pareto import pareto
-from alloc.allocators.plotting.front import save_front
-from alloc.cli.output.console import number
+from alloc.allocators.plotting import plot_front
+from alloc.problems.text import number
 
 FIELDS = [
     "method", "status", "stop_reason", "makespan", "lower_bound", "makespan_limit", "energy", "energy_lower_bound",
@@ -43,7 +43,7 @@ def test_one_point_is_drawn(alloc, unservable):
     """Where a task stays unserved there is one point, a drawing all the same, and exit code 1."""
     ran = alloc("pareto", "unservable.json", "--method", "milp", "--plot", "front.png")
     assert ran.code == 1
-    save_front(pareto(unservable, "milp", handle_signals=False), "expected.png")
+    plot_front(pareto(unservable, "milp", handle_signals=False), "expected.png")
     assert compare_images("expected.png", "front.png", 0) is None
 
 
@@ -52,7 +52,7 @@ def test_one_point_with_energy_is_drawn(alloc, small):
     ran = alloc("pareto", "small.json", "--method", "milp", "--points", "1", "--plot", "front.png")
     assert ran.code == 0
     assert "Warning" not in ran.err
-    save_front(pareto(small, "milp", points=1, handle_signals=False), "expected.png")
+    plot_front(pareto(small, "milp", points=1, handle_signals=False), "expected.png")
     assert compare_images("expected.png", "front.png", 0) is None
 
 

@@ -7,11 +7,11 @@ import pytest
 from matplotlib.testing.compare import compare_images
 
 from alloc.allocators import solve
-from alloc.allocators.plotting.figure import save_plot
+from alloc.allocators.plotting import plot
 from alloc.cli.main import main
-from alloc.cli.output.console import number
 from alloc.problems import Allocation, evaluate
 from alloc.problems.formats import read_instance
+from alloc.problems.text import number
 
 FIELDS = [
     "format", "method", "objective", "instance", "seed", "status", "stop_reason", "makespan", "served_makespan",
@@ -104,7 +104,7 @@ def test_saturated_reward_is_a_note(alloc):
 def test_the_picture_is_that_of_the_answer(alloc, small):
     """--plot draws the plan that is answered with, to the last pixel."""
     assert alloc("solve", "small.json", "--method", "greedy", "--plot", "picture.png", "-q").code == 0
-    save_plot(solve(small, "greedy", handle_signals=False), "expected.png")
+    plot(solve(small, "greedy", handle_signals=False), "expected.png")
     assert compare_images("expected.png", "picture.png", 0) is None
 
 

@@ -5,9 +5,10 @@ import sys
 import pytest
 
 from alloc.cli.main import main
-from alloc.cli.output.console import is_terminal, one_line, percent, say, table, to_json
+from alloc.cli.output.console import is_terminal, say, table, to_json
 from alloc.cli.output.files import check_output
 from alloc.problems import InputError
+from alloc.problems.text import one_line, percent
 
 
 def test_control_characters_cannot_break_the_line():

@@ -11,8 +11,10 @@ from alloc.allocators import load, solve
 from alloc.allocators.contract.budget import Budget
 from alloc.allocators.contract.search import Search
 from alloc.allocators.heuristic.greedy.list_schedule import greedy
-from alloc.allocators.heuristic.local_search.improve import Parameters, improve
-from alloc.problems import Allocation, Instance, Objective, evaluate, serve_all
+from alloc.allocators.heuristic.local_search.allocator import LocalSearch
+from alloc.allocators.heuristic.local_search.improve import improve
+from alloc.allocators.heuristic.local_search.parameters import LocalSearchParameters
+from alloc.problems import Allocation, InputError, Instance, Objective, evaluate, serve_all
 from alloc.problems.generate import paper, random_instance
 from alloc.problems.generate.family import Family
 
@@ -38,7 +40,7 @@ def test_energy_of_a_paper_scenario(allocator):
 
 @pytest.mark.parametrize("seed", range(24))
 def test_tiny_instances(allocator, seed):
-    """On tiny instances as many tasks are served as can be; if all are, makespan and energy are the least there are."""
+    """On tiny instances as many tasks are served as possible; if all are, makespan and energy are optimal."""
     instance = tiny_instance(seed)
     best = brute_force(instance)
     result = solve(instance, allocator, objective="makespan-energy", iterations=60, time_limit_s=None)
@@ -52,7 +54,7 @@ def test_tiny_instances(allocator, seed):
 @given(allocated())
 @pytest.mark.parametrize("objective", list(Objective))
 def test_never_worse_than_start_or_greedy(allocator, objective, drawn):
-    """Whatever the start, the answer is no worse than it, nor than greedy, and sends nobody astray."""
+    """Whatever the start, the answer is no worse than it, nor than greedy, and violates no constraint."""
     instance, start = drawn
     result = solve(instance, allocator, objective=objective, start=start, iterations=3, time_limit_s=None)
     assert result.evaluation.violations == ()
@@ -61,7 +63,7 @@ def test_never_worse_than_start_or_greedy(allocator, objective, drawn):
 
 
 def test_slack_buys_energy(allocator):
-    """With a tenth more time, the plan flies less and keeps to that time."""
+    """With a tenth more time, the plan has less energy and keeps to that time."""
     instance = paper(1, 1001)
     strict = solve(instance, allocator, objective="makespan-energy", iterations=60, time_limit_s=None)
     slack = solve(
@@ -72,7 +74,7 @@ def test_slack_buys_energy(allocator):
 
 
 def test_travel_times_and_real_abilities(allocator):
-    """With speeds, and with real abilities in large groups, plans are faster than greedy's and fly far less."""
+    """With speeds, and with real abilities in large groups, plans are faster than greedy's and have far less energy."""
     settings = {"objective": "makespan-energy", "iterations": 60, "time_limit_s": None, "makespan_slack": 0.01}
     for speed in ((1.0, 3.0), None):
         instance = random_instance(Family(agents=80, tasks=5, integer=False, speed=speed, starts="own"), 1)
@@ -84,13 +86,13 @@ def test_travel_times_and_real_abilities(allocator):
 
 @pytest.mark.parametrize(("seed", "least"), [(1, 77.27), (2, 57.17), (3, 63.68)])
 def test_long_travel_of_equal_agents(allocator, seed, least):
-    """Where flights take half of the time, equal agents are shared out within 1 % of the least that `cpsat` finds."""
+    """Where travel takes half of the time, the makespan of equal agents is within 1 % of that of `cpsat`."""
     result = solve(long_travel(seed), allocator, iterations=60, time_limit_s=None)
     assert result.lower_bound <= result.makespan <= 1.01 * least
 
 
 def test_nothing_to_do(allocator):
-    """Where no task with work can be served, or none has any, everybody rests."""
+    """Where no task with work can be served, or none has any, all agents are idle."""
     places = {"agent_position": [[0, 0], [0, 1]], "task_position": [[1, 0], [2, 0]]}
     for work, lists in (([0, 0], None), ([0, 1], [[0], [0]])):
         instance = Instance(ability=[1, 1], workload=work, allowed_tasks=lists, **places)
@@ -99,8 +101,8 @@ def test_nothing_to_do(allocator):
         assert result.energy == 0
 
 
-def test_work_that_there_is_not(allocator):
-    """Agents that a start sends to a task without work come to rest."""
+def test_tasks_without_work(allocator):
+    """Agents that a start sends to a task without work become idle."""
     places = {"agent_position": [[0, 0], [0, 1]], "task_position": [[0, 0], [2, 0]]}
     instance = Instance(ability=[1, 1], workload=[1, 0], **places)
     start = Allocation([0, 1])
@@ -117,18 +119,32 @@ def test_few_agents_per_task(allocator):
 
 
 def test_many_agents(allocator):
-    """Without a table of distances, thirty thousand agents reach the bound, and fly less when that counts."""
+    """Without a table of distances, thirty thousand agents reach the bound, with less energy than greedy."""
     instance = random_instance(Family(agents=30_000, tasks=300, starts="own", battery=None), 2)
     result = solve(instance, allocator, objective="makespan-energy", iterations=40, time_limit_s=None)
     assert result.gap < 1e-9
     assert result.energy < evaluate(instance, greedy(instance)).energy
 
 
-def test_others_can_use_it():
-    """`improve` goes on from the best plan of any search, within its own limits, and submits what is better."""
+def test_other_methods_can_use_it():
+    """`improve` continues from the best plan of any search, within its own limits, and submits better ones."""
     instance = paper(1, 1002)
     search = Search(instance, Objective.MAKESPAN_ENERGY, Budget(None, 1000), seed=1)
     first = search.submit(greedy(instance))
-    improve(search, iterations=30, parameters=Parameters(exchanges=500))
+    improve(search, iterations=30, parameters=LocalSearchParameters(exchanges=500))
     assert search.iteration <= 30
     assert search.best.evaluation.is_better_than(first, Objective.MAKESPAN_ENERGY)
+
+
+def test_parameters_are_keywords():
+    """Parameters are set by keyword, over those of an object, and change the answer; wrong ones are named."""
+    instance = paper(1, 1003)
+    settings = {"objective": "makespan-energy", "iterations": 20, "time_limit_s": None}
+    few = LocalSearch(exchanges=100)
+    assert few.parameters == LocalSearchParameters(exchanges=100)
+    assert LocalSearch(few.parameters, neighbours=3).parameters == LocalSearchParameters(exchanges=100, neighbours=3)
+    assert solve(instance, few, **settings).energy > solve(instance, LocalSearch(), **settings).energy
+    for name, value in (("exchanges", 0), ("final_noise", -1.0), ("exchange", 10)):
+        with pytest.raises(InputError) as caught:
+            LocalSearch(**{name: value})
+        assert caught.value.place == name

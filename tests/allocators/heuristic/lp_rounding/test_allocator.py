@@ -1,4 +1,4 @@
-"""Relax, round, mend."""
+"""Relax, round and repair."""
 
 import numpy as np
 import pytest
@@ -6,23 +6,25 @@ from oracle import brute_force
 from tiny_instances import all_can_be_served, seeds_where, tiny_instance
 
 from alloc.allocators import Budget, RefusedError, Search, solve
-from alloc.allocators.heuristic.lp_rounding.allocator import Programme
-from alloc.problems import Instance, Objective, evaluate, paper
+from alloc.allocators.heuristic.lp_rounding.allocator import LpRound, LpRoundParameters
+from alloc.allocators.heuristic.lp_rounding.relaxation import Relaxation
+from alloc.problems import InputError, Instance, Objective, evaluate, paper
 
 
-def programme(instance: Instance, by_place: bool = True) -> tuple[Programme, Search]:
-    return Programme(instance, by_place=by_place), Search(instance, Objective.MAKESPAN_ENERGY, Budget(None))
+def relaxation(instance: Instance, by_place: bool = True) -> tuple[Relaxation, Search]:
+    lp = Relaxation(instance, by_place=by_place, time_share=0.4)
+    return lp, Search(instance, Objective.MAKESPAN_ENERGY, Budget(None))
 
 
-def test_programme_by_hand() -> None:
+def test_least_makespan_by_hand() -> None:
     """Two thirds of the ability go to two thirds of the work; with ranges, whoever can go must do it alone."""
-    lp, search = programme(Instance(ability=[4, 2], workload=[4, 2]))
-    assert lp.least_hours(search) == pytest.approx(1.0)
-    lp, search = programme(Instance(ability=[3, 3], workload=[4, 2], allowed_tasks=[[0], [1]]))
-    assert lp.least_hours(search) == pytest.approx(4 / 3)
+    lp, search = relaxation(Instance(ability=[4, 2], workload=[4, 2]))
+    assert lp.least_makespan(search) == pytest.approx(1.0)
+    lp, search = relaxation(Instance(ability=[3, 3], workload=[4, 2], allowed_tasks=[[0], [1]]))
+    assert lp.least_makespan(search) == pytest.approx(4 / 3)
     late = Instance(ability=[1], workload=[2], agent_position=[[0, 0]], task_position=[[3, 0]], speed=[1])
-    lp, search = programme(late)
-    assert lp.least_hours(search) == pytest.approx(5.0)
+    lp, search = relaxation(late)
+    assert lp.least_makespan(search) == pytest.approx(5.0)
 
 
 @pytest.mark.parametrize("seed", seeds_where(lambda one: all_can_be_served(one) and not one.has_travel_time, 20))
@@ -31,21 +33,21 @@ def test_never_above_the_optimum(seed: int) -> None:
     instance = tiny_instance(seed)
     best = brute_force(instance)
     assert not best.unserved
-    lp, search = programme(instance)
-    assert lp.least_hours(search) <= best.makespan * (1 + 1e-6)
+    lp, search = relaxation(instance)
+    assert lp.least_makespan(search) <= best.makespan * (1 + 1e-6)
 
 
 def test_rounding_is_close() -> None:
-    """Before any mending, no task of the first scenario lacks more than one agent of ability 10."""
+    """Before any repair, no task of the first scenario lacks more than one agent of ability 10."""
     instance = paper(1, 1000)
-    lp, search = programme(instance)
-    hours = lp.least_hours(search)
-    rounded = lp.rounded(search, hours)
-    assert (evaluate(instance, rounded).group_ability >= instance.workload / hours - 10 - 1e-6).all()
+    lp, search = relaxation(instance)
+    makespan = lp.least_makespan(search)
+    rounded = lp.rounded(search, makespan)
+    assert (evaluate(instance, rounded).group_ability >= instance.workload / makespan - 10 - 1e-6).all()
 
 
 def test_energy_near_its_bound() -> None:
-    """Scenario 1 is solved to T = 1 at an energy not far above that of the programme."""
+    """Scenario 1 is solved to T = 1 at an energy not far above its bound."""
     result = solve(paper(1, 1000), "lp-round", objective="makespan-energy", iterations=200, time_limit_s=None)
     assert result.makespan == pytest.approx(1.0)
     assert result.energy <= 1.4 * result.energy_lower_bound
@@ -62,3 +64,11 @@ def test_large_programmes_are_refused() -> None:
     )
     with pytest.raises(RefusedError, match="linear programme"):
         solve(large, "lp-round", objective="makespan-energy", time_limit_s=1)
+
+
+def test_parameters_are_keywords() -> None:
+    """Parameters are set by keyword; wrong ones are named."""
+    assert LpRound(repair_iterations=0).parameters == LpRoundParameters(repair_iterations=0)
+    with pytest.raises(InputError) as caught:
+        LpRound(time_share=0)
+    assert caught.value.place == "time_share"

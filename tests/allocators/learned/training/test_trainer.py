@@ -15,6 +15,7 @@ from alloc.allocators.learned.algorithms.ppo import Ppo
 from alloc.allocators.learned.algorithms.registry import METHODS
 from alloc.allocators.learned.files import checkpoint
 from alloc.allocators.learned.files.policy_file import load_policy
+from alloc.allocators.learned.files.run_files import RunFiles
 from alloc.allocators.learned.network.actor_critic import NetworkSize
 from alloc.allocators.learned.training import member as module_of_members
 from alloc.allocators.learned.training import trainer as module
@@ -23,7 +24,6 @@ from alloc.allocators.learned.training.limits import Limits
 from alloc.allocators.learned.training.loop import run_training
 from alloc.allocators.learned.training.parameters import TrainingParameters
 from alloc.allocators.learned.training.report import Report
-from alloc.allocators.learned.training.run_files import RunFiles
 from alloc.allocators.learned.training.trainer import Trainer
 from alloc.allocators.learned.training.validation import Validation, games_on
 from alloc.allocators.parallel.processes import ProcessEngine

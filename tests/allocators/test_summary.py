@@ -1,7 +1,9 @@
+"""The summary of a result."""
+
 import pytest
 
 from alloc.allocators import solve
-from alloc.cli.output.report import holdup, rounded_up, summary
+from alloc.allocators.summary import bottleneck_lines, rounded_up, summary
 from alloc.problems import Instance
 
 
@@ -25,7 +27,7 @@ def test_abilities_are_rounded_up(ability, whole, text):
 
 def test_ties_gain_nothing():
     """Tasks that are last together are named, and one more agent on one of them gains nothing."""
-    lines = holdup(solve(Instance(ability=[2, 2], workload=[2, 2]), "greedy", handle_signals=False))
+    lines = bottleneck_lines(solve(Instance(ability=[2, 2], workload=[2, 2]), "greedy", handle_signals=False))
     assert lines[0].startswith("Last: 2 of 2 tasks together, at 1 h: t1, t2")
     assert "gains nothing" in lines[1]
     assert "100 % of all ability is at work" in lines[2]
@@ -33,7 +35,7 @@ def test_ties_gain_nothing():
 
 def test_single_task_says_what_a_median_agent_gains():
     """Without a next task there is no ability that is enough; the median agent stands in."""
-    lines = holdup(solve(Instance(ability=[3], workload=[6]), "greedy", handle_signals=False))
+    lines = bottleneck_lines(solve(Instance(ability=[3], workload=[6]), "greedy", handle_signals=False))
     assert "of ability 3, the median, gains 50 %: 1 h" in lines[1]
 
 
@@ -43,7 +45,7 @@ def test_finite_speeds_say_so():
         ability=[3, 1], workload=[6, 1], speed=[1, 1], agent_position=[[0, 0], [0, 1]], task_position=[[1, 0], [0, 1]]
     )
     assert "One more agent there that is there at once" in "\n".join(
-        holdup(solve(instance, "greedy", handle_signals=False))
+        bottleneck_lines(solve(instance, "greedy", handle_signals=False))
     )
 
 

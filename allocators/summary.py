@@ -1,11 +1,18 @@
-"""Results in plain words."""
+"""The summary of a result as text: how good it is, its figures, and its bottleneck."""
 
 import math
+from typing import TYPE_CHECKING
 
-from alloc.allocators import Result, Status, StopReason
+from alloc.allocators.contract.budget import StopReason
+from alloc.allocators.contract.status import Status
+from alloc.allocators.contract.tolerance import PROVEN
 from alloc.allocators.explain import Bottleneck, explain
-from alloc.cli.output.console import counted, number, percent
 from alloc.problems import Instance, Objective
+from alloc.problems.evaluation import RELATIVE_TOLERANCE
+from alloc.problems.text import counted, number, percent
+
+if TYPE_CHECKING:
+    from alloc.allocators.result import Result
 
 STOPS = {
     StopReason.PROVEN: "nothing better exists",
@@ -19,21 +26,31 @@ STOPS = {
 MOST_NAMES = 8
 """Ids in a list before it is cut."""
 
-SETTLED = 1e-6 + 1e-9
-"""Relative gap up to which no allocation is sooner, as for the status `optimal`; with slack that may be far."""
+SETTLED = PROVEN + RELATIVE_TOLERANCE
+"""Relative gap up to which no allocation is sooner, as for the status `optimal` without slack."""
 
 
-def summary(result: Result) -> str:
-    """Return the whole answer for people: how good it is, its figures, and what holds it up."""
-    return "\n".join([_headline(result), *figures(result), _ending(result), *holdup(result)])
+def summary(result: "Result") -> str:
+    """Return the summary that ``alloc solve`` prints.
+
+    Parameters
+    ----------
+    result : Result
+
+    Returns
+    -------
+    str
+        Several lines: status, makespan, energy, battery, runtime, bottleneck or unserved tasks.
+    """
+    return "\n".join([_headline(result), *figures(result), _ending(result), *bottleneck_lines(result)])
 
 
-def _headline(result: Result) -> str:
+def _headline(result: "Result") -> str:
     size = f"{counted(result.instance.n, 'agent')}, {counted(result.instance.m, 'task')}"
     return f"{result.instance.name} ({size}), {result.method}: {_status(result)}"
 
 
-def _status(result: Result) -> str:
+def _status(result: "Result") -> str:
     unserved = 0 if result.evaluation is None else len(result.evaluation.unserved_tasks)
     if result.status is Status.OPTIMAL:
         if result.makespan_limit is not None:
@@ -47,8 +64,17 @@ def _status(result: Result) -> str:
     return "no allocation found"
 
 
-def figures(result: Result) -> list[str]:
-    """Return the makespan, the energy and the battery, a line each."""
+def figures(result: "Result") -> list[str]:
+    """Return the makespan, the energy and the battery, a line each.
+
+    Parameters
+    ----------
+    result : Result
+
+    Returns
+    -------
+    list of str
+    """
     score = result.evaluation
     if score is None:
         return []
@@ -69,12 +95,21 @@ def figures(result: Result) -> list[str]:
     return lines
 
 
-def _ending(result: Result) -> str:
+def _ending(result: "Result") -> str:
     return f"  runtime   {result.runtime_s:.3g} s; it stopped because {STOPS[result.stop_reason]}"
 
 
-def holdup(result: Result) -> list[str]:
-    """Say which task is the last and what one more agent there would gain, or which tasks are unserved."""
+def bottleneck_lines(result: "Result") -> list[str]:
+    """Return which task is the last and what one more agent there would gain, or which tasks are unserved.
+
+    Parameters
+    ----------
+    result : Result
+
+    Returns
+    -------
+    list of str
+    """
     if result.allocation is None or result.evaluation is None:
         return []
     if result.evaluation.unserved_tasks:
@@ -121,7 +156,7 @@ def _gain(instance: Instance, found: Bottleneck) -> str:
     )
 
 
-def _room(result: Result, found: Bottleneck) -> str:
+def _room(result: "Result", found: Bottleneck) -> str:
     used = f"{percent(found.use)} of all ability is at work until then"
     if result.gap is None or result.gap <= SETTLED:
         return f"{used}; the same agents cannot be done sooner."

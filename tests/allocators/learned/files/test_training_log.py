@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from alloc.allocators.learned.training.log import TrainingLog
+from alloc.allocators.learned.files.training_log import TrainingLog
 from alloc.problems import InputError
 
 

@@ -1,4 +1,4 @@
-"""The processors that this process may use."""
+"""How many processors there are to compute on."""
 
 import os
 

@@ -15,8 +15,7 @@ from PIL import Image
 
 from alloc.allocators import Result, StopReason
 from alloc.allocators.pareto import Front
-from alloc.allocators.plotting.figure import save_plot
-from alloc.allocators.plotting.front import save_front
+from alloc.allocators.plotting import plot, plot_front
 from alloc.problems import Allocation, Instance, Objective, evaluate
 
 KEPT = Path(__file__).parent / "pictures"
@@ -115,15 +114,15 @@ def front(*slow: float) -> Front:
     return Front(instance, (fastest, *later), True)
 
 
-DRAWN: dict[str, Callable[[str], None]] = {
-    "moves": lambda path: save_plot(moves(), path),
-    "times": lambda path: save_plot(times(), path),
-    "many": lambda path: save_plot(many(), path),
-    "lines": lambda path: save_plot(lines(), path),
-    "nothing": lambda path: save_plot(replace(moves(), allocation=None, evaluation=None), path),
-    "front": lambda path: save_front(front(1.3, 2.0), path),
-    "wide-front": lambda path: save_front(front(2.0, 5.0, 20.0), path),
-    "one-point": lambda path: save_front(front(), path),
+DRAWN: dict[str, Callable[[str], object]] = {
+    "moves": lambda path: plot(moves(), path),
+    "times": lambda path: plot(times(), path),
+    "many": lambda path: plot(many(), path),
+    "lines": lambda path: plot(lines(), path),
+    "nothing": lambda path: plot(replace(moves(), allocation=None, evaluation=None), path),
+    "front": lambda path: plot_front(front(1.3, 2.0), path),
+    "wide-front": lambda path: plot_front(front(2.0, 5.0, 20.0), path),
+    "one-point": lambda path: plot_front(front(), path),
 }
 
 
@@ -162,21 +161,21 @@ def one_elsewhere(result: Result, agent: int, task: int) -> Result:
     return replace(result, allocation=allocation, evaluation=evaluate(result.instance, allocation))
 
 
-WRONG: dict[str, tuple[str, Callable[[str], None]]] = {
-    "one agent goes elsewhere": ("moves", lambda path: save_plot(one_elsewhere(moves(), 4, 3), path)),
-    "the idle one goes too": ("moves", lambda path: save_plot(one_elsewhere(moves(), 5, 2), path)),
-    "another task takes longer": ("times", lambda path: save_plot(one_elsewhere(times(), 2, 0), path)),
-    "another bound": ("times", lambda path: save_plot(replace(times(), lower_bound=1.5), path)),
+WRONG: dict[str, tuple[str, Callable[[str], object]]] = {
+    "one agent goes elsewhere": ("moves", lambda path: plot(one_elsewhere(moves(), 4, 3), path)),
+    "the idle one goes too": ("moves", lambda path: plot(one_elsewhere(moves(), 5, 2), path)),
+    "another task takes longer": ("times", lambda path: plot(one_elsewhere(times(), 2, 0), path)),
+    "another bound": ("times", lambda path: plot(replace(times(), lower_bound=1.5), path)),
     "all stay where they are": (
         "many",
-        lambda path: save_plot(planned(many().instance, ((np.arange(80) + 1) % 80).tolist(), lower_bound=2.0), path),
+        lambda path: plot(planned(many().instance, ((np.arange(80) + 1) % 80).tolist(), lower_bound=2.0), path),
     ),
-    "all on one task": ("lines", lambda path: save_plot(planned(lines().instance, [0] * 1200), path)),
-    "a plan after all": ("nothing", lambda path: save_plot(moves(), path)),
-    "a point is missing": ("front", lambda path: save_front(front(2.0), path)),
-    "a point elsewhere": ("front", lambda path: save_front(front(1.5, 2.0), path)),
-    "the scale": ("wide-front", lambda path: save_front(front(1.3, 2.0), path)),
-    "more than one point": ("one-point", lambda path: save_front(front(1.3), path)),
+    "all on one task": ("lines", lambda path: plot(planned(lines().instance, [0] * 1200), path)),
+    "a plan after all": ("nothing", lambda path: plot(moves(), path)),
+    "a point is missing": ("front", lambda path: plot_front(front(2.0), path)),
+    "a point elsewhere": ("front", lambda path: plot_front(front(1.5, 2.0), path)),
+    "the scale": ("wide-front", lambda path: plot_front(front(1.3, 2.0), path)),
+    "more than one point": ("one-point", lambda path: plot_front(front(1.3), path)),
 }
 
 

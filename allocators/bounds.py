@@ -1,0 +1,70 @@
+"""Bounds that `solve` proves itself, by linear programmes before and after the method runs."""
+
+import sys
+import time
+from collections.abc import Callable
+
+from alloc.allocators.contract.base import Proposal
+from alloc.allocators.contract.search import Search
+from alloc.allocators.contract.tolerance import PROVEN
+from alloc.allocators.runtime.interrupts import run_native
+from alloc.problems import Objective, energy_lower_bound, lp_makespan_lower_bound
+
+UNLIMITED_S = 30.0
+"""Time limit of the linear programme before a run without one; so long that the clock does not decide."""
+
+
+def raise_bound_before(search: Search) -> None:
+    """Raise the bound on the makespan before the run, so that a target gap is measured from it."""
+    seconds = UNLIMITED_S if search.budget.time_limit_s is None else seconds_for_bounds(search)
+    raise_makespan_bound(search, time.monotonic() + seconds)
+
+
+def raise_makespan_bound(search: Search, end: float) -> None:
+    """Raise the bound on the makespan by a linear programme that ends at `end` on the monotonic clock."""
+    seconds = max(0.0, end - time.monotonic())
+    search.raise_bound(_unless_interrupted(search, lambda: lp_makespan_lower_bound(search.instance, seconds)) or 0.0)
+
+
+def bounds_after(search: Search, proposal: Proposal) -> float | None:
+    """Close the gap further by linear programmes, within about a tenth of the time limit in all.
+
+    Parameters
+    ----------
+    search : Search
+        A run with a best allocation; its bound on the makespan is raised.
+    proposal : Proposal
+        Of the method, with the bounds that it proved.
+
+    Returns
+    -------
+    float or None
+        The bound on the energy; None where energy is no objective, or no bound was found.
+    """
+    end = time.monotonic() + seconds_for_bounds(search)
+    if not search.fast_enough:
+        raise_makespan_bound(search, end)
+    if search.objective is Objective.MAKESPAN or search.best is None or search.best.evaluation.makespan is None:
+        return None
+    if search.best.evaluation.energy == 0:
+        return 0.0
+    known = proposal.energy_lower_bound
+    if known is not None and known >= search.best.evaluation.energy * (1 - PROVEN):
+        return known
+    makespan, seconds = search.makespan_limit, max(0.0, end - time.monotonic())
+    found = _unless_interrupted(search, lambda: energy_lower_bound(search.instance, makespan, seconds))
+    return max((bound for bound in (known, found) if bound is not None), default=None)
+
+
+def seconds_for_bounds(search: Search) -> float:
+    """Return the seconds for linear programmes; hardly any after a stop request, and none to load a solver."""
+    if search.interrupted:
+        return 0.1 if "scipy.optimize" in sys.modules else 0.0
+    limit = search.budget.time_limit_s
+    return 0.2 + 0.1 * min(10.0, 10.0 if limit is None else limit)
+
+
+def _unless_interrupted(search: Search, work: Callable[[], float | None]) -> float | None:
+    """Run `work`, but return early on a stop request: a linear programme ends by its time limit alone."""
+    before = search.interrupted
+    return run_native(work, lambda: search.interrupted and not before, lambda: None)

@@ -1,0 +1,98 @@
+"""Checks of single answers: sound, no better than possible, and no more claimed than holds."""
+
+import re
+
+import pytest
+
+from alloc.allocators.conformance.cases import CASES, least_energy, optimum
+from alloc.allocators.conformance.runner import TOLERANCE, Runner, every_case, every_objective
+from alloc.allocators.contract.base import Allocator, Proposal
+from alloc.allocators.contract.budget import Budget
+from alloc.allocators.contract.search import Search
+from alloc.allocators.contract.status import Status
+from alloc.allocators.contract.tolerance import PROVEN
+from alloc.problems import Objective, evaluate, fewest_unserved
+
+
+class AnswerChecks(Runner):
+    """What must hold of every answer."""
+
+    def test_method_is_described(self, subject: Allocator) -> None:
+        """Name, summary, objectives and needs are such that ``alloc methods`` can show them."""
+        method = subject.method
+        assert re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)*", method.name), "lower-case letters, digits and hyphens"
+        assert method.summary.strip(), "the summary is empty"
+        assert "\n" not in method.summary, "the summary has more than one line"
+        assert set(method.objectives) <= set(Objective)
+        assert Objective.MAKESPAN in method.objectives, "every method minimises the makespan"
+        assert not method.missing, f"requires {method.missing}, which is not installed"
+
+    def test_plain_instance_is_not_refused(self, subject: Allocator) -> None:
+        """A method may refuse what it cannot do, but not a small instance without anything special."""
+        assert subject.refusal(CASES["integer"], Objective.MAKESPAN, Budget()) is None
+
+    @every_case
+    def test_proposal_is_sound(self, subject: Allocator, case: str) -> None:
+        """Before `solve` repairs anything, there is an answer, and every agent in it can do its task."""
+        self.answer(subject, case, subject.method.objectives[0])  # skips what is refused
+        search = Search(CASES[case], subject.method.objectives[0], Budget(None, self.iterations))
+        proposal = subject.allocate(search)
+        assert isinstance(proposal, Proposal)
+        if proposal.allocation is not None:
+            search.submit(proposal.allocation)
+            assert evaluate(CASES[case], proposal.allocation).violations == ()
+        assert search.best is not None, "neither proposed nor submitted an allocation"
+        assert search.best.evaluation.violations == ()
+
+    @every_case
+    @every_objective
+    def test_answer_is_sound(self, subject: Allocator, case: str, objective: Objective) -> None:
+        """Scores are those of the allocation, every agent can do its task, and as few tasks as can be are unserved."""
+        instance = CASES[case]
+        result = self.answer(subject, case, objective)
+        assert result.allocation is not None, "no allocation, though any would do"
+        assert result.evaluation is not None, "an allocation without scores"
+        again = evaluate(instance, result.allocation)
+        assert result.evaluation.key(Objective.MAKESPAN_ENERGY) == again.key(Objective.MAKESPAN_ENERGY)
+        assert result.evaluation.violations == ()
+        assert len(again.unserved_tasks) == fewest_unserved(instance)
+        best = optimum(case, objective)
+        assert not again.is_better_than(best, objective), "better than the optimum; the suite or `evaluate` is wrong"
+
+    @every_case
+    @every_objective
+    def test_claims_hold(self, subject: Allocator, case: str, objective: Objective) -> None:
+        """Bounds lie below the optimum by enumeration, and the status claims no more than they prove."""
+        result, best = self.answer(subject, case, objective), optimum(case, objective)
+        assert result.evaluation is not None
+        if best.unserved_tasks:
+            assert result.status is Status.INFEASIBLE
+            assert result.lower_bound is None
+            return
+        assert best.makespan is not None
+        assert result.makespan is not None
+        assert result.lower_bound is not None
+        assert result.lower_bound <= best.makespan * TOLERANCE, "the makespan is proven to be more than it can be"
+        if result.energy_lower_bound is not None:
+            least = least_energy(case, result.makespan)
+            assert result.energy_lower_bound <= least * TOLERANCE, "the energy is proven to be more than it can be"
+        assert result.status in (Status.OPTIMAL, Status.FEASIBLE)
+        if result.status is Status.OPTIMAL:
+            assert result.makespan <= best.makespan * (1 + 2 * PROVEN)
+
+    @every_case
+    def test_slack_is_spent_on_energy(self, subject: Allocator, case: str) -> None:
+        """With slack for the makespan, the answer keeps within it, and the bound on the energy holds within it."""
+        result = self.solve(subject, CASES[case], objective=Objective.MAKESPAN_ENERGY, makespan_slack=0.5)
+        score, fastest = result.evaluation, optimum(case, Objective.MAKESPAN).makespan
+        assert score is not None
+        if fastest is None:
+            assert result.makespan_limit is None
+            return
+        limit = result.makespan_limit
+        assert limit is not None
+        assert score.makespan is not None
+        assert score.makespan <= limit * TOLERANCE
+        assert (result.energy_lower_bound or 0.0) <= least_energy(case, limit) * TOLERANCE
+        if result.status is Status.OPTIMAL:
+            assert score.energy == pytest.approx(least_energy(case, 1.5 * fastest), rel=2 * PROVEN)

@@ -1,0 +1,110 @@
+"""Checks of runs: seeds, warm starts, improvements, budgets and stop requests."""
+
+import threading
+import time
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+
+from alloc.allocators.conformance.cases import CASES, large_case, medium_case
+from alloc.allocators.conformance.runner import Runner, every_objective
+from alloc.allocators.contract.base import Allocator
+from alloc.allocators.contract.improvement import Improvement
+from alloc.problems import Allocation, Objective
+
+
+class RunChecks(Runner):
+    """What must hold of every run."""
+
+    @every_objective
+    def test_same_seed_gives_same_answer(self, subject: Allocator, objective: Objective) -> None:
+        """With a budget in iterations, the seed alone decides; the clock does not."""
+        first = self.solve(subject, medium_case(), objective=objective, seed=7)
+        again = self.solve(subject, medium_case(), objective=objective, seed=7)
+        assert first.allocation == again.allocation
+
+    @every_objective
+    def test_start_is_never_lost(self, subject: Allocator, objective: Objective) -> None:
+        """The answer is no worse than the allocation that the run starts from."""
+        good = self.solve(subject, medium_case(), objective=objective, seed=1)
+        assert good.allocation is not None
+        assert good.evaluation is not None
+        warm = self.solve(subject, medium_case(), objective=objective, start=good.allocation, iterations=1, seed=2)
+        assert warm.evaluation is not None
+        assert not good.evaluation.is_better_than(warm.evaluation, objective)
+
+    def test_broken_start_is_repaired(self, subject: Allocator) -> None:
+        """A start that assigns agents to tasks that they cannot do does no harm."""
+        instance = CASES["ranges"]
+        good = self.solve(subject, instance)
+        assert good.allocation is not None
+        for agent, task in np.argwhere(~instance.reach.mask[instance.reach.origin]):
+            astray = good.allocation.task_of_agent.copy()
+            astray[agent] = task
+            result = self.solve(subject, instance, start=Allocation(astray))
+            assert result.evaluation is not None
+            assert result.evaluation.violations == ()
+            assert result.evaluation.unserved_tasks == ()
+
+    @every_objective
+    def test_improvements_improve(self, subject: Allocator, objective: Objective) -> None:
+        """Every improvement is better and later than the one before; the last is the answer, the trace has all."""
+        told: list[Improvement] = []
+        result = self.solve(subject, medium_case(), objective=objective, on_improvement=told.append)
+        assert told, "no improvement was reported"
+        assert tuple(step.figures for step in told) == result.trace
+        assert told[-1].allocation == result.allocation
+        for before, after in pairwise(told):
+            assert after.evaluation.is_better_than(before.evaluation, objective)
+            assert after.time_s >= before.time_s
+        assert told[-1].time_s <= result.runtime_s
+
+    def test_callback_can_end_the_run(self, subject: Allocator) -> None:
+        """An exception from `on_improvement` propagates out of `solve`."""
+
+        class EnoughError(Exception):
+            pass
+
+        def raise_enough(improvement: Improvement) -> None:
+            raise EnoughError
+
+        with pytest.raises(EnoughError):
+            self.solve(subject, large_case(), on_improvement=raise_enough)
+
+    @pytest.mark.parametrize("limit_s", [0.0, 0.4])
+    def test_time_limit_is_held(self, subject: Allocator, limit_s: float) -> None:
+        """A run takes at most 10 % + 0.5 s more than its limit, and answers even where the limit is 0."""
+        instance = large_case()
+        runs = (self.solve(subject, instance, iterations=None, time_limit_s=limit_s) for _ in range(2))
+        first = next(runs)
+        assert first.allocation is not None
+        allowed = 1.1 * limit_s + 0.5
+        assert first.runtime_s <= allowed or next(runs).runtime_s <= allowed  # one more try, for a busy machine
+
+    @pytest.mark.parametrize("budget", [{"iterations": 0}, {"target_gap": 1.0}])
+    def test_empty_budget_gives_an_answer(self, subject: Allocator, budget: dict[str, Any]) -> None:
+        """No iterations at all, or a gap that any answer has, still give a sound answer at once."""
+        result = self.solve(subject, large_case(), **budget)
+        assert result.evaluation is not None
+        assert not result.evaluation.unserved_tasks
+
+    @pytest.mark.parametrize("after_s", [0.0, 0.3])
+    def test_stop_event_ends_the_run(self, subject: Allocator, after_s: float) -> None:
+        """Setting the event ends a run within a second, with the best so far."""
+
+        def late_s() -> float:
+            stop = threading.Event()
+            timer = threading.Timer(after_s, stop.set)
+            began = time.monotonic()
+            timer.start()
+            try:
+                result = self.solve(subject, large_case(), iterations=None, time_limit_s=self.patience_s, stop=stop)
+            finally:
+                timer.cancel()
+            assert result.allocation is not None
+            return time.monotonic() - began - after_s
+
+        # the certificate after the run included; one more try, for a busy machine
+        assert late_s() <= 1.5 or late_s() <= 1.5

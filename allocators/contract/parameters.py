@@ -1,0 +1,90 @@
+"""Parameters of methods: frozen dataclasses whose fields are also keywords of the method's constructor."""
+
+import dataclasses
+import math
+import types
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_origin, get_type_hints
+
+from alloc.problems import InputError
+from alloc.problems.arguments import flag, listed, of_type, real, shown, text, whole
+from alloc.problems.errors import nearest
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+P = TypeVar("P", bound="DataclassInstance")
+Value = TypeVar("Value")
+
+LARGEST_INTEGER = 2**53
+"""Beyond it, floats skip integers."""
+
+
+def with_settings(parameters_type: type[P], parameters: P | None, settings: Mapping[str, object]) -> P:
+    """Return parameters with some fields replaced, all of them checked.
+
+    Parameters
+    ----------
+    parameters_type : type
+        A frozen dataclass whose fields have defaults and are annotated with int, float, bool, str, a tuple of one of
+        these (``tuple[float, ...]``), or one of these and None.
+    parameters : P or None
+        What to start from; None for the defaults.
+    settings : mapping of str to object
+        Values by field name; numpy scalars are converted to Python's own types.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown, or a value has the wrong type or is out of range.
+    """
+    start = parameters_type() if parameters is None else of_type(parameters, parameters_type, "parameters")
+    hints = get_type_hints(parameters_type)
+    names = [field.name for field in dataclasses.fields(parameters_type)]
+    for name in settings:
+        if name not in names:
+            raise InputError(f"is not a parameter of this method{nearest(name, names)}", name)
+    checked = {name: _converted(value, hints[name], name) for name, value in settings.items()}
+    return dataclasses.replace(start, **checked)
+
+
+def bounded(default: Value, low: float = -math.inf, high: float = math.inf, *, above: bool = False) -> Value:
+    """Return the field of a `CheckedParameters` with this default and range; `above` excludes `low` itself."""
+    field: Any = dataclasses.field(default=default, metadata={"low": low, "high": high, "above": above})
+    return field  # type: ignore[no-any-return]
+
+
+@dataclasses.dataclass(frozen=True)
+class CheckedParameters:
+    """Base of parameters that check their types and ranges, as `bounded` declares them, however they are made."""
+
+    def __post_init__(self) -> None:
+        hints = get_type_hints(type(self))
+        for field in dataclasses.fields(self):
+            value = _converted(getattr(self, field.name), hints[field.name], field.name, **field.metadata)
+            object.__setattr__(self, field.name, value)
+
+
+def _converted(
+    value: object, hint: Any, name: str, low: float = -math.inf, high: float = math.inf, above: bool = False
+) -> object:
+    """Return a value as Python's own of the type `hint`, checked to be of that type and in that range."""
+    kinds = get_args(hint) if get_origin(hint) is types.UnionType else (hint,)
+    if value is None and types.NoneType in kinds:
+        return None
+    kind = next(one for one in kinds if one is not types.NoneType)
+    if get_origin(kind) is tuple:
+        entries = listed(value, name, "numbers")  # type: ignore[arg-type]
+        if not entries:
+            raise InputError("must not be empty", name)
+        return tuple(_converted(entry, get_args(kind)[0], name, low, high, above) for entry in entries)
+    if kind is bool:
+        return flag(value, name)
+    if kind is int:
+        first = -LARGEST_INTEGER if low == -math.inf else int(low) + above
+        return whole(value, name, first, None if high == math.inf else int(high))
+    if kind is float:
+        return float(real(value, name, low, high, above=above))
+    if kind is str:
+        return text(value, name)
+    raise TypeError(f"{name} has a type that cannot be set: {shown(hint)}")

@@ -1,0 +1,82 @@
+"""Runs on instances in which not every task can be served, decomposed into the competing tasks and the rest."""
+
+import sys
+
+from alloc.allocators.contract.search import Search
+from alloc.allocators.contract.tolerance import PROVEN, MakespanTolerance, relative_gap
+from alloc.allocators.request import Request
+from alloc.problems import Allocation, Objective, Shortage, only_allowed
+
+
+class Decomposition:
+    """A run on an instance in which not every task can be served.
+
+    The competing tasks are allocated by matching: at the least makespan beforehand, and again at the end, at the least
+    energy in the time that the rest takes. The method allocates the rest, where every task can be served.
+
+    Parameters
+    ----------
+    whole : Search
+        The run on the whole instance; it gets every allocation, the start of the request first of all.
+    shortage : Shortage
+        The competing tasks and the rest.
+    request : Request
+
+    Attributes
+    ----------
+    shortage : Shortage
+    rest : Search or None
+        The run of the method on the rest; None where no task is left for it.
+    """
+
+    def __init__(self, whole: Search, shortage: Shortage, request: Request) -> None:
+        self._whole, self.shortage = whole, shortage
+        self.rest: Search | None = None
+        start = request.start
+        if start is not None:
+            whole.submit(only_allowed(whole.instance, start))
+        instance, tolerance = shortage.rest, request.tolerance
+        self._hours = max(tolerance.hours(shortage.hours), sys.float_info.min)
+        if instance is None:
+            whole.submit(self._merged(None, self._hours))
+            return
+        self.rest = Search(
+            instance,
+            request.objective,
+            request.budget,
+            seed=request.seed,
+            start=None if start is None else shortage.part_of(start),
+            threads=request.threads,
+            # the rest need not be faster than the competing tasks
+            tolerance=MakespanTolerance(tolerance.slack, self._hours),
+            on_improvement=lambda found: self._submit(found.allocation),
+            stop=request.stop,
+            spent_s=whole.elapsed_s,
+        )
+
+    def _submit(self, rest: Allocation) -> None:
+        self._whole.submit(self.shortage.merged(rest))
+
+    def conclude(self) -> None:
+        """Submit the best of the rest together with the cheapest allocation of the competing tasks that is as fast."""
+        if self.rest is not None and self.rest.best is not None:
+            self._whole.submit(self._merged(self.rest.best.allocation, self.rest.makespan_limit))
+
+    def _merged(self, rest: Allocation | None, hours: float) -> Allocation:
+        shortage = self.shortage
+        if self._whole.objective is Objective.MAKESPAN_ENERGY:
+            shortage = shortage.economical(hours, lambda: 0.0 if self._whole.interrupted else self._whole.remaining_s)
+        return shortage.merged(rest)
+
+    def notes(self) -> list[str]:
+        """Return the notes on the rest, and what is proven of the makespan of the tasks that are served."""
+        best, bound = self._whole.best, self.shortage.bound
+        notes: list[str] = []
+        if self.rest is not None:
+            bound, notes = max(bound, self.rest.lower_bound), self.rest.notes
+        if best is None or bound <= 0:
+            return notes
+        hours = best.evaluation.served_makespan
+        if relative_gap(hours, bound) <= PROVEN:
+            return [*notes, f"no plan that serves as many tasks is done sooner than in these {hours:.6g} h"]
+        return [*notes, f"every plan that serves as many tasks takes {bound:.6g} h or more, this one {hours:.6g} h"]

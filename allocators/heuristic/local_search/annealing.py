@@ -1,0 +1,98 @@
+"""Simulated annealing over exchanges, compiled."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from alloc.allocators.heuristic.local_search.candidates import Candidates
+from alloc.allocators.heuristic.local_search.exchange import exchange
+from alloc.allocators.heuristic.local_search.instance_arrays import InstanceArrays, Int32Array
+from alloc.allocators.heuristic.local_search.moves import save_best
+from alloc.allocators.heuristic.local_search.plan import BEST, CURRENT, FULL_GROUP, N_SHORT, Plan, Weights, Workspace
+from alloc.allocators.runtime.compiled import compiled
+from alloc.allocators.runtime.random import draw
+
+TRIES = 30
+"""Agents that are drawn to find one that can reach a task."""
+
+ANY_TASK_PERIOD = 8
+"""One in so many exchanges is with any task, not with a candidate."""
+
+SMALLEST_GAIN = 1e-10
+"""Relative improvement of the distance from which on a plan is saved as the best."""
+
+
+@compiled
+def draw_candidate(random: NDArray[np.uint64], tasks: int, candidates: Int32Array) -> int:
+    """Return a random task of one row of candidates, now and then any task."""
+    if draw(random, ANY_TASK_PERIOD) == 0:
+        return draw(random, tasks)
+    candidate: int = candidates[draw(random, candidates.shape[0])]
+    return candidate
+
+
+@compiled
+def draw_helper(arrays: InstanceArrays, plan: Plan, task: int) -> int:
+    """Return a random agent, one that can reach `task` if a few draws find any."""
+    agent = 0
+    table, origin, random, agents = arrays.distance, arrays.origin, plan.random, plan.group_of_agent.shape[0]
+    for _ in range(TRIES):
+        agent = draw(random, agents)
+        if table.shape[0] == 0 or table[origin[agent], task] < np.inf:
+            break
+    return agent
+
+
+@compiled
+def anneal(
+    arrays: InstanceArrays,
+    plan: Plan,
+    work: Workspace,
+    candidates: Candidates,
+    makespan: float,
+    steps: int,
+    weights: Weights,
+    cooling: float,
+) -> float:
+    """Make `steps` exchanges, the noise multiplied by `cooling` before each; return the last noise.
+
+    Where distance has no weight, only exchanges with short tasks are made, until there is none; otherwise the plan of
+    least distance without a shortfall is saved.
+    """
+    tasks, agents = plan.demand.shape[0] - 1, plan.group_of_agent.shape[0]
+    noise = weights.noise
+    for _ in range(steps):
+        noise *= cooling
+        now = Weights(
+            weights.distance, noise, weights.short_task, weights.shortfall, weights.surplus, weights.integer_ability
+        )
+        agent = -1
+        if plan.counter[N_SHORT] > 0 and (weights.distance == 0.0 or draw(plan.random, 4) == 0):
+            task = plan.short_task[draw(plan.random, plan.counter[N_SHORT])]
+            if plan.size[tasks] > 0 and draw(plan.random, 2) == 0:
+                other = tasks
+            else:
+                agent = draw_helper(arrays, plan, task)
+                other = plan.group_of_agent[agent]
+        else:
+            agent = draw(plan.random, agents)
+            other = plan.group_of_agent[agent]
+            task = draw_candidate(plan.random, tasks, candidates.of_origin[candidates.row[arrays.origin[agent]]])
+            surplus = other < tasks and plan.supply[other] > plan.demand[other]
+            if other < tasks and (task == other or (surplus and draw(plan.random, 4) == 0)):
+                if surplus or plan.size[tasks] > 0:
+                    task, other = other, tasks
+                else:
+                    task = draw_candidate(plan.random, tasks, candidates.of_task[other])
+        if task < 0 or other < 0 or task == other or plan.demand[task] == 0.0:
+            continue
+        if other < tasks and plan.demand[other] == 0.0:
+            continue
+        exchange(arrays, plan, work, now, makespan, agent, task, other)
+        if plan.counter[FULL_GROUP] > 0:
+            break
+        if plan.counter[N_SHORT] == 0:
+            if weights.distance == 0.0:
+                break
+            if plan.distance[CURRENT] < plan.distance[BEST] * (1 - SMALLEST_GAIN):
+                save_best(plan)
+    return noise

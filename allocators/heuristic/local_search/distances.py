@@ -1,0 +1,80 @@
+"""Distances from origins to tasks, compiled."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from alloc.allocators.heuristic.local_search.instance_arrays import InstanceArrays, Int32Array
+from alloc.allocators.runtime.compiled import compiled, inlined
+from alloc.problems.instance import FloatArray
+
+
+@compiled
+def compute_distance(
+    origin_position: FloatArray,
+    task_position: FloatArray,
+    longest_distance: FloatArray,
+    battery: FloatArray,
+    list_begin: NDArray[np.int64],
+    listed_task: Int32Array,
+    distance_unit: float,
+    energy_per_distance: float,
+    origin: int,
+    task: int,
+) -> float:
+    """Return the distance from an origin to a task, ``inf`` where it is out of reach, bit for bit as `Reach` does.
+
+    Takes arrays rather than `InstanceArrays`, as passing that costs more than the distance.
+    """
+    total = 0.0
+    for axis in range(3):
+        step = origin_position[origin, axis] - task_position[task, axis]
+        total += step * step
+    distance: float = np.sqrt(total) * distance_unit
+    if np.isnan(distance):
+        distance = 0.0
+    distance = min(distance, 1.7976931348623157e308)
+    if not distance <= longest_distance[origin] or not energy_per_distance * distance <= battery[origin]:
+        return np.inf
+    low, high = list_begin[origin], list_begin[origin + 1]
+    if low == high:
+        return distance
+    while low < high:
+        middle = (low + high) // 2
+        if listed_task[middle] < task:
+            low = middle + 1
+        else:
+            high = middle
+    return distance if low < list_begin[origin + 1] and listed_task[low] == task else np.inf
+
+
+@inlined
+def untabulated_distance(arrays: InstanceArrays, origin: int, task: int) -> float:
+    """Return the distance from an origin to a task without the table."""
+    return compute_distance(
+        arrays.origin_position,
+        arrays.task_position,
+        arrays.longest_distance,
+        arrays.battery,
+        arrays.list_begin,
+        arrays.listed_task,
+        arrays.distance_unit,
+        arrays.energy_per_distance,
+        origin,
+        task,
+    )
+
+
+@compiled
+def fill_table(arrays: InstanceArrays, distance: FloatArray) -> None:
+    """Write all distances into `distance`, shape (origins, m)."""
+    for origin in range(distance.shape[0]):
+        for task in range(distance.shape[1]):
+            distance[origin, task] = untabulated_distance(arrays, origin, task)
+
+
+@compiled
+def effective_ability(ability: float, hours_per_distance: float, makespan: float, distance: float) -> float:
+    """Return what an agent contributes per hour of the makespan, reduced by the time that it travels."""
+    if hours_per_distance == 0.0:
+        return ability
+    return ability * max(0.0, 1.0 - distance * hours_per_distance / makespan)

@@ -1,0 +1,139 @@
+"""One exchange: agents of two groups are reassigned to them at the least cost; compiled."""
+
+import numpy as np
+
+from alloc.allocators.heuristic.local_search.distances import compute_distance, effective_ability
+from alloc.allocators.heuristic.local_search.instance_arrays import InstanceArrays
+from alloc.allocators.heuristic.local_search.moves import apply_subset
+from alloc.allocators.heuristic.local_search.plan import (
+    MOST_SUMS,
+    NOISE_SIZE,
+    POOL_BY_HALVES,
+    POOL_BY_SUMS,
+    POOL_ENUMERATED,
+    Plan,
+    Weights,
+    Workspace,
+)
+from alloc.allocators.heuristic.local_search.subsets import best_by_enumeration, best_by_halves, best_by_sums
+from alloc.allocators.runtime.compiled import compiled
+from alloc.allocators.runtime.random import draw
+
+
+@compiled
+def add_to_pool(
+    arrays: InstanceArrays,
+    plan: Plan,
+    work: Workspace,
+    weights: Weights,
+    makespan: float,
+    group: int,
+    first: int,
+    task: int,
+    other: int,
+    most: int,
+    pool: int,
+) -> int:
+    """Add up to `most` agents of `group` that can reach both tasks, starting at position `first`.
+
+    Returns the new size of the pool.
+    """
+    size, begin, slot = plan.size[group], plan.begin[group], plan.slot
+    idle = plan.demand.shape[0] - 1
+    origins, ability, hours_per_distance = arrays.origin, arrays.ability, arrays.hours_per_distance
+    table, origin_position, task_position = arrays.distance, arrays.origin_position, arrays.task_position
+    longest, battery, list_begin, listed = (
+        arrays.longest_distance,
+        arrays.battery,
+        arrays.list_begin,
+        arrays.listed_task,
+    )
+    unit, rate = arrays.distance_unit, arrays.energy_per_distance
+    agents, contribution, other_contribution = work.agent, work.ability, work.other_ability
+    distances, costs, logistic = work.distance, work.cost, work.logistic
+    noise = draw(plan.random, NOISE_SIZE)
+    full = pool + most
+    for step in range(size):
+        if pool == full:
+            break
+        position = first + step
+        agent = slot[begin + (position if position < size else position - size)]
+        row = origins[agent]
+        there = 0.0
+        if table.shape[0] > 0:
+            here = table[row, task]
+            if other != idle:
+                there = table[row, other]
+        else:
+            here = compute_distance(
+                origin_position, task_position, longest, battery, list_begin, listed, unit, rate, row, task
+            )
+            if other != idle:
+                there = compute_distance(
+                    origin_position, task_position, longest, battery, list_begin, listed, unit, rate, row, other
+                )
+        if here == np.inf or there == np.inf:
+            continue
+        w, slow = ability[agent], hours_per_distance[agent]
+        agents[pool] = agent
+        contribution[pool] = effective_ability(w, slow, makespan, here)
+        other_contribution[pool] = 0.0 if other == idle else effective_ability(w, slow, makespan, there)
+        distances[pool] = here - there
+        costs[pool] = weights.distance * (here - there) + weights.noise * logistic[(noise + step) % NOISE_SIZE]
+        pool += 1
+    return pool
+
+
+@compiled
+def exchange(
+    arrays: InstanceArrays,
+    plan: Plan,
+    work: Workspace,
+    weights: Weights,
+    makespan: float,
+    agent: int,
+    task: int,
+    other: int,
+) -> None:
+    """Reassign the agents of two groups to them at the least cost: weighted distances, noise and shortfall penalties.
+
+    Of large groups only some agents take part, from `agent` on where that is one of them, from a random one on else
+    (-1). `other` may be the group of idle agents.
+    """
+    if plan.demand[other] < plan.demand[task] and other != plan.demand.shape[0] - 1:
+        task, other = other, task
+    by_sums = weights.integer_ability * POOL_BY_SUMS < MOST_SUMS
+    most = POOL_BY_SUMS // 2 if by_sums else POOL_BY_HALVES // 2
+    if plan.size[task] + plan.size[other] <= POOL_ENUMERATED:
+        most = POOL_ENUMERATED
+    elif not arrays.instant_travel:  # contributions depend on the task: just enough for one says nothing of the other
+        most = POOL_ENUMERATED // 2
+    pool: int = np.int64(0)  # type: ignore[assignment]
+    for group in (task, other):
+        if plan.size[group] > 0:
+            first = draw(plan.random, plan.size[group])
+            if agent >= 0 and plan.group_of_agent[agent] == group:
+                first = plan.position[agent]
+            pool = add_to_pool(arrays, plan, work, weights, makespan, group, first, task, other, most, pool)
+    missing, other_missing = plan.demand[task] - plan.supply[task], plan.demand[other] - plan.supply[other]
+    total, members = 0.0, 0
+    for index in range(pool):
+        total += work.ability[index]
+        if plan.group_of_agent[work.agent[index]] == task:
+            missing += work.ability[index]
+            members += 1
+        else:
+            other_missing += work.other_ability[index]
+    may_empty = members == plan.size[task] and plan.demand[task] > 0.0
+    other_may_empty = pool - members == plan.size[other] and plan.demand[other] > 0.0
+    most_needed = missing if other == plan.demand.shape[0] - 1 else max(missing, total - other_missing)
+    largest_sum = int(max(0.0, min(total, most_needed + weights.surplus)))
+    if by_sums and (pool > POOL_ENUMERATED or pool * largest_sum < 2 << pool):
+        subset = best_by_sums(
+            work, weights, pool, largest_sum, total, missing, other_missing, may_empty, other_may_empty
+        )
+    elif pool > POOL_ENUMERATED:
+        subset = best_by_halves(work, weights, pool, missing, other_missing)
+    else:
+        subset = best_by_enumeration(work, weights, pool, missing, other_missing, may_empty, other_may_empty)
+    apply_subset(plan, work, pool, subset, task, other)

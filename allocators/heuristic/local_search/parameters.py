@@ -1,0 +1,77 @@
+"""Parameters of local search."""
+
+import math
+from dataclasses import dataclass
+
+from alloc.allocators.contract.parameters import CheckedParameters, bounded
+from alloc.allocators.heuristic.local_search.annealing_state import AnnealingState
+from alloc.allocators.heuristic.local_search.plan import Weights
+
+
+@dataclass(frozen=True)
+class LocalSearchParameters(CheckedParameters):
+    """Parameters of local search, tuned on the paper's scenarios with seeds from 1000 on, and on hard instances.
+
+    Attributes
+    ----------
+    exchanges : int
+        Exchanges in an iteration; a thousand take about 5 ms.
+    neighbours : int
+        Candidate tasks per origin and per task.
+    initial_noise, final_noise : float
+        First and last noise on distances, relative to the mean distance to a candidate task.
+    short_task_penalty, shortfall_penalty : float
+        Penalty of each task with a shortfall, and of each mean ability that is missing, in mean distances.
+    attempt_noise : tuple of float
+        Initial noise of successive attempts at a target makespan, relative to the mean ability.
+    attempt_final_noise : float
+        Their last noise.
+    attempt_iterations : int
+        Iterations of the first attempt at a target makespan.
+    attempt_growth : float
+        Factor on the iterations of the next attempt after one that failed.
+    makespan_share : float
+        Largest share of the budget spent on the makespan where energy counts as well.
+    first_cycle : int
+        Iterations of the first annealing cycle where the budget is unlimited; each cycle is twice as long.
+    few_exchanges, many_exchanges : float
+        Exchanges per agent up to which annealing begins at `final_noise`, and from which on at `initial_noise`.
+    """
+
+    exchanges: int = bounded(1000, low=1)
+    neighbours: int = bounded(10, low=1)
+    initial_noise: float = bounded(0.12, low=0, above=True)
+    final_noise: float = bounded(0.007, low=0, above=True)
+    short_task_penalty: float = bounded(1.2, low=0)
+    shortfall_penalty: float = bounded(5.0, low=0)
+    attempt_noise: tuple[float, ...] = bounded((0.1, 0.01, 0.001), low=0, above=True)
+    attempt_final_noise: float = bounded(1e-6, low=0, above=True)
+    attempt_iterations: int = bounded(4, low=1)
+    attempt_growth: float = bounded(1.2, low=1)
+    makespan_share: float = bounded(0.5, low=0, high=1)
+    first_cycle: int = bounded(100, low=1)
+    few_exchanges: float = bounded(10.0, low=0, above=True)
+    many_exchanges: float = bounded(100.0, low=0, above=True)
+
+    def weights(self, state: AnnealingState, noise: float, penalty_factor: float) -> Weights:
+        """Return the weights of exchanges that reduce the distance.
+
+        Parameters
+        ----------
+        state : AnnealingState
+        noise : float
+            Relative to the mean distance to a candidate task.
+        penalty_factor : float
+            Factor on both penalties.
+        """
+        unit = penalty_factor * max(state.candidate_distance, state.distance / state.instance.n)
+        shortfall = self.shortfall_penalty * unit / state.mean_ability
+        return state.weights(1.0, noise * state.candidate_distance, self.short_task_penalty * unit, shortfall)
+
+    def noise_reduction(self, exchanges: float) -> float:
+        """Return the factor on `initial_noise` where the budget allows so many exchanges per agent."""
+        if self.many_exchanges <= self.few_exchanges:
+            return 1.0 if exchanges >= self.many_exchanges else self.final_noise / self.initial_noise
+        rise = math.log(max(exchanges, 1e-9) / self.few_exchanges) / math.log(self.many_exchanges / self.few_exchanges)
+        factor: float = (self.final_noise / self.initial_noise) ** (1 - min(1.0, max(0.0, rise)))
+        return factor

@@ -1,0 +1,167 @@
+"""The cheapest subset of a pool of agents for one of two tasks, the rest being for the other; compiled.
+
+A subset is a bit mask over the pool. Its cost is that of its agents (`Workspace.cost`) and the penalties of what both
+tasks then lack: `missing` and `other_missing` are what each would lack without any agent of the pool. `may_empty` and
+`other_may_empty` tell whether a task without any agent of the pool is without any agent at all.
+"""
+
+import numpy as np
+
+from alloc.allocators.heuristic.local_search.plan import MOST_SUMS, POOL_BY_HALVES, Weights, Workspace
+from alloc.allocators.runtime.compiled import compiled
+
+UNSERVED_PENALTY = 1e12
+"""Penalty of a task without any agent, larger than all others."""
+
+LOOKAHEAD = 8
+"""Subsets of the second half that are considered for each of the first, from the smallest that suffices on."""
+
+UNREACHABLE = 1e300
+"""Cost of a sum of abilities that no subset has."""
+
+
+@compiled
+def penalty(weights: Weights, shortfall: float, is_unserved: bool) -> float:
+    """Return the penalty of the shortfall of one task."""
+    if shortfall <= 0.0:
+        return 0.0
+    return weights.short_task + weights.shortfall * shortfall + (UNSERVED_PENALTY if is_unserved else 0.0)
+
+
+@compiled
+def best_by_sums(
+    work: Workspace,
+    weights: Weights,
+    pool: int,
+    largest_sum: int,
+    total: float,
+    missing: float,
+    other_missing: float,
+    may_empty: bool,
+    other_may_empty: bool,
+) -> np.uint64:
+    """Return the cheapest subset by dynamic programming over integer sums of abilities.
+
+    For each sum up to `largest_sum`, the cheapest subset of the first k agents is known, k = 0, 1 and so on. Indices are
+    unsigned, which spares the compiler checks for negative ones.
+    """
+    cost, sets, sizes, costs = work.sum_cost, work.sum_set, work.ability, work.cost
+    old, new = np.uint64(0), np.uint64(MOST_SUMS)
+    one, top = np.uint64(1), np.uint64(0)
+    last = np.uint64(largest_sum)
+    cost[0], sets[0] = 0.0, np.uint64(0)
+    for index in range(pool):
+        size, price, bit = np.uint64(sizes[index]), costs[index], one << np.uint64(index)
+        reach = min(last, top + size)
+        for entry in range(top + one, reach + one):
+            cost[old + entry], sets[old + entry] = UNREACHABLE, np.uint64(0)
+        for entry in range(np.uint64(0), min(size, reach + one)):
+            cost[new + entry], sets[new + entry] = cost[old + entry], sets[old + entry]
+        for entry in range(size, reach + one):
+            without, with_it = cost[old + entry], cost[old + entry - size] + price
+            cheaper = with_it < without
+            cost[new + entry] = with_it if cheaper else without
+            sets[new + entry] = (sets[old + entry - size] | bit) if cheaper else sets[old + entry]
+        top = reach
+        old, new = new, old
+    best, subset = np.inf, np.uint64(0)
+    for entry in range(int(top) + 1):
+        value = cost[old + np.uint64(entry)] + penalty(weights, missing - entry, may_empty and entry == 0)
+        value += penalty(weights, other_missing - (total - entry), other_may_empty and entry == total)
+        if value < best:
+            best, subset = value, sets[old + np.uint64(entry)]
+    return subset
+
+
+@compiled
+def best_by_enumeration(
+    work: Workspace,
+    weights: Weights,
+    pool: int,
+    missing: float,
+    other_missing: float,
+    may_empty: bool,
+    other_may_empty: bool,
+) -> np.uint64:
+    """Return the cheapest of all 2^pool subsets."""
+    ability, other, cost = work.subset_ability, work.subset_other_ability, work.subset_cost
+    ability[0], cost[0], other[0] = 0.0, 0.0, 0.0
+    for index in range(pool):
+        other[0] += work.other_ability[index]
+    for index in range(pool):
+        half = 1 << index
+        more, less, price = work.ability[index], work.other_ability[index], work.cost[index]
+        for entry in range(half):
+            ability[half + entry] = ability[entry] + more
+            other[half + entry] = other[entry] - less
+            cost[half + entry] = cost[entry] + price
+    count = 1 << pool
+    best, subset = np.inf, 0
+    for entry in range(count):
+        shortfall, other_shortfall = missing - ability[entry], other_missing - other[entry]
+        value = cost[entry]
+        if shortfall > 0.0:
+            value += penalty(weights, shortfall, may_empty and entry == 0)
+        if other_shortfall > 0.0:
+            value += penalty(weights, other_shortfall, other_may_empty and entry == count - 1)
+        if value < best:
+            best, subset = value, entry
+    return np.uint64(subset)
+
+
+@compiled
+def sorted_subsets(work: Workspace, begin: int, count: int, base: int) -> int:
+    """Write all subsets of `count` agents of the pool, sorted by ability, from `base` on; return their number."""
+    ability, other = work.subset_ability, work.subset_other_ability
+    cost, bits = work.subset_cost, work.subset_bits
+    buffer = 2 << (POOL_BY_HALVES // 2)
+    ability[base], other[base], cost[base], bits[base] = 0.0, 0.0, 0.0, 0
+    size = 1
+    for index in range(begin, begin + count):
+        more, less, price, bit = work.ability[index], work.other_ability[index], work.cost[index], 1 << index
+        without, with_it = base, base
+        for entry in range(buffer, buffer + 2 * size):
+            if with_it == base + size or (without < base + size and ability[without] <= ability[with_it] + more):
+                ability[entry], other[entry] = ability[without], other[without]
+                cost[entry], bits[entry] = cost[without], bits[without]
+                without += 1
+            else:
+                ability[entry], other[entry] = ability[with_it] + more, other[with_it] + less
+                cost[entry], bits[entry] = cost[with_it] + price, bits[with_it] | bit
+                with_it += 1
+        size *= 2
+        for entry in range(size):
+            ability[base + entry], other[base + entry] = ability[buffer + entry], other[buffer + entry]
+            cost[base + entry], bits[base + entry] = cost[buffer + entry], bits[buffer + entry]
+    return size
+
+
+@compiled
+def best_by_halves(work: Workspace, weights: Weights, pool: int, missing: float, other_missing: float) -> np.uint64:
+    """Return the cheapest of the subsets that barely suffice, by meeting in the middle.
+
+    With the subsets of both halves of the pool sorted, the subsets of the second half that complete each of the first
+    are found in one pass.
+
+    References
+    ----------
+    Horowitz and Sahni (1974), doi:10.1145/321812.321823.
+    """
+    ability, other = work.subset_ability, work.subset_other_ability
+    cost, bits = work.subset_cost, work.subset_bits
+    middle = 1 << (POOL_BY_HALVES // 2)
+    size = sorted_subsets(work, 0, pool // 2, 0)
+    other_size = sorted_subsets(work, pool // 2, pool - pool // 2, middle)
+    total = 0.0
+    for index in range(pool):
+        total += work.other_ability[index]
+    best, subset, enough = np.inf, 0, other_size
+    for entry in range(size):
+        while enough > 0 and ability[entry] + ability[middle + enough - 1] >= missing:
+            enough -= 1
+        for fit in range(middle + max(0, enough - 1), middle + min(other_size, enough + LOOKAHEAD)):
+            value = cost[entry] + cost[fit] + penalty(weights, missing - ability[entry] - ability[fit], False)
+            value += penalty(weights, other_missing - (total - other[entry] - other[fit]), False)
+            if value < best:
+                best, subset = value, bits[entry] | bits[fit]
+    return np.uint64(subset)

@@ -1,0 +1,48 @@
+"""What a method refuses before it runs: what it cannot handle, or not within the budget."""
+
+from alloc.allocators.contract.base import Allocator
+from alloc.allocators.contract.budget import Budget
+from alloc.allocators.contract.tolerance import EXACT, MakespanTolerance
+from alloc.allocators.registry import BUILT_IN
+from alloc.problems import Instance, Objective, RefusedError
+
+
+def refuse(
+    allocator: Allocator, instance: Instance, objective: Objective, budget: Budget, tolerance: MakespanTolerance = EXACT
+) -> None:
+    """Raise an error if `allocator` cannot handle `instance` within `budget`.
+
+    Parameters
+    ----------
+    allocator : Allocator
+    instance : Instance
+    objective : Objective
+    budget : Budget
+    tolerance : MakespanTolerance
+
+    Raises
+    ------
+    RefusedError
+        With the reason, and other methods where some can.
+    """
+    reason = _beyond(allocator, instance, objective, tolerance) or allocator.refusal(instance, objective, budget)
+    if reason is not None:
+        raise RefusedError(f"method {allocator.method.name!r} refuses {instance.name!r}: {reason}")
+
+
+def _beyond(allocator: Allocator, instance: Instance, objective: Objective, tolerance: MakespanTolerance) -> str | None:
+    """Return which capability the method lacks, None if it has all that is needed."""
+    method = allocator.method
+    if instance.has_travel_time and not method.finite_speeds:
+        able = [name for name, other in BUILT_IN.items() if other.finite_speeds]
+        return f"finite speeds are beyond it; use {_either(able)}"
+    if objective not in method.objectives:
+        return f"it does not optimise {objective}"
+    if tolerance != EXACT and not method.makespan_slack:
+        able = [name for name, other in BUILT_IN.items() if other.makespan_slack]
+        return f"it makes no use of slack for the makespan; use {_either(able)}"
+    return None
+
+
+def _either(names: list[str]) -> str:
+    return " or ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)

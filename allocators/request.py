@@ -1,0 +1,125 @@
+"""The arguments of `solve`, checked: an error names the parameter, before anything runs."""
+
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from alloc.allocators.contract.budget import Budget
+from alloc.allocators.contract.improvement import Improvement
+from alloc.allocators.contract.tolerance import EXACT, MakespanTolerance
+from alloc.allocators.result import Result
+from alloc.problems import Allocation, InputError, Instance, Objective
+from alloc.problems.allocation import require_fit
+from alloc.problems.arguments import of_type, real, whole
+
+LARGEST_SEED = 2**63 - 1
+MOST_THREADS = 1024
+
+Start = Allocation | Result | Mapping[str, str | None]
+"""What a run may start from: an allocation, that of a result, or the task id of each agent id."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """What a run is asked for; every field as `solve` describes it.
+
+    Attributes
+    ----------
+    instance : Instance
+    objective : Objective
+    budget : Budget
+    tolerance : MakespanTolerance
+    seed : int
+    start : Allocation or None
+    threads : int
+    on_improvement : callable or None
+    stop : threading.Event
+    """
+
+    instance: Instance
+    objective: Objective
+    budget: Budget
+    tolerance: MakespanTolerance
+    seed: int
+    start: Allocation | None
+    threads: int
+    on_improvement: Callable[[Improvement], None] | None
+    stop: threading.Event
+
+
+def checked_tolerance(slack: float, limit: float | None, objective: Objective) -> MakespanTolerance:
+    """Return the tolerance on the makespan.
+
+    Parameters
+    ----------
+    slack : float
+        The parameter `makespan_slack`.
+    limit : float or None
+        The parameter `makespan_limit`, in hours.
+    objective : Objective
+
+    Raises
+    ------
+    InputError
+        If a number is out of range, or the objective leaves no room for a tolerance.
+    """
+    tolerance = MakespanTolerance(
+        real(slack, "makespan_slack"),
+        None if limit is None else real(limit, "makespan_limit", above=True, unit="of hours "),
+    )
+    if objective is Objective.MAKESPAN and tolerance != EXACT:
+        name = "makespan_slack" if slack else "makespan_limit"
+        raise InputError(f"leaves room for less energy; it is for the objective {Objective.MAKESPAN_ENERGY}", name)
+    return tolerance
+
+
+def checked_seed(seed: int, name: str = "seed") -> int:
+    """Return the seed as a whole number from 0 to 2^63 - 1."""
+    return whole(seed, name, 0, LARGEST_SEED)
+
+
+def checked_threads(threads: int | None) -> int | None:
+    """Return the number of threads, or None if none is given."""
+    return None if threads is None else whole(threads, "threads", 1, MOST_THREADS)
+
+
+def as_allocation(instance: Instance, given: Start, name: str) -> Allocation:
+    """Return the allocation of `instance` that the caller gave in one of several forms.
+
+    Parameters
+    ----------
+    instance : Instance
+    given : Allocation, Result or mapping
+        An allocation, a result that has one, or task ids by agent id.
+    name : str
+        The parameter, for errors.
+
+    Returns
+    -------
+    Allocation
+
+    Raises
+    ------
+    InputError
+        If it is none of these, or does not belong to `instance`; its place is `name`.
+    """
+    try:
+        if isinstance(given, Mapping):
+            return Allocation.from_ids(instance, given)
+        if isinstance(given, Result):
+            return _allocation_of(given, instance)
+        allocation = of_type(given, (Allocation, Result), name)
+        assert isinstance(allocation, Allocation)
+        require_fit(instance, allocation)
+        return allocation
+    except InputError as error:
+        raise InputError(error.message, name) from error
+
+
+def _allocation_of(result: Result, instance: Instance) -> Allocation:
+    if result.allocation is None:
+        raise InputError("is a result without an allocation")
+    other = result.instance
+    if (other.agent_ids, other.task_ids) == (instance.agent_ids, instance.task_ids):
+        return result.allocation
+    return Allocation.from_ids(instance, result.allocation.to_ids(other))

@@ -1,0 +1,134 @@
+"""The document of a result (alloc-result/1), read back: its fields checked against the scores of its allocation."""
+
+import json
+import math
+from collections.abc import Mapping
+from typing import Any, TypedDict
+
+from alloc.allocators.contract.budget import StopReason
+from alloc.allocators.contract.improvement import TracePoint
+from alloc.allocators.contract.status import Status
+from alloc.allocators.contract.tolerance import EXACT, MakespanTolerance
+from alloc.problems import Allocation, Evaluation, InputError, Instance, Objective, evaluate
+from alloc.problems.arguments import choice, listed, of_type, real, shown, text, whole
+from alloc.problems.evaluation import RELATIVE_TOLERANCE
+from alloc.problems.formats import json_text, read_text
+from alloc.problems.formats.allocation_file import RESULT_FORMAT
+from alloc.problems.formats.columns import require_format
+from alloc.problems.formats.files import PathLike, named
+from alloc.problems.formats.messages import told
+
+SCORES = ("makespan", "served_makespan", "energy", "distance", "battery_remaining_percent", "reward")
+"""Fields that must be what `evaluate` says of the allocation."""
+
+LARGEST_EXACT = 2**53
+"""Beyond it, floats skip whole numbers."""
+
+
+class ResultFields(TypedDict):
+    """Arguments of `Result`, but for the instance and the notes."""
+
+    method: str
+    objective: Objective
+    seed: int
+    allocation: Allocation | None
+    evaluation: Evaluation | None
+    lower_bound: float | None
+    energy_lower_bound: float | None
+    stop_reason: StopReason
+    runtime_s: float
+    trace: tuple[TracePoint, ...]
+    makespan_limit: float | None
+    tolerance: MakespanTolerance
+
+
+def read_document(path: PathLike) -> dict[str, Any]:
+    """Return the object in a JSON file; ``-`` is standard input.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or is no JSON object.
+    """
+    source = named(path)
+    try:
+        content = read_text(path)
+        document = json_text.require_object(json_text.parse(content))
+    except InputError as error:
+        raise told(error, source) from error.__cause__
+    seed = document.get("seed")
+    if isinstance(seed, float) and seed >= LARGEST_EXACT:
+        document["seed"] = json.loads(content, parse_int=lambda digits: int(digits[:20]))["seed"]
+    return document
+
+
+def result_fields(document: Mapping[str, Any], instance: Instance) -> ResultFields:
+    """Return what a document says of a result on `instance`.
+
+    Parameters
+    ----------
+    document : mapping
+        As `Result.to_dict` returns it.
+    instance : Instance
+
+    Raises
+    ------
+    InputError
+        If a field is missing or wrong, an id is unknown, or the scores are not those on this instance.
+    """
+    of_type(instance, Instance, "instance")
+    fields = dict(of_type(document, Mapping, "document"))
+    require_format(fields.get("format"), (RESULT_FORMAT,))
+    status = choice(Status, fields.get("status"), "status")
+    allocation = evaluation = None
+    if status is not Status.NO_SOLUTION:
+        allocation = Allocation.from_ids(instance, of_type(fields.get("assignment"), dict, "assignment"))
+        evaluation = evaluate(instance, allocation)
+        _require_scores(fields, evaluation)
+    limit = _nullable(fields, "makespan_limit")
+    return {
+        "method": text(fields.get("method"), "method"),
+        "objective": choice(Objective, fields.get("objective"), "objective"),
+        "seed": whole(_integral(fields.get("seed")), "seed"),
+        "allocation": allocation,
+        "evaluation": evaluation,
+        "lower_bound": _nullable(fields, "lower_bound"),
+        "energy_lower_bound": _nullable(fields, "energy_lower_bound"),
+        "stop_reason": choice(StopReason, fields.get("stop_reason"), "stop_reason"),
+        "runtime_s": real(fields.get("runtime_s"), "runtime_s"),
+        "trace": tuple(
+            _trace_point(point, f"trace[{number}]")
+            for number, point in enumerate(listed(fields.get("trace", ()), "trace", "objects"))
+        ),
+        "makespan_limit": limit,
+        # the slack is not in the document; that there was one matters only where it was needed for the proof
+        "tolerance": MakespanTolerance(limit=limit) if limit and status is Status.OPTIMAL else EXACT,
+    }
+
+
+def _require_scores(fields: Mapping[str, Any], evaluation: Evaluation) -> None:
+    """Raise an error unless the scores of the document are those on this instance."""
+    for name in SCORES:
+        found, expected = _nullable(fields, name, low=-math.inf), getattr(evaluation, name)
+        if (found is None) != (expected is None) or (
+            found is not None and not math.isclose(found, expected, rel_tol=RELATIVE_TOLERANCE)
+        ):
+            message = f"is {shown(found)}, but on this instance the allocation has {shown(expected)}"
+            raise InputError(message, name)
+
+
+def _trace_point(point: object, place: str) -> TracePoint:
+    fields = of_type(point, dict, place)
+    return TracePoint(
+        real(fields.get("time_s"), f"{place}.time_s"), _nullable(fields, "makespan"), real(fields.get("energy"), place)
+    )
+
+
+def _nullable(fields: Mapping[str, Any], name: str, low: float = 0.0) -> float | None:
+    value = fields.get(name)
+    return None if value is None else real(value, name, low)
+
+
+def _integral(value: object) -> object:
+    """Return a float without a fraction, as JSON readers return whole numbers, as an int."""
+    return int(value) if isinstance(value, float) and value.is_integer() else value

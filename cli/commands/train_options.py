@@ -1,0 +1,112 @@
+"""Arguments and options of ``alloc train``, and those that ``alloc tune`` shares with it."""
+
+from enum import StrEnum
+from typing import Annotated
+
+import typer
+
+STEPS = 500_000
+"""Decisions of agents in a training without any other limit."""
+
+
+class Turn(StrEnum):
+    """As `alloc.problems.game.Turn`, without torch; a test compares the two."""
+
+    BIDDING = "bidding"
+    SIMULTANEOUS = "simultaneous"
+
+
+class Reward(StrEnum):
+    """As `alloc.problems.game.Reward`, without torch."""
+
+    MAKESPAN = "makespan"
+    COVERAGE = "coverage"
+
+
+class Engine(StrEnum):
+    """As `alloc.allocators.parallel.engine.ENGINES`, without numpy."""
+
+    SERIAL = "serial"
+    PROCESSES = "processes"
+    RAY = "ray"
+
+
+MethodArgument = Annotated[str, typer.Argument(metavar="METHOD", help="Method: gappo, ppo, a2c, dqn or ddpg.")]
+OutputOption = Annotated[str, typer.Option(metavar="FILE", help="Policy file to write: the best networks so far.")]
+StepsOption = Annotated[
+    int | None,
+    typer.Option(
+        min=1,
+        help="Decisions of agents, of the whole population and including those before --resume.",
+        show_default=f"{STEPS}; none where --minutes or --iterations is given",
+    ),
+]
+MinutesOption = Annotated[
+    float | None, typer.Option(min=0, help="Minutes of training, including those before --resume.")
+]
+GenerationsOption = Annotated[
+    int | None, typer.Option("--iterations", min=0, help="Generations, including those before --resume.")
+]
+PatienceOption = Annotated[
+    int | None, typer.Option(min=1, help="Stop after so many generations without better networks.")
+]
+FamilyOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="NAME",
+        help="Instances to train on: mixed, paper (small ones like the paper's), elsewhere, real, heavy-tailed, "
+        "clustered, depots, short-range, travel, battery, priority, unbalanced or varied; may be repeated.",
+        show_default="mixed",
+    ),
+]
+TrainingInstancesOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="FILE|DIR",
+        help="Train on these instances instead; of five or more, a random fifth is held out for validation.",
+    ),
+]
+InitOption = Annotated[str | None, typer.Option(metavar="POLICY", help="Start from the networks of this policy file.")]
+PopulationOption = Annotated[
+    int | None, typer.Option(min=1, help="Networks that are trained and bred; for gappo only.", show_default="4")
+]
+GenerationStepsOption = Annotated[int, typer.Option(min=1, help="Decisions of agents per network and generation.")]
+FormerGenerationStepsOption = Annotated[
+    int | None, typer.Option("--lesson", min=1, hidden=True, help="Former name of --generation-steps.")
+]
+HyperparametersOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="NAME=VALUE",
+        help="A hyperparameter of the method, such as clip_coef=0.1; may be repeated. An unknown name, such as help=, "
+        "prints all that the method has, with their defaults.",
+    ),
+]
+TurnOption = Annotated[Turn, typer.Option(help="Who moves: the highest bids, or all agents at once.")]
+RewardOption = Annotated[Reward, typer.Option(help="Makespan, or the paper's coverage (3).")]
+ResumeOption = Annotated[bool, typer.Option("--resume", help="Continue from the checkpoint.")]
+CheckpointOption = Annotated[
+    str | None,
+    typer.Option(metavar="FILE", help="State of the run, for --resume.", show_default="OUTPUT with .checkpoint"),
+]
+LogOption = Annotated[
+    str | None,
+    typer.Option(metavar="FILE", help="A CSV line for each generation.", show_default="OUTPUT with .csv"),
+]
+TensorBoardOption = Annotated[
+    str | None, typer.Option(metavar="DIR", help="Also write event files for TensorBoard there.")
+]
+EngineOption = Annotated[Engine, typer.Option(help="Where the networks of the population are trained.")]
+WorkersOption = Annotated[
+    int | None, typer.Option(min=1, max=1024, help="For --engine processes.", show_default="all processors")
+]
+AddressOption = Annotated[
+    str | None,
+    typer.Option(
+        help="For --engine ray: head of the cluster.", show_default="RAY_ADDRESS, else the cluster on this machine"
+    ),
+]
+TorchThreadsOption = Annotated[
+    int, typer.Option(min=1, max=1024, help="Threads of torch; the tensors are small, so more than one rarely helps.")
+]

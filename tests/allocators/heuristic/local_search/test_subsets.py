@@ -1,0 +1,94 @@
+"""The cheapest subset of a pool, against the definition of its cost."""
+
+import numpy as np
+import pytest
+
+from alloc.allocators.heuristic.local_search.plan import Weights, workspace
+from alloc.allocators.heuristic.local_search.subsets import (
+    best_by_enumeration,
+    best_by_halves,
+    best_by_sums,
+    sorted_subsets,
+)
+
+WEIGHTS = Weights(distance=1.0, noise=0.0, short_task=3.0, shortfall=0.7, surplus=2.0, integer_ability=10.0)
+
+
+def pool_of(seed, size, *, integer):
+    rng = np.random.default_rng(seed)
+    work = workspace(seed)
+    ability = rng.integers(1, 9, size) if integer else rng.uniform(0.5, 8, size)
+    work.ability[:size] = work.other_ability[:size] = ability
+    work.cost[:size] = rng.normal(size=size)
+    missing = float(rng.integers(1, 4 * size)) if integer else rng.uniform(1, 4 * size)
+    return work, missing, float(ability.sum()) - missing - float(rng.integers(-2, 4))
+
+
+def cost_of(work, size, subset, missing, other_missing, weights):
+    """Return the cost of a subset for the first task, from the definition."""
+    goes = np.array([int(subset) >> bit & 1 for bit in range(size)], dtype=bool)
+    cost = float(work.cost[:size][goes].sum())
+    for shortfall in (
+        missing - work.ability[:size][goes].sum(),
+        other_missing - work.other_ability[:size][~goes].sum(),
+    ):
+        cost += weights.short_task + weights.shortfall * shortfall if shortfall > 0 else 0.0
+    return cost
+
+
+def least_cost(work, size, missing, other_missing, weights):
+    return min(cost_of(work, size, subset, missing, other_missing, weights) for subset in range(1 << size))
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_enumeration_is_exact(seed):
+    """Enumeration finds the cheapest subset."""
+    size = 1 + seed % 8
+    work, missing, other_missing = pool_of(seed, size, integer=False)
+    subset = best_by_enumeration(work, WEIGHTS, size, missing, other_missing, False, False)
+    found = cost_of(work, size, subset, missing, other_missing, WEIGHTS)
+    assert found == pytest.approx(least_cost(work, size, missing, other_missing, WEIGHTS))
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_sums_are_exact(seed):
+    """Dynamic programming over all sums finds the cheapest subset where abilities are integers."""
+    size = 1 + seed % 8
+    work, missing, other_missing = pool_of(seed, size, integer=True)
+    total = float(work.ability[:size].sum())
+    subset = best_by_sums(work, WEIGHTS, size, int(total), total, missing, other_missing, False, False)
+    found = cost_of(work, size, subset, missing, other_missing, WEIGHTS)
+    assert found == pytest.approx(least_cost(work, size, missing, other_missing, WEIGHTS))
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_halves_have_the_least_shortfall(seed):
+    """Where agents cost nothing, meeting in the middle finds a subset whose shortfall is as small as any."""
+    size = 2 + seed % 8
+    work, missing, other_missing = pool_of(seed, size, integer=False)
+    work.cost[:size] = 0.0
+    weights = WEIGHTS._replace(short_task=0.0)
+    subset = best_by_halves(work, weights, size, missing, other_missing)
+    found = cost_of(work, size, subset, missing, other_missing, weights)
+    assert found == pytest.approx(least_cost(work, size, missing, other_missing, weights))
+
+
+def test_no_task_is_left_unserved():
+    """A task that would lose its last agent keeps it, whatever that costs."""
+    work = workspace(0)
+    work.ability[0], work.other_ability[0], work.cost[0] = 1.0, 1.0, 1e6
+    assert best_by_enumeration(work, WEIGHTS, 1, 1e-9, 0.0, True, False) == 1
+    assert best_by_sums(work, WEIGHTS, 1, 1, 1.0, 1e-9, 0.0, True, False) == 1
+
+
+def test_subsets_are_sorted():
+    """All subsets are listed, sorted by ability, each with its own cost."""
+    work, *_ = pool_of(3, 7, integer=False)
+    size = sorted_subsets(work, 2, 5, 0)
+    assert size == 32
+    assert (np.diff(work.subset_ability[:size]) >= 0).all()
+    for entry in range(size):
+        goes = [bit for bit in range(7) if work.subset_bits[entry] >> bit & 1]
+        assert work.subset_ability[entry] == pytest.approx(work.ability[goes].sum())
+        assert work.subset_cost[entry] == pytest.approx(work.cost[goes].sum())
+    assert len(set(work.subset_bits[:size].tolist())) == size

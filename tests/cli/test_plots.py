@@ -1,0 +1,57 @@
+"""`alloc plot` and `--plot` write a drawing, and print nothing beside it."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+from matplotlib.testing.compare import compare_images
+
+from alloc.problems import Instance
+from alloc.problems.formats import write_instance
+
+
+@pytest.mark.parametrize("suffix", ["png", "svg"])
+def test_names_of_every_script_are_drawn_without_output(tmp_path, suffix):
+    """Missing glyphs and folders that cannot be written to cause no output, for results and fronts alike."""
+    ids = ["日本語のタスク", "한국어", "हिन्दी عربي"]
+    instance = Instance(
+        name="日本", task_ids=ids, ability=[1, 2, 3, 4], workload=[1, 2, 3], task_position=[[0, 0], [1, 0], [0, 1]],
+        start_task=[0, 1, 2, 0],
+    )  # fmt: skip
+    write_instance(instance, tmp_path / "names.json")
+    for arguments in (
+        ("solve", "names.json", "--method", "greedy"),
+        ("pareto", "names.json", "--points", "1", "--iterations", "1"),
+    ):
+        command = [sys.executable, "-m", "alloc.cli", *arguments, "-q", "--plot", f"picture.{suffix}"]
+        home = {**os.environ, "HOME": "/nowhere", "MPLCONFIGDIR": "/nowhere", "PYTHONWARNINGS": "always::UserWarning"}
+        ran = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, env=home)
+        assert (ran.returncode, ran.stdout, ran.stderr) == (0, "", "")
+        assert (tmp_path / f"picture.{suffix}").stat().st_size > 5_000
+
+
+def test_plot_draws_what_solve_drew(alloc, small):
+    """A stored result gives the drawing that --plot made of it, to the last pixel, whether read or piped."""
+    ran = alloc("solve", "small.json", "--method", "greedy", "--json", "--output", "r.json", "--plot", "one.png", "-q")
+    assert ran.code == 0
+    assert alloc("plot", "small.json", "r.json", "--output", "two.png") == type(ran)(0, "", "")
+    assert alloc("plot", "small.json", "-", "--output", "three.png", stdin=ran.out).code == 0
+    assert compare_images("one.png", "two.png", 0) is None
+    assert compare_images("one.png", "three.png", 0) is None
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("small.json", "small.json", "--output", "p.png"), "small.json: format: "),
+        (("small.json", "r.json", "--output", "p.gif"), "p.gif: must end in .png or .svg"),
+        (("-", "-", "--output", "p.png"), "standard input: cannot be the instance and the result at once"),
+        (("small.json", "r.json", "--output", "small.json"), "small.json: is INSTANCE and --output at once"),
+    ],
+)
+def test_what_cannot_be_drawn_is_one_line(alloc, small, arguments, message):
+    """An instance in the place of a result, another suffix and clashing files end with exit code 2 and one line."""
+    ran = alloc("plot", *arguments)
+    assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
+    assert message in ran.err
