@@ -26,8 +26,8 @@ from torch import Tensor, nn
 
 from alloc.allocators.learned.algorithms.hyperparameters import DdpgParameters
 from alloc.allocators.learned.algorithms.learner import Lesson, LessonReport
-from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize, fresh
-from alloc.allocators.learned.play.transitions import Memory, after, gains, play
+from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize, initialised
+from alloc.allocators.learned.play.transitions import TransitionMemory, next_state, play, scores_above_reserve
 from alloc.problems.game import Board, Rules, State
 
 
@@ -74,12 +74,12 @@ class Ddpg:
         self, size: NetworkSize | None = None, parameters: DdpgParameters | None = None, seed: int = 0
     ) -> None:
         self.parameters = parameters or DdpgParameters()
-        actor, critic, *targets = fresh(size, seed, 4)
+        actor, critic, *targets = initialised(size, seed, 4)
         self.networks = nn.ModuleDict({"actor": actor, "critic": critic})
         self.targets = nn.ModuleDict(dict(zip(self.networks, targets, strict=True)))
         self.targets.load_state_dict(self.networks.state_dict())
         self.optimisers = {name: torch.optim.Adam(one.parameters()) for name, one in self.networks.items()}
-        self.memory = Memory(self.parameters.capacity)
+        self.memory = TransitionMemory(self.parameters.capacity)
 
     @property
     def policy(self) -> ActorCritic:
@@ -121,7 +121,7 @@ class Ddpg:
         """Take one gradient step of critic and actor on remembered moves; return the mean entropy of the shares."""
         board, state, action, reward = self.memory.draw(self.parameters.minibatch, generator)
         quality = self._gains(self.networks["critic"], board, state, rules)
-        wanted = self.wanted(board, after(board, state, action), reward, rules)
+        wanted = self.wanted(board, next_state(board, state, action), reward, rules)
         value = quality.gather(1, action[:, None])[:, 0]
         self._descend("critic", nn.functional.huber_loss(value, wanted))
         shares = shares_of(self._gains(self.networks["actor"], board, state, rules), self.parameters.softness)
@@ -140,7 +140,7 @@ class Ddpg:
 
     def _gains(self, network: nn.Module, board: Board, state: State, rules: Rules) -> Tensor:
         scores = network(board, state)
-        return gains(scores.bids, scores.reserve, board, state, rules)
+        return scores_above_reserve(scores.bids, scores.reserve, board, state, rules)
 
     def _descend(self, name: str, loss: Tensor) -> None:
         optimiser, network = self.optimisers[name], self.networks[name]

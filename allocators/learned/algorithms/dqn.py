@@ -22,8 +22,8 @@ from torch import Tensor, nn
 
 from alloc.allocators.learned.algorithms.hyperparameters import DqnParameters
 from alloc.allocators.learned.algorithms.learner import Lesson, LessonReport
-from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize, fresh
-from alloc.allocators.learned.play.transitions import Memory, after, gains, play
+from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize, initialised
+from alloc.allocators.learned.play.transitions import TransitionMemory, next_state, play, scores_above_reserve
 from alloc.problems.game import Board, Rules, State
 
 
@@ -50,10 +50,10 @@ class Dqn:
 
     def __init__(self, size: NetworkSize | None = None, parameters: DqnParameters | None = None, seed: int = 0) -> None:
         self.parameters = parameters or DqnParameters()
-        self.network, self.target = fresh(size, seed, 2)
+        self.network, self.target = initialised(size, seed, 2)
         self.target.load_state_dict(self.network.state_dict())
         self.optimiser = torch.optim.Adam(self.network.parameters(), self.parameters.learning_rate)
-        self.memory = Memory(self.parameters.capacity)
+        self.memory = TransitionMemory(self.parameters.capacity)
         self.updates = 0
 
     @property
@@ -90,8 +90,8 @@ class Dqn:
         """Take one gradient step on remembered moves, and now and then renew the target network."""
         board, state, action, reward = self.memory.draw(self.parameters.minibatch, generator)
         scores = self.network(board, state)
-        value = gains(scores.bids, scores.reserve, board, state, rules).gather(1, action[:, None])[:, 0]
-        loss = nn.functional.huber_loss(value, self.wanted(board, after(board, state, action), reward, rules))
+        value = scores_above_reserve(scores.bids, scores.reserve, board, state, rules).gather(1, action[:, None])[:, 0]
+        loss = nn.functional.huber_loss(value, self.wanted(board, next_state(board, state, action), reward, rules))
         self.optimiser.zero_grad(set_to_none=True)
         loss.backward()
         nn.utils.clip_grad_norm_(self.network.parameters(), self.parameters.max_gradient_norm)
@@ -104,10 +104,10 @@ class Dqn:
     def wanted(self, board: Board, following: State, reward: Tensor, rules: Rules) -> Tensor:
         """Return the targets of (17), shape (B,)."""
         scores = self.target(board, following)
-        value = picker = gains(scores.bids, scores.reserve, board, following, rules)
+        value = picker = scores_above_reserve(scores.bids, scores.reserve, board, following, rules)
         if self.parameters.double:
             own = self.network(board, following)
-            picker = gains(own.bids, own.reserve, board, following, rules)
+            picker = scores_above_reserve(own.bids, own.reserve, board, following, rules)
         return td_target(reward, best_gain(value, picker), following.done, self.parameters.discount)
 
     def state(self) -> dict[str, Any]:

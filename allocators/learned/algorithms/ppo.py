@@ -16,7 +16,7 @@ from torch import Tensor, nn
 from alloc.allocators.learned.algorithms.hyperparameters import PpoParameters
 from alloc.allocators.learned.algorithms.learner import Lesson, LessonReport
 from alloc.allocators.learned.algorithms.replay import Replay
-from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize, fresh
+from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize, initialised
 from alloc.allocators.learned.play.action_sampling import log_probabilities
 from alloc.allocators.learned.play.trajectories import Trajectories, advantages, collect
 from alloc.problems.game import Board, Rules, State
@@ -93,7 +93,7 @@ class Ppo:
 
     def __init__(self, size: NetworkSize | None = None, parameters: PpoParameters | None = None, seed: int = 0) -> None:
         self.parameters = parameters or PpoParameters()
-        (self.network,) = fresh(size, seed, 1)
+        (self.network,) = initialised(size, seed, 1)
         self.optimiser = torch.optim.Adam(self.network.parameters(), self.parameters.learning_rate)
         self.replay = Replay(self.parameters.capacity)
 

@@ -5,6 +5,7 @@ from typing import Any
 
 import torch
 
+from alloc.allocators.learned.play.stored_games import from_stored, to_stored
 from alloc.allocators.learned.play.trajectories import Trajectories
 from alloc.problems.game import Board, State
 
@@ -40,8 +41,8 @@ class Replay:
         return [
             {
                 **{field.name: getattr(one, field.name) for field in fields(Trajectories) if field.name not in _PARTS},
-                "board": {field.name: getattr(one.board, field.name) for field in fields(Board)},
-                "state": {field.name: getattr(one.state, field.name) for field in fields(State)},
+                "board": to_stored(one.board),
+                "state": to_stored(one.state),
             }
             for one in self._kept
         ]
@@ -49,7 +50,10 @@ class Replay:
     def load(self, state: list[dict[str, Any]]) -> None:
         """Take up what `state` returned."""
         self._kept = [
-            Trajectories(**{**one, "board": Board(**one["board"]), "state": State(**one["state"])}) for one in state
+            Trajectories(
+                **{**one, "board": from_stored(Board, one["board"]), "state": from_stored(State, one["state"])}
+            )
+            for one in state
         ]
 
 

@@ -21,7 +21,7 @@ from alloc.allocators.learned.algorithms.learner import Lesson, LessonReport
 from alloc.allocators.learned.algorithms.registry import new_learner
 from alloc.allocators.learned.files.checkpoint import described, read_checkpoint, write_checkpoint
 from alloc.allocators.learned.files.policy_file import save_policy
-from alloc.allocators.learned.network.actor_critic import NetworkSize, unfilled
+from alloc.allocators.learned.network.actor_critic import NetworkSize, uninitialised
 from alloc.allocators.learned.training.curriculum import Curriculum
 from alloc.allocators.learned.training.log import TrainingLog
 from alloc.allocators.learned.training.validation import Validation, validate, validation_boards
@@ -342,7 +342,7 @@ class Trainer:
         """Write the best networks up to now."""
         networks = []
         for weights in self.best:
-            network = unfilled(self.parameters.network)
+            network = uninitialised(self.parameters.network)
             network.load_state_dict(weights)
             networks.append(network)
         figures = self.history[self.best_generation - 1]

@@ -25,7 +25,7 @@ from alloc.allocators.parallel.engine import ENGINES, EngineError, SerialEngine
 from alloc.cli.commands import train as module
 from alloc.problems import Instance
 from alloc.problems.formats import write_instance
-from alloc.problems.game import Reward, Turn
+from alloc.problems.game import Reward, TurnRule
 from alloc.problems.generate import paper_like
 
 QUICK = ("--instances", "mine", "--lesson", "150", "--set", "epochs=1")
@@ -328,7 +328,7 @@ def test_the_game_of_the_paper_can_be_trained_on(alloc, mine):
 
 def test_options_are_those_of_the_library():
     """The command line, which must not wait for torch, names the same turns, rewards, engines and families."""
-    assert set(module.Turn) == set(Turn)
+    assert set(module.Turn) == set(TurnRule)
     assert set(module.Reward) == set(Reward)
     assert {engine.value for engine in module.Engine} == set(ENGINES)
     for name in FAMILIES:

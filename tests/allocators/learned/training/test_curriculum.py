@@ -60,7 +60,7 @@ def test_prices_and_aims_spread() -> None:
     """Prices fill their range in proportion; a share of the games aim beyond the bound, so that ability is left."""
     curriculum = Curriculum(families=("paper",), pairs=3000, price=(0.2, 3.0), eased_share=0.3, easing=1.3)
     boards = [drawn(curriculum, seed) for seed in range(40)]
-    price = torch.cat([board.price for board in boards])
+    price = torch.cat([board.energy_weight for board in boards])
     assert price.min() >= 0.2
     assert price.max() <= 3.0
     assert 0.6 < price.median() < 1.0
@@ -96,7 +96,7 @@ def test_own_instances_are_played_in_place_of_drawn_ones() -> None:
     seen = {drawn(curriculum, seed).shape[1:] for seed in range(10)}
     assert seen == {(12, 4), (9, 3)}
     board = drawn(curriculum)
-    assert len(board.price.unique()) == len(board.price)
+    assert len(board.energy_weight.unique()) == len(board.energy_weight)
 
 
 def test_own_instances_may_be_large() -> None:
