@@ -1,9 +1,9 @@
-"""Games laid out for tests, at one reference makespan and one price of energy."""
+"""Games laid out for tests, at one reference makespan and one weight of energy."""
 
 import numpy as np
 
 from alloc.problems import Allocation, Instance
-from alloc.problems.game import Board, State, begin, make_board, step, tasks_of
+from alloc.problems.game import Board, State, current_tasks, make_board, reset, step
 
 EXTREMES = {
     "huge": Instance(
@@ -34,20 +34,20 @@ EXTREMES = {
 """Instances at the ends of what is valid."""
 
 
-def layout(*instances: Instance, hours: float = 1.0, price: float = 0.5, seed: int = 0, **options) -> Board:
+def layout(*instances: Instance, hours: float = 1.0, energy_weight: float = 0.5, seed: int = 0, **options) -> Board:
     """Lay out games on `instances`; further options are those of `make_board`."""
     size = len(instances)
-    return make_board(instances, [hours] * size, [price] * size, np.random.default_rng(seed), **options)
+    return make_board(instances, [hours] * size, [energy_weight] * size, np.random.default_rng(seed), **options)
 
 
 def state_of(board: Board, plan: np.ndarray) -> State:
     """Return the state after all agents have gone where `plan`, shape (n,), sends them; they must be able to."""
     places = np.where(plan < 0, board.places - 1, plan)
-    slot = ((board.goal == board.goal.new_tensor(places)[None, :, None]) & board.legal).int().argmax(2)
-    return step(board, begin(board), slot)
+    slot = ((board.candidates == board.candidates.new_tensor(places)[None, :, None]) & board.legal).int().argmax(2)
+    return step(board, reset(board), slot)
 
 
 def plan_of(board: Board, state: State, game: int = 0) -> Allocation:
     """Return where everybody is in one game."""
-    task = tasks_of(board, state)[game].numpy()
+    task = current_tasks(board, state)[game].numpy()
     return Allocation(np.where(task == board.places - 1, -1, task))

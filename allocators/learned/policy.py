@@ -1,4 +1,4 @@
-"""Trained policies as allocators: the networks of a policy file, put to use by the planner."""
+"""Trained policies as allocators: the planner with the networks of a policy file."""
 
 from dataclasses import replace
 from importlib.resources import as_file, files
@@ -21,11 +21,11 @@ from alloc.allocators.runtime.torch_state import plain_torch, torch_threads
 from alloc.problems import Allocation, InputError, Instance, Objective
 from alloc.problems.arguments import text
 
-GPU_PAIRS, GPU_LANES = 40_000, 512
-"""`lane_pairs` and `most_lanes` of the planner on a GPU: ten times as many games take no longer there."""
+GPU_PAIRS, GPU_GAMES = 40_000, 512
+"""`pairs_per_stream` and `games_per_region` of the planner on a GPU, where ten times as many games take no longer."""
 
-LOCAL_PRICE = 2.0
-"""Weight of energy in the game that local search goes on from, where travel takes no time."""
+START_ENERGY_WEIGHT = 2.0
+"""Weight of energy in the game that local search starts from, where travel takes no time."""
 
 
 class PolicyAllocator(Allocator):
@@ -41,7 +41,7 @@ class PolicyAllocator(Allocator):
     Raises
     ------
     InputError
-        If the policy file is not one, does not fit this version, or there is no such device.
+        If the file is no policy, does not fit this version, or there is no such device.
     """
 
     trained_by: str
@@ -50,7 +50,7 @@ class PolicyAllocator(Allocator):
     def __init__(self, policy: Path | str | None = None, device: str = "cpu") -> None:
         self.device = usable(device)
         if self.device.type != "cpu":
-            self.parameters = replace(self.parameters, lane_pairs=GPU_PAIRS, most_lanes=GPU_LANES)
+            self.parameters = replace(self.parameters, pairs_per_stream=GPU_PAIRS, games_per_region=GPU_GAMES)
         with plain_torch():
             self.networks = self._read(policy)
             play_once(self.networks[0])
@@ -68,7 +68,7 @@ class PolicyAllocator(Allocator):
         return too_large(instance, budget)
 
     def allocate(self, search: Search) -> Proposal:
-        """Play game after game and submit what is better."""
+        """Play games and submit improvements until the budget ends."""
         if not (search.instance.workload > 0).any():
             return Proposal(Allocation.idle(search.instance))
         with plain_torch(), torch_threads(1):  # the tensors are small: a second thread costs more than it brings
@@ -76,7 +76,7 @@ class PolicyAllocator(Allocator):
         return Proposal()
 
     def plan(self, search: Search) -> None:
-        """Use the budget up."""
+        """Run the planner."""
         Planner(search, self.networks, self.parameters).run()
 
 
@@ -93,7 +93,7 @@ class A2c(PolicyAllocator):
 
 
 class Dqn(PolicyAllocator):
-    """A network that estimates what each bid is worth."""
+    """A network that estimates what each bid is utility."""
 
     method, trained_by = BUILT_IN["dqn"], "dqn"
     parameters = PlannerParameters(temperature=(DqnParameters().final_temperature, DqnParameters().temperature))
@@ -106,7 +106,7 @@ class Ddpg(PolicyAllocator):
 
 
 class Gappo(PolicyAllocator):
-    """A population of actor-critics; where time allows, it learns on, on the instance itself.
+    """A population of actor-critics; where time allows, it is fine-tuned on the instance itself.
 
     References
     ----------
@@ -116,7 +116,7 @@ class Gappo(PolicyAllocator):
     method, trained_by = BUILT_IN["gappo"], "gappo"
 
     def plan(self, search: Search) -> None:
-        """Play, and learn on in between: on the CPU, where learners work."""
+        """Run the planner with fine-tuning, which works on the CPU only."""
         tuning = FineTuning(search, self.networks) if self.device.type == "cpu" else None
         Planner(search, self.networks, self.parameters, tuning).run()
 
@@ -136,8 +136,8 @@ class GappoLs(Gappo):
         """Play one game on the whole instance, then improve its plan by local search."""
         from alloc.allocators.heuristic.local_search.improve import improve
 
-        price = self.parameters.first_price if search.instance.has_travel_time else LOCAL_PRICE
-        Planner(search, self.networks, self.parameters).play_whole(price)
+        energy_weight = self.parameters.first_energy_weight if search.instance.has_travel_time else START_ENERGY_WEIGHT
+        Planner(search, self.networks, self.parameters).play_whole(energy_weight)
         with search.improving("local search"):
             improve(search)
 
@@ -155,6 +155,6 @@ def usable(device: str) -> torch.device:
         return torch.device(device)
     except torch.OutOfMemoryError as error:
         raise InputError(f"{device!r} has no memory left", "device") from error
-    except (RuntimeError, AssertionError, ImportError) as error:  # torch's own words are about its insides
+    except (RuntimeError, AssertionError, ImportError) as error:  # the message of torch would not help a user
         able = "cpu or cuda" if torch.cuda.is_available() else "cpu"
         raise InputError(f"{device!r} cannot be used here; use {able}", "device") from error

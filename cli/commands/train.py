@@ -144,7 +144,7 @@ def _close(run: _Progress, policy: str) -> None:
 
 @contextmanager
 def _interrupts(run: _Progress) -> Iterator[None]:
-    """End a training by Ctrl-C or SIGTERM, and say what is stored; files are complete at any moment, so neither waits."""
+    """End a training by Ctrl-C or SIGTERM, and say what is stored: files are complete at any moment."""
 
     def interrupt(_number: int, _frame: FrameType | None) -> None:
         raise KeyboardInterrupt

@@ -17,13 +17,13 @@ from alloc.problems.game import (
     TASK_FEATURES,
     Rules,
     State,
-    Turn,
-    begin,
+    TurnRule,
+    action_mask,
+    apply_moves,
     marginal_contributions,
-    moved,
     observe_pairs,
     observe_tasks,
-    open_bids,
+    reset,
     step,
 )
 
@@ -36,7 +36,7 @@ class BiddingEnv(gymnasium.Env[NDArray[np.float32], np.int64]):
     Action ``agent * (m + 1) + task`` sends an agent to a task, with m for being idle; ``n * (m + 1)`` stops.
     Observations are `observe_pairs` and then `observe_tasks`, laid flat: all within -2 and 2, and the same as the
     policies of this package see. The reward is the marginal contribution of the move: rewards of an episode add up to
-    the rise of `worth`.
+    the rise of `utility`.
 
     Illegal actions - going where the agent is, cannot go, or has been before - change nothing, bring `illegal_reward`
     and cost a step; `action_masks` names the legal ones, as MaskablePPO of sb3-contrib asks for them. Infos hold
@@ -48,7 +48,7 @@ class BiddingEnv(gymnasium.Env[NDArray[np.float32], np.int64]):
         Drawn from at every reset, or called with a numpy generator.
     rules : Rules
         Agents must bid; one bid a step is granted, whatever `most_moves` says.
-    price : float
+    energy_weight : float
         Weight of energy in the reward.
     max_steps : int, optional
         Steps after which the game is truncated; four per agent by default.
@@ -71,17 +71,17 @@ class BiddingEnv(gymnasium.Env[NDArray[np.float32], np.int64]):
         instances: Source,
         *,
         rules: Rules = ONE_BY_ONE,
-        price: float = 0.5,
+        energy_weight: float = 0.5,
         max_steps: int | None = None,
         illegal_reward: float = 0.0,
     ) -> None:
-        if rules.turn != Turn.BIDDING:
+        if rules.turn != TurnRule.BIDDING:
             raise InputError(
                 "agents of this environment bid; SimultaneousEnv is the one where they choose at once", "turn"
             )
         self._source, self._sizes = instances, sizes_of(instances)
         n, m = self._sizes
-        self.rules, self.price, self.illegal_reward = rules, price, illegal_reward
+        self.rules, self.energy_weight, self.illegal_reward = rules, energy_weight, illegal_reward
         self.max_steps = 4 * n if max_steps is None else max_steps
         size = (m + 1) * (n * PAIR_FEATURES + TASK_FEATURES)
         self.observation_space = spaces.Box(-2, 2, (size,), np.float32)
@@ -95,8 +95,8 @@ class BiddingEnv(gymnasium.Env[NDArray[np.float32], np.int64]):
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Begin a game on an instance drawn anew; with a seed, the same games follow."""
         super().reset(seed=seed)
-        self._game = draw(self._source, self._sizes, self.price, self.np_random)
-        self._state, self._steps = begin(self._game.board), 0
+        self._game = draw(self._source, self._sizes, self.energy_weight, self.np_random)
+        self._state, self._steps = reset(self._game.board), 0
         return self._observation(), self._info(illegal=False, over=False)
 
     def step(self, action: np.int64) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
@@ -107,20 +107,20 @@ class BiddingEnv(gymnasium.Env[NDArray[np.float32], np.int64]):
         if legal:
             bid = torch.tensor([[number]])
             reward = marginal_contributions(board, before, bid, self.rules).item()
-            self._state = step(board, before, moved(board, before, bid))
+            self._state = step(board, before, apply_moves(board, before, bid))
         ended = bool(self._state.done)
         cut = not ended and self._steps >= self.max_steps
         return self._observation(), reward, ended, cut, self._info(illegal=not legal, over=ended or cut)
 
     def action_masks(self) -> NDArray[np.bool_]:
         """Return which actions are legal now, shape (n * (m + 1) + 1,)."""
-        can = open_bids(self._game.board, self._state, self.rules).flatten().numpy()
+        can = action_mask(self._game.board, self._state, self.rules).flatten().numpy()
         return np.append(can, not bool(self._state.done))
 
     def _observation(self) -> NDArray[np.float32]:
         board, state = self._game.board, self._state
-        parts = [observe_pairs(board, state).flatten(), observe_tasks(board, state).flatten()]
-        figures: NDArray[np.float32] = torch.cat(parts).numpy()
+        regions = [observe_pairs(board, state).flatten(), observe_tasks(board, state).flatten()]
+        figures: NDArray[np.float32] = torch.cat(regions).numpy()
         return figures
 
     def _info(self, illegal: bool, over: bool) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from alloc.problems.allocation import Allocation
 from alloc.problems.bounds import makespan_lower_bound
 from alloc.problems.errors import InputError
 from alloc.problems.evaluation import evaluate
-from alloc.problems.game import Board, State, battery_left, make_board, tasks_of
+from alloc.problems.game import Board, State, battery_left, current_tasks, make_board
 from alloc.problems.instance import IDLE, Instance
 
 Source = Sequence[Instance] | Callable[[np.random.Generator], Instance]
@@ -43,7 +43,7 @@ def sizes_of(source: Source) -> tuple[int, int]:
     return found.pop()
 
 
-def draw(source: Source, sizes: tuple[int, int], price: float, rng: np.random.Generator) -> Game:
+def draw(source: Source, sizes: tuple[int, int], energy_weight: float, rng: np.random.Generator) -> Game:
     """Return a game on an instance drawn at random, with needs at the lower bound on its makespan.
 
     Raises
@@ -56,19 +56,19 @@ def draw(source: Source, sizes: tuple[int, int], price: float, rng: np.random.Ge
         raise InputError(
             f"has {instance.n} agents and {instance.m} tasks, not {sizes[0]} and {sizes[1]}", instance.name
         )
-    return Game(instance, make_board([instance], [makespan_lower_bound(instance)], [price], rng))
+    return Game(instance, make_board([instance], [makespan_lower_bound(instance)], [energy_weight], rng))
 
 
 def episode_figures(game: Game, state: State) -> Info:
     """Return energy of all hops so far, and the mean share of the battery left, in percent (figure 6 of the paper)."""
-    distance = float(state.hopped.double().sum()) / game.board.scale.item()
+    distance = float(state.flown.double().sum()) / game.board.scale.item()
     energy = min(distance * game.instance.energy_per_distance, np.finfo(float).max)
     return {"episode_energy": energy, "episode_battery": 100 * battery_left(game.board, state).item()}
 
 
 def plan_figures(game: Game, state: State) -> Info:
     """Return the scores of `evaluate` of where everybody is: those of the plan, flown directly."""
-    task = tasks_of(game.board, state)[0].numpy()
+    task = current_tasks(game.board, state)[0].numpy()
     scores = evaluate(game.instance, Allocation(np.where(task == game.instance.m, IDLE, task)))
     return {
         "makespan": scores.served_makespan,

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
 from alloc.problems.environments.episode import Game, Info, Source, draw, episode_figures, plan_figures, sizes_of
-from alloc.problems.environments.sight import AGENT_FIGURES, LIMIT, TASK_FIGURES, look
+from alloc.problems.environments.observation import AGENT_FIGURES, LIMIT, TASK_FIGURES, observe
 from alloc.problems.errors import InputError
-from alloc.problems.game import PAPER, Rules, State, Turn, begin, difference_rewards, open_bids, step
+from alloc.problems.game import PAPER, Rules, State, TurnRule, action_mask, difference_rewards, reset, step
 
 Observation = dict[str, NDArray[Any]]
 
@@ -27,7 +27,7 @@ class SimultaneousEnv(ParallelEnv[str, Observation, int]):  # type: ignore[misc]
     - ``agent``, shape (7,): position, share of the battery left, ability, whether idle, and share of the steps gone;
     - ``tasks``, shape (m, 9): of each task the ability that it needs, its priority, the flight there, what the agent
       would bring, and whether it is within communication range; and if it is, the occupancy map: ability there, number
-      of members, lack of ability; last, whether the agent is there;
+      of members, shortfall of ability; last, whether the agent is there;
     - ``action_mask``, shape (m + 1,).
 
     They have the units of `Board` and are cut off at `LIMIT`. The reward of an agent is what all would lose had it
@@ -40,7 +40,7 @@ class SimultaneousEnv(ParallelEnv[str, Observation, int]):  # type: ignore[misc]
         Drawn from at every reset, or called with a numpy generator.
     rules : Rules
         Agents must take their turns at once; the paper's by default.
-    price : float
+    energy_weight : float
         Weight of energy in the reward.
     max_steps : int
         Steps after which the game is truncated.
@@ -57,11 +57,13 @@ class SimultaneousEnv(ParallelEnv[str, Observation, int]):  # type: ignore[misc]
 
     metadata = {"name": "alloc_simultaneous_v0", "render_modes": [], "is_parallelizable": True}  # noqa: RUF012
 
-    def __init__(self, instances: Source, *, rules: Rules = PAPER, price: float = 0.5, max_steps: int = 20) -> None:
-        if rules.turn != Turn.SIMULTANEOUS:
+    def __init__(
+        self, instances: Source, *, rules: Rules = PAPER, energy_weight: float = 0.5, max_steps: int = 20
+    ) -> None:
+        if rules.turn != TurnRule.SIMULTANEOUS:
             raise InputError("agents of this environment choose at once; BiddingEnv is the one where they bid", "turn")
         self._source, self._sizes = instances, sizes_of(instances)
-        self.rules, self.price, self.max_steps = rules, price, max_steps
+        self.rules, self.energy_weight, self.max_steps = rules, energy_weight, max_steps
         n, m = self._sizes
         self.possible_agents = [f"agent_{number}" for number in range(n)]
         self.agents: list[str] = []
@@ -88,8 +90,8 @@ class SimultaneousEnv(ParallelEnv[str, Observation, int]):  # type: ignore[misc]
         """Begin a game on an instance drawn anew; with a seed, the same games follow."""
         if seed is not None or self._rng is None:
             self._rng = np.random.default_rng(seed)
-        self._game = draw(self._source, self._sizes, self.price, self._rng)
-        self._state, self._steps = begin(self._game.board), 0
+        self._game = draw(self._source, self._sizes, self.energy_weight, self._rng)
+        self._state, self._steps = reset(self._game.board), 0
         self.agents = list(self.possible_agents)
         return self._observations(), self._infos(frozenset(), over=False)
 
@@ -124,11 +126,11 @@ class SimultaneousEnv(ParallelEnv[str, Observation, int]):  # type: ignore[misc]
         )
 
     def _mask(self) -> NDArray[np.int8]:
-        can = open_bids(self._game.board, self._state, self.rules)
+        can = action_mask(self._game.board, self._state, self.rules)
         return can.scatter(2, self._state.slot[..., None], True)[0].to(torch.int8).numpy()
 
     def _observations(self) -> dict[str, Observation]:
-        agents, tasks = look(self._game, self._state, self._steps / self.max_steps)
+        agents, tasks = observe(self._game, self._state, self._steps / self.max_steps)
         rows = zip(self.agents, agents, tasks, self._mask(), strict=True)
         return {
             agent: {"agent": one.copy(), "tasks": all_.copy(), "action_mask": mask.copy()}

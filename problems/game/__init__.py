@@ -1,30 +1,24 @@
 """The Markov game of the paper (section 2.2), batched in torch.
 
-States, not observations, are kept in trajectories: what agents see is a pure function of `Board` and `State`.
+States, not observations, are kept in trajectories: observations are a pure function of `Board` and `State`.
 
 References
 ----------
-Fang et al. (2025), section 2.2 and equations (1)-(8), doi:10.20944/preprints202502.0192.v1. That agents take turns by
-bidding, instead of all choosing at once, is ours.
+Fang et al. (2025), section 2.2 and equations (1)-(8), doi:10.20944/preprints202502.0192.v1. That agents bid in turn,
+instead of all choosing at once, is ours.
 """
 
-from alloc.problems.game.board import Board, make_board
-from alloc.problems.game.observation import (
-    AGENT_FEATURES,
-    FEATURE_SET,
-    PAIR_FEATURES,
-    TASK_FEATURES,
-    observe_agents,
-    observe_pairs,
-    observe_tasks,
-)
+from alloc.problems.game.board import Board
+from alloc.problems.game.features import AGENT_FEATURES, FEATURE_SET, PAIR_FEATURES, TASK_FEATURES
+from alloc.problems.game.layout import make_board
+from alloc.problems.game.observation import observe_agents, observe_pairs, observe_tasks
 from alloc.problems.game.reward import (
     coverage,
     difference_rewards,
     marginal_contributions,
     potential,
-    time_over_reference,
-    worth,
+    relative_makespan,
+    utility,
 )
 from alloc.problems.game.rules import (
     PAPER,
@@ -32,19 +26,19 @@ from alloc.problems.game.rules import (
     Reward,
     Rules,
     State,
-    Turn,
+    TurnRule,
+    action_mask,
+    apply_moves,
+    at_slot,
     battery_left,
-    begin,
-    flown,
-    grant,
+    current_tasks,
+    grant_bids,
     group_ability,
-    hop,
-    moved,
-    open_bids,
-    pick,
+    hop_distance,
+    mean_distance,
+    reset,
     step,
     sum_by_place,
-    tasks_of,
 )
 
 __all__ = [
@@ -58,27 +52,27 @@ __all__ = [
     "Reward",
     "Rules",
     "State",
-    "Turn",
+    "TurnRule",
+    "action_mask",
+    "apply_moves",
+    "at_slot",
     "battery_left",
-    "begin",
     "coverage",
+    "current_tasks",
     "difference_rewards",
-    "flown",
-    "grant",
+    "grant_bids",
     "group_ability",
-    "hop",
+    "hop_distance",
     "make_board",
     "marginal_contributions",
-    "moved",
+    "mean_distance",
     "observe_agents",
     "observe_pairs",
     "observe_tasks",
-    "open_bids",
-    "pick",
     "potential",
+    "relative_makespan",
+    "reset",
     "step",
     "sum_by_place",
-    "tasks_of",
-    "time_over_reference",
-    "worth",
+    "utility",
 ]

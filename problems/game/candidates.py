@@ -1,59 +1,80 @@
-"""Which tasks an agent bids for: all of them, or the near ones where there are many."""
+"""The candidates of each agent: all tasks, or the nearest ones where there are many."""
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from alloc.problems.instance import IDLE, Instance
 
-SHARED = 4
-"""Candidates of each agent that are kept for tasks which few have near, as a share: one in so many."""
+SCARCE_SHARE = 4
+"""One in so many candidates of each agent is kept for tasks that few agents have near."""
 
 AMPLE = 3.0
 """Supply over need from the nearest agents up to which a task is added to their candidates."""
 
 CHUNK = 2_000_000
-"""Pairs looked at at once, to bound the memory."""
+"""Pairs of agent and task handled at once, to bound the memory."""
 
-Layout = tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.bool_]]
+Ints = NDArray[np.int64]
 
 
-def near_tasks(instance: Instance, near: int | None, plan: NDArray[np.int64] | None) -> Layout:
-    """Return place, distance and legality of each agent's candidates, each of shape (n, c); the last is idleness.
+class Candidates(NamedTuple):
+    """Candidates of n agents, the last of which is being idle.
+
+    Attributes
+    ----------
+    place : ndarray of int, shape (n, c)
+        Task, or m for idle and where there are fewer tasks in reach than candidates.
+    distance : ndarray, shape (n, c)
+    legal : ndarray of bool, shape (n, c)
+    """
+
+    place: Ints
+    distance: NDArray[np.float64]
+    legal: NDArray[np.bool_]
+
+
+def candidate_tasks(instance: Instance, near: int | None, plan: Ints | None) -> Candidates:
+    """Return the candidates of each agent.
 
     Parameters
     ----------
     near : int or None
-        Candidates besides idleness, at least 1; None, or as many as there are tasks, for all tasks.
+        Candidates besides being idle, at least 1; None, or as many as there are tasks, for all tasks.
     plan : ndarray of int, shape (n,), or None
         Places that must be among the candidates.
     """
     n, m = instance.n, instance.m
     if near is None or near >= m:
         distance, legal = instance.reach.rows(instance.reach.origin)
-        goal = np.broadcast_to(np.arange(m + 1), (n, m + 1)).copy()
-        return goal, np.column_stack([distance, np.zeros(n)]), np.column_stack([legal, np.ones(n, dtype=bool)])
+        return _with_idle(np.broadcast_to(np.arange(m), (n, m)), distance, legal, m)
     chosen = _nearest(instance, near)
     _include(chosen, instance.start_task, np.full(n, -1))
     if plan is not None:
         begins = (chosen[:, -1] == instance.start_task) & (near > 1)
         _include(chosen, plan, np.where(begins, -2, -1))
-    agent = np.repeat(np.arange(n), near)
-    known = chosen.ravel() >= 0
-    task = np.where(known, chosen.ravel(), 0)
-    distance = instance.reach.distance_of(agent, task).reshape(n, near)
-    legal = (instance.reach.allows(agent, task) & known).reshape(n, near)
-    goal = np.where(chosen < 0, m, chosen)
-    return (
-        np.column_stack([goal, np.full(n, m)]),
-        np.column_stack([np.where(legal, distance, 0.0), np.zeros(n)]),
+    known = chosen >= 0
+    agent, task = np.broadcast_arrays(np.arange(n)[:, None], np.where(known, chosen, 0))
+    legal = instance.reach.allows(agent, task) & known
+    distance = np.where(legal, instance.reach.distance_of(agent, task), 0.0)
+    return _with_idle(np.where(known, chosen, m), distance, legal, m)
+
+
+def _with_idle(task: Ints, distance: NDArray[np.float64], legal: NDArray[np.bool_], idle: int) -> Candidates:
+    """Append being idle to the candidates, all of shape (n, c - 1)."""
+    n = len(task)
+    return Candidates(
+        np.column_stack([task, np.full(n, idle)]),
+        np.column_stack([distance, np.zeros(n)]),
         np.column_stack([legal, np.ones(n, dtype=bool)]),
     )
 
 
-def _nearest(instance: Instance, near: int) -> NDArray[np.int64]:
-    """The nearest tasks in reach, and in the last columns tasks that lack near agents; -1 for none; shape (n, near)."""
+def _nearest(instance: Instance, near: int) -> Ints:
+    """Return the nearest tasks in reach, then scarce ones (`_add_scarce`); -1 for none; shape (n, near)."""
     reach, m = instance.reach, instance.m
-    own = near - near // SHARED
+    own = near - near // SCARCE_SHARE
     origins = len(reach.place)
     nearest = np.empty((origins, near), dtype=np.int64)
     useful = instance.workload > 0
@@ -71,8 +92,8 @@ def _nearest(instance: Instance, near: int) -> NDArray[np.int64]:
     return chosen
 
 
-def _add_scarce(instance: Instance, chosen: NDArray[np.int64], own: int) -> None:
-    """Put tasks that too little ability has near in place of the farthest candidates of the agents nearest to them."""
+def _add_scarce(instance: Instance, chosen: Ints, own: int) -> None:
+    """Put tasks that too little ability has near in the last columns of the agents nearest to them."""
     n, m = instance.n, instance.m
     kept = chosen[:, :own]
     supply = np.bincount(kept[kept >= 0], np.repeat(instance.ability[:, None], own, axis=1)[kept >= 0], minlength=m)
@@ -92,7 +113,7 @@ def _add_scarce(instance: Instance, chosen: NDArray[np.int64], own: int) -> None
         chosen[twice, column] = -1
 
 
-def _include(chosen: NDArray[np.int64], wanted: NDArray[np.int64], column: NDArray[np.int64]) -> None:
+def _include(chosen: Ints, wanted: Ints, column: Ints) -> None:
     """Put each agent's wanted task in its column where it is not among the candidates."""
-    missing = np.flatnonzero((wanted != IDLE) & ~(chosen == wanted[:, None]).any(axis=1))
-    chosen[missing, column[missing]] = wanted[missing]
+    absent = np.flatnonzero((wanted != IDLE) & ~(chosen == wanted[:, None]).any(axis=1))
+    chosen[absent, column[absent]] = wanted[absent]

@@ -1,8 +1,8 @@
-"""How the game goes: states, turns, and what an episode costs."""
+"""The rules of the game: states, legal moves, transitions, and the distance flown."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from enum import StrEnum
 
 import torch
@@ -11,18 +11,18 @@ from torch import Tensor
 from alloc.problems.game.board import Board
 
 TOLERANCE = 1e-5
-"""Distance that a battery may be overdrawn by: single precision."""
+"""Distance by which a battery may be overdrawn, for rounding in single precision."""
 
 
-class Turn(StrEnum):
-    """Who moves in a step."""
+class TurnRule(StrEnum):
+    """Which agents move in a step."""
 
     BIDDING = "bidding"
     SIMULTANEOUS = "simultaneous"
 
 
 class Reward(StrEnum):
-    """What the agents are rewarded for."""
+    """What the reward measures."""
 
     MAKESPAN = "makespan"
     COVERAGE = "coverage"
@@ -34,22 +34,21 @@ class Rules:
 
     Attributes
     ----------
-    turn : Turn or str
-        ``bidding``: all agents bid for all their candidates, and the best bid of each neighbourhood moves: bids are
-        granted in their order, but for those that share a task with one granted before. ``simultaneous``, the
-        paper's: all agents choose at once.
+    turn : TurnRule or str
+        ``bidding``: all agents bid for all their candidates, and bids are granted in descending order, but for those
+        that share a task with one granted before. ``simultaneous``, the paper's: all agents choose at once.
     reward : Reward or str
         ``makespan``: see `potential`; ``coverage``: (3).
     flying : bool
-        Whether agents fly at once where they decide to go, so that energy adds up over the hops (19) and the battery
-        left limits the reach. If not, they decide first and fly to the last place only: energy is that of the plan.
+        Whether agents fly in each step, so that energy adds up over the hops (19) and the battery left limits the
+        reach. If not, they decide first and fly to their last place only: energy is that of the plan.
     returning : bool
         Whether an agent may return to a place that it left in the same episode.
     most_moves : int or None
         Bids granted at most in a step; 1 is one move at a time.
     """
 
-    turn: Turn | str = Turn.BIDDING
+    turn: TurnRule | str = TurnRule.BIDDING
     reward: Reward | str = Reward.MAKESPAN
     flying: bool = False
     returning: bool = False
@@ -57,15 +56,15 @@ class Rules:
 
 
 PLANNING = Rules()
-"""The game that the shipped policies play: agents bid, and fly when all is decided."""
+"""The game that the shipped policies play: agents bid, and fly once all is decided."""
 
-PAPER = Rules(Turn.SIMULTANEOUS, Reward.COVERAGE, flying=True, returning=True)
+PAPER = Rules(TurnRule.SIMULTANEOUS, Reward.COVERAGE, flying=True, returning=True)
 """The game of the paper, section 2.2."""
 
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """Where everybody is.
+    """States of B games.
 
     Attributes
     ----------
@@ -73,57 +72,63 @@ class State:
         Candidate that each agent has chosen.
     group : Tensor, shape (B, m + 1)
         Ability at each place.
-    left : Tensor of bool, shape (B, n, c)
+    visited : Tensor of bool, shape (B, n, c)
         Candidates that each agent has left in this episode.
     done : Tensor of bool, shape (B,)
         Whether the game has ended.
-    at : Tensor of int, shape (B, n)
-        Task that each agent has flown to, first to where it begins; it stays there while it is idle. m for its start.
-    hopped : Tensor, shape (B, n)
+    location : Tensor of int, shape (B, n)
+        Task that each agent has flown to, at first where it begins; it stays there while idle. m for its start.
+    flown : Tensor, shape (B, n)
         Distance that each agent has flown hop by hop.
     """
 
     slot: Tensor
     group: Tensor
-    left: Tensor
+    visited: Tensor
     done: Tensor
-    at: Tensor
-    hopped: Tensor
+    location: Tensor
+    flown: Tensor
 
     def __getitem__(self, rows: Tensor | tuple[Tensor, ...]) -> State:
         """Return the states with these numbers."""
         return State(*(getattr(self, field.name)[rows] for field in fields(self)))
 
+    def of_agents(self, some: slice) -> State:
+        """Return the same states with some of the agents, for the features of these alone."""
+        return replace(self, slot=self.slot[:, some], location=self.location[:, some], flown=self.flown[:, some])
 
-def begin(board: Board) -> State:
-    """Return the state in which a game starts: agents have flown to where they begin."""
+
+def reset(board: Board) -> State:
+    """Return the initial states: agents have flown to where they begin."""
     return State(
         slot=board.start,
         group=group_ability(board, board.start),
-        left=torch.zeros_like(board.legal),
-        done=torch.zeros_like(board.price, dtype=torch.bool),
-        at=pick(board.goal, board.start),
-        hopped=pick(board.distance, board.start),
+        visited=torch.zeros_like(board.legal),
+        done=torch.zeros_like(board.energy_weight, dtype=torch.bool),
+        location=at_slot(board.candidates, board.start),
+        flown=at_slot(board.distance, board.start),
     )
 
 
-def pick(values: Tensor, slot: Tensor) -> Tensor:
+def at_slot(values: Tensor, slot: Tensor) -> Tensor:
     """Return each agent's value at its slot: (B, n, c) and (B, n) to (B, n)."""
     return values.gather(2, slot[..., None])[..., 0]
 
 
-def tasks_of(board: Board, state: State) -> Tensor:
+def current_tasks(board: Board, state: State) -> Tensor:
     """Return the task of each agent, m for idle, shape (B, n)."""
-    return pick(board.goal, state.slot)
+    return at_slot(board.candidates, state.slot)
 
 
 def group_ability(board: Board, slot: Tensor) -> Tensor:
     """Return the ability at each place, shape (B, m + 1)."""
-    return sum_by_place(pick(board.contribution, slot)[..., None], pick(board.goal, slot), board.places)[..., 0]
+    return sum_by_place(at_slot(board.contribution, slot)[..., None], at_slot(board.candidates, slot), board.places)[
+        ..., 0
+    ]
 
 
 def sum_by_place(values: Tensor, place: Tensor, places: int) -> Tensor:
-    """Add up what agents have, by their place: (B, n, k) and (B, n) to (B, places, k).
+    """Sum values of agents by their place: (B, n, k) and (B, n) to (B, places, k).
 
     Always the same to the last bit: on a GPU, `scatter_add` adds in any order, and a product of matrices does not.
     """
@@ -134,25 +139,29 @@ def sum_by_place(values: Tensor, place: Tensor, places: int) -> Tensor:
     return here.to(values.dtype) @ values
 
 
-def open_bids(board: Board, state: State, rules: Rules = PLANNING) -> Tensor:
-    """Return which candidates each agent may move to now, shape (B, n, c): all in C(i) but where it is."""
+def action_mask(board: Board, state: State, rules: Rules = PLANNING) -> Tensor:
+    """Return which candidates each agent may move to, shape (B, n, c): legal, not where it is, not visited."""
     allowed = board.legal & ~state.done[:, None, None]
     if not rules.returning:
-        allowed = allowed & ~state.left
+        allowed = allowed & ~state.visited
     if rules.flying:
-        allowed = allowed & (state.hopped[..., None] + hop(board, state) <= board.endurance[..., None] + TOLERANCE)
+        allowed = allowed & (
+            state.flown[..., None] + hop_distance(board, state) <= board.endurance[..., None] + TOLERANCE
+        )
     return allowed.scatter(2, state.slot[..., None], False)
 
 
-def hop(board: Board, state: State) -> Tensor:
-    """Return how far it is from where each agent is to its candidates, shape (B, n, c); being idle takes no flight."""
-    rows = board.apart.gather(1, state.at[..., None].expand(-1, -1, board.places)).gather(2, board.goal)
-    from_start = (state.at == board.places - 1)[..., None]
-    return torch.where(from_start, board.distance, rows).masked_fill(board.goal == board.places - 1, 0.0)
+def hop_distance(board: Board, state: State) -> Tensor:
+    """Return the distance from where each agent is to its candidates, shape (B, n, c); 0 for being idle."""
+    rows = board.task_distance.gather(1, state.location[..., None].expand(-1, -1, board.places)).gather(
+        2, board.candidates
+    )
+    from_start = (state.location == board.places - 1)[..., None]
+    return torch.where(from_start, board.distance, rows).masked_fill(board.candidates == board.places - 1, 0.0)
 
 
-def grant(board: Board, state: State, bids: Tensor, reserve: Tensor, most_moves: int | None = None) -> Tensor:
-    """Grant the best bid of each neighbourhood: bids above the reserve that share no task with one granted before.
+def grant_bids(board: Board, state: State, bids: Tensor, reserve: Tensor, most_moves: int | None = None) -> Tensor:
+    """Grant bids above the reserve in descending order, but for those that share a task with one granted before.
 
     Parameters
     ----------
@@ -170,30 +179,38 @@ def grant(board: Board, state: State, bids: Tensor, reserve: Tensor, most_moves:
         nobody else could bid; then -1. Where `most_moves` were granted, no reserve follows.
     """
     batch, n, c = board.shape
-    task, idle = tasks_of(board, state), board.places - 1
+    task, idle = current_tasks(board, state), board.places - 1
     flat = torch.cat([bids.flatten(1), reserve[:, None]], 1)
     open_, passed = flat[:, :-1].view(batch, n, c), state.done.clone()
     granted: list[Tensor] = []
     flat[state.done, :-1] = -torch.inf
     rows = torch.arange(batch, device=flat.device)
     while not bool(passed.all()) and (most_moves is None or len(granted) < most_moves):
-        best, choice = flat.max(1)
-        choice = choice.masked_fill(best == -torch.inf, n * c)
-        granted.append(choice.masked_fill(passed, -1))
-        passed = passed | (choice == n * c)
-        agent = torch.div(choice, c, rounding_mode="floor").clamp(max=n - 1)
+        best, bid = flat.max(1)
+        bid = bid.masked_fill(best == -torch.inf, n * c)
+        granted.append(bid.masked_fill(passed, -1))
+        passed = passed | (bid == n * c)
+        agent = torch.div(bid, c, rounding_mode="floor").clamp(max=n - 1)
         source = task[rows, agent]
-        target = board.goal[rows, agent, choice % c]
+        target = board.candidates[rows, agent, bid % c]
         source = source.masked_fill(passed | (source == idle), -1)[:, None]
         target = target.masked_fill(passed | (target == idle), -1)[:, None]
         open_.masked_fill_(((task == source) | (task == target))[..., None], -torch.inf)
-        open_.masked_fill_((board.goal == source[..., None]) | (board.goal == target[..., None]), -torch.inf)
+        open_.masked_fill_(
+            (board.candidates == source[..., None]) | (board.candidates == target[..., None]), -torch.inf
+        )
         open_[rows, agent] = open_[rows, agent].masked_fill(~passed[:, None], -torch.inf)
     return torch.stack(granted, 1) if granted else task.new_full((batch, 1), -1)
 
 
-def moved(board: Board, state: State, granted: Tensor) -> Tensor:
-    """Return the slots of all agents after the granted bids, shape (B, n)."""
+def apply_moves(board: Board, state: State, granted: Tensor) -> Tensor:
+    """Return the slots of all agents after the granted bids, shape (B, n).
+
+    Parameters
+    ----------
+    granted : Tensor of int, shape (B, k)
+        Bids, ``agent * c + slot``; anything else is none.
+    """
     batch, n, c = board.shape
     slot = torch.cat([state.slot, state.slot.new_zeros(batch, 1)], 1)  # a last column for what is no bid
     real = (granted >= 0) & (granted < n * c)
@@ -202,37 +219,41 @@ def moved(board: Board, state: State, granted: Tensor) -> Tensor:
 
 
 def step(board: Board, state: State, slot: Tensor) -> State:
-    """Have every agent go to a candidate; a game in which nobody moves ends.
+    """Move every agent to a candidate; a game in which nobody moves ends.
 
     Parameters
     ----------
     slot : Tensor of int, shape (B, n)
-        The same as in the state for staying; ignored in games that are done.
+        Candidate that each agent goes to, or its slot now to stay; ignored in games that are done.
     """
     slot = torch.where(state.done[:, None], state.slot, slot)
     goes = slot != state.slot
-    left = state.left | (goes[..., None] & torch.zeros_like(state.left).scatter_(2, state.slot[..., None], True))
-    goal = pick(board.goal, slot)
-    flies = goes & (goal != board.places - 1)
+    here = torch.zeros_like(state.visited).scatter_(2, state.slot[..., None], True)
+    place = at_slot(board.candidates, slot)
+    flies = goes & (place != board.places - 1)
     return State(
         slot=slot,
         group=group_ability(board, slot),
-        left=left,
+        visited=state.visited | (goes[..., None] & here),
         done=state.done | ~goes.any(1),
-        at=torch.where(flies, goal, state.at),
-        hopped=state.hopped + _flight(board, state, slot, goal) * flies,
+        location=torch.where(flies, place, state.location),
+        flown=state.flown + _flight(board, state, slot, place) * flies,
     )
 
 
-def _flight(board: Board, state: State, slot: Tensor, goal: Tensor) -> Tensor:
-    """Return `hop` to one candidate of each agent, shape (B, n)."""
-    games = torch.arange(len(goal), device=goal.device)[:, None]
-    return torch.where(state.at == board.places - 1, pick(board.distance, slot), board.apart[games, state.at, goal])
+def _flight(board: Board, state: State, slot: Tensor, place: Tensor) -> Tensor:
+    """Return `hop_distance` to one candidate of each agent, shape (B, n)."""
+    games = torch.arange(len(place), device=place.device)[:, None]
+    return torch.where(
+        state.location == board.places - 1,
+        at_slot(board.distance, slot),
+        board.task_distance[games, state.location, place],
+    )
 
 
-def flown(board: Board, state: State, rules: Rules = PLANNING) -> Tensor:
-    """Return the mean distance per agent, shape (B,): directly to the last place (19), or hop by hop."""
-    return (state.hopped if rules.flying else pick(board.distance, state.slot)).sum(1) / board.crew
+def mean_distance(board: Board, state: State, rules: Rules = PLANNING) -> Tensor:
+    """Return the mean distance flown per agent, shape (B,): directly to the last place (19), or hop by hop."""
+    return (state.flown if rules.flying else at_slot(board.distance, state.slot)).sum(1) / board.agent_count
 
 
 def battery_left(board: Board, state: State) -> Tensor:
@@ -241,5 +262,5 @@ def battery_left(board: Board, state: State) -> Tensor:
     The mean over the agents that have a battery; 1 where nobody has one.
     """
     limited = board.endurance < torch.inf
-    spent = (state.hopped / board.endurance.clamp(min=TOLERANCE)).clamp(max=1.0) * limited
+    spent = (state.flown / board.endurance.clamp(min=TOLERANCE)).clamp(max=1.0) * limited
     return 1 - spent.sum(1) / limited.sum(1).clamp(min=1)

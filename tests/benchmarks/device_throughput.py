@@ -19,12 +19,12 @@ import torch
 
 from alloc.allocators import load
 from alloc.allocators.learned.network.actor_critic import ActorCritic
-from alloc.allocators.learned.play.action_sampling import choose
+from alloc.allocators.learned.play.action_sampling import sample_actions
 from alloc.allocators.learned.play.batched_games import Games, play_games
 from alloc.allocators.learned.play.rollout import play
 from alloc.allocators.runtime.torch_state import torch_threads
 from alloc.problems import paper_like
-from alloc.problems.game import Board, begin, make_board, step
+from alloc.problems.game import Board, make_board, reset, step
 
 INSTANCES = 64
 ROUNDS = 40
@@ -37,20 +37,20 @@ def lay_out(n: int, m: int, total: int, games: int) -> Board:
     instances = [paper_like(n, m, total, seed) for seed in range(INSTANCES)]
     board = make_board(instances, [1.0] * INSTANCES, [1.0] * INSTANCES, np.random.default_rng(0))
     price = torch.linspace(0.2, 3.0, games)
-    return replace(board[torch.arange(games) % INSTANCES], price=price)
+    return replace(board[torch.arange(games) % INSTANCES], energy_weight=price)
 
 
 @torch.no_grad()
 def decisions(network: ActorCritic, board: Board) -> int:
     """Count the decisions in the games on a board, so many games at once as there are instances."""
     count = 0
-    for rows in torch.arange(len(board.price), device=board.price.device).split(INSTANCES):
+    for rows in torch.arange(len(board.energy_weight), device=board.energy_weight.device).split(INSTANCES):
         part = board[rows]
-        state = begin(part)
+        state = reset(part)
         for _ in range(ROUNDS):
             if bool(state.done.all()):
                 break
-            actions, slot = choose(part, state, network(part, state))
+            actions, slot = sample_actions(part, state, network(part, state))
             count += int((actions >= 0).sum())
             state = step(part, state, slot)
     return count
@@ -62,11 +62,11 @@ def loops(network: ActorCritic, board: Board, threads: int) -> None:
     def share(rows: np.ndarray) -> None:
         with torch_threads(1):
             part = board[torch.from_numpy(rows)]
-            games = Games(np.arange(len(rows)), part.price.numpy().astype(float), part.start.numpy())
+            games = Games(np.arange(len(rows)), part.energy_weight.numpy().astype(float), part.start.numpy())
             play_games(network, part, games, rounds=ROUNDS)
 
     with ThreadPoolExecutor(threads) as pool:
-        list(pool.map(share, np.array_split(np.arange(len(board.price)), threads)))
+        list(pool.map(share, np.array_split(np.arange(len(board.energy_weight)), threads)))
 
 
 def by_torch(network: ActorCritic, board: Board, threads: int) -> None:

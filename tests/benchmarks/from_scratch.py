@@ -25,14 +25,14 @@ from from_scratch_report import publish
 
 from alloc.allocators.learned.algorithms.registry import method_parameters, new_learner
 from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize
-from alloc.allocators.learned.play.action_sampling import choose
+from alloc.allocators.learned.play.action_sampling import sample_actions
 from alloc.allocators.learned.play.rollout import position
 from alloc.allocators.learned.training.curriculum import Curriculum, reference_board
 from alloc.allocators.learned.training.limits import Limits
 from alloc.allocators.learned.training.parameters import TrainingParameters
 from alloc.allocators.learned.training.trainer import Trainer
 from alloc.allocators.learned.training.validation import VALIDATION_SEED
-from alloc.problems.game import PLANNING, Board, battery_left, begin, moved, step, time_over_reference
+from alloc.problems.game import PLANNING, Board, apply_moves, battery_left, relative_makespan, reset, step
 from alloc.problems.generate import paper, paper_like
 
 PRICE = 0.3
@@ -171,17 +171,17 @@ def games(price: float, *, tests: bool) -> Board:
 @torch.no_grad()
 def judged(network: ActorCritic, board: Board) -> dict[str, float]:
     """Play greedily to the end, and return what a `Row` says of the games."""
-    state = begin(board)
-    best, hops, everything = position(board, state), 0.0, torch.arange(len(board.price))
+    state = reset(board)
+    best, hops, everything = position(board, state), 0.0, torch.arange(len(board.energy_weight))
     for _ in range(ROUNDS):
-        actions, _ = choose(board, state, network(board, state), PLANNING)
+        actions, _ = sample_actions(board, state, network(board, state), PLANNING)
         hops += float(((actions >= 0) & (actions < board.shape[1] * board.shape[2])).sum())
-        state = step(board, state, moved(board, state, actions))
+        state = step(board, state, apply_moves(board, state, actions))
         best = best.improved_by(position(board, state), everything)
         if bool(state.done.all()):
             break
     time = 1 / (1 - best.shortfall)
-    end_time, unserved = time_over_reference(board, state.group)
+    end_time, unserved = relative_makespan(board, state.group)
     return {
         "time": float(time.median()),
         "mean_time": float(time.mean()),

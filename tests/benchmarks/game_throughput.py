@@ -16,12 +16,12 @@ import torch
 from torch import Tensor, nn
 
 from alloc.allocators.learned.network.actor_critic import ActorCritic, Scores
-from alloc.allocators.learned.play.action_sampling import choose
+from alloc.allocators.learned.play.action_sampling import sample_actions
 from alloc.problems import Instance, paper_like
 from alloc.problems.environments import SimultaneousEnv
-from alloc.problems.game import PAPER, PLANNING, Board, Rules, Turn, begin, make_board, step
+from alloc.problems.game import PAPER, PLANNING, Board, Rules, TurnRule, make_board, reset, step
 
-AT_ONCE = Rules(Turn.SIMULTANEOUS, returning=True)
+AT_ONCE = Rules(TurnRule.SIMULTANEOUS, returning=True)
 
 Play = Callable[[], tuple[int, int]]
 """Plays for a while; returns decisions and bids weighed."""
@@ -30,16 +30,16 @@ Play = Callable[[], tuple[int, int]]
 def batched(board: Board, rules: Rules, network: ActorCritic | None, seed: int, steps: int) -> tuple[int, int]:
     """Play all games on `board` side by side."""
     generator = torch.Generator().manual_seed(seed)
-    state, decisions, bids = begin(board), 0, 0
+    state, decisions, bids = reset(board), 0, 0
     batch, n, c = board.shape
     for _ in range(steps):
         if bool(state.done.all()):
-            state = begin(board)
+            state = reset(board)
         if network is None:
             scores = Scores(torch.randn(batch, n, c, generator=generator), torch.zeros(batch), torch.zeros(batch))
         else:
             scores = network(board, state)
-        actions, slot = choose(board, state, scores, rules, 1.0, generator)
+        actions, slot = sample_actions(board, state, scores, rules, 1.0, generator)
         decisions += int((actions >= 0).sum())
         bids += int((~state.done).sum()) * n * c
         state = step(board, state, slot)

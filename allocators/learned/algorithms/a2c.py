@@ -16,10 +16,10 @@ from torch import Tensor, nn
 from alloc.allocators.learned.algorithms.hyperparameters import A2cParameters
 from alloc.allocators.learned.algorithms.learner import StateDict, TrainingJob, TrainingStats
 from alloc.allocators.learned.algorithms.schedules import linear, set_learning_rate
-from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize, fresh
+from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize, initialised
 from alloc.allocators.learned.play.action_sampling import log_probabilities
 from alloc.allocators.learned.play.trajectories import Trajectories, collect
-from alloc.problems.game import Rules, begin, moved, step
+from alloc.problems.game import Rules, apply_moves, step
 
 
 def n_step_returns(reward: Tensor, alive: Tensor, last_value: Tensor, gamma: float) -> Tensor:
@@ -56,7 +56,7 @@ class A2c:
 
     def __init__(self, size: NetworkSize | None = None, parameters: A2cParameters | None = None, seed: int = 0) -> None:
         self.parameters = parameters or A2cParameters()
-        (self.network,) = fresh(size, seed, 1)
+        (self.network,) = initialised(size, seed, 1)
         self.optimiser = torch.optim.Adam(self.network.parameters(), self.parameters.learning_rate)
 
     @property
@@ -74,14 +74,14 @@ class A2c:
         rewards, entropies = [], []
         while decisions < job.decisions:
             board = job.curriculum.draw(rng, job.progress)
-            state, left, total = begin(board), job.curriculum.max_steps(board), 0.0
+            state, left, total = reset(board), job.curriculum.max_steps(board), 0.0
             while left > 0 and not bool(state.done.all()):
                 count = min(parameters.num_steps, left)
                 played = collect(self.network, board, count, generator, job.rules, parameters.reward_scale, state=state)
                 entropies.append(self.update(played, job.rules))
                 left -= count
                 before = played.state[torch.tensor(len(played.reward) - 1)]
-                state = step(board, before, moved(board, before, played.actions[-1]))
+                state = step(board, before, apply_moves(board, before, played.actions[-1]))
                 decisions += played.decisions
                 evaluations += 2 * played.evaluations
                 total += float(played.reward.sum(0).mean()) / parameters.reward_scale

@@ -26,8 +26,8 @@ from alloc.allocators.learned.algorithms.dqn import gradient_steps, td_target
 from alloc.allocators.learned.algorithms.hyperparameters import DdpgParameters
 from alloc.allocators.learned.algorithms.learner import StateDict, TrainingJob, TrainingStats
 from alloc.allocators.learned.algorithms.schedules import exponential, linear, set_learning_rate
-from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize, fresh
-from alloc.allocators.learned.play.transitions import Memory, after, gains, play
+from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize, initialised
+from alloc.allocators.learned.play.transitions import TransitionMemory, next_state, play, scores_above_reserve
 from alloc.problems.game import Board, Rules, State
 
 
@@ -69,12 +69,12 @@ class Ddpg:
         self, size: NetworkSize | None = None, parameters: DdpgParameters | None = None, seed: int = 0
     ) -> None:
         self.parameters = parameters or DdpgParameters()
-        actor, critic, *targets = fresh(size, seed, 4)
+        actor, critic, *targets = initialised(size, seed, 4)
         self.networks = nn.ModuleDict({"actor": actor, "critic": critic})
         self.targets = nn.ModuleDict(dict(zip(self.networks, targets, strict=True)))
         self.targets.load_state_dict(self.networks.state_dict())
         self.optimisers = {name: torch.optim.Adam(one.parameters()) for name, one in self.networks.items()}
-        self.memory = Memory(self.parameters.buffer_size)
+        self.memory = TransitionMemory(self.parameters.buffer_size)
 
     @property
     def policy(self) -> ActorCritic:
@@ -113,7 +113,7 @@ class Ddpg:
         """Take one gradient step of critic and actor on replayed moves; return the actor's mean entropy in nats."""
         board, state, action, reward = self.memory.draw(self.parameters.batch_size, generator)
         q_value = self._gains(self.networks["critic"], board, state, rules)
-        target = self.td_targets(board, after(board, state, action), reward, rules)
+        target = self.td_targets(board, next_state(board, state, action), reward, rules)
         value = q_value.gather(1, action[:, None])[:, 0]
         self._gradient_step("critic", nn.functional.huber_loss(value, target))
         relaxed = self._act(self.networks["actor"], board, state, rules)
@@ -135,7 +135,7 @@ class Ddpg:
 
     def _gains(self, network: nn.Module, board: Board, state: State, rules: Rules) -> Tensor:
         scores = network(board, state)
-        return gains(scores.bids, scores.reserve, board, state, rules)
+        return scores_above_reserve(scores.bids, scores.reserve, board, state, rules)
 
     def _gradient_step(self, name: str, loss: Tensor) -> None:
         optimiser, network = self.optimisers[name], self.networks[name]

@@ -21,8 +21,8 @@ from torch import Tensor, nn
 from alloc.allocators.learned.algorithms.hyperparameters import DqnParameters
 from alloc.allocators.learned.algorithms.learner import StateDict, TrainingJob, TrainingStats
 from alloc.allocators.learned.algorithms.schedules import exponential, linear, set_learning_rate
-from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize, fresh
-from alloc.allocators.learned.play.transitions import Memory, after, gains, play
+from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize, initialised
+from alloc.allocators.learned.play.transitions import TransitionMemory, next_state, play, scores_above_reserve
 from alloc.problems.game import Board, Rules, State
 
 
@@ -54,10 +54,10 @@ class Dqn:
 
     def __init__(self, size: NetworkSize | None = None, parameters: DqnParameters | None = None, seed: int = 0) -> None:
         self.parameters = parameters or DqnParameters()
-        self.network, self.target = fresh(size, seed, 2)
+        self.network, self.target = initialised(size, seed, 2)
         self.target.load_state_dict(self.network.state_dict())
         self.optimiser = torch.optim.Adam(self.network.parameters(), self.parameters.learning_rate)
-        self.memory = Memory(self.parameters.buffer_size)
+        self.memory = TransitionMemory(self.parameters.buffer_size)
         self.updates = 0
 
     @property
@@ -93,8 +93,8 @@ class Dqn:
         """Take one gradient step on replayed moves, and update the target network where its interval is over."""
         board, state, action, reward = self.memory.draw(self.parameters.batch_size, generator)
         scores = self.network(board, state)
-        value = gains(scores.bids, scores.reserve, board, state, rules).gather(1, action[:, None])[:, 0]
-        loss = nn.functional.huber_loss(value, self.td_targets(board, after(board, state, action), reward, rules))
+        value = scores_above_reserve(scores.bids, scores.reserve, board, state, rules).gather(1, action[:, None])[:, 0]
+        loss = nn.functional.huber_loss(value, self.td_targets(board, next_state(board, state, action), reward, rules))
         self.optimiser.zero_grad(set_to_none=True)
         loss.backward()
         nn.utils.clip_grad_norm_(self.network.parameters(), self.parameters.max_grad_norm)
@@ -107,10 +107,10 @@ class Dqn:
     def td_targets(self, board: Board, following: State, reward: Tensor, rules: Rules) -> Tensor:
         """Return the targets of (17), shape (B,), from the states that follow and the rewards, shape (B,)."""
         scores = self.target(board, following)
-        value = selector = gains(scores.bids, scores.reserve, board, following, rules)
+        value = selector = scores_above_reserve(scores.bids, scores.reserve, board, following, rules)
         if self.parameters.double_q:
             own = self.network(board, following)
-            selector = gains(own.bids, own.reserve, board, following, rules)
+            selector = scores_above_reserve(own.bids, own.reserve, board, following, rules)
         return td_target(reward, best_move_value(value, selector), following.done, self.parameters.gamma)
 
     def state_dict(self) -> StateDict:

@@ -17,7 +17,7 @@ from alloc.allocators.learned.algorithms.hyperparameters import PpoParameters
 from alloc.allocators.learned.algorithms.learner import StateDict, TrainingJob, TrainingStats
 from alloc.allocators.learned.algorithms.replay import ReplayBuffer
 from alloc.allocators.learned.algorithms.schedules import linear, set_learning_rate
-from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize, fresh
+from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize, initialised
 from alloc.allocators.learned.play.action_sampling import log_probabilities
 from alloc.allocators.learned.play.trajectories import Trajectories, advantages, collect
 from alloc.problems.game import Board, Rules, State
@@ -97,7 +97,7 @@ class Ppo:
 
     def __init__(self, size: NetworkSize | None = None, parameters: PpoParameters | None = None, seed: int = 0) -> None:
         self.parameters = parameters or PpoParameters()
-        (self.network,) = fresh(size, seed, 1)
+        (self.network,) = initialised(size, seed, 1)
         self.optimiser = torch.optim.Adam(self.network.parameters(), self.parameters.learning_rate)
         self.replay = ReplayBuffer(self.parameters.buffer_size)
 

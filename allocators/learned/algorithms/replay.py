@@ -5,6 +5,7 @@ from dataclasses import fields
 import torch
 
 from alloc.allocators.learned.algorithms.learner import StateDict
+from alloc.allocators.learned.play.stored_games import from_stored, to_stored
 from alloc.allocators.learned.play.trajectories import Trajectories
 from alloc.problems.game import Board, State
 
@@ -42,8 +43,8 @@ class ReplayBuffer:
         return [
             {
                 **{field.name: getattr(one, field.name) for field in fields(Trajectories) if field.name not in _NESTED},
-                "board": {field.name: getattr(one.board, field.name) for field in fields(Board)},
-                "state": {field.name: getattr(one.state, field.name) for field in fields(State)},
+                "board": to_stored(one.board),
+                "state": to_stored(one.state),
             }
             for one in self._kept
         ]
@@ -51,5 +52,8 @@ class ReplayBuffer:
     def load_state_dict(self, state: list[StateDict]) -> None:
         """Restore what `state_dict` returned."""
         self._kept = [
-            Trajectories(**{**one, "board": Board(**one["board"]), "state": State(**one["state"])}) for one in state
+            Trajectories(
+                **{**one, "board": from_stored(Board, one["board"]), "state": from_stored(State, one["state"])}
+            )
+            for one in state
         ]

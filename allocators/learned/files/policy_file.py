@@ -11,10 +11,10 @@ from safetensors.torch import load, save
 
 from alloc.allocators.learned.algorithms.registry import METHODS
 from alloc.allocators.learned.files.policy_header import read_header
-from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize, unfilled
+from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize, uninitialised
 from alloc.problems import InputError
 from alloc.problems.formats import read_bytes, write_bytes_atomically
-from alloc.problems.game import AGENT_FEATURES, FEATURE_SET, PAIR_FEATURES, TASK_FEATURES, Turn
+from alloc.problems.game import AGENT_FEATURES, FEATURE_SET, PAIR_FEATURES, TASK_FEATURES
 
 POLICY_FORMAT = "alloc-policy/1"
 
@@ -97,8 +97,8 @@ def load_policy(path: Path | str, method: str | None, device: torch.device | Non
         if metadata.get(key) != expected[key]:
             raise InputError(f"is {metadata.get(key)!r}, this version needs {expected[key]!r}; train anew", key, source)
     turn = _turn(metadata, source)
-    if method is not None and turn != Turn.BIDDING:
-        raise InputError(f"was trained for turns by {turn}, but plans are made by {Turn.BIDDING}", "turn", source)
+    if method is not None and turn != TurnRule.BIDDING:
+        raise InputError(f"was trained for turns by {turn}, but plans are made by {TurnRule.BIDDING}", "turn", source)
     if not all(bool(tensor.isfinite().all()) for tensor in tensors.values()):
         raise InputError("weights are not finite; train anew", "", source)
     try:
@@ -110,7 +110,7 @@ def load_policy(path: Path | str, method: str | None, device: torch.device | Non
 
 def _turn(metadata: Mapping[str, str], source: str) -> str:
     try:
-        turn: str = json.loads(metadata.get("training", "{}")).get("turn", Turn.BIDDING)
+        turn: str = json.loads(metadata.get("training", "{}")).get("turn", TurnRule.BIDDING)
     except (AttributeError, ValueError) as error:
         raise InputError("does not describe its training; use a file by `alloc train`", "training", source) from error
     return turn
@@ -119,7 +119,7 @@ def _turn(metadata: Mapping[str, str], source: str) -> str:
 def _network(
     size: NetworkSize, tensors: dict[str, torch.Tensor], number: int, device: torch.device | None
 ) -> ActorCritic:
-    network = unfilled(size)
+    network = uninitialised(size)
     prefix = f"{number}."
     network.load_state_dict({name.removeprefix(prefix): t for name, t in tensors.items() if name.startswith(prefix)})
     return network.to(device).eval().requires_grad_(False)

@@ -1,4 +1,4 @@
-"""The body that all five methods share: attention over groups and tasks, and a small network that scores each bid."""
+"""The network that all methods share: attention over groups and tasks, and a small network that scores each bid."""
 
 import math
 from dataclasses import dataclass
@@ -13,15 +13,15 @@ from alloc.problems.game import (
     TASK_FEATURES,
     Board,
     State,
+    current_tasks,
     observe_agents,
     observe_pairs,
     observe_tasks,
     sum_by_place,
-    tasks_of,
 )
 
 SLOPES = (-2.0, 1.0)
-"""Between which the heads' parameters of nearness lie at first."""
+"""Range of the initial values of the heads' distance parameters."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class NetworkSize:
     ----------
     pair_width, task_width, heads : int
     attention : bool
-        Whether groups and tasks attend; without, each is seen alone.
+        Whether groups and tasks attend to each other.
     """
 
     pair_width: int = 32
@@ -42,7 +42,7 @@ class NetworkSize:
 
 
 class Scores(NamedTuple):
-    """What a network says of a state.
+    """Scores of the bids in B states, and values of these.
 
     Attributes
     ----------
@@ -62,10 +62,10 @@ class Scores(NamedTuple):
 class ActorCritic(nn.Module):
     """Scores bids (the actor, (7)) and states (the critic, (8)) for any number of agents and tasks.
 
-    Each group attends to its members, and the places to each other, the nearer the more: so an agent knows of its
-    neighbours within two steps, whatever their number, at a cost that grows with n, not with n^2. The score of a bid
-    is the sum of two parts. The local part sees the pair of agent and task alone, so that after a move only the pairs
-    that it touched are scored anew. The other part, a pointer, compares the agent's group with the task.
+    Each group attends to its members, and the places to each other, the nearer the more: information of neighbours
+    reaches an agent in two steps, at a cost of O(n + m^2), not O(n^2). The score of a bid is the sum of two parts. The
+    local part depends on the features of agent and candidate alone, so that after a move only the pairs that it
+    touched are scored anew. The other, a pointer, compares the agent's group with the candidate's place.
 
     References
     ----------
@@ -98,12 +98,12 @@ class ActorCritic(nn.Module):
         return Scores(self.pairs(observe_pairs(board, state)) + self.pointer(board, state, token), *self.heads(token))
 
     def pairs(self, features: Tensor) -> Tensor:
-        """Local part of the scores: (..., PAIR_FEATURES) to (...)."""
+        """Return the local part of the scores: (..., PAIR_FEATURES) to (...)."""
         score: Tensor = self.local(features)[..., 0]
         return score
 
     def places(self, board: Board, state: State) -> Tensor:
-        """Return what each place knows of its group and of the others, shape (B, m + 1, width)."""
+        """Return an encoding of each place, its group and the other places, shape (B, m + 1, width)."""
         token = torch.relu(self.embed(observe_tasks(board, state)))
         if self.size.attention:
             token = token + self.gather(self._members(board, state))
@@ -112,34 +112,34 @@ class ActorCritic(nn.Module):
         return nn.functional.layer_norm(token, list(token.shape[-1:]))
 
     def _members(self, board: Board, state: State) -> Tensor:
-        """Each group attends to its members: softmax over those at each place, shape (B, m + 1, width)."""
+        """Attention of each group over its members, a softmax over those at each place, shape (B, m + 1, width)."""
         heads, width = self.size.heads, self.size.task_width
-        seen = self.member(observe_agents(board, state))
-        weight = (8 * torch.tanh(seen[..., :heads] / 8)).exp() * (board.ability > 0)[..., None]
-        heard = torch.relu(seen[..., heads:]).unflatten(-1, (heads, width // heads)) * weight[..., None]
-        total = sum_by_place(torch.cat([weight, heard.flatten(2)], -1), tasks_of(board, state), board.places)
+        projected = self.member(observe_agents(board, state))
+        weight = (8 * torch.tanh(projected[..., :heads] / 8)).exp() * (board.ability > 0)[..., None]
+        values = torch.relu(projected[..., heads:]).unflatten(-1, (heads, width // heads)) * weight[..., None]
+        total = sum_by_place(torch.cat([weight, values.flatten(2)], -1), current_tasks(board, state), board.places)
         shares = total[..., heads:].unflatten(-1, (heads, width // heads)) / (total[..., :heads, None] + 1e-6)
         mean: Tensor = shares.flatten(2)
         return mean
 
     def _neighbours(self, board: Board, token: Tensor) -> Tensor:
-        """Places attend to each other, those near by more, by a learned slope per head, shape (B, m + 1, width)."""
+        """Attention of places over each other, falling with distance by a slope per head, shape (B, m + 1, width)."""
         heads, width = self.size.heads, self.size.task_width
         query, key, value = (
-            part.unflatten(-1, (heads, width // heads)).transpose(1, 2) for part in self.attend(token).chunk(3, -1)
+            one.unflatten(-1, (heads, width // heads)).transpose(1, 2) for one in self.attend(token).chunk(3, -1)
         )
         slope = nn.functional.softplus(self.nearness)[:, None, None]
-        likeness = query @ key.transpose(2, 3) / (width // heads) ** 0.5 - slope * board.apart[:, None]
-        heard: Tensor = likeness.softmax(-1) @ value
-        return heard.transpose(1, 2).flatten(2)
+        likeness = query @ key.transpose(2, 3) / (width // heads) ** 0.5 - slope * board.task_distance[:, None]
+        attended: Tensor = likeness.softmax(-1) @ value
+        return attended.transpose(1, 2).flatten(2)
 
     def pointer(self, board: Board, state: State, token: Tensor) -> Tensor:
-        """Compare each agent's group with its candidates: shape (B, n, c)."""
+        """Return the pointer's part of the scores, shape (B, n, c)."""
         width = token.shape[2]
-        group = token.gather(1, tasks_of(board, state)[..., None].expand(-1, -1, width))
+        group = token.gather(1, current_tasks(board, state)[..., None].expand(-1, -1, width))
         query = self.query(torch.cat([group, board.ability[..., None] - 1], -1))
         likeness = query @ self.key(token).transpose(1, 2) / width**0.5
-        scores: Tensor = likeness if board.goal.shape[2] == board.places else likeness.gather(2, board.goal)
+        scores: Tensor = likeness if board.candidates.shape[2] == board.places else likeness.gather(2, board.candidates)
         return scores
 
     def heads(self, token: Tensor) -> tuple[Tensor, Tensor]:
@@ -148,21 +148,21 @@ class ActorCritic(nn.Module):
         return self.reserve(pooled)[:, 0], self.critic(pooled)[:, 0]
 
 
-def unfilled(size: NetworkSize | None = None) -> ActorCritic:
-    """Return a network in main memory whose weights are yet to be set; nothing is drawn for them."""
+def uninitialised(size: NetworkSize | None = None) -> ActorCritic:
+    """Return a network in main memory with uninitialised weights; no random numbers are drawn."""
     with torch.device("meta"):
         network = ActorCritic(size)
     return network.to(torch.float32).to_empty(device="cpu")
 
 
-def fresh(size: NetworkSize | None, seed: int, count: int) -> list[ActorCritic]:
-    """Return networks with first weights, one after the other from the same stream of random numbers.
+def initialised(size: NetworkSize | None, seed: int, count: int) -> list[ActorCritic]:
+    """Return networks with initial weights, drawn one after the other from one stream of random numbers.
 
-    They are those that the layers of torch draw for themselves after `torch.manual_seed`, but no generator that is
-    shared by the process is touched.
+    The weights are those that torch draws by itself after `torch.manual_seed`, but no generator that is shared by the
+    process is touched.
     """
     generator = torch.Generator().manual_seed(seed)
-    networks = [unfilled(size) for _ in range(count)]
+    networks = [uninitialised(size) for _ in range(count)]
     for network in networks:
         for layer in network.modules():
             if isinstance(layer, nn.Linear):

@@ -1,15 +1,26 @@
-"""From scores to moves, and how probable moves were: for agents that bid, and for agents that choose at once."""
+"""Sampling of actions from scores, and their log-probabilities: by bidding, and by simultaneous choice."""
 
 import torch
 from torch import Tensor
 
 from alloc.allocators.learned.network.actor_critic import Scores
-from alloc.problems.game import PLANNING, Board, Rules, State, Turn, grant, moved, open_bids, pick, tasks_of
+from alloc.problems.game import (
+    PLANNING,
+    Board,
+    Rules,
+    State,
+    TurnRule,
+    action_mask,
+    apply_moves,
+    at_slot,
+    current_tasks,
+    grant_bids,
+)
 
-BARRED = -torch.inf
+MASKED = -torch.inf
 
 
-def choose(
+def sample_actions(
     board: Board,
     state: State,
     scores: Scores,
@@ -17,7 +28,7 @@ def choose(
     temperature: float = 0.0,
     generator: torch.Generator | None = None,
 ) -> tuple[Tensor, Tensor]:
-    """Draw what is to be done.
+    """Draw the actions of a step.
 
     With Gumbel noise on the scores, granting bids in their order draws them one after the other from the softmax over
     all that share no task with those before (a Plackett-Luce model); agents that choose at once each draw from a
@@ -26,33 +37,33 @@ def choose(
     Parameters
     ----------
     temperature : float
-        What scores are divided by; 0 takes the best.
+        Scores are divided by it; 0 takes the best.
 
     Returns
     -------
     actions : Tensor of int, shape (B, k)
-        ``agent * c + slot`` of each move in its order; -1 and ``n * c`` as `grant` says.
+        ``agent * c + slot`` of each move in its order; -1 and ``n * c`` as `grant_bids` says.
     slot : Tensor of int, shape (B, n)
-        Where all agents go.
+        Candidate that each agent goes to.
 
     References
     ----------
     Kool, van Hoof and Welling (2019), arXiv:1903.06059, for the draws by Gumbel noise.
     """
     bids, reserve = scores.bids, scores.reserve
-    if rules.turn == Turn.SIMULTANEOUS:
+    if rules.turn == TurnRule.SIMULTANEOUS:
         bids = _with_staying(board, state, bids, rules)
     else:
-        bids = bids.masked_fill(~open_bids(board, state, rules), BARRED)
+        bids = bids.masked_fill(~action_mask(board, state, rules), MASKED)
     if temperature > 0:
         bids = bids / temperature + _gumbel(bids, generator)
         reserve = reserve / temperature + _gumbel(reserve, generator)
-    if rules.turn == Turn.SIMULTANEOUS:
+    if rules.turn == TurnRule.SIMULTANEOUS:
         slot = bids.argmax(2)
         agents = torch.arange(board.shape[1], device=slot.device)
         return (agents * board.shape[2] + slot).masked_fill(state.done[:, None], -1), slot
-    actions = grant(board, state, bids, reserve, rules.most_moves)
-    return actions, moved(board, state, actions)
+    actions = grant_bids(board, state, bids, reserve, rules.most_moves)
+    return actions, apply_moves(board, state, actions)
 
 
 def _gumbel(like: Tensor, generator: torch.Generator | None) -> Tensor:
@@ -60,7 +71,7 @@ def _gumbel(like: Tensor, generator: torch.Generator | None) -> Tensor:
 
 
 def _with_staying(board: Board, state: State, bids: Tensor, rules: Rules) -> Tensor:
-    bids = bids.masked_fill(~open_bids(board, state, rules), BARRED)
+    bids = bids.masked_fill(~action_mask(board, state, rules), MASKED)
     return bids.scatter(2, state.slot[..., None], 0.0)
 
 
@@ -72,7 +83,7 @@ def log_probabilities(
     Parameters
     ----------
     actions : Tensor of int, shape (B, k)
-        As `choose` returns them.
+        As `sample_actions` returns them.
 
     Returns
     -------
@@ -81,10 +92,10 @@ def log_probabilities(
     entropy : Tensor, shape (B,)
         Of the first draw where agents bid, of the mean agent where they choose at once.
     """
-    if rules.turn == Turn.SIMULTANEOUS:
+    if rules.turn == TurnRule.SIMULTANEOUS:
         logits = _with_staying(board, state, scores.bids, rules).log_softmax(2)
-        chosen = pick(logits, actions.clamp(min=0) % board.shape[2])
-        entropy = -(logits.exp() * logits.masked_fill(logits == BARRED, 0.0)).sum(2).mean(1)
+        chosen = at_slot(logits, actions.clamp(min=0) % board.shape[2])
+        entropy = -(logits.exp() * logits.masked_fill(logits == MASKED, 0.0)).sum(2).mean(1)
         return chosen.masked_fill(actions < 0, 0.0), entropy
     return _of_bids(board, state, scores, actions, rules)
 
@@ -92,8 +103,8 @@ def log_probabilities(
 def _of_bids(board: Board, state: State, scores: Scores, actions: Tensor, rules: Rules) -> tuple[Tensor, Tensor]:
     batch, n, c = board.shape
     rows, idle = torch.arange(batch, device=actions.device), board.places - 1
-    task = tasks_of(board, state)
-    bids = scores.bids.masked_fill(~open_bids(board, state, rules), BARRED)
+    task = current_tasks(board, state)
+    bids = scores.bids.masked_fill(~action_mask(board, state, rules), MASKED)
     result = []
     entropy = torch.zeros_like(scores.reserve)
     for number, action in enumerate(actions.unbind(1)):
@@ -101,17 +112,17 @@ def _of_bids(board: Board, state: State, scores: Scores, actions: Tensor, rules:
         total = logits.logsumexp(1)
         if number == 0:
             shares = (logits - total[:, None]).exp()
-            entropy = total - (shares * logits.masked_fill(logits == BARRED, 0.0)).sum(1)
+            entropy = total - (shares * logits.masked_fill(logits == MASKED, 0.0)).sum(1)
         taken = action.clamp(min=0)
         result.append((logits[rows, taken] - total).masked_fill(action < 0, 0.0))
         if number + 1 < actions.shape[1]:
             real = (action >= 0) & (action < n * c)
             agent, slot = torch.div(taken, c, rounding_mode="floor").clamp(max=n - 1), taken % c
-            source, target = task[rows, agent], board.goal[rows, agent, slot]
+            source, target = task[rows, agent], board.candidates[rows, agent, slot]
             source = source.masked_fill(~real | (source == idle), -1)[:, None]
             target = target.masked_fill(~real | (target == idle), -1)[:, None]
             shut = ((task == source) | (task == target))[..., None]
-            shut = shut | (board.goal == source[..., None]) | (board.goal == target[..., None])
+            shut = shut | (board.candidates == source[..., None]) | (board.candidates == target[..., None])
             shut[rows, agent] |= real[:, None]
-            bids = bids.masked_fill(shut, BARRED)
+            bids = bids.masked_fill(shut, MASKED)
     return torch.stack(result, 1), entropy

@@ -1,33 +1,33 @@
-"""Playing many games at once, scoring anew after a step only the pairs that its moves touched."""
+"""Batched games by torch; after a step only the pairs that its moves touched are scored anew."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor
 
 from alloc.allocators.learned.network.actor_critic import ActorCritic, Scores
-from alloc.allocators.learned.play.action_sampling import choose
+from alloc.allocators.learned.play.action_sampling import sample_actions
 from alloc.problems.game import (
     PLANNING,
     Board,
     Rules,
     State,
-    begin,
-    flown,
+    current_tasks,
+    mean_distance,
     observe_pairs,
+    relative_makespan,
+    reset,
     step,
-    tasks_of,
-    time_over_reference,
 )
-from alloc.problems.game.board import LEAST
-from alloc.problems.game.observation import Sight, lacks, pair_features
+from alloc.problems.game.board import SMALLEST
+from alloc.problems.game.observation import AgentAtPlace, pair_features, shortfalls
 
 SCORE_CHUNK = 250_000
 """Pairs scored at once, to bound the memory."""
 
-ANEW = 0.5
-"""Share of the pairs touched from which on all are scored anew: gathering them costs more than it saves."""
+RESCORE_ALL = 0.5
+"""Share of touched pairs above which all are scored anew: gathering them costs more than it saves."""
 
 TIE = 1e-5
 """Relative difference below which two figures in single precision are taken for equal."""
@@ -59,7 +59,7 @@ class Best:
         return (self.unserved < other.unserved) | ((self.unserved == other.unserved) & (less | (same & nearer)))
 
     def improved_by(self, other: "Best", rows: Tensor) -> "Best":
-        """Put the positions of `other` in place of those in `rows` where they are better."""
+        """Replace the positions in `rows` by those of `other` where these are better."""
         here = Best(self.slot[rows], self.unserved[rows], self.shortfall[rows], self.distance[rows])
         better = other.better_than(here)
         rows = rows[better]
@@ -72,14 +72,14 @@ class Best:
 
 
 def position(board: Board, state: State, total: bool = False) -> Best:
-    """Return where each game stands; see `Best`."""
+    """Return the position of each game; see `Best`."""
     need, group = board.need[:, :-1], state.group[:, :-1]
-    time, unserved = time_over_reference(board, state.group)
+    time, unserved = relative_makespan(board, state.group)
     if total:
-        shortfall = (need - group).clamp(min=0).sum(1) / need.sum(1).clamp(min=LEAST)
+        shortfall = (need - group).clamp(min=0).sum(1) / need.sum(1).clamp(min=SMALLEST)
     else:
-        shortfall = (1 - 1 / time.clamp(min=LEAST)).clamp(min=0)
-    return Best(state.slot, unserved, shortfall, flown(board, state))
+        shortfall = (1 - 1 / time.clamp(min=SMALLEST)).clamp(min=0)
+    return Best(state.slot, unserved, shortfall, mean_distance(board, state))
 
 
 @torch.no_grad()
@@ -94,28 +94,27 @@ def play(
     total: bool = False,
     should_stop: Callable[[], bool] = lambda: False,
 ) -> Best:
-    """Play the games on `board` and return the best positions on the way.
+    """Play the games on `board`, and return the best position of each.
 
     Parameters
     ----------
     network : ActorCritic
     board : Board
-        Any games, such as copies of one; see `Board.repeat`.
     steps : int
         Most steps.
     temperature : float
-        0 grants the best bids; above 0 they are drawn with their scores divided by it.
+        Scores are divided by it where bids are drawn; 0 grants the best bids.
     generator : torch.Generator
-        Source of the draws.
+        For the draws.
     total : bool
-        Whether positions are compared by the shortfall in total, instead of that of the worst task.
+        Whether positions are compared by the total shortfall, instead of that of the worst task.
     should_stop : callable
-        Asked before each step, and between chunks of the first scoring.
+        Called before each step, and between chunks of the first scoring.
     """
-    state = begin(board)
+    state = reset(board)
     best = position(board, state, total)
-    rows = torch.arange(len(board.price), device=board.price.device)
-    scores = _Local(network, board, state, should_stop)
+    rows = torch.arange(len(board.energy_weight), device=board.energy_weight.device)
+    scores = LocalScores(network, board, state, should_stop)
     for _ in range(steps):
         if should_stop() or bool(state.done.all()):
             break
@@ -123,25 +122,25 @@ def play(
             going = torch.nonzero(~state.done)[:, 0]
             rows, board, state = rows[going], board[going], state[going]
             scores.keep(board, going)
-        _, slot = choose(board, state, scores.all(state), rules, temperature, generator)
+        _, slot = sample_actions(board, state, scores.all(state), rules, temperature, generator)
         state = step_and_score(board, state, slot, scores)
         best = best.improved_by(position(board, state, total), rows)
     return best
 
 
-def step_and_score(board: Board, state: State, slot: Tensor, scores: "_Local") -> State:
-    """Make a step, and score anew what it touched."""
+def step_and_score(board: Board, state: State, slot: Tensor, scores: "LocalScores") -> State:
+    """Make a step, and update the scores of the pairs that it touched."""
     after = step(board, state, slot)
     scores.refresh(state, after)
     return after
 
 
-class _Local:
-    """Local scores of all pairs, kept up to date."""
+class LocalScores:
+    """The local part of the scores of all pairs, kept up to date."""
 
     def __init__(self, network: ActorCritic, board: Board, state: State, should_stop: Callable[[], bool]) -> None:
         self.network, self.board = network, board
-        self.local = board.price.new_full(board.shape, -1e9)
+        self.local = board.energy_weight.new_full(board.shape, -1e9)
         self._score_all(state, should_stop)
 
     def _score_all(self, state: State, should_stop: Callable[[], bool] = lambda: False) -> None:
@@ -153,8 +152,9 @@ class _Local:
         for first in range(0, n, width):
             if should_stop():
                 break
-            part, there = _agents(self.board, state, slice(first, first + width))
-            self.local[:, first : first + width] = self.network.pairs(observe_pairs(part, there))
+            some = slice(first, first + width)
+            features = observe_pairs(self.board.of_agents(some), state.of_agents(some))
+            self.local[:, some] = self.network.pairs(features)
 
     def all(self, state: State) -> Scores:
         """Return the scores of all bids."""
@@ -162,38 +162,40 @@ class _Local:
         return Scores(self.local + self.network.pointer(self.board, state, token), *self.network.heads(token))
 
     def keep(self, board: Board, rows: Tensor) -> None:
-        """Drop the other games."""
+        """Drop all games but those in `rows`, which are on `board`."""
         self.board, self.local = board, self.local[rows]
 
     def refresh(self, before: State, after: State) -> None:
-        """Score the pairs whose agent or goal is at a place that changed."""
+        """Score the pairs whose agent or candidate is at a place that changed."""
         board = self.board
         changed = before.group != after.group
         changed[:, -1] = False
-        concerned = changed.gather(1, tasks_of(board, after)) | (before.slot != after.slot)
-        touched = (concerned[..., None] | changed.gather(1, board.goal.flatten(1)).view(board.shape)) & board.legal
+        concerned = changed.gather(1, current_tasks(board, after)) | (before.slot != after.slot)
+        touched = (
+            concerned[..., None] | changed.gather(1, board.candidates.flatten(1)).view(board.shape)
+        ) & board.legal
         game, agent, slot = torch.nonzero(touched, as_tuple=True)
-        if len(game) > ANEW * touched.numel():
+        if len(game) > RESCORE_ALL * touched.numel():
             self._score_all(after)
         elif len(game):
             self.local[game, agent, slot] = self.network.pairs(_observe(board, after, game, agent, slot))
 
 
 def _observe(board: Board, state: State, game: Tensor, agent: Tensor, slot: Tensor) -> Tensor:
-    """Return `pair_features` of some pairs, shape (k, PAIR_FEATURES)."""
-    lack, need = lacks(board, state), board.need.clamp(min=LEAST)
+    """Return `pair_features` of k pairs, given by number, shape (k, PAIR_FEATURES)."""
+    shortfall, need = shortfalls(board, state), board.need.clamp(min=SMALLEST)
 
-    def sight(chosen: Tensor) -> Sight:
-        place = board.goal[game, agent, chosen]
-        given, distance = board.contribution[game, agent, chosen], board.distance[game, agent, chosen]
-        return lack[game, place], need[game, place], board.supply[game, place], given, distance
+    def at_candidate(chosen: Tensor) -> AgentAtPlace:
+        place = board.candidates[game, agent, chosen]
+        contribution, distance = board.contribution[game, agent, chosen], board.distance[game, agent, chosen]
+        return AgentAtPlace(
+            shortfall[game, place], need[game, place], board.supply_ratio[game, place], contribution, distance
+        )
 
-    own, other = sight(state.slot[game, agent]), sight(slot)
-    return pair_features(board.price[game], board.ability[game, agent], board.choice[game, agent], own, other)
-
-
-def _agents(board: Board, state: State, some: slice) -> tuple[Board, State]:
-    """Return the same games with some of the agents, for their features alone."""
-    per_agent = ("ability", "goal", "legal", "distance", "contribution", "start", "choice", "endurance")
-    part = replace(board, **{name: getattr(board, name)[:, some] for name in per_agent})
-    return part, replace(state, slot=state.slot[:, some], at=state.at[:, some], hopped=state.hopped[:, some])
+    return pair_features(
+        board.energy_weight[game],
+        board.ability[game, agent],
+        board.reachable_share[game, agent],
+        own=at_candidate(state.slot[game, agent]),
+        other=at_candidate(slot),
+    )

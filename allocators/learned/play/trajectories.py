@@ -1,4 +1,4 @@
-"""Playing games to learn from them, and the advantages of what was done."""
+"""Trajectories to learn from, and the advantages of their actions."""
 
 from dataclasses import dataclass, fields
 
@@ -6,21 +6,21 @@ import torch
 from torch import Tensor
 
 from alloc.allocators.learned.network.actor_critic import ActorCritic
-from alloc.allocators.learned.play.action_sampling import choose, log_probabilities
+from alloc.allocators.learned.play.action_sampling import log_probabilities, sample_actions
 from alloc.problems.game import (
     PLANNING,
     Board,
     Rules,
     State,
-    begin,
+    reset,
     step,
-    worth,
+    utility,
 )
 
 
 @dataclass(frozen=True, eq=False)
 class Trajectories:
-    """What B games brought in S steps, with at most k moves a step.
+    """Trajectories of B games over S steps, with at most k moves a step.
 
     Attributes
     ----------
@@ -28,13 +28,13 @@ class Trajectories:
     state : State
         Before each step; all arrays begin with (S, B).
     actions : Tensor of int, shape (S, B, k)
-        As `choose` returns them, filled up with -1.
+        As `sample_actions` returns them, filled up with -1.
     log_probability : Tensor, shape (S, B, k)
-        Of each action, by the policy that played.
+        Of each action, by the behaviour policy.
     value, reward : Tensor, shape (S, B)
-        Value of the state before the step, and rise of the worth.
+        Value of the state before the step, and rise of the utility.
     last_value : Tensor, shape (B,)
-        Value of the state after the last step, 0 in games that had ended: a game that was cut off is not over.
+        Value of the state after the last step, 0 in games that had ended; truncated games have not.
     """
 
     board: Board
@@ -52,7 +52,7 @@ class Trajectories:
 
     @property
     def decisions(self) -> int:
-        """Decisions of agents, those to move no further included."""
+        """Decisions of agents, those to stop included."""
         return int((self.actions >= 0).sum())
 
     @property
@@ -71,18 +71,18 @@ def collect(
     reward_scale: float = 1.0,
     state: State | None = None,
 ) -> Trajectories:
-    """Play up to `steps` steps of every game on `board`, from `state` on, drawing actions from the policy."""
-    state = begin(board) if state is None else state
-    before = worth(board, state, rules)
+    """Play up to `steps` steps of every game on `board`, from `state` if given, with actions drawn from the policy."""
+    state = reset(board) if state is None else state
+    before = utility(board, state, rules)
     columns: list[tuple[State, Tensor, Tensor, Tensor, Tensor]] = []
     for _ in range(steps):
         if bool(state.done.all()):
             break
         scores = network(board, state)
-        actions, slot = choose(board, state, scores, rules, 1.0, generator)
+        actions, slot = sample_actions(board, state, scores, rules, 1.0, generator)
         log_probability, _ = log_probabilities(board, state, scores, actions, rules)
         after = step(board, state, slot)
-        now = worth(board, after, rules)
+        now = utility(board, after, rules)
         alive = ~state.done
         reward = reward_scale * (now - before)
         columns.append((state, actions, log_probability, scores.value * alive, reward * alive))
@@ -112,8 +112,8 @@ def advantages(
     alive: Tensor,
     last_value: Tensor,
     discount: float,
-    smoothing: float,
-    likelihood: Tensor | None = None,
+    gae_lambda: float,
+    importance_ratio: Tensor | None = None,
 ) -> Tensor:
     """Generalised advantage estimation, (9) and (10), shape (S, B).
 
@@ -124,16 +124,16 @@ def advantages(
         Whether the game was still on before each step.
     last_value : Tensor, shape (B,)
         Value after the last step, 0 where the game is over.
-    likelihood : Tensor, shape (S, B), optional
+    importance_ratio : Tensor, shape (S, B), optional
         How much likelier each step is by the policy that learns than by the one that played; those up to 1 cut the
         trace short, as in V-trace (Espeholt et al. 2018, arXiv:1802.01561). 1 by default.
     """
     result = torch.zeros_like(reward)
     following, later = last_value, torch.zeros_like(last_value)
-    trace = torch.ones_like(reward) if likelihood is None else likelihood.clamp(max=1.0)
+    trace = torch.ones_like(reward) if importance_ratio is None else importance_ratio.clamp(max=1.0)
     for t in reversed(range(len(reward))):
         error = reward[t] + discount * following - value[t]
-        result[t] = (error + discount * smoothing * later) * alive[t]
+        result[t] = (error + discount * gae_lambda * later) * alive[t]
         later = trace[t] * result[t]
         following = value[t] * alive[t]
     return result

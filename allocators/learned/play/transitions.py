@@ -13,18 +13,19 @@ import torch
 from torch import Tensor
 
 from alloc.allocators.learned.network.actor_critic import ActorCritic, Scores
-from alloc.allocators.learned.play.action_sampling import choose
+from alloc.allocators.learned.play.action_sampling import sample_actions
+from alloc.allocators.learned.play.stored_games import from_stored, stored_name, to_stored
 from alloc.problems import InputError
 from alloc.problems.game import (
     Board,
     Rules,
     State,
-    Turn,
-    begin,
+    TurnRule,
+    action_mask,
+    apply_moves,
     group_ability,
     marginal_contributions,
-    moved,
-    open_bids,
+    reset,
     step,
 )
 
@@ -45,9 +46,9 @@ class Transitions(NamedTuple):
         Number of the game on the board.
     slot, at : Tensor of int16, shape (N, n)
         As in `State`, before the bid.
-    hopped : Tensor, shape (N, n)
-    left : Tensor of uint8, shape (N, ceil(n * c / 8))
-        Bits of `State.left`.
+    flown : Tensor, shape (N, n)
+    visited : Tensor of uint8, shape (N, ceil(n * c / 8))
+        Bits of `State.visited`.
     action : Tensor of int32, shape (N,)
         ``agent * c + slot``.
     reward : Tensor, shape (N,)
@@ -56,9 +57,9 @@ class Transitions(NamedTuple):
     board: Board
     game: Tensor
     slot: Tensor
-    at: Tensor
-    hopped: Tensor
-    left: Tensor
+    location: Tensor
+    flown: Tensor
+    visited: Tensor
     action: Tensor
     reward: Tensor
 
@@ -66,14 +67,14 @@ class Transitions(NamedTuple):
         """Return board and state before each of these bids, the bid and what it brought."""
         board, slot = self.board[self.game[index].long()], self.slot[index].long()
         _, n, c = board.shape
-        left = np.unpackbits(self.left[index].numpy(), axis=1, count=n * c).astype(bool)
+        left = np.unpackbits(self.visited[index].numpy(), axis=1, count=n * c).astype(bool)
         state = State(
             slot=slot,
             group=group_ability(board, slot),
-            left=torch.from_numpy(left).view(-1, n, c),
+            visited=torch.from_numpy(left).view(-1, n, c),
             done=torch.zeros(len(slot), dtype=torch.bool),
-            at=self.at[index].long(),
-            hopped=self.hopped[index],
+            location=self.location[index].long(),
+            flown=self.flown[index],
         )
         return board, state, self.action[index].long(), self.reward[index]
 
@@ -103,7 +104,7 @@ def play(
     Parameters
     ----------
     temperature : float
-        Of the noise, see `choose`.
+        Of the noise, see `sample_actions`.
     exploring : float
         Share of the rounds in which any bid, all being equally likely, is granted before the others: also where the
         network would stop at once, and so never learn what it misses.
@@ -113,9 +114,9 @@ def play(
     InputError
         If all agents choose at once: then what one of them brings depends on all others.
     """
-    if rules.turn == Turn.SIMULTANEOUS:
+    if rules.turn == TurnRule.SIMULTANEOUS:
         raise InputError("dqn and ddpg learn the value of one move at a time: they play the turn rule `bidding` only")
-    state = begin(board)
+    state = reset(board)
     columns: list[tuple[Tensor, ...]] = []
     decisions = evaluations = 0
     total = 0.0
@@ -123,22 +124,22 @@ def play(
         if bool(state.done.all()):
             break
         scores = _exploring(network(board, state), board, state, rules, exploring, generator)
-        actions, slot = choose(board, state, scores, rules, temperature, generator)
+        actions, slot = sample_actions(board, state, scores, rules, temperature, generator)
         brought = reward_scale * marginal_contributions(board, state, actions, rules)
         evaluations += int((~state.done).sum())
         decisions += int((actions >= 0).sum())
         total += float(brought.sum())
         columns += _single_moves(board, state, actions, brought)
         state = step(board, state, slot)
-    parts = [torch.cat(column) for column in zip(*columns, strict=True)] if columns else _nothing(board)
-    return Played(Transitions(board, *parts), decisions, evaluations, total / len(state.done) / reward_scale)
+    regions = [torch.cat(column) for column in zip(*columns, strict=True)] if columns else _nothing(board)
+    return Played(Transitions(board, *regions), decisions, evaluations, total / len(state.done) / reward_scale)
 
 
 def _exploring(
     scores: Scores, board: Board, state: State, rules: Rules, share: float, generator: torch.Generator
 ) -> Scores:
     """Put a random open bid first in a share of the games."""
-    draw = torch.rand(scores.bids.shape, generator=generator).masked_fill(~open_bids(board, state, rules), -1.0)
+    draw = torch.rand(scores.bids.shape, generator=generator).masked_fill(~action_mask(board, state, rules), -1.0)
     explores = torch.rand(len(draw), generator=generator) < share
     first = (
         torch.nn.functional.one_hot(draw.flatten(1).argmax(1), draw[0].numel()).view_as(draw) * explores[:, None, None]
@@ -147,7 +148,7 @@ def _exploring(
 
 
 def _single_moves(board: Board, state: State, actions: Tensor, brought: Tensor) -> list[tuple[Tensor, ...]]:
-    """Take a round apart: the fields of `Transitions` for each of its bids."""
+    """Take a round task_distance: the fields of `Transitions` for each of its bids."""
     _, n, c = board.shape
     columns: list[tuple[Tensor, ...]] = []
     for action, reward in zip(actions.unbind(1), brought.unbind(1), strict=True):
@@ -156,14 +157,14 @@ def _single_moves(board: Board, state: State, actions: Tensor, brought: Tensor) 
             (
                 game.short(),
                 state.slot[game].short(),
-                state.at[game].short(),
-                state.hopped[game],
-                torch.from_numpy(np.packbits(state.left[game].flatten(1).numpy(), axis=1)),
+                state.location[game].short(),
+                state.flown[game],
+                torch.from_numpy(np.packbits(state.visited[game].flatten(1).numpy(), axis=1)),
                 action[game].int(),
                 reward[game],
             )
         )
-        state = step(board, state, moved(board, state, action[:, None]))
+        state = step(board, state, apply_moves(board, state, action[:, None]))
     return columns
 
 
@@ -174,21 +175,21 @@ def _nothing(board: Board) -> list[Tensor]:
     return [short, agents, agents, torch.zeros(0, n), bits, torch.zeros(0, dtype=torch.int32), torch.zeros(0)]
 
 
-def after(board: Board, state: State, action: Tensor) -> State:
+def next_state(board: Board, state: State, action: Tensor) -> State:
     """Return the states after one bid in each game, shape of `action` (B,)."""
-    return step(board, state, moved(board, state, action[:, None]))
+    return step(board, state, apply_moves(board, state, action[:, None]))
 
 
-def gains(bids: Tensor, reserve: Tensor, board: Board, state: State, rules: Rules) -> Tensor:
+def scores_above_reserve(bids: Tensor, reserve: Tensor, board: Board, state: State, rules: Rules) -> Tensor:
     """Return what each bid, and in the last column stopping, is scored above stopping; shape (B, n * c + 1).
 
     ``-inf`` where an agent may not bid; the last column is 0.
     """
-    above = (bids - reserve[:, None, None]).masked_fill(~open_bids(board, state, rules), -torch.inf)
+    above = (bids - reserve[:, None, None]).masked_fill(~action_mask(board, state, rules), -torch.inf)
     return torch.cat([above.flatten(1), torch.zeros_like(reserve)[:, None]], 1)
 
 
-class Memory:
+class TransitionMemory:
     """The latest transitions, up to `capacity`; those of the oldest board go first."""
 
     def __init__(self, capacity: int) -> None:
@@ -214,8 +215,14 @@ class Memory:
 
     def state(self) -> list[dict[str, Any]]:
         """Return all transitions as dictionaries of tensors."""
-        return [{**one._asdict(), "board": vars(one.board).copy()} for one in self.kept]
+        return [
+            {**{stored_name(name): value for name, value in one._asdict().items()}, "board": to_stored(one.board)}
+            for one in self.kept
+        ]
 
     def load(self, state: list[dict[str, Any]]) -> None:
-        """Take up what `state` returned."""
-        self.kept = [Transitions(**{**one, "board": Board(**one["board"])}) for one in state]
+        """Restore what `state` returned."""
+        self.kept = [
+            Transitions(from_stored(Board, one["board"]), *(one[stored_name(name)] for name in Transitions._fields[1:]))
+            for one in state
+        ]

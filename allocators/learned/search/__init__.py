@@ -1,1 +1,1 @@
-"""From a policy to a plan: games on the whole instance and on its parts."""
+"""From a policy to a plan: games on the whole instance and on its regions."""

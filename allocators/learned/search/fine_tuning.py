@@ -1,4 +1,4 @@
-"""Learning on, on the instance at hand: games on its parts, PPO, and a generation now and then."""
+"""Fine-tuning of the policies on the instance to be solved: PPO on games of its regions, and breeding."""
 
 import copy
 import time
@@ -15,29 +15,29 @@ from alloc.allocators.learned.algorithms.learner import TrainingJob, TrainingSta
 from alloc.allocators.learned.algorithms.ppo import Ppo
 from alloc.allocators.learned.network.actor_critic import ActorCritic
 from alloc.problems.game import Board
-from alloc.problems.game.parts import Parts
+from alloc.problems.game.regions import Regions
 
 GENERATION = 4
-"""Lessons of each member between two generations."""
+"""Updates of each member between two generations."""
 
 BREEDING = BreedingParameters(mutation_sigma=0.002)
 
 
 @dataclass(frozen=True)
 class FineTuningParameters:
-    """How a policy learns on.
+    """How policies are fine-tuned.
 
     Attributes
     ----------
     after_s : float
-        Seconds of play before any learning: short runs are better spent on playing.
+        Seconds of play before any learning: short runs are better spent on play.
     share : float
         Share of the time thereafter that is spent on learning.
     games, pairs : int
-        Games of an update, at the most; and pairs of agent and candidate, so that no update takes long.
+        Most games of an update, and most pairs of agent and candidate in them.
     rounds : int
         Most rounds of a game.
-    price : (float, float)
+    energy_weight : (float, float)
         Least and most weight of energy.
     ppo : PpoParameters
     """
@@ -54,22 +54,26 @@ class FineTuningParameters:
 
 
 @dataclass(frozen=True, eq=False)
-class _PartGames:
-    """A curriculum of games on the parts of a plan; see `Curriculum`."""
+class _RegionGames:
+    """A curriculum of games on the regions of a plan, in place of `Curriculum`."""
 
-    parts: Parts
+    regions: Regions
     parameters: FineTuningParameters
 
     def draw(self, rng: np.random.Generator, progress: float) -> Board:
-        """Draw a board on which everybody begins at the nearest task, or where the plan has them."""
-        board = self.parts.board
+        """Draw a board on which each agent begins at the nearest task or where the plan has it."""
+        board = self.regions.board
         games = max(1, min(self.parameters.games, self.parameters.pairs // (board.shape[1] * board.shape[2])))
-        rows = torch.from_numpy(rng.integers(len(board.price), size=games))
-        ruined = rng.uniform(0.2, 1.4, (games, 1))
-        back = torch.from_numpy(rng.random((games, board.shape[1])) < ruined)
-        low, high = np.log(self.parameters.price)
-        price = torch.from_numpy(np.exp(rng.uniform(low, high, games)).astype(np.float32))
-        return replace(board[rows], price=price, start=torch.where(back, self.parts.home[rows], board.start[rows]))
+        rows = torch.from_numpy(rng.integers(len(board.energy_weight), size=games))
+        moved_share = rng.uniform(0.2, 1.4, (games, 1))
+        at_nearest = torch.from_numpy(rng.random((games, board.shape[1])) < moved_share)
+        low, high = np.log(self.parameters.energy_weight)
+        energy_weight = torch.from_numpy(np.exp(rng.uniform(low, high, games)).astype(np.float32))
+        return replace(
+            board[rows],
+            energy_weight=energy_weight,
+            start=torch.where(at_nearest, self.regions.nearest[rows], board.start[rows]),
+        )
 
     def max_steps(self, board: Board) -> int:
         """Most rounds."""
@@ -77,13 +81,13 @@ class _PartGames:
 
 
 class FineTuning:
-    """The population at work on one instance, members in turn; after some lessons of each comes a generation.
+    """Fine-tuning of a population on one instance: its members learn in turn, and are bred now and then.
 
     Parameters
     ----------
     search : Search
     networks : sequence of ActorCritic
-        As shipped; they are left as they are.
+        As shipped; they are not changed.
     parameters : FineTuningParameters, optional
     """
 
@@ -94,42 +98,42 @@ class FineTuning:
         self.parameters = parameters or FineTuningParameters()
         self.members: list[Ppo] = []
         self.spent_s = 0.0
-        self.lessons = 0
-        self._reports: list[TrainingStats] = []
+        self.jobs = 0
+        self._stats: list[TrainingStats] = []
 
     def is_due(self) -> bool:
-        """Whether it is time to learn; runs without a time limit never learn on, so that they repeat."""
+        """Whether it is time to learn; runs without a time limit never learn, so that they repeat."""
         since = self.search.elapsed_s - self.parameters.after_s
         limit = self.search.budget.time_limit_s
         return limit is not None and since > 0 and self.spent_s < self.parameters.share * since
 
-    def learn(self, parts: Parts) -> Sequence[ActorCritic]:
-        """Have the next member take a lesson on these parts; return the networks as they are now."""
+    def learn(self, regions: Regions) -> Sequence[ActorCritic]:
+        """Train the next member on these regions; return the networks as they are now."""
         begin = time.monotonic()
         if not self.members:
             self.members = [_learner(network, self.parameters.ppo) for network in self.shipped]
-        games = _PartGames(parts, self.parameters)
-        job = TrainingJob(seed=(self.search.seed + self.lessons) % 2**63, decisions=1, curriculum=games)
-        self._reports.append(self.members[self.lessons % len(self.members)].train_on(job))
-        self.lessons += 1
-        if self.lessons % (GENERATION * len(self.members)) == 0:
+        games = _RegionGames(regions, self.parameters)
+        job = TrainingJob(seed=(self.search.seed + self.jobs) % 2**63, decisions=1, curriculum=games)
+        self._stats.append(self.members[self.jobs % len(self.members)].train_on(job))
+        self.jobs += 1
+        if self.jobs % (GENERATION * len(self.members)) == 0:
             self._breed()
         self.spent_s += time.monotonic() - begin
         return [member.policy for member in self.members]
 
     def _breed(self) -> None:
-        """Replace the less fit, judged by the reward of their last lessons (12)."""
+        """Replace the less fit, by the rewards of their last updates (12)."""
         count = len(self.members)
-        latest = [self._reports[number::count][-GENERATION:] for number in range(count)]
-        self._reports = []
+        latest = [self._stats[number::count][-GENERATION:] for number in range(count)]
+        self._stats = []
         scores = fitness(
-            [float(np.mean([report.reward for report in reports])) for reports in latest],
-            [float(np.mean([report.entropy for report in reports])) for reports in latest],
-            [sum(report.evaluations for report in reports) for reports in latest],
+            [float(np.mean([stats.reward for stats in member])) for member in latest],
+            [float(np.mean([stats.entropy for stats in member])) for member in latest],
+            [sum(stats.evaluations for stats in member) for member in latest],
             BREEDING,
         )
         members = [copy.deepcopy(member.state_dict()) for member in self.members]  # loading one changes what it shares
-        for member, state in zip(self.members, breed(members, scores, BREEDING, self.lessons), strict=True):
+        for member, state in zip(self.members, breed(members, scores, BREEDING, self.jobs), strict=True):
             member.load_state_dict(copy.deepcopy(state))
 
 

@@ -1,4 +1,4 @@
-"""How large an instance a learned policy can play within a budget; knows nothing of torch."""
+"""How large an instance a learned policy can play within a budget; does not import torch."""
 
 from alloc.allocators.contract.budget import Budget
 from alloc.problems import Instance
@@ -7,10 +7,10 @@ NEAR = 20
 """Candidates per agent, besides being idle, in games on a whole instance."""
 
 PAIRS_PER_SECOND = 40_000
-"""Pairs of agent and candidate whose game is over after a second on one slow core."""
+"""Pairs of agent and candidate of a game that takes a second on one slow core."""
 
 PLACES = 12
-"""Pairs of places, which attend to each other, that take as long in a game as one pair of agent and candidate."""
+"""Pairs of places, which attend to each other, that take as long as one pair of agent and candidate."""
 
 LARGEST = 3_000_000
 """Pairs beyond which one game takes more than a few gigabytes."""

@@ -1,4 +1,4 @@
-"""From a policy to a plan: games on the whole instance first, then games on parts of it, until time is up."""
+"""From a policy to a plan: games on the whole instance, then on regions of it until the budget ends."""
 
 import math
 from collections.abc import Callable, Iterable, Sequence
@@ -17,22 +17,22 @@ from alloc.allocators.learned.play.batched_games import Games, play_games
 from alloc.allocators.learned.play.rollout import Best, position
 from alloc.allocators.learned.search.fine_tuning import FineTuning
 from alloc.allocators.learned.search.limits import NEAR
-from alloc.allocators.learned.search.regions import cover, links_between
-from alloc.allocators.learned.search.target_makespan import Aims
+from alloc.allocators.learned.search.regions import partition, reach_graph
+from alloc.allocators.learned.search.target_makespan import TargetMakespan
 from alloc.allocators.parallel.pool import Pool
 from alloc.problems import IDLE, Allocation, Objective, serve_all
-from alloc.problems.game import Board, begin, make_board, pick
-from alloc.problems.game.candidates import Layout, near_tasks
-from alloc.problems.game.parts import Parts, lay_out_parts
+from alloc.problems.game import Board, at_slot, make_board, reset
+from alloc.problems.game.candidates import Candidates, candidate_tasks
+from alloc.problems.game.regions import Regions, lay_out_regions
 
 Ints = NDArray[np.int64]
 
 STREAMS = 2
-"""Batches of games that are played side by side, in as many threads if the run may have them."""
+"""Batches of games played side by side, in as many threads if the run may have them."""
 
 WHOLE_ROUNDS = 16
-"""Most rounds of a game on the whole instance, besides two for every agent that a task has in the mean, or one for each
-that the largest task needs."""
+"""Most rounds of a game on the whole instance, plus twice the mean number of agents a task, or once the number that the
+largest task needs."""
 
 SECOND_GAME = 0.15
 """Share of the budget after which no second game on the whole instance is begun."""
@@ -40,61 +40,62 @@ SECOND_GAME = 0.15
 
 @dataclass(frozen=True)
 class PlannerParameters:
-    """How a policy is put to use.
+    """How a policy is used.
 
     Attributes
     ----------
     near : int
         Candidates per agent in games on the whole instance.
-    lane_pairs : int
+    pairs_per_stream : int
         Pairs of agent and candidate in the games of a stream.
-    most_lanes : int
-        Games on one part in a stream, at the most.
-    part_tasks : (int, int)
-        Least and most tasks of a part.
-    larger_parts, far_share : int, float
-        How much larger parts may be when patience runs out, and the share of those then that are of tasks anywhere.
+    games_per_region : int
+        Most games on one region in a stream.
+    region_tasks : (int, int)
+        Least and most tasks of a region.
+    extra_tasks, random_share : int, float
+        How much larger regions may be at full stagnation, and the share of them then that are of random tasks.
     rounds : int
-        Most rounds of a game on a part; more of them are worth less than more games.
-    fresh_share : float
-        Share of the games on parts in which everybody begins at the nearest task.
-    ruined : (float, float)
-        Least and most chance of an agent to begin at the nearest task in the other games; the rest keep their place.
+        Most rounds of a game on a region; more games bring more than more rounds.
+    restart_share : float
+        Share of the games on regions in which all agents begin at the nearest task.
+    moved : (float, float)
+        Least and most probability of an agent to begin at the nearest task in the other games; else it begins where
+        the plan has it.
     scattered_share : float
-        Share of the streams in which agents begin at any candidate instead of the nearest.
+        Share of the streams in which agents begin at a random candidate instead of the nearest.
     scattered : (float, float)
-        Least and most chance of an agent to do so.
+        Least and most probability of an agent to do so.
     temperature : (float, float)
-        Least and most of what scores are divided by in games on parts.
+        Least and most of what scores are divided by in games on regions.
     patience : int
-        Sweeps over all parts without success after which a longer makespan is aimed at; see `Aims`.
+        Sweeps over all regions without success after which the target is a longer makespan; see `TargetMakespan`.
     makespan_share : float
         Share of the budget after which energy counts, if it does, even if the makespan may not be the least.
-    first_price, second_price : float
-        Weight of energy in the first game, which is the first answer; and in the second, from where games on parts go
-        on if energy counts: it is easier to mend a lack than to save energy.
+    first_energy_weight, second_energy_weight : float
+        Weight of energy in the first game, which is the first answer; and in the second, where games on regions begin
+        if energy counts: it is easier to make up for a shortfall than to save energy.
     """
 
     near: int = NEAR
-    lane_pairs: int = 4_000
-    most_lanes: int = 64
-    part_tasks: tuple[int, int] = (2, 5)
-    larger_parts: int = 3
-    far_share: float = 0.5
+    pairs_per_stream: int = 4_000
+    games_per_region: int = 64
+    region_tasks: tuple[int, int] = (2, 5)
+    extra_tasks: int = 3
+    random_share: float = 0.5
     rounds: int = 8
-    fresh_share: float = 0.3
-    ruined: tuple[float, float] = (0.2, 0.9)
+    restart_share: float = 0.3
+    moved: tuple[float, float] = (0.2, 0.9)
     scattered_share: float = 0.1
     scattered: tuple[float, float] = (0.05, 0.4)
     temperature: tuple[float, float] = (0.4, 0.9)
     patience: int = 20
     makespan_share: float = 0.6
-    first_price: float = 0.8
-    second_price: float = 3.0
+    first_energy_weight: float = 0.8
+    second_energy_weight: float = 3.0
 
 
-PRICES = {Objective.MAKESPAN: (0.2, 0.8), Objective.MAKESPAN_ENERGY: (0.6, 3.0)}
-"""Weights of energy that games on parts are played at."""
+ENERGY_WEIGHTS = {Objective.MAKESPAN: (0.2, 0.8), Objective.MAKESPAN_ENERGY: (0.6, 3.0)}
+"""Least and most weight of energy in games on regions."""
 
 
 class Planner:
@@ -107,7 +108,7 @@ class Planner:
         The best first.
     parameters : PlannerParameters, optional
     tuning : FineTuning, optional
-        Learns on in between.
+        Fine-tunes the networks between sweeps.
     """
 
     def __init__(
@@ -123,40 +124,42 @@ class Planner:
         self.run_all: Callable[..., Iterable[Best]] = map
         self.rng = np.random.default_rng(search.seed)
         self.instance = search.instance
-        self.aims = Aims(search, self.instance, self.parameters.patience, self.parameters.makespan_share)
+        self.target = TargetMakespan(search, self.instance, self.parameters.patience, self.parameters.makespan_share)
         self.plan = np.full(search.instance.n, IDLE)
 
     def run(self) -> None:
         """Play until the budget ends; every improvement has been submitted by then."""
-        self.play_whole(self.parameters.first_price)
+        self.play_whole(self.parameters.first_energy_weight)
         if not (self.instance.workload > 0).any():
             return
-        if self.search.objective is Objective.MAKESPAN_ENERGY and self.aims.spent < SECOND_GAME:
-            self.play_whole(self.parameters.second_price)
-        with self.search.improving("playing on parts"), Pool(STREAMS) as pool:
+        if self.search.objective is Objective.MAKESPAN_ENERGY and self.target.spent < SECOND_GAME:
+            self.play_whole(self.parameters.second_energy_weight)
+        with self.search.improving("playing on regions"), Pool(STREAMS) as pool:
             self.run_all = pool.map if self.search.threads > 1 else map
             while not self.search.should_stop():
                 self._sweep()
                 self.search.iteration += 1
 
-    def play_whole(self, price: float) -> None:
-        """Play one greedy game on the whole instance, and go on from where it ends."""
+    def play_whole(self, energy_weight: float) -> None:
+        """Play one greedy game on the whole instance, and continue from its best plan."""
         search, instance = self.search, self.instance
         plan = None if search.start is None else search.start.task_of_agent
-        board = make_board([instance], [self.aims.hours], [price], self.rng, near=self.parameters.near, plan=plan)
-        games = Games(np.zeros(1, dtype=np.int64), board.price.numpy(), board.start.numpy())
+        board = make_board(
+            [instance], [self.target.hours], [energy_weight], self.rng, near=self.parameters.near, plan=plan
+        )
+        games = Games(np.zeros(1, dtype=np.int64), board.energy_weight.numpy(), board.start.numpy())
         rounds = WHOLE_ROUNDS + max(2 * instance.n // instance.m, most_helpers(board))
         best = play_games(self.networks[0], board, games, rounds=rounds, should_stop=self._late)
-        place = pick(board.goal, best.slot)[0].numpy()
-        self._go_on_from(np.where(place == instance.m, IDLE, place))
+        place = at_slot(board.candidates, best.slot)[0].numpy()
+        self._continue_from(np.where(place == instance.m, IDLE, place))
 
     def _late(self) -> bool:
-        """Whether a game has to end where it is: the first one goes on unless the time itself is up."""
+        """Whether a game must stop: before there is any plan, only when the time itself is up or on a stop request."""
         search = self.search
         return search.should_stop() if search.best is not None else search.interrupted or search.remaining_s <= 0
 
-    def _go_on_from(self, plan: Ints) -> None:
-        """Score a plan, with all tasks served that can be, and take it for the one to be improved."""
+    def _continue_from(self, plan: Ints) -> None:
+        """Submit a plan, with all tasks served that can be, and make it the one to be improved."""
         allocation = Allocation(plan)
         if not np.isin(np.flatnonzero(self.instance.workload > 0), plan).all():
             allocation = serve_all(self.instance, allocation)
@@ -164,69 +167,79 @@ class Planner:
         self.plan = allocation.task_of_agent
 
     def _sweep(self) -> None:
-        """Cover the instance with parts, play each many times, and keep what is better."""
-        search, aims = self.search, self.aims
+        """Partition the tasks into regions, play each many times, and keep what is better."""
+        search, target = self.search, self.target
         assert search.best is not None
-        if aims.set(self.plan):
+        if target.update(self.plan):
             self.plan = search.best.allocation.task_of_agent
-        surplus = aims.surplus(self.plan)
-        aims.note(surplus)
-        tasks, agents = self._cover(surplus)
-        parts = lay_out_parts(self.instance, aims.hours, self.plan, tasks, agents)
+        surplus = target.surplus(self.plan)
+        target.record(surplus)
+        tasks, agents = self._partition(surplus)
+        regions = lay_out_regions(self.instance, target.hours, self.plan, tasks, agents)
         if self.tuning is not None and self.tuning.is_due():
-            self._learn(self.tuning, parts)
+            self._learn(self.tuning, regions)
         network = self.networks[int(self.rng.integers(len(self.networks)))]
-        goal = Objective.MAKESPAN if (surplus < 0).any() else search.objective
-        accepted, slots = self._play_parts(network, parts, PRICES[goal])
+        objective = Objective.MAKESPAN if (surplus < 0).any() else search.objective
+        accepted, slots = self._play_regions(network, regions, ENERGY_WEIGHTS[objective])
         if accepted.any():
-            self._go_on_from(parts.merge(self.plan, slots, accepted))
+            self._continue_from(regions.merge(self.plan, slots, accepted))
 
-    def _learn(self, tuning: FineTuning, parts: Parts) -> None:
-        """Play on with what is learned; should that fail, with the policy as it was, and learn no more."""
+    def _learn(self, tuning: FineTuning, regions: Regions) -> None:
+        """Fine-tune the networks; should that fail, use them as they were, and learn no more."""
         self.networks, self.tuning = tuning.shipped, None
-        with self.search.improving("learning on"):
-            self.networks, self.tuning = tuning.learn(parts), tuning
+        with self.search.improving("fine-tuning"):
+            self.networks, self.tuning = tuning.learn(regions), tuning
 
-    def _cover(self, surplus: NDArray[np.float64]) -> tuple[Ints, list[Ints]]:
-        """Partition tasks into neighbours, and find the agents that work there, and idle ones that could."""
+    def _partition(self, surplus: NDArray[np.float64]) -> tuple[Ints, list[Ints]]:
+        """Partition the tasks into regions; return their tasks and agents: those there, and idle ones in reach."""
         instance, rng = self.instance, self.rng
-        low, high = self.parameters.part_tasks
-        lacking = bool((surplus < 0).any())
-        in_vain = self.aims.in_vain if lacking else 0.0
-        high += round(self.parameters.larger_parts * in_vain)
+        low, high = self.parameters.region_tasks
+        is_short = bool((surplus < 0).any())
+        stagnation = self.target.stagnation if is_short else 0.0
+        high += round(self.parameters.extra_tasks * stagnation)
         size = min(int(rng.integers(low, high + 1)), instance.m)
-        bound_by_reach = lacking and not instance.reach.is_complete
-        links = links_between(self._near, self.plan, instance.m, rng) if bound_by_reach else None
-        tasks = cover(instance.task_position, surplus, size, rng, self.parameters.far_share * in_vain, links)
-        part_of = np.full(instance.m + 1, -1)
-        part_of[tasks.ravel()] = np.repeat(np.arange(len(tasks)), size)
-        chosen = part_of[self.plan]  # idle agents have no part yet: index -1 is the last entry
+        bound_by_reach = is_short and not instance.reach.is_complete
+        graph = reach_graph(self._near, self.plan, instance.m, rng) if bound_by_reach else None
+        tasks = partition(instance.task_position, surplus, size, rng, self.parameters.random_share * stagnation, graph)
+        region_of = np.full(instance.m + 1, -1)
+        region_of[tasks.ravel()] = np.repeat(np.arange(len(tasks)), size)
+        chosen = region_of[self.plan]  # idle agents have no region yet: index -1 is the last entry
         idle = np.flatnonzero(self.plan == IDLE)
         if len(idle):
-            goal, _, legal = self._near
-            chance = np.where(legal[idle] & (part_of[goal[idle]] >= 0), rng.random((len(idle), goal.shape[1])), -1.0)
-            chosen[idle] = np.where(chance.max(1) >= 0, part_of[goal[idle, chance.argmax(1)]], -1)
+            place, _, legal = self._near
+            chance = np.where(
+                legal[idle] & (region_of[place[idle]] >= 0), rng.random((len(idle), place.shape[1])), -1.0
+            )
+            chosen[idle] = np.where(chance.max(1) >= 0, region_of[place[idle, chance.argmax(1)]], -1)
         order = np.argsort(chosen, kind="stable")
         first = np.searchsorted(chosen[order], np.arange(len(tasks) + 1))
         return tasks, [order[first[p] : first[p + 1]] for p in range(len(tasks))]
 
     @cached_property
-    def _near(self) -> Layout:
-        """Candidates of each agent, in games on the whole; see `near_tasks`."""
-        return near_tasks(self.instance, self.parameters.near, None)
+    def _near(self) -> Candidates:
+        """Candidates of each agent in games on the whole instance; see `candidate_tasks`."""
+        return candidate_tasks(self.instance, self.parameters.near, None)
 
-    def _play_parts(
-        self, network: ActorCritic, parts: Parts, prices: tuple[float, float]
+    def _play_regions(
+        self, network: ActorCritic, regions: Regions, energy_weights: tuple[float, float]
     ) -> tuple[NDArray[np.bool_], Ints]:
-        """Play the parts in several streams; return which games are better than the plan, and their slots."""
-        streams = [self._games(parts, prices) for _ in range(STREAMS)]
+        """Play the regions in several streams.
+
+        Returns
+        -------
+        accepted : ndarray of bool, shape (G,)
+            Where the best game is better than the plan.
+        slots : ndarray of int, shape (G, k)
+            Those of the best game.
+        """
+        streams = [self._games(regions, energy_weights) for _ in range(STREAMS)]
         temperatures = self.rng.uniform(*self.parameters.temperature, STREAMS).tolist()
         seeds = self.rng.integers(2**63, size=STREAMS).tolist()
 
         def one(number: int) -> Best:
             return play_games(
                 network,
-                parts.board,
+                regions.board,
                 streams[number],
                 rounds=self.parameters.rounds,
                 seed=seeds[number],
@@ -240,29 +253,29 @@ class Planner:
         )
         row = np.concatenate([games.row for games in streams])
         order = np.lexsort((best.distance.numpy(), best.shortfall.numpy().round(6), best.unserved.numpy(), row))
-        first = torch.from_numpy(order[:: len(row) // len(parts.tasks)].copy())
+        first = torch.from_numpy(order[:: len(row) // len(regions.tasks)].copy())
         found = Best(*(getattr(best, field.name)[first] for field in fields(Best)))
-        now = position(parts.board, begin(parts.board), total=True)
+        now = position(regions.board, reset(regions.board), total=True)
         return found.better_than(now).numpy(), found.slot.numpy()
 
-    def _games(self, parts: Parts, prices: tuple[float, float]) -> Games:
-        """Lay out several games on every part, from various beginnings and at various prices."""
-        parameters, rng, board, count = self.parameters, self.rng, parts.board, len(parts.tasks)
+    def _games(self, regions: Regions, energy_weights: tuple[float, float]) -> Games:
+        """Return several games on every region, from various starts and at various weights of energy."""
+        parameters, rng, board, count = self.parameters, self.rng, regions.board, len(regions.tasks)
         pairs = board.shape[1] * board.shape[2]
-        lanes = count * int(np.clip(parameters.lane_pairs // (count * pairs), 1, parameters.most_lanes))
-        row = np.arange(count).repeat(lanes // count)
-        ruined = rng.uniform(*parameters.ruined, lanes)
-        ruined[rng.random(lanes) < parameters.fresh_share] = 1.0
-        away = parts.home.numpy()[row]
+        games = count * int(np.clip(parameters.pairs_per_stream // (count * pairs), 1, parameters.games_per_region))
+        row = np.arange(count).repeat(games // count)
+        moved = rng.uniform(*parameters.moved, games)
+        moved[rng.random(games) < parameters.restart_share] = 1.0
+        elsewhere = regions.nearest.numpy()[row]
         if rng.random() < parameters.scattered_share:
-            ruined = rng.uniform(*parameters.scattered, lanes)
-            away = np.where(board.legal.numpy()[row], rng.random((lanes, *board.shape[1:])), -1.0).argmax(2)
-        back = rng.random((lanes, board.shape[1])) < ruined[:, None]
-        start = np.where(back, away, board.start.numpy()[row])
-        cheap, dear = np.log(prices)
-        return Games(row, np.exp(rng.uniform(cheap, dear, lanes)), start)
+            moved = rng.uniform(*parameters.scattered, games)
+            elsewhere = np.where(board.legal.numpy()[row], rng.random((games, *board.shape[1:])), -1.0).argmax(2)
+        is_moved = rng.random((games, board.shape[1])) < moved[:, None]
+        start = np.where(is_moved, elsewhere, board.start.numpy()[row])
+        low, high = np.log(energy_weights)
+        return Games(row, np.exp(rng.uniform(low, high, games)), start)
 
 
 def most_helpers(board: Board) -> int:
-    """Return how many mean agents the largest task needs, but not more than there are: one joins it in a round."""
+    """Return how many mean agents the largest task needs, at most all there are: one joins it in a round."""
     return min(board.shape[1], math.ceil(float(board.need.max())))

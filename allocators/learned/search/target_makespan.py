@@ -1,4 +1,4 @@
-"""Which makespan games are to reach: the least possible first, and then what seems within reach."""
+"""The makespan that games on regions are to reach: the lower bound first, then what seems achievable."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,39 +6,39 @@ from numpy.typing import NDArray
 from alloc.allocators.contract.search import Search
 from alloc.allocators.learned.training.curriculum import reference_makespan
 from alloc.problems import IDLE, Instance, Objective
-from alloc.problems.game.board import working_share
+from alloc.problems.game.layout import SHORTEST_HOURS, working_share
 
 Ints = NDArray[np.int64]
 
-UNHURRIED_S = 30.0
+BOUND_UNLIMITED_S = 30.0
 """Seconds that the first bound may take where there is no time limit: runs that count iterations have to repeat."""
 
 BOUND_SHARE = 0.1
 """Share of the time limit that the first bound may take."""
 
 ROUNDING = 1e-9
-"""Share of the need by which a group may be off and still be right."""
+"""Share of the need by which a group may differ and still count as sufficient."""
 
 CHECK_SHARE, CHECK_SWEEPS = 0.1, 5
-"""Share of the budget, and sweeps, after which it is asked how much of what was lacking still is."""
+"""Share of the budget, and sweeps, between two checks of how far the shortfall has fallen."""
 
 TOO_SLOW = 0.5
-"""Share of what was lacking at the last check that must be gone by the next, or the aim is given up."""
+"""Share of the shortfall at the last check below which it must be at the next, or the target is given up."""
 
-LITTLE, FEW = 0.002, 0.1
-"""What is lacking is a rest, for which only patience counts, if it is no more than this share of all that is needed, or
-one mean ability, and no more than this share of the tasks lack it, or two."""
+SMALL_SHORTFALL, FEW_TASKS = 0.002, 0.1
+"""A shortfall is small, so that only patience ends a target, if it is no more than this share of all needs or one mean
+ability, and no more than this share of the tasks, or two tasks, are short."""
 
-UNCONCERNED = 5
-"""Sweeps without success that mean nothing."""
+GRACE_SWEEPS = 5
+"""Sweeps without success that do not count as stagnation."""
 
 
-class Aims:
-    """The makespan that games on parts aim at, as a run goes on.
+class TargetMakespan:
+    """The makespan that games on regions are to reach, as a run goes on.
 
-    The first aim is the best lower bound. An aim is given up when nothing gets better or it comes too slowly; the next
-    one is halfway to the makespan reached. Once that is as good as it gets, or most of the budget is spent, energy
-    counts, if it does at all.
+    The first target is the best lower bound. A target is given up on stagnation, or where the shortfall falls too
+    slowly; the next one is halfway to the makespan reached. Once no better makespan is possible, or most of the budget
+    is spent, the target is the makespan reached, and games are for energy, if the objective has it.
 
     Parameters
     ----------
@@ -46,18 +46,18 @@ class Aims:
     instance : Instance
         Of the search, without what cannot be served.
     patience : int
-        Sweeps over all parts without success after which an aim is given up.
+        Sweeps over all regions without success after which a target is given up.
     makespan_share : float
         Share of the budget after which energy counts even if the makespan may not be the least.
 
     Attributes
     ----------
     hours : float
-        The aim.
+        The target.
     failed : float
         A makespan that could not be reached, or is a lower bound.
     stale : int
-        Sweeps since less was lacking.
+        Sweeps since the shortfall last fell.
     """
 
     def __init__(self, search: Search, instance: Instance, patience: int, makespan_share: float) -> None:
@@ -68,24 +68,25 @@ class Aims:
         if instance is search.instance:
             search.raise_bound(bound)
         self.failed = max(bound, self._given_limit())
-        self._aim_at(self.failed)
+        self._start(self.failed)
 
     def _bound(self) -> float:
         limit = self.search.budget.time_limit_s
-        return reference_makespan(self.instance, UNHURRIED_S if limit is None else BOUND_SHARE * limit)
+        return reference_makespan(self.instance, BOUND_UNLIMITED_S if limit is None else BOUND_SHARE * limit)
 
     def _given_limit(self) -> float:
         """Hours that the user gave, up to which a plan need be no faster."""
         energy_counts = self.search.objective is Objective.MAKESPAN_ENERGY
         return self.search.tolerance.limit or 0.0 if energy_counts else 0.0
 
-    def _aim_at(self, hours: float) -> None:
+    def _start(self, hours: float) -> None:
+        """Set a new target, and start its counters."""
         self.hours, self.stale = hours, 0
-        self.least_shortfall = self._shortfall_then = np.inf
-        self._checked, self._sweeps, self._lacking = self.spent, 0, 0
+        self.least_shortfall = self._shortfall_at_check = np.inf
+        self._checked, self._sweeps, self._short_tasks = self.spent, 0, 0
 
-    def set(self, plan: Ints) -> bool:
-        """Decide on the aim; return whether it is all about energy from here on."""
+    def update(self, plan: Ints) -> bool:
+        """Choose the target for the next sweep; return whether games are for energy alone from here on."""
         search = self.search
         assert search.fastest is not None
         reached = search.fastest.evaluation.served_makespan
@@ -95,54 +96,55 @@ class Aims:
             self.hours = search.makespan_limit
             return True
         if reached <= self.hours * (1 + ROUNDING):
-            self._aim_at((self.failed + reached) / 2)
+            self._start((self.failed + reached) / 2)
         elif self.stale >= self.patience or self._is_too_slow():
             self.failed = self.hours
-            self._aim_at((self.hours + reached) / 2)
+            self._start((self.hours + reached) / 2)
         elif self.hours < (balanced := self._balanced(plan)) * (1 - ROUNDING):
             self.hours = min(balanced, (self.hours + reached) / 2)
         return False
 
     def surplus(self, plan: Ints) -> NDArray[np.float64]:
-        """Return the ability that each task has too much for the aim, negative where it lacks some, shape (m,).
+        """Return the ability at each task beyond its need at the target, negative for a shortfall, shape (m,).
 
-        A task without anyone lacks nothing: the plan serves as many tasks as can be, and no part of it serves more.
+        It is 0 for a task without anyone: the plan serves as many tasks as can be, and no region of it serves more.
         """
         instance = self.instance
         agent = np.flatnonzero(plan != IDLE)
         share = working_share(instance.speed[agent], instance.reach.distance_of(agent, plan[agent]), self.hours)
         group = np.bincount(plan[agent], instance.ability[agent] * share, minlength=instance.m)
         with np.errstate(over="ignore"):
-            need = instance.workload / max(self.hours, 1e-300)
+            need = instance.workload / max(self.hours, SHORTEST_HOURS)
         alone = np.bincount(plan[agent], minlength=instance.m) == 0
         return np.where(alone | (np.abs(group - need) <= ROUNDING * need), 0.0, group - need)
 
-    def note(self, surplus: NDArray[np.float64]) -> None:
-        """Note what a plan lacks, before a sweep."""
+    def record(self, surplus: NDArray[np.float64]) -> None:
+        """Record the shortfall of a plan before a sweep."""
         shortfall = float(-surplus[surplus < 0].sum())
         self.stale = 0 if shortfall < self.least_shortfall else self.stale + 1
         self.least_shortfall = min(shortfall, self.least_shortfall)
-        self._lacking = int((surplus < 0).sum())
+        self._short_tasks = int((surplus < 0).sum())
         self._sweeps += 1
 
     @property
-    def in_vain(self) -> float:
+    def stagnation(self) -> float:
         """How much of the patience is used up, from 0 to 1."""
-        return min(1.0, max(0, self.stale - UNCONCERNED) / max(1, self.patience - UNCONCERNED))
+        return min(1.0, max(0, self.stale - GRACE_SWEEPS) / max(1, self.patience - GRACE_SWEEPS))
 
     def _is_too_slow(self) -> bool:
-        """Whether most of what was lacking a while ago still is, and that is more than a rest."""
+        """Whether, at a check, the shortfall has not fallen by enough since the last one and is not small."""
         if self._sweeps < CHECK_SWEEPS or self.spent - self._checked < CHECK_SHARE:
             return False
-        rest = 0.0
-        if self._lacking <= max(2, FEW * self.instance.m):
-            rest = max(self._mean_ability, LITTLE * float(self.instance.workload.sum()) / max(self.hours, 1e-300))
-        slow = self.least_shortfall > max(TOO_SLOW * self._shortfall_then, rest)
-        self._checked, self._sweeps, self._shortfall_then = self.spent, 0, self.least_shortfall
+        small = 0.0
+        if self._short_tasks <= max(2, FEW_TASKS * self.instance.m):
+            workload = float(self.instance.workload.sum())
+            small = max(self._mean_ability, SMALL_SHORTFALL * workload / max(self.hours, SHORTEST_HOURS))
+        slow = self.least_shortfall > max(TOO_SLOW * self._shortfall_at_check, small)
+        self._checked, self._sweeps, self._shortfall_at_check = self.spent, 0, self.least_shortfall
         return slow
 
     def _balanced(self, plan: Ints) -> float:
-        """Hours that the plan would take if its work were shared out without a rest, flights included; 0 without."""
+        """Hours that the plan would take with its work divided evenly, flights included; 0 without finite speeds."""
         instance = self.instance
         agent = np.flatnonzero(plan != IDLE)
         if not np.isfinite(instance.speed).any() or not len(agent):

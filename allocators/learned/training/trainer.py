@@ -17,7 +17,7 @@ from alloc.allocators.learned.algorithms.learner import TrainingJob
 from alloc.allocators.learned.files.checkpoint import read_checkpoint, write_checkpoint
 from alloc.allocators.learned.files.description import described
 from alloc.allocators.learned.files.policy_file import save_policy
-from alloc.allocators.learned.network.actor_critic import unfilled
+from alloc.allocators.learned.network.actor_critic import uninitialised
 from alloc.allocators.learned.training.limits import Limits
 from alloc.allocators.learned.training.member import MemberJob, MemberResult, Weights, initial_state, train_member
 from alloc.allocators.learned.training.parameters import TrainingParameters
@@ -172,7 +172,7 @@ class Trainer:
         """Write the best networks up to now to a policy file."""
         networks = []
         for weights in self.best:
-            network = unfilled(self.parameters.network)
+            network = uninitialised(self.parameters.network)
             network.load_state_dict(weights)
             networks.append(network)
         report = self.history[self.best_generation - 1]

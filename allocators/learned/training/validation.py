@@ -9,11 +9,11 @@ import torch
 from torch import Tensor
 
 from alloc.allocators.learned.network.actor_critic import ActorCritic
-from alloc.allocators.learned.play.action_sampling import choose
+from alloc.allocators.learned.play.action_sampling import sample_actions
 from alloc.allocators.learned.training.curriculum import Curriculum, TrainingInstance, with_reference
 from alloc.allocators.learned.training.families import RECIPES, draw_instance
 from alloc.problems import InputError, Instance
-from alloc.problems.game import Board, Rules, begin, flown, make_board, step, time_over_reference, worth
+from alloc.problems.game import Board, Rules, make_board, mean_distance, relative_makespan, reset, step, utility
 from alloc.problems.generate import paper_like
 
 VALIDATION = "shortfall-1"
@@ -153,16 +153,16 @@ class _Outcome(NamedTuple):
 
 def _play(network: ActorCritic, board: Board, rules: Rules, steps: int) -> _Outcome:
     """Play a board, and return the figures of the best position of each game."""
-    state = begin(board)
-    start = worth(board, state, rules)
+    state = reset(board)
+    start = utility(board, state, rules)
     best = _Outcome(torch.full_like(start, torch.inf), start, start, start, start)
     for _ in range(steps):
-        _, slot = choose(board, state, network(board, state), rules)
+        _, slot = sample_actions(board, state, network(board, state), rules)
         state = step(board, state, slot)
-        time, unserved = time_over_reference(board, state.group)
-        distance = flown(board, state, rules)
+        time, unserved = relative_makespan(board, state.group)
+        distance = mean_distance(board, state, rules)
         cost = 1 - 1 / time.clamp(min=1) + unserved + DISTANCE_WEIGHT * distance
-        now = _Outcome(cost, unserved.to(cost.dtype), time, distance, worth(board, state, rules) - start)
+        now = _Outcome(cost, unserved.to(cost.dtype), time, distance, utility(board, state, rules) - start)
         better = cost < best.cost
         best = _Outcome(*(torch.where(better, one, other) for one, other in zip(now, best, strict=True)))
         if bool(state.done.all()):

@@ -9,9 +9,9 @@ import torch
 from torch import Tensor
 
 from alloc.allocators.learned.algorithms.learner import Learner, TrainingJob
-from alloc.allocators.learned.play.action_sampling import choose
+from alloc.allocators.learned.play.action_sampling import sample_actions
 from alloc.problems import Instance
-from alloc.problems.game import PLANNING, Board, Rules, begin, group_ability, make_board, step, worth
+from alloc.problems.game import PLANNING, Board, Rules, group_ability, make_board, reset, step, utility
 
 GAMES = 64
 
@@ -74,13 +74,13 @@ def probe(name: str) -> Probe:
 def best_utility(board: Board) -> Tensor:
     """Return the maximum utility over all allocations in each game, by enumeration, shape (B,)."""
     batch, n, c = board.shape
-    start = begin(board)
+    start = reset(board)
     found = torch.full((batch,), -torch.inf)
     for slots in product(range(c), repeat=n):
         slot = torch.tensor(slots).expand(batch, n)
         allowed = board.legal.gather(2, slot[..., None]).flatten(1).all(1)
         moved = vars(start) | {"slot": slot, "group": group_ability(board, slot)}
-        value = worth(board, type(start)(**moved))
+        value = utility(board, type(start)(**moved))
         found = torch.where(allowed, torch.maximum(found, value), found)
     return found
 
@@ -88,11 +88,11 @@ def best_utility(board: Board) -> Tensor:
 @torch.no_grad()
 def share_solved(learner: Learner, board: Board, rules: Rules = PLANNING) -> float:
     """Return the share of the games in which the best bids end at the best allocation."""
-    state = begin(board)
+    state = reset(board)
     for _ in range(6):
-        _, slot = choose(board, state, learner.policy(board, state), rules)
+        _, slot = sample_actions(board, state, learner.policy(board, state), rules)
         state = step(board, state, slot)
-    return float((worth(board, state, rules) > best_utility(board) - 1e-4).float().mean())
+    return float((utility(board, state, rules) > best_utility(board) - 1e-4).float().mean())
 
 
 def share_learned(learner: Learner, name: str, jobs: int = 40, decisions: int = 150) -> float:

@@ -12,7 +12,7 @@ from alloc.allocators import load, solve
 from alloc.allocators.learned.network.actor_critic import ActorCritic
 from alloc.allocators.learned.play.batched_games import Games, play_games
 from alloc.problems import Family, Instance, random_instance
-from alloc.problems.game import Board, State, begin, step, sum_by_place
+from alloc.problems.game import Board, State, reset, step, sum_by_place
 from alloc.problems.generate import paper_like
 
 pytestmark = [
@@ -42,13 +42,13 @@ def pair() -> tuple[ActorCritic, ActorCritic]:
 
 
 def games_on(board: Board, copies: int = 1) -> Games:
-    row = np.arange(len(board.price)).repeat(copies)
-    return Games(row, board.price.numpy().astype(float)[row], board.start.numpy()[row])
+    row = np.arange(len(board.energy_weight)).repeat(copies)
+    return Games(row, board.energy_weight.numpy().astype(float)[row], board.start.numpy()[row])
 
 
 def states(board: Board) -> Iterator[State]:
     """States on the way of agents that go anywhere."""
-    state, generator = begin(board), torch.Generator().manual_seed(0)
+    state, generator = reset(board), torch.Generator().manual_seed(0)
     for _ in range(4):
         yield state
         drawn = torch.rand(board.shape, generator=generator).masked_fill(~board.legal, -1.0).argmax(2)

@@ -7,7 +7,7 @@ from resuming import assert_resumes_elsewhere
 
 from alloc.allocators.learned.algorithms.hyperparameters import GappoParameters, PpoParameters
 from alloc.allocators.learned.algorithms.ppo import Ppo
-from alloc.problems.game import State, begin, group_ability, worth
+from alloc.problems.game import State, group_ability, reset, utility
 
 PARAMETERS = {"ppo": PpoParameters(), "gappo": GappoParameters()}
 
@@ -21,7 +21,7 @@ def known_answer(name: str) -> torch.Tensor:
         return (board.ability[:, :, None] - board.need[:, None, :-1]).abs().argmin(2)
     if name == "when_to_stop":
         return torch.tensor([0, 0, 1]).expand_as(board.start)
-    return torch.where(board.price[:, None] > 1, torch.tensor([0, 0]), torch.tensor([0, 1]))
+    return torch.where(board.energy_weight[:, None] > 1, torch.tensor([0, 0]), torch.tensor([0, 1]))
 
 
 @pytest.mark.parametrize("name", PROBES)
@@ -29,8 +29,8 @@ def test_answers_are_known(name: str) -> None:
     """The optimum found by enumeration is the one known by reasoning."""
     board = probe(name).board
     slot = known_answer(name)
-    state = State(**{**vars(begin(board)), "slot": slot, "group": group_ability(board, slot)})
-    torch.testing.assert_close(worth(board, state), best_utility(board))
+    state = State(**{**vars(reset(board)), "slot": slot, "group": group_ability(board, slot)})
+    torch.testing.assert_close(utility(board, state), best_utility(board))
 
 
 @pytest.mark.parametrize("name", PROBES)
@@ -38,7 +38,7 @@ def test_playing_without_learning_is_not_enough(name: str) -> None:
     """An untrained network does not solve all games, nor does the initial allocation."""
     board = probe(name).board
     assert share_solved(Ppo(), board) < 1
-    assert (worth(board, begin(board)) < best_utility(board) - 1e-3).any()
+    assert (utility(board, reset(board)) < best_utility(board) - 1e-3).any()
 
 
 @pytest.mark.parametrize("method", PARAMETERS)

@@ -77,7 +77,7 @@ def test_a_failure_in_learning_on_costs_no_plan(
     monkeypatch.setattr(FineTuning, "learn", fail)
     result = solve(paper_like(24, 6, 100, 0), "gappo", objective="makespan-energy", time_limit_s=1.0)
     assert str(result.stop_reason) == "time_limit"
-    assert result.notes == (f"learning on failed (RuntimeError: out of luck); {STANDS}",)
+    assert result.notes == (f"fine-tuning failed (RuntimeError: out of luck); {STANDS}",)
     (record,) = caplog.records
     assert (record.name, record.exc_info is not None) == ("alloc", True)
 
@@ -87,7 +87,7 @@ def test_threads_are_those_of_the_calling_thread() -> None:
     seen: list[int] = []
     first_in, second_in, first_out = threading.Event(), threading.Event(), threading.Event()
 
-    def fresh() -> int:
+    def initialised() -> int:
         thread = threading.Thread(target=lambda: seen.append(torch.get_num_threads()))
         thread.start()
         thread.join()
@@ -110,11 +110,11 @@ def test_threads_are_those_of_the_calling_thread() -> None:
             assert torch.get_num_threads() == 1
             first_in.set()
             second_in.wait(10)
-            assert fresh() == 3
+            assert initialised() == 3
         first_out.set()
         other.join()
         assert seen == [1, 3, 3]
-        assert (torch.get_num_threads(), fresh()) == (3, 3)
+        assert (torch.get_num_threads(), initialised()) == (3, 3)
     finally:
         torch.set_num_threads(before)
 

@@ -11,7 +11,7 @@ from gymnasium.utils.env_checker import check_env
 
 from alloc.problems import Allocation, Family, InputError, Instance, evaluate, paper_like, random_instance
 from alloc.problems.environments import BiddingEnv
-from alloc.problems.game import PAPER, Reward, Rules, worth
+from alloc.problems.game import PAPER, Reward, Rules, utility
 
 
 def small(**options) -> BiddingEnv:
@@ -59,7 +59,7 @@ def test_observations_lie_in_their_space(name: str) -> None:
 
 def test_a_game_by_hand(street: Instance) -> None:
     """The second agent flies 3 to the second task, then the planner stops: both tasks take an hour, for 3 of energy."""
-    env = BiddingEnv([street], price=0.0)
+    env = BiddingEnv([street], energy_weight=0.0)
     env.reset(seed=0)
     assert env.action_masks().tolist() == [False, True, True, False, True, True, True]
     _, reward, ended, cut, info = env.step(np.int64(4))
@@ -87,16 +87,16 @@ def test_illegal_actions_change_nothing(street: Instance) -> None:
 
 
 @pytest.mark.parametrize("rules", [Rules(), Rules(reward="coverage"), Rules(flying=True, returning=True)])
-def test_rewards_add_up_to_the_rise_of_the_worth(rules: Rules) -> None:
+def test_rewards_add_up_to_the_rise_of_the_utility(rules: Rules) -> None:
     """Whatever is played, an episode brings what it changed."""
     env = BiddingEnv([paper_like(8, 3, 30, 1)], rules=rules)
     env.reset(seed=0)
     env.action_space.seed(0)
-    before, total, over = worth(env._game.board, env._state, rules).item(), 0.0, False
+    before, total, over = utility(env._game.board, env._state, rules).item(), 0.0, False
     while not over:
         _, reward, ended, cut, _ = env.step(env.action_space.sample(env.action_masks().astype(np.int8)))
         total, over = total + reward, ended or cut
-    after = worth(env._game.board, env._state, rules).item()
+    after = utility(env._game.board, env._state, rules).item()
     assert total == pytest.approx(after - before, abs=1e-3 * (1 + abs(before) + abs(after)))
 
 

@@ -10,9 +10,9 @@ from pettingzoo.test import parallel_api_test, parallel_seed_test
 
 from alloc.problems import Allocation, Family, InputError, Instance, evaluate, paper_like, random_instance
 from alloc.problems.environments import SimultaneousEnv
-from alloc.problems.game import PAPER, PLANNING, Reward, Rules, Turn, begin, difference_rewards, step
+from alloc.problems.game import PAPER, PLANNING, Reward, Rules, TurnRule, difference_rewards, reset, step
 
-SEEN = ("need", "priority", "flight", "brings", "seen", "ability", "members", "lack", "here")
+SEEN = ("need", "priority", "flight", "brings", "seen", "ability", "members", "shortfall", "here")
 
 
 def small(**options) -> SimultaneousEnv:
@@ -54,7 +54,7 @@ def test_it_passes_pettingzoos_own_tests(make) -> None:
 def test_observations_lie_in_their_space(name: str) -> None:
     """Whatever the numbers, what agents see is within the bounds, and rewards are finite."""
     for reward in Reward:
-        rules = Rules(Turn.SIMULTANEOUS, reward, flying=True, returning=True)
+        rules = Rules(TurnRule.SIMULTANEOUS, reward, flying=True, returning=True)
         env = SimultaneousEnv([EXTREMES[name]], rules=rules, max_steps=4)
         seen, _ = env.reset(seed=0)
         while env.agents:
@@ -75,7 +75,7 @@ def test_what_an_agent_sees_by_hand(street: Instance) -> None:
     assert table["seen"] == [1, 1, 0]
     assert table["ability"] == pytest.approx([1.5, 0, 0])
     assert table["members"] == [2, 0, 0]
-    assert table["lack"] == pytest.approx([-1, 0.5, 0])
+    assert table["shortfall"] == pytest.approx([-1, 0.5, 0])
     assert table["here"] == [1, 0, 0]
     unit = env._game.board.scale.item()
     assert table["flight"] == pytest.approx([0, 3 * unit, 7 * unit])
@@ -116,15 +116,15 @@ def test_energy_and_battery_add_up_over_the_hops(street: Instance) -> None:
 
 def test_rewards_are_those_of_the_game(street: Instance) -> None:
     """Each agent gets its difference reward, by (3) as in the paper or by the makespan."""
-    for rules in (PAPER, Rules(Turn.SIMULTANEOUS)):
-        env = SimultaneousEnv([street], rules=rules, price=0.25)
+    for rules in (PAPER, Rules(TurnRule.SIMULTANEOUS)):
+        env = SimultaneousEnv([street], rules=rules, energy_weight=0.25)
         env.reset(seed=0)
         _, rewards, *_ = env.step(everybody(env, 1, 3, 2))
-        board = layout(street, hours=2.0, price=0.25)
+        board = layout(street, hours=2.0, energy_weight=0.25)
         slot = board.start.new_tensor([[1, 3, 2]])
-        expected = difference_rewards(board, begin(board), slot, rules)[0].tolist()
+        expected = difference_rewards(board, reset(board), slot, rules)[0].tolist()
         assert list(rewards.values()) == pytest.approx(expected)
-        assert step(board, begin(board), slot).done.item() is False
+        assert step(board, reset(board), slot).done.item() is False
 
 
 def test_the_end(street: Instance) -> None:

@@ -12,7 +12,7 @@ from oracle import reachable
 from strategies import instances
 
 from alloc.problems import IDLE, Allocation, Family, Instance, evaluate, paper_like, random_instance
-from alloc.problems.game import Board, begin, group_ability, make_board, tasks_of
+from alloc.problems.game import Board, current_tasks, group_ability, make_board, reset
 
 
 def fields(board: Board) -> dict[str, torch.Tensor]:
@@ -26,7 +26,7 @@ def test_units_by_hand(board: Board) -> None:
     # legal: 0; 0.9 and 0.1; 0.2 and 0.8: a mean of 0.4, which becomes 0.66
     assert board.scale.item() == pytest.approx(1.65)
     torch.testing.assert_close(board.distance[0], 1.65 * torch.tensor([[0, 1, 0], [0.9, 0.1, 0], [0.2, 0.8, 0]]))
-    torch.testing.assert_close(board.apart[0], 1.65 * torch.tensor([[0.0, 1, 0], [1, 0, 0], [0, 0, 0]]))
+    torch.testing.assert_close(board.task_distance[0], 1.65 * torch.tensor([[0.0, 1, 0], [1, 0, 0], [0, 0, 0]]))
     assert board.log_tau.item() == pytest.approx(2 * np.log(0.5))
 
 
@@ -37,8 +37,8 @@ def test_the_reference_makespan_sets_the_needs(pair: Instance) -> None:
 
 def test_supply_and_choice_by_hand(board: Board) -> None:
     """All 3 mean abilities reach the first task, which needs 2; 2.5 reach the second, which needs 1."""
-    assert board.supply[0, :2].tolist() == pytest.approx([np.log(1.5) / 2 - 1, np.log(2.5) / 2 - 1])
-    assert board.choice[0].tolist() == pytest.approx([2 / 3, 1, 1])
+    assert board.supply_ratio[0, :2].tolist() == pytest.approx([np.log(1.5) / 2 - 1, np.log(2.5) / 2 - 1])
+    assert board.reachable_share[0].tolist() == pytest.approx([2 / 3, 1, 1])
 
 
 def test_weights_are_priorities_over_their_mean() -> None:
@@ -161,7 +161,7 @@ def test_layout_is_always_finite(name: str, hours: float, near: int | None) -> N
     for field, value in fields(board).items():
         assert not value.is_floating_point() or bool(torch.isfinite(value).all() | (field == "endurance")), field
     assert not bool(board.endurance.isnan().any())
-    assert bool((tasks_of(board, begin(board)) < board.places).all())
+    assert bool((current_tasks(board, reset(board)) < board.places).all())
 
 
 def test_a_large_mean_ability_keeps_the_discount() -> None:

@@ -16,16 +16,16 @@ from alloc.problems.game import (
     Board,
     Reward,
     Rules,
-    begin,
+    action_mask,
     difference_rewards,
-    grant,
+    grant_bids,
     marginal_contributions,
     observe_agents,
     observe_pairs,
     observe_tasks,
-    open_bids,
+    reset,
     step,
-    worth,
+    utility,
 )
 
 OBSERVE = (observe_pairs, observe_agents, observe_tasks)
@@ -34,22 +34,23 @@ OBSERVE = (observe_pairs, observe_agents, observe_tasks)
 def test_pairs_by_hand(board: Board) -> None:
     """The third agent, of ability 1.5, at the first task, which has just the 2 it needs, bids for the second.
 
-    That task needs 1 and has 1; the agent is 0.2 away from its own and 0.8 from that one, times 1.65; the price is 0.5.
+    That task needs 1 and has 1; the agent is 0.2 away from its own and 0.8 from that one, times 1.65.
+    Energy weighs 0.5.
     """
-    seen = observe_pairs(board, begin(board))[0, 2, 1].tolist()
+    seen = observe_pairs(board, reset(board))[0, 2, 1].tolist()
     assert seen == pytest.approx(
         [
-            0 / 1.5 / 3,  # lack there over what it brings
-            -1.0,  # lack there once it is there
-            0 / 1.5 / 3,  # lack at its own task
-            1.0,  # lack at its own task once it is gone
-            0 / 1,  # lack there over the need
+            0 / 1.5 / 3,  # shortfall there over what it brings
+            -1.0,  # shortfall there once it is there
+            0 / 1.5 / 3,  # shortfall at its own task
+            1.0,  # shortfall at its own task once it is gone
+            0 / 1,  # shortfall there over the need
             -1.5,
             0 / 2,
             1.5 / 2,
             0.6 * 1.65,  # farther
             0.8 * 1.65,
-            0.5 * 0.6 * 1.65,  # its price
+            0.5 * 0.6 * 1.65,  # its energy_weight
             0.5 - 1,
             np.log(1) - 1.5,
             np.log(2) - 1.5,
@@ -68,16 +69,16 @@ def test_pairs_by_hand(board: Board) -> None:
 
 def test_agents_by_hand(board: Board) -> None:
     """The second agent, of ability 1, alone at the second task, 0.1 * 1.65 away, which needs 1."""
-    seen = observe_agents(board, begin(board))[0, 1].tolist()
+    seen = observe_agents(board, reset(board))[0, 1].tolist()
     assert seen == pytest.approx([0, 0, 1, 1, 0.165, 0.0825, 1, 0], abs=1e-6)
 
 
 def test_tasks_by_hand(board: Board) -> None:
     """With groups of 0.5 for 2 and of 2.5 for 1: short by 1.5 of 3 and by half of the mean, with 1.5 to spare."""
     seen = observe_tasks(board, state_of(board, np.array([0, 1, 1])))[0]
-    lacking = [0.75, 0.5, 2, np.log(2) - 1.5, 0.5 - 1, np.log(2) - 1.5, 0]
+    short = [0.75, 0.5, 2, np.log(2) - 1.5, 0.5 - 1, np.log(2) - 1.5, 0]
     everywhere = [0.25, 2, 0, -0.5]
-    assert seen[0].tolist() == pytest.approx([*lacking, *everywhere, np.log(1.5) / 2 - 1], abs=1e-6)
+    assert seen[0].tolist() == pytest.approx([*short, *everywhere, np.log(1.5) / 2 - 1], abs=1e-6)
     ample = [-1.5, -0.5, -2, -1.5, 2.5 / 2 - 1, np.log(3) - 1.5, 0]
     assert seen[1].tolist() == pytest.approx([*ample, *everywhere, np.log(2.5) / 2 - 1], abs=1e-6)
     assert seen[2, 6].item() == 1
@@ -87,9 +88,9 @@ def test_tasks_by_hand(board: Board) -> None:
 def test_observations_are_finite_and_bounded(instance: Instance, seed: int) -> None:
     """Features stay within -2 and 2, also of idle agents and of tasks without workload."""
     board = layout(instance)
-    state = begin(board)
+    state = reset(board)
     draws = torch.rand(board.shape, generator=torch.Generator().manual_seed(seed))
-    state = step(board, state, draws.masked_fill(~open_bids(board, state), -1.0).argmax(2))
+    state = step(board, state, draws.masked_fill(~action_mask(board, state), -1.0).argmax(2))
     _check(board, state)
 
 
@@ -109,14 +110,14 @@ def _check(board: Board, state) -> None:
 def test_extremes_stay_finite(name: str, hours: float, reward: Reward, flying: bool) -> None:
     """Whatever the numbers, no feature and no reward ever is NaN or infinite."""
     rules, board = Rules(reward=reward, flying=flying), layout(EXTREMES[name], hours=hours)
-    state, generator = begin(board), torch.Generator().manual_seed(0)
+    state, generator = reset(board), torch.Generator().manual_seed(0)
     for _ in range(3):
         _check(board, state)
-        bids = torch.rand(board.shape, generator=generator).masked_fill(~open_bids(board, state, rules), -torch.inf)
+        bids = torch.rand(board.shape, generator=generator).masked_fill(~action_mask(board, state, rules), -torch.inf)
         slot = torch.where(bids.amax(2) > 0, bids.argmax(2), state.slot)
-        granted = grant(board, state, bids, torch.tensor([0.1]))
+        granted = grant_bids(board, state, bids, torch.tensor([0.1]))
         for rewards in (
-            worth(board, state, rules),
+            utility(board, state, rules),
             marginal_contributions(board, state, granted, rules),
             difference_rewards(board, state, slot, rules),
         ):
@@ -136,5 +137,5 @@ def test_names_do_not_matter(instance: Instance, seed: int) -> None:
     board = layout(instance, plan=plan)
     other = layout(rebuilt(instance, agents, tasks), plan=plan)
     places = [*tasks.tolist(), instance.m]
-    one, two = observe_pairs(board, begin(board)), observe_pairs(other, begin(other))
+    one, two = observe_pairs(board, reset(board)), observe_pairs(other, reset(other))
     torch.testing.assert_close(one[0][agents][:, places], two[0], rtol=1e-4, atol=1e-4)

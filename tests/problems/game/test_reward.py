@@ -20,19 +20,19 @@ from alloc.problems.game import (
     Reward,
     Rules,
     State,
-    begin,
+    action_mask,
+    apply_moves,
     coverage,
     difference_rewards,
-    flown,
-    grant,
+    grant_bids,
     group_ability,
     marginal_contributions,
-    moved,
-    open_bids,
+    mean_distance,
     potential,
+    relative_makespan,
+    reset,
     step,
-    time_over_reference,
-    worth,
+    utility,
 )
 from alloc.problems.game.reward import LARGEST_EXPONENT
 
@@ -47,7 +47,7 @@ RULES = (
 
 def somewhere(board: Board, state: State, rules: Rules, seed: int) -> torch.Tensor:
     """Return open slots, or those where agents are, at random."""
-    can = open_bids(board, state, rules).scatter(2, state.slot[..., None], True)
+    can = action_mask(board, state, rules).scatter(2, state.slot[..., None], True)
     draws = torch.rand(board.shape, generator=torch.Generator().manual_seed(seed))
     return draws.masked_fill(~can, -1.0).argmax(2)
 
@@ -72,10 +72,10 @@ def test_rewards_take_many_groups_at_once(board: Board) -> None:
         assert torch.equal(reward(board, group), each)
 
 
-def test_worth_by_hand(board: Board) -> None:
-    """The price of energy is 0.5 per mean distance of an agent, (0 + 0.1 + 0.8) * 1.65 / 3 here."""
+def test_utility_by_hand(board: Board) -> None:
+    """The weight of energy is 0.5 per mean distance of an agent, (0 + 0.1 + 0.8) * 1.65 / 3 here."""
     state = state_of(board, np.array([0, 1, 1]))
-    assert worth(board, state).item() == pytest.approx(-3.5 - 0.5 * 0.9 * 1.65 / 3)
+    assert utility(board, state).item() == pytest.approx(-3.5 - 0.5 * 0.9 * 1.65 / 3)
 
 
 def test_coverage_is_that_of_the_evaluator() -> None:
@@ -85,7 +85,7 @@ def test_coverage_is_that_of_the_evaluator() -> None:
         if instance.has_travel_time or (instance.workload == 0).any():
             continue
         board = layout(instance)
-        state = begin(board)
+        state = reset(board)
         expected = evaluate(instance, plan_of(board, state)).reward / instance.m
         assert coverage(board, state.group).item() == pytest.approx(expected, rel=1e-4)
 
@@ -95,59 +95,59 @@ def test_coverage_goes_on_along_its_tangent() -> None:
     board = layout(Instance(ability=[1], workload=[1], tau=0.5))
     limit = LARGEST_EXPONENT / np.log(2)  # mean abilities short at which the exponent is reached
 
-    def short_of(lack: float) -> float:
-        return coverage(board, board.need - torch.tensor([[lack, 0.0]])).item()
+    def short_of(shortfall: float) -> float:
+        return coverage(board, board.need - torch.tensor([[shortfall, 0.0]])).item()
 
     top = np.exp(LARGEST_EXPONENT)
     assert short_of(limit) == pytest.approx(-top, rel=1e-4)
     assert short_of(limit - 1) == pytest.approx(-top / 2, rel=1e-4)
     assert short_of(limit + 1) == pytest.approx(-top * (1 + np.log(2)), rel=1e-4)
-    lacks = [short_of(limit * factor) for factor in (0.99, 1.0, 1.01, 2, 10, 1e3, 1e6)]
-    assert lacks == sorted(lacks, reverse=True)
-    assert len(set(lacks)) == len(lacks)
+    shortfalls = [short_of(limit * factor) for factor in (0.99, 1.0, 1.01, 2, 10, 1e3, 1e6)]
+    assert shortfalls == sorted(shortfalls, reverse=True)
+    assert len(set(shortfalls)) == len(shortfalls)
     assert np.isfinite(short_of(1e9))
 
 
 @given(instances(), st.integers(0, 99), st.sampled_from(RULES))
 def test_marginal_contributions_add_up(instance: Instance, seed: int, rules: Rules) -> None:
-    """What granted bids bring is the rise of the worth, and what each brings is that of granting it by itself."""
+    """What granted bids bring is the rise of the utility, and what each brings is that of granting it by itself."""
     board = layout(instance)
-    state, generator = begin(board), torch.Generator().manual_seed(seed)
-    bids = torch.randn(board.shape, generator=generator).masked_fill(~open_bids(board, state, rules), -torch.inf)
-    granted = grant(board, state, bids, torch.tensor([-1.0]), rules.most_moves)
+    state, generator = reset(board), torch.Generator().manual_seed(seed)
+    bids = torch.randn(board.shape, generator=generator).masked_fill(~action_mask(board, state, rules), -torch.inf)
+    granted = grant_bids(board, state, bids, torch.tensor([-1.0]), rules.most_moves)
     brought = marginal_contributions(board, state, granted, rules)
-    after = step(board, state, moved(board, state, granted))
-    rise = worth(board, after, rules) - worth(board, state, rules)
-    size = 1e-5 * (1 + abs(worth(board, state, rules).item()) + abs(worth(board, after, rules).item()))
+    after = step(board, state, apply_moves(board, state, granted))
+    rise = utility(board, after, rules) - utility(board, state, rules)
+    size = 1e-5 * (1 + abs(utility(board, state, rules).item()) + abs(utility(board, after, rules).item()))
     assert brought.sum().item() == pytest.approx(rise.item(), abs=size)
-    so_far = worth(board, state, rules)
+    so_far = utility(board, state, rules)
     for number in range(granted.shape[1]):
-        part = step(board, state, moved(board, state, granted[:, : number + 1]))
-        now = worth(board, part, rules)
+        region = step(board, state, apply_moves(board, state, granted[:, : number + 1]))
+        now = utility(board, region, rules)
         assert brought[0, number].item() == pytest.approx((now - so_far).item(), abs=size)
         so_far = now
 
 
 def test_what_is_no_bid_brings_nothing(board: Board) -> None:
     """The reserve and what fills up bring 0, wherever they stand."""
-    state = begin(board)
+    state = reset(board)
     brought = marginal_contributions(board, state, torch.tensor([[9, -1]]))
     assert brought.tolist() == [[0, 0]]
 
 
 @given(instances(), st.integers(0, 99), st.sampled_from(RULES))
 def test_difference_rewards_by_brute_force(instance: Instance, seed: int, rules: Rules) -> None:
-    """The reward of an agent is the worth of what all did, less that had it alone stayed."""
+    """The reward of an agent is the utility of what all did, less that had it alone stayed."""
     board = layout(instance)
-    state = step(board, begin(board), somewhere(board, begin(board), rules, seed))
+    state = step(board, reset(board), somewhere(board, reset(board), rules, seed))
     slot = somewhere(board, state, rules, seed + 1)
     slot = torch.where(state.done[:, None], state.slot, slot)
     rewards = difference_rewards(board, state, slot, rules)
-    after = worth(board, step(board, state, slot), rules)
+    after = utility(board, step(board, state, slot), rules)
     for agent in range(instance.n):
         stayed = slot.clone()
         stayed[0, agent] = state.slot[0, agent]
-        expected = after - worth(board, step(board, state, stayed), rules)
+        expected = after - utility(board, step(board, state, stayed), rules)
         size = 1e-5 * (1 + 2 * abs(after.item()) + abs(expected.item()))
         assert rewards[0, agent].item() == pytest.approx(expected.item(), abs=size)
 
@@ -156,8 +156,8 @@ def test_difference_rewards_by_brute_force(instance: Instance, seed: int, rules:
 def test_time_is_that_of_the_evaluator(instance: Instance, hours: float, seed: int) -> None:
     """Times the reference, it is the makespan of the served tasks; and as many tasks are unserved."""
     board = layout(instance, hours=hours)
-    state = step(board, begin(board), somewhere(board, begin(board), PLANNING, seed))
-    time, unserved = time_over_reference(board, state.group)
+    state = step(board, reset(board), somewhere(board, reset(board), PLANNING, seed))
+    time, unserved = relative_makespan(board, state.group)
     expected = evaluate(instance, plan_of(board, state))
     assert time.item() * hours == pytest.approx(expected.served_makespan, rel=1e-5)
     assert unserved.item() == len(expected.unserved_tasks)
@@ -167,7 +167,7 @@ def test_time_is_that_of_the_evaluator(instance: Instance, hours: float, seed: i
 def test_needs_are_met_when_all_is_done_in_time(instance: Instance, hours: float, seed: int) -> None:
     """With travel times too, all needs are met if and only if the makespan is within the reference."""
     board = layout(instance, hours=hours)
-    state = step(board, begin(board), somewhere(board, begin(board), PLANNING, seed))
+    state = step(board, reset(board), somewhere(board, reset(board), PLANNING, seed))
     score = evaluate(instance, plan_of(board, state))
     makespan = np.inf if score.makespan is None else score.makespan
     assume(abs(makespan - hours) > 1e-4 * hours)  # single precision
@@ -177,9 +177,9 @@ def test_needs_are_met_when_all_is_done_in_time(instance: Instance, hours: float
 def test_the_last_term_of_the_potential_is_the_makespan() -> None:
     """1 - T_ref / T of a plan by hand: groups of 3 and 1 for 2 and 2 at T_ref = 1 take 2 h."""
     board = layout(Instance(ability=[2, 1, 1], workload=[2, 2], start_task=[0, 0, 1]))
-    assert time_over_reference(board, begin(board).group)[0].item() == 2
+    assert relative_makespan(board, reset(board).group)[0].item() == 2
     # short: 0 of 2 and 1 of 2, in mean abilities of 4/3; total 1 of 4, on average 1/4, at worst 1/2
-    assert potential(board, begin(board).group).item() == pytest.approx(-4 / 4 - 2 / 4 - 1 / 2)
+    assert potential(board, reset(board).group).item() == pytest.approx(-4 / 4 - 2 / 4 - 1 / 2)
 
 
 def best_groups(instance: Instance) -> tuple[set[tuple[float, ...]], set[tuple[float, ...]]]:
@@ -215,8 +215,8 @@ def test_coverage_and_makespan_differ_at_other_loads() -> None:
 
 @pytest.mark.parametrize("reward", list(Reward))
 def test_the_reward_ranks_plans_as_its_objective(reward: Reward) -> None:
-    """At balanced load the worth of the game is highest at the same plan for both rewards."""
-    board = layout(Instance(ability=[3, 1, 1, 1], workload=[4, 2]), price=0.0)
+    """At balanced load the utility of the game is highest at the same plan for both rewards."""
+    board = layout(Instance(ability=[3, 1, 1, 1], workload=[4, 2]), energy_weight=0.0)
     slots = torch.tensor(list(itertools.product(range(2), repeat=4)))
     boards = board[torch.zeros(len(slots), dtype=torch.int64)]
     gain = potential if reward == Reward.MAKESPAN else coverage
@@ -227,13 +227,13 @@ def test_the_reward_ranks_plans_as_its_objective(reward: Reward) -> None:
 
 @pytest.mark.parametrize("reward", list(Reward))
 def test_priorities_say_who_is_served_first(reward: Reward) -> None:
-    """Of two equal tasks without anybody, the agent is worth more at the one of higher priority."""
+    """Of two equal tasks without anybody, the agent is utility more at the one of higher priority."""
     for priority in ([1, 3], [3, 1]):
         instance = Instance(ability=[1, 1], workload=[2, 2], priority=priority)
         board = layout(instance, plan=np.array([-1, -1]))
         rules = Rules(reward=reward)
         bids = torch.tensor([[0 * 3 + 0], [0 * 3 + 1]])
-        brought = [marginal_contributions(board, begin(board), bid[None], rules).item() for bid in bids]
+        brought = [marginal_contributions(board, reset(board), bid[None], rules).item() for bid in bids]
         assert (brought[0] > brought[1]) == (priority[0] > priority[1])
         assert min(brought) > 0
 
@@ -243,18 +243,18 @@ def test_equal_priorities_are_none(pair: Instance, reward: Reward) -> None:
     """Priorities that are all the same, whatever they are, change no reward."""
     rules = Rules(reward=reward)
     one, other = (layout(instance) for instance in (pair, replace(pair, priority=[5, 5])))
-    assert worth(one, begin(one), rules).item() == worth(other, begin(other), rules).item()
+    assert utility(one, reset(one), rules).item() == utility(other, reset(other), rules).item()
 
 
-def test_energy_costs_its_price(route: Instance) -> None:
-    """A flight of 3 lowers the worth by the price times its share of the mean distance, 3 of two agents' here."""
-    board = layout(route, price=0.25)
+def test_energy_counts_by_its_weight(route: Instance) -> None:
+    """A flight of 3 lowers the utility by its weight times the mean distance: 3 of two agents' here."""
+    board = layout(route, energy_weight=0.25)
     unit = board.scale.item()
     bid = torch.tensor([[1]])
-    free = layout(route, price=0.0)
+    free = layout(route, energy_weight=0.0)
     for rules in (PLANNING, Rules(flying=True)):
-        paid = marginal_contributions(board, begin(board), bid, rules) - marginal_contributions(
-            free, begin(free), bid, rules
+        paid = marginal_contributions(board, reset(board), bid, rules) - marginal_contributions(
+            free, reset(free), bid, rules
         )
         assert paid.item() == pytest.approx(-0.25 * 3 * unit / 2, rel=1e-4)
-    assert flown(board, begin(board)).item() == 0
+    assert mean_distance(board, reset(board)).item() == 0

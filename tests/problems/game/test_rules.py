@@ -15,16 +15,16 @@ from alloc.problems.game import (
     Board,
     Rules,
     State,
+    action_mask,
+    apply_moves,
     battery_left,
-    begin,
-    flown,
-    grant,
-    hop,
-    moved,
-    open_bids,
+    current_tasks,
+    grant_bids,
+    hop_distance,
+    mean_distance,
+    reset,
     step,
     sum_by_place,
-    tasks_of,
 )
 from alloc.problems.game.rules import TOLERANCE
 
@@ -37,9 +37,9 @@ def go(board: Board, state: State, *slots: int) -> State:
 
 def played(board: Board, rules: Rules, seed: int, steps: int = 5) -> list[State]:
     """Return the states of a game in which each agent goes somewhere at random, or stays."""
-    generator, states = torch.Generator().manual_seed(seed), [begin(board)]
+    generator, states = torch.Generator().manual_seed(seed), [reset(board)]
     for _ in range(steps):
-        can = open_bids(board, states[-1], rules).scatter(2, states[-1].slot[..., None], True)
+        can = action_mask(board, states[-1], rules).scatter(2, states[-1].slot[..., None], True)
         draws = torch.rand(board.shape, generator=generator).masked_fill(~can, -1.0)
         states.append(step(board, states[-1], draws.argmax(2)))
     return states
@@ -48,7 +48,7 @@ def played(board: Board, rules: Rules, seed: int, steps: int = 5) -> list[State]
 def greedy_matching(board: Board, state: State, bids: np.ndarray, reserve: float, most: int | None) -> list[int]:
     """Grant bids in one game as the words say: from the best down, the first of equals first, none on a used task."""
     n, c = bids.shape
-    goal, task, idle = board.goal[0].tolist(), tasks_of(board, state)[0].tolist(), board.places - 1
+    goal, task, idle = board.candidates[0].tolist(), current_tasks(board, state)[0].tolist(), board.places - 1
     used, gone, granted = set[int](), set[int](), list[int]()
     for _, action in sorted((-bid, number) for number, bid in enumerate(bids.ravel().tolist())):
         agent, slot = divmod(action, c)
@@ -75,9 +75,9 @@ def test_grants_are_a_greedy_matching(most: int | None, reserve: float, ties: bo
         board = layout(random_instance(family, seed))
         state = played(board, PLANNING, seed)[seed % 3]
         bids = rng.integers(-2, 5, (9, 5)).astype(float) if ties else rng.normal(1, 2, (9, 5))
-        bids[~open_bids(board, state)[0].numpy()] = -np.inf
+        bids[~action_mask(board, state)[0].numpy()] = -np.inf
         tensor = torch.tensor(bids, dtype=torch.float32)
-        granted = grant(board, state, tensor[None], torch.tensor([reserve], dtype=torch.float32), most)[0].tolist()
+        granted = grant_bids(board, state, tensor[None], torch.tensor([reserve], dtype=torch.float32), most)[0].tolist()
         assert granted == greedy_matching(board, state, tensor.numpy(), reserve, most)
 
 
@@ -85,31 +85,31 @@ def test_games_side_by_side_grant_what_each_grants_alone() -> None:
     """What other games do changes nothing; games that end sooner are filled up with -1, those that ended with it."""
     games = [paper_like(8, 4, 30, seed) for seed in range(4)]
     board, generator = layout(*games), torch.Generator().manual_seed(3)
-    state = begin(board)
+    state = reset(board)
     state = State(
-        state.slot, state.group, state.left, torch.tensor([False, True, False, False]), state.at, state.hopped
+        state.slot, state.group, state.visited, torch.tensor([False, True, False, False]), state.location, state.flown
     )
-    bids = torch.randn(board.shape, generator=generator).masked_fill(~open_bids(board, state), -torch.inf)
+    bids = torch.randn(board.shape, generator=generator).masked_fill(~action_mask(board, state), -torch.inf)
     reserve = torch.tensor([-1.0, 0.0, 0.5, 9.0])
-    together = grant(board, state, bids.clone(), reserve)
+    together = grant_bids(board, state, bids.clone(), reserve)
     assert (together[1] == -1).all()
     for number in (0, 2, 3):
         row = torch.tensor([number])
-        alone = grant(board[row], state[row], bids[row], reserve[row])[0].tolist()
+        alone = grant_bids(board[row], state[row], bids[row], reserve[row])[0].tolist()
         assert together[number].tolist() == alone + [-1] * (together.shape[1] - len(alone))
 
 
 def test_nobody_can_bid(board: Board) -> None:
     """Where no bid is open the game ends, whatever the reserve: no barred bid is ever granted."""
     bids = torch.full(board.shape, -torch.inf)
-    assert grant(board, begin(board), bids, torch.tensor([-torch.inf])).tolist() == [[9]]
+    assert grant_bids(board, reset(board), bids, torch.tensor([-torch.inf])).tolist() == [[9]]
 
 
 def test_bids_are_not_written_over(board: Board) -> None:
     """Granting leaves the bids as they were."""
     bids = torch.arange(9.0).view(1, 3, 3)
     before = bids.clone()
-    grant(board, begin(board), bids, torch.tensor([0.0]))
+    grant_bids(board, reset(board), bids, torch.tensor([0.0]))
     assert torch.equal(bids, before)
 
 
@@ -118,9 +118,9 @@ def test_many_may_become_idle_at_once() -> None:
     board = layout(Instance(ability=[1, 1, 1], workload=[1, 1, 1], start_task=[0, 1, 2]))
     bids = torch.full(board.shape, -torch.inf)
     bids[0, :, 3] = torch.tensor([3.0, 2.0, 1.0])
-    granted = grant(board, begin(board), bids, torch.tensor([0.0]))
+    granted = grant_bids(board, reset(board), bids, torch.tensor([0.0]))
     assert granted.tolist() == [[3, 7, 11, 12]]
-    after = step(board, begin(board), moved(board, begin(board), granted))
+    after = step(board, reset(board), apply_moves(board, reset(board), granted))
     assert after.group.tolist() == [[0, 0, 0, 3]]
 
 
@@ -128,8 +128,8 @@ def test_one_move_at_a_time(board: Board) -> None:
     """With `most_moves` 1 the best bid alone is granted, and the reserve is listed only where it is the best."""
     bids = torch.full(board.shape, -torch.inf)
     bids[0, 2, 1], bids[0, 0, 2] = 2.0, 1.0
-    assert grant(board, begin(board), bids, torch.tensor([0.0]), 1).tolist() == [[7]]
-    assert grant(board, begin(board), bids, torch.tensor([3.0]), 1).tolist() == [[9]]
+    assert grant_bids(board, reset(board), bids, torch.tensor([0.0]), 1).tolist() == [[7]]
+    assert grant_bids(board, reset(board), bids, torch.tensor([3.0]), 1).tolist() == [[9]]
 
 
 def test_sums_by_place_by_hand() -> None:
@@ -141,25 +141,25 @@ def test_sums_by_place_by_hand() -> None:
 
 def test_step_moves_ability(board: Board) -> None:
     """A move takes the agent's ability from one task to the other, and nothing else changes."""
-    state = begin(board)
+    state = reset(board)
     assert state.group.tolist() == [[2.0, 1.0, 0.0]]
     after = go(board, state, 0, 1, 1)
     assert after.group.tolist() == [[0.5, 2.5, 0.0]]
-    assert after.left[0].tolist() == [[False] * 3, [False] * 3, [True, False, False]]
+    assert after.visited[0].tolist() == [[False] * 3, [False] * 3, [True, False, False]]
     assert not after.done.any()
 
 
 def test_a_game_in_which_nobody_moves_ends(board: Board) -> None:
     """After it has ended, nothing changes any more and nothing is open."""
-    ended = go(board, begin(board), *board.start[0].tolist())
+    ended = go(board, reset(board), *board.start[0].tolist())
     assert ended.done.all()
-    assert not open_bids(board, ended).any()
-    assert tasks_of(board, go(board, ended, 2, 2, 2)).tolist() == [[0, 1, 0]]
+    assert not action_mask(board, ended).any()
+    assert current_tasks(board, go(board, ended, 2, 2, 2)).tolist() == [[0, 1, 0]]
 
 
 def test_open_bids_by_hand(board: Board) -> None:
     """Agents may go to what is in reach, but where they are; also to being idle."""
-    assert open_bids(board, begin(board))[0].tolist() == [
+    assert action_mask(board, reset(board))[0].tolist() == [
         [False, False, True],
         [True, False, True],
         [False, True, True],
@@ -168,38 +168,38 @@ def test_open_bids_by_hand(board: Board) -> None:
 
 def test_no_return(board: Board) -> None:
     """Nobody returns to a place that it left, being idle included, unless the rules let it."""
-    there = go(board, begin(board), 2, 1, 1)
+    there = go(board, reset(board), 2, 1, 1)
     back = go(board, there, 2, 1, 2)
-    assert open_bids(board, back)[0].tolist() == [[False] * 3, [True, False, True], [False] * 3]
-    free = open_bids(board, back, Rules(returning=True))
+    assert action_mask(board, back)[0].tolist() == [[False] * 3, [True, False, True], [False] * 3]
+    free = action_mask(board, back, Rules(returning=True))
     assert free[0].tolist() == [[True, False, False], [True, False, True], [True, True, False]]
 
 
 def test_planning_pays_for_the_last_place(board: Board) -> None:
     """Going away and back costs nothing: energy is that of the final task, flown directly (19)."""
-    start = begin(board)
+    start = reset(board)
     there = go(board, start, 0, 1, 1)
-    assert flown(board, start).item() == pytest.approx(1.65 * (0 + 0.1 + 0.2) / 3)
-    assert flown(board, there).item() == pytest.approx(1.65 * (0 + 0.1 + 0.8) / 3)
-    assert flown(board, go(board, there, 0, 1, 0)).item() == flown(board, start).item()
+    assert mean_distance(board, start).item() == pytest.approx(1.65 * (0 + 0.1 + 0.2) / 3)
+    assert mean_distance(board, there).item() == pytest.approx(1.65 * (0 + 0.1 + 0.8) / 3)
+    assert mean_distance(board, go(board, there, 0, 1, 0)).item() == mean_distance(board, start).item()
 
 
 def test_flying_by_hand(route: Instance) -> None:
     """Agents at 0 fly to 3, 7 and 0: hops of 3, 4 and 7; being idle takes no flight and no agent away."""
     board = layout(route)
     unit = board.scale.item()
-    start = begin(board)
-    assert (hop(board, start)[0] / unit).tolist() == [pytest.approx([0, 3, 7, 0])] * 2
+    start = reset(board)
+    assert (hop_distance(board, start)[0] / unit).tolist() == [pytest.approx([0, 3, 7, 0])] * 2
     there = go(board, start, 1, 0)
-    assert (there.hopped[0] / unit).tolist() == pytest.approx([3, 0])
-    assert (hop(board, there)[0] / unit).tolist() == [pytest.approx([3, 0, 4, 0]), pytest.approx([0, 3, 7, 0])]
+    assert (there.flown[0] / unit).tolist() == pytest.approx([3, 0])
+    assert (hop_distance(board, there)[0] / unit).tolist() == [pytest.approx([3, 0, 4, 0]), pytest.approx([0, 3, 7, 0])]
     farther = go(board, there, 2, 3)
-    assert (farther.hopped[0] / unit).tolist() == pytest.approx([7, 0])
-    assert farther.at.tolist() == [[2, 0]]
+    assert (farther.flown[0] / unit).tolist() == pytest.approx([7, 0])
+    assert farther.location.tolist() == [[2, 0]]
     rest = go(board, farther, 3, 1)
-    assert (rest.hopped[0] / unit).tolist() == pytest.approx([7, 3])
-    assert rest.at.tolist() == [[2, 1]]
-    assert flown(board, rest, FLYING).item() / unit == pytest.approx(5)
+    assert (rest.flown[0] / unit).tolist() == pytest.approx([7, 3])
+    assert rest.location.tolist() == [[2, 1]]
+    assert mean_distance(board, rest, FLYING).item() / unit == pytest.approx(5)
     # batteries last for 11 and 7: 4 of 11 and 4 of 7 are left
     assert battery_left(board, rest).item() == pytest.approx((4 / 11 + 4 / 7) / 2)
 
@@ -207,27 +207,27 @@ def test_flying_by_hand(route: Instance) -> None:
 def test_the_battery_left_limits_the_reach(route: Instance) -> None:
     """After hops of 3 and 4, 4 of 11 are left: enough for 4 back to 3, not for 7 back to 0; 0 of 7 for none."""
     board = layout(route)
-    state = go(board, go(board, begin(board), 1, 1), 2, 2)
+    state = go(board, go(board, reset(board), 1, 1), 2, 2)
     free = Rules(flying=True, returning=True)
-    assert open_bids(board, state, free)[0].tolist() == [[False, True, False, True], [False, False, False, True]]
-    assert open_bids(board, state, Rules(returning=True)).all(2).logical_not().all()
-    assert open_bids(board, state, Rules(returning=True))[0].sum().item() == 6
+    assert action_mask(board, state, free)[0].tolist() == [[False, True, False, True], [False, False, False, True]]
+    assert action_mask(board, state, Rules(returning=True)).all(2).logical_not().all()
+    assert action_mask(board, state, Rules(returning=True))[0].sum().item() == 6
 
 
 def test_agents_fly_to_where_they_begin(board: Board) -> None:
     """Who starts away from the task that it begins at pays for the way; else staying there were free."""
-    state = begin(board)
-    assert state.hopped[0].tolist() == pytest.approx([0, 0.165, 0.33])
-    assert state.at.tolist() == [[0, 1, 0]]
+    state = reset(board)
+    assert state.flown[0].tolist() == pytest.approx([0, 0.165, 0.33])
+    assert state.location.tolist() == [[0, 1, 0]]
 
 
 def test_the_idle_stay_where_they_are() -> None:
     """Who begins idle, as nothing is in its range, is at its start; from there distances are its own."""
     board = layout(Instance(ability=[1, 1], workload=[1], task_position=[[3, 0]], agent_position=[[0, 0], [3, 0]],
                             communication_range=[1, 1]))  # fmt: skip
-    state = begin(board)
-    assert state.at.tolist() == [[1, 0]]
-    assert state.hopped.tolist() == [[0, 0]]
+    state = reset(board)
+    assert state.location.tolist() == [[1, 0]]
+    assert state.flown.tolist() == [[0, 0]]
     assert battery_left(board, state).item() == 1
 
 
@@ -235,7 +235,7 @@ def test_battery_left_is_that_of_agents_with_a_battery(route: Instance) -> None:
     """Agents without a battery do not count."""
     board = layout(Instance(ability=[1, 1], workload=[1, 1], task_position=[[0, 0], [1, 0]], start_task=[0, 0],
                             battery=[2, np.inf]))  # fmt: skip
-    assert battery_left(board, go(board, begin(board), 1, 1)).item() == pytest.approx(0.5)
+    assert battery_left(board, go(board, reset(board), 1, 1)).item() == pytest.approx(0.5)
 
 
 @given(instances(), st.integers(0, 99))
@@ -244,8 +244,8 @@ def test_hops_are_no_shorter_than_the_direct_flight(instance: Instance, seed: in
     board = layout(instance)
     last = played(board, PAPER, seed)[-1]
     if not np.isnan(instance.task_position).any():
-        assert flown(board, last, PAPER).item() >= flown(board, last, PLANNING).item() - 1e-4
-    assert (last.hopped <= board.endurance + 2 * TOLERANCE).all()
+        assert mean_distance(board, last, PAPER).item() >= mean_distance(board, last, PLANNING).item() - 1e-4
+    assert (last.flown <= board.endurance + 2 * TOLERANCE).all()
     assert 0 <= battery_left(board, last).item() <= 1
 
 

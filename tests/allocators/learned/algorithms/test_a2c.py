@@ -10,7 +10,7 @@ from alloc.allocators.learned.algorithms.hyperparameters import A2cParameters
 from alloc.allocators.learned.algorithms.learner import TrainingJob
 from alloc.allocators.learned.play.action_sampling import log_probabilities
 from alloc.allocators.learned.play.trajectories import collect
-from alloc.problems.game import PAPER, PLANNING, Rules, Turn, begin, moved, step
+from alloc.problems.game import PAPER, PLANNING, Rules, TurnRule, apply_moves, reset, step
 
 
 def test_returns_match_the_definition() -> None:
@@ -27,17 +27,19 @@ def test_nothing_follows_the_end_of_a_game() -> None:
     assert n_step_returns(reward, alive, torch.tensor([77.0]), 0.5)[:, 0].tolist() == [2.0, 2.0, 0.0]
 
 
-@pytest.mark.parametrize("rules", [PLANNING, Rules(turn=Turn.SIMULTANEOUS), PAPER])
+@pytest.mark.parametrize("rules", [PLANNING, Rules(turn=TurnRule.SIMULTANEOUS), PAPER])
 def test_segments_follow_on_each_other(rules: Rules) -> None:
     """Playing on from the state after a segment earns what one long game earns: rewards add up to the rise."""
     board = probe("pairing").board
     learner, generator = A2c(), torch.Generator().manual_seed(0)
     first = collect(learner.network, board, 1, generator, rules)
-    state = step(board, first.state[torch.tensor(0)], moved(board, first.state[torch.tensor(0)], first.actions[0]))
+    state = step(
+        board, first.state[torch.tensor(0)], apply_moves(board, first.state[torch.tensor(0)], first.actions[0])
+    )
     second = collect(learner.network, board, 2, generator, rules, state=state)
     assert torch.equal(second.state.slot[0], state.slot)
     assert torch.equal(second.state.done[0], state.done)
-    assert not torch.equal(second.state.slot[0], begin(board).slot)
+    assert not torch.equal(second.state.slot[0], reset(board).slot)
 
 
 def test_likelier_after_a_gain_and_unlikelier_after_a_loss() -> None:
@@ -49,8 +51,8 @@ def test_likelier_after_a_gain_and_unlikelier_after_a_loss() -> None:
         told = type(played)(**{**vars(played), "reward": 10 * sign * torch.ones_like(played.reward)})
         told = type(told)(**{**vars(told), "last_value": torch.zeros_like(told.last_value)})
         learner.update(told, PLANNING)
-        now = learner.network(board, begin(board))
-        again, _ = log_probabilities(board, begin(board), now, played.actions[0], PLANNING)
+        now = learner.network(board, reset(board))
+        again, _ = log_probabilities(board, reset(board), now, played.actions[0], PLANNING)
         assert torch.sign((again - played.log_probability[0]).sum()).item() == sign
 
 
@@ -63,7 +65,7 @@ def test_simultaneous_turns_can_be_trained_on() -> None:
     """The paper's turn rule works as well, and weights stay finite."""
     learner = A2c()
     before = weights(learner)
-    report = learner.train_on(TrainingJob(0, 50, curriculum=probe("pairing"), rules=Rules(turn=Turn.SIMULTANEOUS)))
+    report = learner.train_on(TrainingJob(0, 50, curriculum=probe("pairing"), rules=Rules(turn=TurnRule.SIMULTANEOUS)))
     assert report.decisions >= 50
     assert torch.isfinite(weights(learner)).all()
     assert not torch.equal(weights(learner), before)

@@ -7,7 +7,7 @@ from resuming import assert_resumes_elsewhere
 
 from alloc.allocators.learned.algorithms.ddpg import Ddpg, entropy_of, polyak_update, relaxed_action, relaxed_value
 from alloc.allocators.learned.algorithms.hyperparameters import DdpgParameters
-from alloc.problems.game import PLANNING, State, begin
+from alloc.problems.game import PLANNING, State, reset
 
 GAIN = torch.tensor([[1.0, -torch.inf, 0.5, 0.0]], dtype=torch.float64)
 QUALITY = torch.tensor([[2.0, -torch.inf, 5.0, 0.0]], dtype=torch.float64)
@@ -58,7 +58,7 @@ def test_targets_of_states() -> None:
         torch.nn.init.zeros_(parameter)
     torch.nn.init.constant_(learner.targets["critic"].local[-1].bias, 6.0)
     board = probe("right_task").board[torch.arange(1)]  # two bids are open: the other task, and being idle
-    state = begin(board)
+    state = reset(board)
     none = State(**{**vars(state), "left": torch.ones_like(state.left)})
     assert learner.td_targets(board, state, torch.ones(1), PLANNING).item() == pytest.approx(1 + 0.5 * 2 / 3 * 6)
     assert learner.td_targets(board, none, torch.ones(1), PLANNING).item() == 1.0

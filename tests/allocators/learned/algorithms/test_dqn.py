@@ -9,8 +9,8 @@ from torch import Tensor
 from alloc.allocators.learned.algorithms.dqn import Dqn, best_move_value, td_target
 from alloc.allocators.learned.algorithms.hyperparameters import DqnParameters
 from alloc.allocators.learned.algorithms.learner import TrainingJob
-from alloc.allocators.learned.play.transitions import after
-from alloc.problems.game import PLANNING, State, begin, open_bids
+from alloc.allocators.learned.play.transitions import next_state
+from alloc.problems.game import PLANNING, State, action_mask, reset
 
 
 def test_target_by_hand() -> None:
@@ -43,7 +43,7 @@ def test_targets_of_states(bid: float, reserve: float, following: float) -> None
     learner = Dqn(parameters=DqnParameters(gamma=0.5, double_q=False))
     without_heads(learner, bid, reserve)
     board = probe("right_task").board[torch.arange(2)]
-    state = begin(board)
+    state = reset(board)
     none = State(**{**vars(state), "left": torch.ones_like(state.left)})
     reward = torch.tensor([1.0, 2.0])
     assert learner.td_targets(board, state, reward, PLANNING).tolist() == [1 + 0.5 * following, 2 + 0.5 * following]
@@ -55,8 +55,8 @@ def test_a_game_that_was_cut_off_is_not_over() -> None:
     learner = Dqn(parameters=DqnParameters(gamma=0.5, double_q=False))
     without_heads(learner, 7.0, 3.0)
     board = probe("pairing").board[torch.arange(3)]
-    first = open_bids(board, begin(board)).flatten(1).float().argmax(1)
-    following = after(board, begin(board), first)
+    first = action_mask(board, reset(board)).flatten(1).float().argmax(1)
+    following = next_state(board, reset(board), first)
     assert not following.done.any()
     assert learner.td_targets(board, following, torch.zeros(3), PLANNING).tolist() == [2.0, 2.0, 2.0]
 

@@ -21,11 +21,11 @@ from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSi
 from alloc.allocators.learned.play.action_sampling import log_probabilities
 from alloc.allocators.learned.play.trajectories import Trajectories, collect
 from alloc.problems import Instance
-from alloc.problems.game import PLANNING, Board, Rules, Turn
+from alloc.problems.game import PLANNING, Board, Rules, TurnRule
 from alloc.problems.generate import paper_like
 
 SMALL = NetworkSize(8, 8, 2)
-AT_ONCE = Rules(turn=Turn.SIMULTANEOUS)
+AT_ONCE = Rules(turn=TurnRule.SIMULTANEOUS)
 both_turns = pytest.mark.parametrize("rules", [PLANNING, AT_ONCE], ids=["bidding", "at once"])
 
 
@@ -206,7 +206,7 @@ def test_reuse_by_another_network_is_corrected(board: Board, rules: Rules) -> No
     value, likely = torch.zeros_like(kept.value), torch.ones_like(kept.value)
     value[kept.alive], likely[kept.alive] = scores.value.detach(), shift.sum(1).exp().detach().clamp(max=1.0)
     target = torch.zeros_like(value)
-    for game in range(len(board.price)):  # V-trace's recursion, from the last step to the first
+    for game in range(len(board.energy_weight)):  # V-trace's recursion, from the last step to the first
         after, later = kept.last_value[game], torch.zeros(())
         for t in reversed(torch.nonzero(kept.alive[:, game])[:, 0].tolist()):
             error = kept.reward[t, game] + 0.9 * after - value[t, game]

@@ -9,7 +9,7 @@ from boards import EXTREMES, layout
 
 from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize
 from alloc.problems import Instance
-from alloc.problems.game import begin, step
+from alloc.problems.game import reset, step
 from alloc.problems.generate import paper_like
 
 SIZES = {"attention": NetworkSize(16, 16, 4), "none": NetworkSize(16, 16, 4, attention=False)}
@@ -33,7 +33,7 @@ def test_relabelling_agents_and_tasks_relabels_the_bids(network: ActorCritic) ->
         battery=instance.battery[agents],
         energy_per_distance=instance.energy_per_distance,
     )
-    one, two = (network(board, begin(board)) for board in (layout(instance), layout(other)))
+    one, two = (network(board, reset(board)) for board in (layout(instance), layout(other)))
     torch.testing.assert_close(one.bids[0, agents][:, [*tasks, 4]], two.bids[0], atol=1e-4, rtol=1e-4)
     torch.testing.assert_close(one.reserve, two.reserve, atol=1e-4, rtol=1e-4)
     torch.testing.assert_close(one.value, two.value, atol=1e-4, rtol=1e-4)
@@ -42,10 +42,10 @@ def test_relabelling_agents_and_tasks_relabels_the_bids(network: ActorCritic) ->
 def test_games_side_by_side_are_scored_as_alone(network: ActorCritic) -> None:
     """What a network says of a game does not depend on the other games of the batch."""
     board = layout(*(paper_like(8, 3, 34, seed) for seed in range(5)))
-    together = network(board, begin(board))
+    together = network(board, reset(board))
     for game in range(5):
         alone = board[torch.tensor([game])]
-        for one, two in zip(network(alone, begin(alone)), together, strict=True):
+        for one, two in zip(network(alone, reset(alone)), together, strict=True):
             torch.testing.assert_close(one[0], two[game], atol=1e-5, rtol=1e-5)
 
 
@@ -54,13 +54,19 @@ def test_near_candidates_are_scored_as_in_the_dense_board(network: ActorCritic) 
     instance = paper_like(20, 9, 90, seed=4)
     dense, near = layout(instance), layout(instance, near=5)
     scale = (dense.scale / near.scale).float()  # the two boards measure distances by their own means
-    near = replace(near, distance=near.distance * scale, apart=dense.apart, choice=dense.choice, supply=dense.supply)
-    all_, some = (network(board, begin(board)).bids for board in (dense, near))
-    torch.testing.assert_close(all_.gather(2, near.goal)[near.legal], some[near.legal], atol=1e-4, rtol=1e-4)
+    near = replace(
+        near,
+        distance=near.distance * scale,
+        task_distance=dense.task_distance,
+        reachable_share=dense.reachable_share,
+        supply_ratio=dense.supply_ratio,
+    )
+    all_, some = (network(board, reset(board)).bids for board in (dense, near))
+    torch.testing.assert_close(all_.gather(2, near.candidates)[near.legal], some[near.legal], atol=1e-4, rtol=1e-4)
 
 
 def test_agents_without_ability_are_not_heard() -> None:
-    """Who fills up a part changes nothing of what a place hears of its members."""
+    """Padding agents of a region change nothing of the encodings of places."""
     torch.manual_seed(2)
     network = ActorCritic(SIZES["attention"]).requires_grad_(False)
     board = layout(paper_like(8, 3, 34, 0))
@@ -69,11 +75,11 @@ def test_agents_without_ability_are_not_heard() -> None:
         values = getattr(board, name)
         return torch.cat([values, values[:, :1]], 1)
 
-    per_agent = ("ability", "goal", "legal", "distance", "contribution", "start", "choice", "endurance")
+    per_agent = ("ability", "candidates", "legal", "distance", "contribution", "start", "reachable_share", "endurance")
     more = replace(board, **{name: filled(name) for name in per_agent})
     for nothing in (more.ability, more.contribution):
         nothing[:, -1] = 0.0
-    one, two = (network._members(some, begin(some)) for some in (board, more))
+    one, two = (network._members(some, reset(some)) for some in (board, more))
     torch.testing.assert_close(one, two, atol=1e-5, rtol=1e-5)
 
 
@@ -81,11 +87,11 @@ def test_agents_without_ability_are_not_heard() -> None:
 def test_extremes_stay_finite(network: ActorCritic, name: str) -> None:
     """Scores and gradients are finite on instances at the ends of what is valid."""
     board = layout(EXTREMES[name])
-    state = begin(board)
+    state = reset(board)
     for slot in (state.slot, torch.full_like(state.slot, board.shape[2] - 1)):
-        assert all(part.isfinite().all() for part in network(board, step(board, state, slot)))
+        assert all(scores.isfinite().all() for scores in network(board, step(board, state, slot)))
     network.requires_grad_(True)
-    sum(part.sum() for part in network(board, state)).backward()
+    sum(scores.sum() for scores in network(board, state)).backward()
     assert all(weight.grad is None or weight.grad.isfinite().all() for weight in network.parameters())
 
 
@@ -95,7 +101,7 @@ def test_attention_hears_of_members_and_neighbours() -> None:
         ability=[1, 1, 1], workload=[1, 1, 1], task_position=[[0, 0], [1, 0], [2, 0]], start_task=[0, 1, 2]
     )
     board = layout(instance)
-    before = begin(board)
+    before = reset(board)
     after = step(board, before, torch.tensor([[1, 0, 2]]))
     for size in SIZES.values():
         torch.manual_seed(0)

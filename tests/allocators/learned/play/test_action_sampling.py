@@ -13,12 +13,24 @@ from hypothesis import strategies as st
 from strategies import instances
 
 from alloc.allocators.learned.network.actor_critic import Scores
-from alloc.allocators.learned.play.action_sampling import choose, log_probabilities
+from alloc.allocators.learned.play.action_sampling import log_probabilities, sample_actions
 from alloc.problems import Instance
-from alloc.problems.game import PAPER, PLANNING, Board, Rules, State, Turn, begin, moved, open_bids, step, tasks_of
+from alloc.problems.game import (
+    PAPER,
+    PLANNING,
+    Board,
+    Rules,
+    State,
+    TurnRule,
+    action_mask,
+    apply_moves,
+    current_tasks,
+    reset,
+    step,
+)
 
 ONE_MOVE = Rules(most_moves=1)
-AT_ONCE = Rules(turn=Turn.SIMULTANEOUS)
+AT_ONCE = Rules(turn=TurnRule.SIMULTANEOUS)
 Chances = dict[tuple[int, ...], float]
 
 
@@ -39,16 +51,18 @@ def board() -> Board:
 def scores_of(board: Board, seed: int = 0, spread: float = 1.0) -> Scores:
     """Scores without a network: what is drawn does not depend on where they come from."""
     generator = torch.Generator().manual_seed(seed)
-    reserve = spread * torch.randn(len(board.price), generator=generator)
-    return Scores(spread * torch.randn(board.shape, generator=generator), reserve, torch.zeros(len(board.price)))
+    reserve = spread * torch.randn(len(board.energy_weight), generator=generator)
+    return Scores(
+        spread * torch.randn(board.shape, generator=generator), reserve, torch.zeros(len(board.energy_weight))
+    )
 
 
 def rounds(board: Board, state: State, scores: Scores, most: int | None) -> Chances:
     """Probability of every possible round of one game: a product of softmaxes over what may still be granted."""
     _, n, c = board.shape
-    goal, task, idle = board.goal[0].tolist(), tasks_of(board, state)[0].tolist(), board.places - 1
+    goal, task, idle = board.candidates[0].tolist(), current_tasks(board, state)[0].tolist(), board.places - 1
     bids, reserve = scores.bids[0].tolist(), float(scores.reserve[0])
-    may = open_bids(board, state)[0]
+    may = action_mask(board, state)[0]
     found: Chances = {}
 
     def go_on(chance: float, granted: tuple[int, ...], used: set[int], gone: set[int]) -> None:
@@ -75,7 +89,7 @@ def rounds(board: Board, state: State, scores: Scores, most: int | None) -> Chan
 def choices(board: Board, state: State, scores: Scores) -> Chances:
     """Probability of everything that agents who choose at once may do: each draws from a softmax, staying scores 0."""
     _, n, c = board.shape
-    may, bids = open_bids(board, state)[0], scores.bids[0].tolist()
+    may, bids = action_mask(board, state)[0], scores.bids[0].tolist()
     stays = state.slot[0].tolist()
     shares = []
     for agent in range(n):
@@ -91,7 +105,7 @@ def choices(board: Board, state: State, scores: Scores) -> Chances:
 
 
 def chances(board: Board, state: State, scores: Scores, rules: Rules) -> Chances:
-    if rules.turn == Turn.SIMULTANEOUS:
+    if rules.turn == TurnRule.SIMULTANEOUS:
         return choices(board, state, scores)
     return rounds(board, state, scores, rules.most_moves)
 
@@ -102,14 +116,14 @@ every_turn = pytest.mark.parametrize("rules", [PLANNING, ONE_MOVE, AT_ONCE], ids
 @every_turn
 def test_probabilities_of_all_rounds_by_plain_python(board: Board, rules: Rules) -> None:
     """Each possible round is as probable as its product of softmaxes says, and all together are certain."""
-    state, scores = begin(board), scores_of(board)
+    state, scores = reset(board), scores_of(board)
     expected = chances(board, state, scores, rules)
     assert sum(expected.values()) == pytest.approx(1)
     width = max(map(len, expected))
     actions = torch.tensor([[*one, *[-1] * (width - len(one))] for one in expected])
     many = board[torch.zeros(len(actions), dtype=torch.int64)]
     wide = Scores(*(one.expand(len(actions), *one.shape[1:]) for one in scores))
-    got, _ = log_probabilities(many, begin(many), wide, actions, rules)
+    got, _ = log_probabilities(many, reset(many), wide, actions, rules)
     assert got.sum(1).tolist() == pytest.approx([log(chance) for chance in expected.values()], abs=1e-4)
     assert float(got.sum(1).exp().sum()) == pytest.approx(1, abs=1e-5)
     assert (got[actions < 0] == 0).all()
@@ -119,11 +133,11 @@ def test_probabilities_of_all_rounds_by_plain_python(board: Board, rules: Rules)
 def test_draws_are_as_frequent_as_probable(board: Board, rules: Rules) -> None:
     """Chi-square of 20,000 draws with a fixed seed stays within four standard deviations of its mean."""
     draws = 20_000
-    state, scores = begin(board), scores_of(board, 3)
+    state, scores = reset(board), scores_of(board, 3)
     expected = chances(board, state, scores, rules)
     many = board[torch.zeros(draws, dtype=torch.int64)]
     wide = Scores(*(one.expand(draws, *one.shape[1:]) for one in scores))
-    actions, _ = choose(many, begin(many), wide, rules, 1.0, torch.Generator().manual_seed(7))
+    actions, _ = sample_actions(many, reset(many), wide, rules, 1.0, torch.Generator().manual_seed(7))
     seen = Counter(tuple(action for action in row if action >= 0) for row in actions.tolist())
     assert set(seen) <= set(expected)
     usual = {one for one, chance in expected.items() if chance * draws >= 10}
@@ -138,11 +152,11 @@ def test_draws_are_as_frequent_as_probable(board: Board, rules: Rules) -> None:
 @pytest.mark.parametrize("temperature", [0.5, 2.0])
 def test_temperature_divides_the_scores(board: Board, temperature: float) -> None:
     """A draw at a temperature is the draw at 1 with scores divided by it."""
-    state, scores = begin(board), scores_of(board)
+    state, scores = reset(board), scores_of(board)
     other = Scores(scores.bids / temperature, scores.reserve / temperature, scores.value)
     for rules in (PLANNING, AT_ONCE):
         one, two = (
-            choose(board, state, some, rules, degrees, torch.Generator().manual_seed(1))[0]
+            sample_actions(board, state, some, rules, degrees, torch.Generator().manual_seed(1))[0]
             for some, degrees in ((scores, temperature), (other, 1.0))
         )
         assert torch.equal(one, two)
@@ -151,7 +165,7 @@ def test_temperature_divides_the_scores(board: Board, temperature: float) -> Non
 @pytest.mark.parametrize("seed", range(5))
 def test_without_temperature_the_best_is_done(board: Board, seed: int) -> None:
     """At temperature 0 bids are granted from the best down; agents that choose at once each take their best."""
-    state, scores = begin(board), scores_of(board, seed)
+    state, scores = reset(board), scores_of(board, seed)
     _, n, c = board.shape
     expected: list[int] = []
     left = rounds(board, state, scores, None)
@@ -159,10 +173,10 @@ def test_without_temperature_the_best_is_done(board: Board, seed: int) -> None:
     while not expected or expected[-1] != n * c:
         able = {one[len(expected)] for one in left if list(one[: len(expected)]) == expected}
         expected.append(max(able, key=everything.__getitem__))
-    actions, slot = choose(board, state, scores)
+    actions, slot = sample_actions(board, state, scores)
     assert actions[0].tolist() == expected
-    assert torch.equal(slot, moved(board, state, actions))
-    actions, slot = choose(board, state, scores, AT_ONCE)
+    assert torch.equal(slot, apply_moves(board, state, actions))
+    actions, slot = sample_actions(board, state, scores, AT_ONCE)
     assert tuple(actions[0].tolist()) == max(choices(board, state, scores).items(), key=lambda item: item[1])[0]
     assert torch.equal(slot[0], actions[0] % c)
 
@@ -175,13 +189,13 @@ def test_without_temperature_the_best_is_done(board: Board, seed: int) -> None:
     spread=st.sampled_from([1.0, 300.0]),
 )
 def test_what_is_drawn_has_a_probability(instance: Instance, seed: int, rules: Rules, spread: float) -> None:
-    """Whatever `choose` draws, in any game that goes on or has ended, has a finite log-probability, never above 0."""
+    """Every sampled action, in games that go on or have ended, has a finite log-probability, never above 0."""
     board = layout(instance, instance, instance)
-    state, generator = begin(board), torch.Generator().manual_seed(seed)
+    state, generator = reset(board), torch.Generator().manual_seed(seed)
     state.done[1] = True
     for number in range(4):
         scores = scores_of(board, seed + number, spread)
-        actions, slot = choose(board, state, scores, rules, 1.0, generator)
+        actions, slot = sample_actions(board, state, scores, rules, 1.0, generator)
         got, entropy = log_probabilities(board, state, scores, actions, rules)
         assert got.isfinite().all()
         assert (got <= 1e-4).all()
@@ -193,9 +207,9 @@ def test_what_is_drawn_has_a_probability(instance: Instance, seed: int, rules: R
 
 def test_entropy_by_plain_python(board: Board) -> None:
     """Entropy is that of the first draw of a round, and that of the mean agent where all choose at once."""
-    state, scores = begin(board), scores_of(board)
+    state, scores = reset(board), scores_of(board)
     first = rounds(board, state, scores, 1).values()
-    actions, _ = choose(board, state, scores)
+    actions, _ = sample_actions(board, state, scores)
     _, entropy = log_probabilities(board, state, scores, actions)
     assert entropy.item() == pytest.approx(-sum(p * log(p) for p in first), abs=1e-5)
     everything = choices(board, state, scores).values()
@@ -207,13 +221,13 @@ def test_probabilities_have_gradients(board: Board) -> None:
     """Raising the score of what was granted raises its probability, and barred bids are given no gradient."""
     scores = scores_of(board)
     bids, reserve = scores.bids.clone().requires_grad_(), scores.reserve.clone().requires_grad_()
-    actions, _ = choose(board, begin(board), scores, PLANNING, 1.0, torch.Generator().manual_seed(0))
-    got, entropy = log_probabilities(board, begin(board), Scores(bids, reserve, scores.value), actions)
+    actions, _ = sample_actions(board, reset(board), scores, PLANNING, 1.0, torch.Generator().manual_seed(0))
+    got, entropy = log_probabilities(board, reset(board), Scores(bids, reserve, scores.value), actions)
     (got.sum() + entropy.sum()).backward()
     assert bids.grad is not None
     assert bids.grad.isfinite().all()
-    assert (bids.grad[~open_bids(board, begin(board))] == 0).all()
+    assert (bids.grad[~action_mask(board, reset(board))] == 0).all()
     (slope,) = torch.autograd.grad(
-        log_probabilities(board, begin(board), Scores(bids, reserve, scores.value), actions)[0][0, 0], bids
+        log_probabilities(board, reset(board), Scores(bids, reserve, scores.value), actions)[0][0, 0], bids
     )
     assert slope.flatten()[actions[0, 0]] > 0

@@ -7,8 +7,9 @@ from boards import layout
 from test_rollout import BOARDS
 
 from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize
-from alloc.allocators.learned.network.compiled import weights_of
-from alloc.allocators.learned.play.batched_games import Games, play_games, views_of
+from alloc.allocators.learned.network.game_arrays import game_arrays
+from alloc.allocators.learned.network.weights import weights_of
+from alloc.allocators.learned.play.batched_games import Games, play_games
 from alloc.allocators.learned.play.rollout import play
 from alloc.problems import paper_like
 from alloc.problems.game import Board
@@ -17,8 +18,8 @@ pytestmark = pytest.mark.timeout(400)  # compiles at first
 
 
 def games_on(board: Board, copies: int = 1) -> Games:
-    row = np.arange(len(board.price)).repeat(copies)
-    return Games(row, board.price.numpy().astype(float)[row], board.start.numpy()[row])
+    row = np.arange(len(board.energy_weight)).repeat(copies)
+    return Games(row, board.energy_weight.numpy().astype(float)[row], board.start.numpy()[row])
 
 
 @pytest.mark.parametrize("attention", [True, False])
@@ -60,13 +61,13 @@ def test_time_to_stop() -> None:
     assert torch.isinf(best.shortfall[1:]).all()
 
 
-def test_weights_and_views_keep_their_values() -> None:
-    """Weights come with the bias as last row, and views share the numbers of the board."""
+def test_weights_and_arrays_keep_their_values() -> None:
+    """Weights come with the bias as last row, and game arrays share the numbers of the board."""
     network = ActorCritic()
     weights = weights_of(network)
     assert np.allclose(weights.local1[:-1].T, network.local[0].weight.detach().numpy())
     assert np.allclose(weights.local1[-1], network.local[0].bias.detach().numpy())
     board = BOARDS["dense"]()
-    view = views_of(board)[2]
-    assert np.array_equal(view.need, board.need[2].numpy())
-    assert np.array_equal(view.goal, board.goal[2].numpy())
+    game = game_arrays(board)[2]
+    assert np.array_equal(game.need, board.need[2].numpy())
+    assert np.array_equal(game.candidates, board.candidates[2].numpy())

@@ -11,17 +11,17 @@ from boards import layout, plan_of
 
 from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize
 from alloc.allocators.learned.play import rollout
-from alloc.allocators.learned.play.action_sampling import choose
-from alloc.allocators.learned.play.rollout import Best, _Local, play, position, step_and_score
+from alloc.allocators.learned.play.action_sampling import sample_actions
+from alloc.allocators.learned.play.rollout import Best, LocalScores, play, position, step_and_score
 from alloc.problems import Evaluation, Family, Instance, evaluate, paper_like, random_instance
 from alloc.problems.game import (
     Board,
     Rules,
     State,
-    Turn,
-    begin,
+    TurnRule,
+    action_mask,
     observe_pairs,
-    open_bids,
+    reset,
     step,
 )
 
@@ -68,26 +68,26 @@ def network() -> ActorCritic:
     return network
 
 
-def assert_scored_anew(network: ActorCritic, scores: _Local, board: Board, state: State) -> None:
+def assert_scored_anew(network: ActorCritic, scores: LocalScores, board: Board, state: State) -> None:
     """Every open bid, reserve and value are what scoring everything says."""
     anew, kept = network(board, state), scores.all(state)
-    can = open_bids(board, state, Rules(returning=True))
+    can = action_mask(board, state, Rules(returning=True))
     torch.testing.assert_close(kept.bids[can], anew.bids[can], atol=1e-5, rtol=1e-5)
     torch.testing.assert_close(kept.reserve, anew.reserve, atol=1e-5, rtol=1e-5)
 
 
-@pytest.mark.parametrize("rules", [Rules(), Rules(most_moves=1), Rules(turn=Turn.SIMULTANEOUS)])
+@pytest.mark.parametrize("rules", [Rules(), Rules(most_moves=1), Rules(turn=TurnRule.SIMULTANEOUS)])
 @pytest.mark.parametrize("anew", [0.0, 0.5, 1.0])
 def test_incremental_scores_equal_full_ones(
     board: Board, network: ActorCritic, rules: Rules, anew: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """After every step of random play all open bids are scored as if anew, while games end and are dropped."""
-    monkeypatch.setattr(rollout, "ANEW", anew)
-    generator, state = torch.Generator().manual_seed(0), begin(board)
-    scores = _Local(network, board, state, lambda: False)
+    monkeypatch.setattr(rollout, "RESCORE_ALL", anew)
+    generator, state = torch.Generator().manual_seed(0), reset(board)
+    scores = LocalScores(network, board, state, lambda: False)
     for number in range(8):
         assert_scored_anew(network, scores, board, state)
-        _, slot = choose(board, state, scores.all(state), rules, 2.0, generator)
+        _, slot = sample_actions(board, state, scores.all(state), rules, 2.0, generator)
         state = step_and_score(board, state, slot, scores)
         if number == 4:
             going = torch.tensor([0, 2])
@@ -98,12 +98,12 @@ def test_incremental_scores_equal_full_ones(
 
 def test_chunks_make_no_difference(board: Board, network: ActorCritic, monkeypatch: pytest.MonkeyPatch) -> None:
     """Scored a few agents at a time, the first scores are the same, and a wish to stop is heard in between."""
-    state = begin(board)
+    state = reset(board)
     monkeypatch.setattr(rollout, "SCORE_CHUNK", 100)
-    chunked = _Local(network, board, state, lambda: False).local
+    chunked = LocalScores(network, board, state, lambda: False).local
     torch.testing.assert_close(chunked, network.pairs(observe_pairs(board, state)), atol=1e-5, rtol=1e-5)
     asked: list[int] = []
-    _Local(network, board, state, lambda: asked.append(1) is None and len(asked) > 2)
+    LocalScores(network, board, state, lambda: asked.append(1) is None and len(asked) > 2)
     assert len(asked) == 3
 
 
@@ -117,22 +117,22 @@ def test_the_best_position_by_the_evaluator(network: ActorCritic) -> None:
     instances = [paper_like(12, 4, 50, seed) for seed in range(5)]
     board = layout(*instances)
     best = play(network, board, steps=20, temperature=1.0, generator=torch.Generator().manual_seed(2))
-    generator, state = torch.Generator().manual_seed(2), begin(board)
+    generator, state = torch.Generator().manual_seed(2), reset(board)
     met = [[rank(evaluate(one, plan_of(board, state, game)))] for game, one in enumerate(instances)]
     rows = torch.arange(5)  # games are dropped when half of them have ended, which changes what is drawn
-    part = board
+    region = board
     for _ in range(20):
         if 2 * int((~state.done).sum()) <= len(rows):
             going = torch.nonzero(~state.done)[:, 0]
-            rows, part, state = rows[going], part[going], state[going]
+            rows, region, state = rows[going], region[going], state[going]
         if not len(rows):
             break
-        _, slot = choose(part, state, network(part, state), temperature=1.0, generator=generator)
-        state = step(part, state, slot)
+        _, slot = sample_actions(region, state, network(region, state), temperature=1.0, generator=generator)
+        state = step(region, state, slot)
         for place, game in enumerate(rows.tolist()):
-            met[game].append(rank(evaluate(instances[game], plan_of(part, state, place))))
+            met[game].append(rank(evaluate(instances[game], plan_of(region, state, place))))
     for game, one in enumerate(instances):
-        state = replace(begin(board), slot=best.slot)
+        state = replace(reset(board), slot=best.slot)
         score = evaluate(one, plan_of(board, state, game))
         assert score.violations == ()
         fewest, shortfall, _ = min((few, round(short, 5), far) for few, short, far in met[game])
@@ -145,8 +145,8 @@ def test_the_best_position_by_the_evaluator(network: ActorCritic) -> None:
 
 def test_games_end_side_by_side_as_alone(board: Board, network: ActorCritic) -> None:
     """Games of different lengths, dropped as they end, find the positions that each finds alone."""
-    prices = torch.tensor([0.0, 0.5, 2.0, 8.0])
-    board = replace(board, price=prices)
+    energy_weights = torch.tensor([0.0, 0.5, 2.0, 8.0])
+    board = replace(board, energy_weight=energy_weights)
     together = play(network, board, steps=30)
     for game in range(4):
         alone = play(network, board[torch.tensor([game])], steps=30)
@@ -170,14 +170,14 @@ def test_the_start_is_a_position(board: Board) -> None:
     """Without a step the beginning comes back."""
     start = play(ActorCritic(NetworkSize(8, 8, 2)), board, steps=0)
     assert torch.equal(start.slot, board.start)
-    assert torch.equal(start.distance, position(board, begin(board)).distance)
+    assert torch.equal(start.distance, position(board, reset(board)).distance)
 
 
 def test_shortfall_in_total_and_at_the_worst() -> None:
-    """Needs of 4 and 2 with groups of 3 and 3: a quarter is lacking at the worst task, a sixth of everything."""
+    """Needs of 4 and 2 with groups of 3 and 3: the shortfall is a quarter at the worst task, a sixth in total."""
     instance = Instance(ability=[3, 3], workload=[4, 2])
     board = replace(layout(instance), start=torch.tensor([[0, 1]]))
-    worst, total = (position(board, begin(board), total).shortfall.item() for total in (False, True))
+    worst, total = (position(board, reset(board), total).shortfall.item() for total in (False, True))
     assert (worst, total) == pytest.approx((1 / 4, 1 / 6))
 
 

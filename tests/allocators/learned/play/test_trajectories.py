@@ -11,13 +11,13 @@ from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSi
 from alloc.allocators.learned.play.action_sampling import log_probabilities
 from alloc.allocators.learned.play.trajectories import Trajectories, advantages, collect
 from alloc.problems import evaluate
-from alloc.problems.game import PAPER, PLANNING, Board, Rules, State, Turn, begin, moved, step, worth
+from alloc.problems.game import PAPER, PLANNING, Board, Rules, State, TurnRule, apply_moves, reset, step, utility
 from alloc.problems.generate import paper_like
 
 ALL_RULES = {
     "planning": PLANNING,
     "one move": Rules(most_moves=1),
-    "at once": Rules(turn=Turn.SIMULTANEOUS),
+    "at once": Rules(turn=TurnRule.SIMULTANEOUS),
     "paper": PAPER,
 }
 GAMES = 6
@@ -38,27 +38,27 @@ def play(network: ActorCritic, board: Board, steps: int, rules: Rules = PLANNING
     return collect(network, board, steps, torch.Generator().manual_seed(seed), rules, reward_scale=5.0)
 
 
-def after(played: Trajectories, rules: Rules) -> State:
+def next_state(played: Trajectories, rules: Rules) -> State:
     """Play the recorded actions again; return the last state."""
-    state = begin(played.board)
+    state = reset(played.board)
     for actions in played.actions:
-        if rules.turn == Turn.SIMULTANEOUS:
+        if rules.turn == TurnRule.SIMULTANEOUS:
             slot = torch.where(actions < 0, state.slot, actions % played.board.shape[2])
         else:
-            slot = moved(played.board, state, actions)
+            slot = apply_moves(played.board, state, actions)
         state = step(played.board, state, slot)
     return state
 
 
 def by_definition(
-    reward: list[float], value: list[float], last: float, discount: float, smoothing: float, cut: list[float]
+    reward: list[float], value: list[float], last: float, discount: float, gae_lambda: float, cut: list[float]
 ) -> list[float]:
     """The double sum of (9) over the errors (10), as the paper writes it, with V-trace's cuts of the traces."""
     following = [*value[1:], last]
     error = [r + discount * later - now for r, now, later in zip(reward, value, following, strict=True)]
     steps = len(error)
     return [
-        sum((discount * smoothing) ** (k - t) * prod(cut[t + 1 : k + 1]) * error[k] for k in range(t, steps))
+        sum((discount * gae_lambda) ** (k - t) * prod(cut[t + 1 : k + 1]) * error[k] for k in range(t, steps))
         for t in range(steps)
     ]
 
@@ -70,22 +70,22 @@ def test_advantages_by_hand() -> None:
     assert got[:, 0].tolist() == [1.5, 2.0, 0.0]
 
 
-@pytest.mark.parametrize("smoothing", [0.0, 0.8, 1.0])
-def test_advantages_by_their_definition(smoothing: float) -> None:
+@pytest.mark.parametrize("gae_lambda", [0.0, 0.8, 1.0])
+def test_advantages_by_their_definition(gae_lambda: float) -> None:
     """Games of all lengths side by side: those that end, and one that is cut off and counts its last value."""
     generator = torch.Generator().manual_seed(0)
     steps = 6
     reward, value = torch.randn(2, steps, steps, generator=generator).unbind()
-    last, likelihood = torch.randn(steps, generator=generator), 2 * torch.rand(steps, steps, generator=generator)
+    last, importance_ratio = torch.randn(steps, generator=generator), 2 * torch.rand(steps, steps, generator=generator)
     alive = torch.arange(steps)[:, None] <= torch.arange(steps)  # game b lasts b + 1 steps
     last[:-1] = 0.0
-    for given in (None, likelihood):
-        got = advantages(reward, value, alive, last, 0.9, smoothing, given)
+    for given in (None, importance_ratio):
+        got = advantages(reward, value, alive, last, 0.9, gae_lambda, given)
         for game in range(steps):
             length = game + 1
             cut = [1.0] * length if given is None else given[:length, game].clamp(max=1.0).tolist()
             rewards, values = reward[:length, game].tolist(), value[:length, game].tolist()
-            expected = by_definition(rewards, values, last[game].item(), 0.9, smoothing, cut)
+            expected = by_definition(rewards, values, last[game].item(), 0.9, gae_lambda, cut)
             assert got[:length, game].tolist() == pytest.approx(expected, abs=1e-5)
             assert (got[length:, game] == 0).all()
 
@@ -103,11 +103,11 @@ def test_traces_are_cut_as_by_v_trace() -> None:
     """Value and cut advantage make V-trace's target v_s (Espeholt et al. 2018, (1)), with rho and c cut at 1."""
     generator = torch.Generator().manual_seed(1)
     reward, value = torch.randn(2, 5, 1, generator=generator).unbind()
-    likelihood = torch.tensor([0.5, 3.0, 0.2, 1.0, 0.7])[:, None]
-    got = advantages(reward, value, torch.ones(5, 1, dtype=torch.bool), torch.tensor([0.3]), 0.9, 1.0, likelihood)
-    target = value + likelihood.clamp(max=1.0) * got
+    importance_ratio = torch.tensor([0.5, 3.0, 0.2, 1.0, 0.7])[:, None]
+    got = advantages(reward, value, torch.ones(5, 1, dtype=torch.bool), torch.tensor([0.3]), 0.9, 1.0, importance_ratio)
+    target = value + importance_ratio.clamp(max=1.0) * got
     following = torch.cat([value[1:], torch.tensor([[0.3]])])
-    cut = likelihood.clamp(max=1.0)
+    cut = importance_ratio.clamp(max=1.0)
     error = cut * (reward + 0.9 * following - value)
     for s in range(5):
         v = value[s] + sum(0.9 ** (t - s) * cut[s:t].prod() * error[t] for t in range(s, 5))
@@ -115,19 +115,19 @@ def test_traces_are_cut_as_by_v_trace() -> None:
 
 
 @pytest.mark.parametrize("rules", ALL_RULES.values(), ids=list(ALL_RULES))
-def test_rewards_add_up_to_the_rise_of_worth(board: Board, network: ActorCritic, rules: Rules) -> None:
-    """The recorded actions lead to a state that is worth more by the rewards."""
+def test_rewards_add_up_to_the_rise_of_utility(board: Board, network: ActorCritic, rules: Rules) -> None:
+    """The recorded actions lead to a state that is utility more by the rewards."""
     played = play(network, board, 5, rules)
-    rise = worth(board, after(played, rules), rules) - worth(board, begin(board), rules)
+    rise = utility(board, next_state(played, rules), rules) - utility(board, reset(board), rules)
     torch.testing.assert_close(played.reward.sum(0), 5 * rise, atol=1e-4, rtol=1e-4)
 
 
-def test_the_rise_of_worth_is_that_of_the_evaluator(network: ActorCritic) -> None:
+def test_the_rise_of_utility_is_that_of_the_evaluator(network: ActorCritic) -> None:
     """With energy alone, the reward of a game is the distance saved, as the one scorer measures it."""
     instance = paper_like(8, 3, 36, 0)
-    board = layout(instance, hours=1e6, price=2.0)  # needs of next to nothing: all but energy is met
+    board = layout(instance, hours=1e6, energy_weight=2.0)  # needs of next to nothing: all but energy is met
     played = play(network, board, 4)
-    first, last = (evaluate(instance, plan_of(board, state)) for state in (begin(board), after(played, PLANNING)))
+    first, last = (evaluate(instance, plan_of(board, state)) for state in (reset(board), next_state(played, PLANNING)))
     saved = (first.distance - last.distance) * board.scale.item() / 8
     served = len(first.unserved_tasks) == len(last.unserved_tasks) == 0
     assert served
@@ -152,7 +152,7 @@ def test_a_game_that_is_cut_off_is_not_over(board: Board, network: ActorCritic) 
     with torch.no_grad():
         network.reserve[-1].bias.fill_(3.0)  # as likely as some 20 bids: about every other game stops at once
     played = play(network, board, 1, seed=3)
-    state = after(played, PLANNING)
+    state = next_state(played, PLANNING)
     assert 0 < int(state.done.sum()) < GAMES
     with torch.no_grad():
         value = network(board, state).value
@@ -162,7 +162,7 @@ def test_a_game_that_is_cut_off_is_not_over(board: Board, network: ActorCritic) 
 def test_games_that_ended_are_no_longer_counted(board: Board, network: ActorCritic) -> None:
     """Decisions and evaluations are those of games still on, and nothing happens in the others."""
     played = play(network, board, 50)
-    assert bool(after(played, PLANNING).done.all())
+    assert bool(next_state(played, PLANNING).done.all())
     assert not bool(played.alive.all())
     assert len(played.reward) < 50, "no steps are taken when all games have ended"
     over = ~played.alive
@@ -178,7 +178,7 @@ def test_play_goes_on_from_a_state(board: Board, network: ActorCritic) -> None:
     """Two segments with one generator are one long game."""
     one, generator = play(network, board, 4), torch.Generator().manual_seed(0)
     first = collect(network, board, 2, generator, reward_scale=5.0)
-    second = collect(network, board, 2, generator, reward_scale=5.0, state=after(first, PLANNING))
+    second = collect(network, board, 2, generator, reward_scale=5.0, state=next_state(first, PLANNING))
     assert torch.equal(torch.cat([first.state.slot, second.state.slot]), one.state.slot)
     torch.testing.assert_close(torch.cat([first.reward, second.reward]), one.reward)
     torch.testing.assert_close(torch.cat([first.value, second.value]), one.value)

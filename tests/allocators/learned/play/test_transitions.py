@@ -1,4 +1,4 @@
-"""Rounds taken apart into single moves, and the memory of them."""
+"""Rounds taken task_distance into single moves, and the memory of them."""
 
 import numpy as np
 import pytest
@@ -6,9 +6,15 @@ import torch
 from probes import probe
 
 from alloc.allocators.learned.network.actor_critic import ActorCritic
-from alloc.allocators.learned.play.transitions import Memory, Transitions, after, gains, play
+from alloc.allocators.learned.play.transitions import (
+    TransitionMemory,
+    Transitions,
+    next_state,
+    play,
+    scores_above_reserve,
+)
 from alloc.problems import InputError, generate
-from alloc.problems.game import PLANNING, Board, Rules, Turn, begin, make_board, open_bids, worth
+from alloc.problems.game import PLANNING, Board, Rules, TurnRule, action_mask, make_board, reset, utility
 
 
 @pytest.fixture
@@ -25,17 +31,19 @@ def played(board: Board, rules: Rules = PLANNING, steps: int = 3) -> Transitions
 @pytest.mark.parametrize("rules", [PLANNING, Rules(flying=True), Rules(returning=True), Rules(most_moves=2)])
 def test_single_moves_make_up_the_rounds(board: Board, rules: Rules) -> None:
     """Each game's transitions are a path from its first state: state after state, one legal bid at a time, and each
-    brings the rise of the worth."""
+    brings the rise of the utility."""
     path = played(board, rules)
     games, before, action, reward = path.rows(torch.arange(len(path.action)))
-    assert open_bids(games, before, rules).flatten(1)[torch.arange(len(action)), action].all()
-    following = after(games, before, action)
-    torch.testing.assert_close(reward, worth(games, following, rules) - worth(games, before, rules), atol=1e-5, rtol=0)
+    assert action_mask(games, before, rules).flatten(1)[torch.arange(len(action)), action].all()
+    following = next_state(games, before, action)
+    torch.testing.assert_close(
+        reward, utility(games, following, rules) - utility(games, before, rules), atol=1e-5, rtol=0
+    )
     for game in range(3):
         rows = torch.nonzero(path.game == game)[:, 0]
         assert len(rows) > 4
-        start = begin(board)[torch.tensor([game])]
-        for field in ("slot", "left", "at", "hopped", "group"):
+        start = reset(board)[torch.tensor([game])]
+        for field in ("slot", "visited", "location", "flown", "group"):
             states = torch.cat([getattr(start, field), getattr(following, field)[rows]])
             torch.testing.assert_close(states[:-1], getattr(before, field)[rows])
 
@@ -43,7 +51,7 @@ def test_single_moves_make_up_the_rounds(board: Board, rules: Rules) -> None:
 def test_agents_that_choose_at_once_are_refused(board: Board) -> None:
     """What one agent brings is not defined where all choose at once, and the error says so."""
     with pytest.raises(InputError, match="bidding"):
-        played(board, Rules(turn=Turn.SIMULTANEOUS))
+        played(board, Rules(turn=TurnRule.SIMULTANEOUS))
 
 
 def test_exploring_never_stops_at_once(board: Board) -> None:
@@ -58,11 +66,11 @@ def test_exploring_never_stops_at_once(board: Board) -> None:
 
 def test_gains_are_scores_above_the_reserve(board: Board) -> None:
     """Closed bids have none, and stopping has 0."""
-    state = begin(board)
+    state = reset(board)
     bids, reserve = torch.full(board.shape, 3.0), torch.tensor([1.0, 2.0, 5.0])
-    got = gains(bids, reserve, board, state, PLANNING)
+    got = scores_above_reserve(bids, reserve, board, state, PLANNING)
     assert got[:, -1].tolist() == [0, 0, 0]
-    opened = open_bids(board, state).flatten(1)
+    opened = action_mask(board, state).flatten(1)
     assert torch.equal(got[:, :-1] > -torch.inf, opened)
     assert [set(row[open_].tolist()) for row, open_ in zip(got[:, :-1], opened, strict=True)] == [{2.0}, {1.0}, {-2.0}]
 
@@ -70,7 +78,7 @@ def test_gains_are_scores_above_the_reserve(board: Board) -> None:
 def test_memory_forgets_the_oldest_board(board: Board) -> None:
     """No more than the capacity is kept, and what was kept last is there."""
     first, second = played(board, steps=1), played(board, steps=2)
-    memory = Memory(len(first.action) + len(second.action) - 1)
+    memory = TransitionMemory(len(first.action) + len(second.action) - 1)
     memory.add(first)
     memory.add(second)
     assert memory.kept == [second]
@@ -80,7 +88,7 @@ def test_every_transition_is_drawn_as_often(board: Board) -> None:
     """Whatever the sizes of the boards, each transition has the same chance."""
     small = played(board, steps=1)
     large = played(probe("pairing").board, steps=1)
-    memory, generator = Memory(10_000), torch.Generator().manual_seed(0)
+    memory, generator = TransitionMemory(10_000), torch.Generator().manual_seed(0)
     memory.add(small)
     memory.add(large)
     share = sum(memory.draw(1, generator)[0].shape[1] == 12 for _ in range(2000)) / 2000

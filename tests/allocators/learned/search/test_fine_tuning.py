@@ -15,11 +15,11 @@ from alloc.allocators.learned.search.fine_tuning import (
     GENERATION,
     FineTuning,
     FineTuningParameters,
-    _PartGames,
+    _RegionGames,
 )
 from alloc.allocators.learned.search.planner import Planner, PlannerParameters
 from alloc.problems import Objective
-from alloc.problems.game.parts import Parts, lay_out_parts
+from alloc.problems.game.regions import Regions, lay_out_regions
 from alloc.problems.generate import paper_like
 
 pytestmark = pytest.mark.timeout(400)  # the first game waits for the compiler, long on a busy machine
@@ -34,12 +34,12 @@ def networks() -> list[ActorCritic]:
 
 
 @pytest.fixture
-def parts() -> Parts:
+def regions() -> Regions:
     instance = paper_like(24, 6, 100, 0)
     tasks = np.array([[0, 1, 2], [3, 4, 5]])
     agents = [np.flatnonzero(np.isin(instance.start_task, some)) for some in tasks]
-    plan = instance.start_task // 3 * 3 + (instance.start_task + 1) % 3  # everybody at another task of the same part
-    return lay_out_parts(instance, 1.0, plan, tasks, agents)
+    plan = instance.start_task // 3 * 3 + (instance.start_task + 1) % 3  # everybody at another task of the same region
+    return lay_out_regions(instance, 1.0, plan, tasks, agents)
 
 
 def search(time_limit_s: float | None = 10.0, iterations: int | None = None, seed: int = 0) -> Search:
@@ -62,27 +62,27 @@ def test_when_learning_is_due(networks: list[ActorCritic], monkeypatch: pytest.M
     assert not FineTuning(search(None, 10), networks).is_due()
 
 
-def test_shipped_networks_stay_as_they_are(networks: list[ActorCritic], parts: Parts) -> None:
+def test_shipped_networks_stay_as_they_are(networks: list[ActorCritic], regions: Regions) -> None:
     """Lessons change copies, member by member; the networks of the policy serve the next run as before."""
     before = weights(networks).clone()
     tuning = FineTuning(search(), networks, FEW)
-    once = weights(list(tuning.learn(parts))).clone()
+    once = weights(list(tuning.learn(regions))).clone()
     half = len(once) // 2
     assert not torch.equal(once[:half], before[:half])
     assert torch.equal(once[half:], before[half:]), "the second member has not had its lesson yet"
-    twice = weights(list(tuning.learn(parts)))
+    twice = weights(list(tuning.learn(regions)))
     assert not torch.equal(twice[half:], before[half:])
     assert torch.equal(weights(networks), before)
     assert tuning.spent_s > 0
 
 
-def test_generations_follow_each_other(networks: list[ActorCritic], parts: Parts) -> None:
+def test_generations_follow_each_other(networks: list[ActorCritic], regions: Regions) -> None:
     """After some lessons of each member the population breeds; all weights stay finite, and the seed decides."""
     ends = []
     for seed in (0, 0, 1):
         tuning = FineTuning(search(seed=seed), networks, FEW)
         for _ in range(2 * GENERATION):
-            learned = list(tuning.learn(parts))
+            learned = list(tuning.learn(regions))
         assert tuning._reports == [], "reports are forgotten with their generation"
         ends.append(weights(learned).clone())
         assert ends[-1].isfinite().all()
@@ -91,13 +91,13 @@ def test_generations_follow_each_other(networks: list[ActorCritic], parts: Parts
 
 
 @pytest.mark.parametrize("rewards", list(permutations((1.0, 2.0, 3.0))))
-def test_the_fittest_survive_a_generation(parts: Parts, rewards: tuple[float, ...]) -> None:
+def test_the_fittest_survive_a_generation(regions: Regions, rewards: tuple[float, ...]) -> None:
     """Whatever the order of their fitness, the elite pass unchanged, weights and optimiser together."""
     torch.manual_seed(0)
     shipped = [ActorCritic(NetworkSize(8, 8, 2)).requires_grad_(False) for _ in rewards]
     tuning = FineTuning(search(), shipped, FEW)
     for _ in range(len(rewards)):
-        tuning.learn(parts)
+        tuning.learn(regions)
     before = [(weights([one.policy]).clone(), moments(one)) for one in tuning.members]
     tuning._reports = [TrainingStats(1, 1, reward, 1.0, 0.0, 1e-4) for reward in rewards]
     tuning._breed()
@@ -113,19 +113,19 @@ def moments(member: Ppo) -> torch.Tensor:
     return torch.cat([state["exp_avg"].flatten() for state in member.optimiser.state.values()]).clone()
 
 
-def test_games_begin_at_home_or_where_the_plan_is(parts: Parts) -> None:
-    """Some agents begin at the nearest task, others where the plan has them, at prices of the range asked for."""
-    games = _PartGames(parts, FineTuningParameters(games=200))
+def test_games_begin_at_the_nearest_task_or_where_the_plan_is(regions: Regions) -> None:
+    """Some agents begin at the nearest task, others where the plan has them, with energy weights in the range."""
+    games = _RegionGames(regions, FineTuningParameters(games=200))
     board = games.draw(np.random.default_rng(0), 0.0)
     assert board.shape[0] == 200
-    assert 0.4 <= float(board.price.min()) < 0.6
-    assert 1.6 < float(board.price.max()) <= 2.4
-    row = [int(torch.nonzero((parts.board.need == need).all(1))[0]) for need in board.need]
-    home, plan = parts.home[row], parts.board.start[row]
-    assert ((board.start == home) | (board.start == plan)).all()
-    assert (board.start != home).any()
+    assert 0.4 <= float(board.energy_weight.min()) < 0.6
+    assert 1.6 < float(board.energy_weight.max()) <= 2.4
+    row = [int(torch.nonzero((regions.board.need == need).all(1))[0]) for need in board.need]
+    nearest, plan = regions.nearest[row], regions.board.start[row]
+    assert ((board.start == nearest) | (board.start == plan)).all()
+    assert (board.start != nearest).any()
     assert (board.start != plan).any()
-    few = _PartGames(parts, FineTuningParameters(pairs=3 * board.shape[1] * board.shape[2]))
+    few = _RegionGames(regions, FineTuningParameters(pairs=3 * board.shape[1] * board.shape[2]))
     assert few.draw(np.random.default_rng(0), 0.0).shape[0] == 3
 
 
@@ -134,7 +134,7 @@ def test_the_planner_plays_by_what_was_learned(networks: list[ActorCritic], monk
     run = search(None, 3)
     tuning = FineTuning(run, networks, FEW)
     monkeypatch.setattr(tuning, "is_due", lambda: True)
-    planner = Planner(run, networks, PlannerParameters(lane_pairs=1500), tuning)
+    planner = Planner(run, networks, PlannerParameters(pairs_per_stream=1500), tuning)
     planner.run()
     assert tuning.lessons == 3
     assert [id(one) for one in planner.networks] == [id(member.policy) for member in tuning.members]

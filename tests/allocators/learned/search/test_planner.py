@@ -1,4 +1,4 @@
-"""The planner: parts that cover what is lacking, aims, and what comes out on instances of every kind."""
+"""The planner: regions, targets, and plans for instances of every kind."""
 
 import copy
 from itertools import pairwise
@@ -10,25 +10,26 @@ from boards import EXTREMES
 from oracle import brute_force
 from tiny_instances import tiny_instance
 
-from alloc.allocators import Budget, MakespanTolerance, Search
+from alloc.allocators import Budget, MakespanTolerance, Search, solve
 from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize
 from alloc.allocators.learned.play.batched_games import Games, play_games
 from alloc.allocators.learned.play.rollout import Best
+from alloc.allocators.learned.policy import Ppo
 from alloc.allocators.learned.search.planner import Planner, PlannerParameters, most_helpers
-from alloc.problems import IDLE, Allocation, Family, Instance, Objective, evaluate, random_instance
+from alloc.problems import IDLE, Allocation, Evaluation, Family, Instance, Objective, evaluate, random_instance
 from alloc.problems.game import Board, make_board
-from alloc.problems.game.parts import lay_out_parts
+from alloc.problems.game.regions import lay_out_regions
 from alloc.problems.generate import paper_like
 
 pytestmark = pytest.mark.timeout(400)  # the first game waits for the compiler, long on a busy machine
 
-QUICK = PlannerParameters(lane_pairs=1500, rounds=8)
+QUICK = PlannerParameters(pairs_per_stream=1500, rounds=8)
 ENERGY = Objective.MAKESPAN_ENERGY
 
 
 @pytest.fixture(scope="module")
 def network() -> ActorCritic:
-    """A network that knows nothing: what is promised here does not hang on what was learned."""
+    """An untrained network: what is shown here does not depend on training."""
     torch.manual_seed(0)
     network = ActorCritic(NetworkSize(8, 8, 2)).requires_grad_(False)
     network.reserve[-1].bias.fill_(-1.0)
@@ -54,13 +55,24 @@ def planned(network: ActorCritic, instance: Instance, **settings: object) -> Sea
     return one.search
 
 
-def test_parts_hold_everyone_who_works_there(network: ActorCritic) -> None:
-    """Each part has the agents of its tasks and some of the idle; nobody is in two."""
+def solved(
+    network: ActorCritic, instance: Instance, objective: Objective = Objective.MAKESPAN, iterations: int = 6
+) -> Evaluation:
+    """Return the scores of what `solve` finds by a planner, once it has settled which tasks are served."""
+    allocator = Ppo()
+    allocator.networks, allocator.parameters = [network], QUICK
+    result = solve(instance, allocator, objective=objective, time_limit_s=None, iterations=iterations)
+    assert result.evaluation is not None
+    return result.evaluation
+
+
+def test_regions_hold_all_agents_of_their_tasks(network: ActorCritic) -> None:
+    """Each region has the agents of its tasks and some of the idle; nobody is in two."""
     instance = paper_like(40, 9, 170, 1)
     one = planner(network, instance)
     one.plan = np.random.default_rng(0).integers(-1, 9, 40)
     for _ in range(10):
-        tasks, agents = one._cover(np.zeros(9))
+        tasks, agents = one._partition(np.zeros(9))
         together = np.concatenate(agents)
         assert len(np.unique(together)) == len(together)
         for some, who in zip(tasks, agents, strict=True):
@@ -70,35 +82,35 @@ def test_parts_hold_everyone_who_works_there(network: ActorCritic) -> None:
 
 
 def test_a_sweep_leaves_all_other_agents_alone(network: ActorCritic) -> None:
-    """Agents of parts that were not accepted, and those in no part, stay where they are."""
+    """Agents of regions that were not accepted, and those in no region, stay where they are."""
     instance = paper_like(40, 9, 170, 1)
     one = planner(network, instance)
     one.plan = instance.start_task.copy()
-    tasks, agents = one._cover(one.aims.surplus(one.plan))
-    parts = lay_out_parts(instance, one.aims.hours, one.plan, tasks, agents)
-    accepted, slots = one._play_parts(network, parts, (0.4, 2.4))
+    tasks, agents = one._partition(one.target.surplus(one.plan))
+    regions = lay_out_regions(instance, one.target.hours, one.plan, tasks, agents)
+    accepted, slots = one._play_regions(network, regions, (0.4, 2.4))
     assert accepted.any()
-    merged = parts.merge(one.plan, slots, accepted)
-    may_move = np.concatenate([agents[part] for part in np.flatnonzero(accepted)])
+    merged = regions.merge(one.plan, slots, accepted)
+    may_move = np.concatenate([agents[region] for region in np.flatnonzero(accepted)])
     others = np.setdiff1d(np.arange(40), may_move)
     assert np.array_equal(merged[others], one.plan[others])
     assert not np.array_equal(merged, one.plan)
     assert evaluate(instance, Allocation(merged)).violations == ()
 
 
-def test_what_is_accepted_lacks_less(network: ActorCritic) -> None:
-    """With every merged plan less is lacking in total, or as much at less distance."""
+def test_accepted_plans_have_less_shortfall(network: ActorCritic) -> None:
+    """Every merged plan has less shortfall in total, or as much at less distance."""
     instance = paper_like(40, 9, 170, 1)
     one = planner(network, instance)
     one.play_whole(1.0)
     met = []
     for _ in range(12):
-        surplus, score = one.aims.surplus(one.plan), evaluate(instance, Allocation(one.plan))
+        surplus, score = one.target.surplus(one.plan), evaluate(instance, Allocation(one.plan))
         met.append((round(float(-surplus[surplus < 0].sum()), 4), score.distance))
-        tasks, agents = one._cover(surplus)
-        parts = lay_out_parts(instance, one.aims.hours, one.plan, tasks, agents)
-        accepted, slots = one._play_parts(network, parts, (0.4, 2.4))
-        one.plan = parts.merge(one.plan, slots, accepted)
+        tasks, agents = one._partition(surplus)
+        regions = lay_out_regions(instance, one.target.hours, one.plan, tasks, agents)
+        accepted, slots = one._play_regions(network, regions, (0.4, 2.4))
+        one.plan = regions.merge(one.plan, slots, accepted)
     assert all(later <= earlier for earlier, later in pairwise(met))
     assert met[-1] < met[0]
 
@@ -129,7 +141,7 @@ def test_tiny_instances_by_brute_force(network: ActorCritic, seed: int) -> None:
 
 
 def test_most_tiny_instances_are_solved(network: ActorCritic) -> None:
-    """Even with a network that knows nothing, games on parts find the least makespan of four in five."""
+    """Even with an untrained network, games on regions find the least makespan of four in five."""
     hit = 0
     for seed in range(20):
         instance = tiny_instance(seed)
@@ -139,59 +151,59 @@ def test_most_tiny_instances_are_solved(network: ActorCritic) -> None:
     assert hit >= 16
 
 
-def test_first_aim_is_the_bound_and_then_half_way(network: ActorCritic) -> None:
-    """Aims: the bound; halfway to what was reached after patience is out; nearer the bound when an aim is reached."""
+def test_first_target_is_the_bound_and_then_half_way(network: ActorCritic) -> None:
+    """Targets: the bound; without progress, halfway to the makespan reached; nearer the bound when one is reached."""
     instance = Instance(ability=[3, 3, 3], workload=[4, 5])  # the bound of 1 cannot be met: 5 / 3 or 4 / 3 at best
     one = planner(network, instance)
-    bound = one.aims.hours
-    assert bound == one.aims.failed == one.search.lower_bound
-    one._go_on_from(np.array([0, 1, IDLE]))  # T = 5 / 3
-    one.aims.set(one.plan)
-    assert one.aims.hours == bound
-    one.aims.stale = one.aims.patience
-    one.aims.set(one.plan)
-    assert one.aims.failed == bound
-    assert one.aims.hours == pytest.approx((bound + 5 / 3) / 2)
-    assert one.aims.stale == 0
-    one._go_on_from(np.array([0, 1, 1]))  # T = 4 / 3, which is within the aim
-    assert one.aims.hours >= 4 / 3
-    one.aims.set(one.plan)
-    assert one.aims.hours == pytest.approx((bound + 4 / 3) / 2)
-    one.aims.stale = one.aims.patience
-    one.aims.set(one.plan)
-    assert one.aims.failed == pytest.approx((bound + 4 / 3) / 2)
+    bound = one.target.hours
+    assert bound == one.target.failed == one.search.lower_bound
+    one._continue_from(np.array([0, 1, IDLE]))  # T = 5 / 3
+    one.target.update(one.plan)
+    assert one.target.hours == bound
+    one.target.stale = one.target.patience
+    one.target.update(one.plan)
+    assert one.target.failed == bound
+    assert one.target.hours == pytest.approx((bound + 5 / 3) / 2)
+    assert one.target.stale == 0
+    one._continue_from(np.array([0, 1, 1]))  # T = 4 / 3, which is within the target
+    assert one.target.hours >= 4 / 3
+    one.target.update(one.plan)
+    assert one.target.hours == pytest.approx((bound + 4 / 3) / 2)
+    one.target.stale = one.target.patience
+    one.target.update(one.plan)
+    assert one.target.failed == pytest.approx((bound + 4 / 3) / 2)
 
 
 def test_energy_counts_once_the_bound_is_met_or_time_is_short(network: ActorCritic) -> None:
-    """With energy in the objective the aim becomes the makespan reached, at the bound, or late in the run."""
+    """With energy in the objective the target becomes the makespan reached, at the bound, or late in the run."""
     instance = Instance(ability=[3, 3, 3], workload=[4, 5])
     early, late = (planner(network, instance, ENERGY, iterations=10) for _ in range(2))
     late.search.iteration = 7
     for one in (early, late):
-        one._go_on_from(np.array([0, 1, 1]))
-        one.aims.set(one.plan)
-    assert early.aims.hours == early.aims.failed
-    assert late.aims.hours == pytest.approx(4 / 3)
+        one._continue_from(np.array([0, 1, 1]))
+        one.target.update(one.plan)
+    assert early.target.hours == early.target.failed
+    assert late.target.hours == pytest.approx(4 / 3)
     met = planner(network, Instance(ability=[2, 1], workload=[2, 1], task_position=[[0, 0], [1, 0]]), ENERGY)
-    met._go_on_from(np.array([0, 1]))
-    met.aims.set(met.plan)
-    assert met.aims.hours == 1.0
+    met._continue_from(np.array([0, 1]))
+    met.target.update(met.plan)
+    assert met.target.hours == 1.0
 
 
 def test_bounds_that_cannot_be_met_do_not_hold_it_up(network: ActorCritic) -> None:
-    """Where the bound is out of reach, bisection on the aim finds the optimum all the same."""
+    """Where the bound is out of reach, bisection on the target finds the optimum all the same."""
     instance = Instance(ability=[5, 5, 5, 4, 4], workload=[9, 8, 6], agent_position=np.zeros((5, 2)))
     best = brute_force(instance)
     one = planner(network, instance, iterations=12)
-    one.aims.patience = 2
+    one.target.patience = 2
     one.run()
     assert one.search.best is not None
     assert best.makespan > one.search.lower_bound * 1.01
     assert one.search.best.evaluation.makespan == pytest.approx(best.makespan)
 
 
-def test_tasks_that_nobody_can_do_are_no_aim(network: ActorCritic) -> None:
-    """A huge task out of reach, and tasks without a hand left, spoil neither bound nor search."""
+def test_tasks_that_nobody_can_do_do_not_count(network: ActorCritic) -> None:
+    """A huge task out of reach, and more tasks than agents, spoil neither bound nor search."""
     far = Instance(
         ability=[1] * 10,
         workload=[6, 4, 90],
@@ -199,15 +211,10 @@ def test_tasks_that_nobody_can_do_are_no_aim(network: ActorCritic) -> None:
         start_task=[0] * 10,
         communication_range=[5] * 10,
     )
-    assert planner(network, far).aims.hours == pytest.approx(1.0)
     for objective in Objective:
-        search = planned(network, far, objective=objective, iterations=6)
-        assert search.best is not None
-        assert search.best.evaluation.served_makespan == pytest.approx(1.0)
+        assert solved(network, far, objective, iterations=6).served_makespan == pytest.approx(1.0)
     few = Instance(ability=[3, 1], workload=[2, 5, 1, 4])
-    search = planned(network, few, iterations=6)
-    assert search.best is not None
-    assert len(search.best.evaluation.unserved_tasks) == brute_force(few).unserved == 2
+    assert len(solved(network, few, iterations=6).unserved_tasks) == brute_force(few).unserved == 2
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -215,9 +222,7 @@ def test_of_tasks_that_cannot_all_be_served_the_least_work_is_done(network: Acto
     """With more tasks than agents everywhere in reach, the makespan is that of brute force."""
     rng = np.random.default_rng(seed)
     instance = Instance(ability=rng.integers(1, 6, 3), workload=rng.integers(1, 30, 5))
-    search = planned(network, instance, iterations=10)
-    assert search.best is not None
-    got, best = search.best.evaluation, brute_force(instance)
+    got, best = solved(network, instance, iterations=10), brute_force(instance)
     assert (len(got.unserved_tasks), got.served_makespan) == (best.unserved, pytest.approx(best.makespan))
 
 
@@ -237,93 +242,93 @@ def test_a_task_that_needs_most_agents_gets_them_in_the_first_game(network: Acto
     assert asked == [16 + 48]
 
 
-@pytest.mark.parametrize(("pairs", "most", "lanes"), [(1, 9, 1), (10**9, 9, 9)])
-def test_lanes_are_bounded(
-    network: ActorCritic, monkeypatch: pytest.MonkeyPatch, pairs: int, most: int, lanes: int
+@pytest.mark.parametrize(("pairs", "most", "games"), [(1, 9, 1), (10**9, 9, 9)])
+def test_games_on_a_region_are_bounded(
+    network: ActorCritic, monkeypatch: pytest.MonkeyPatch, pairs: int, most: int, games: int
 ) -> None:
-    """Each part is played once at least, and no more often than is allowed, however many pairs may be."""
+    """Each region is played once at least, and no more often than is allowed, however many pairs may be."""
     instance = paper_like(60, 20, 330, 3)
     one = Planner(
-        Search(instance, ENERGY, Budget(None, 4)), [network], PlannerParameters(lane_pairs=pairs, most_lanes=most)
+        Search(instance, ENERGY, Budget(None, 4)),
+        [network],
+        PlannerParameters(pairs_per_stream=pairs, games_per_region=most),
     )
     played: list[list[int]] = []
 
     def spy(network: ActorCritic, board: Board, games: Games, **settings: object) -> Best:
-        played.append(np.bincount(games.row, minlength=len(board.price)).tolist())
+        played.append(np.bincount(games.row, minlength=len(board.energy_weight)).tolist())
         return play_games(network, board, games, **settings)  # type: ignore[arg-type]
 
     monkeypatch.setattr("alloc.allocators.learned.search.planner.play_games", spy)
     one.run()
-    on_parts = [games for games in played if len(games) > 1]
-    assert len(on_parts) > 0
-    assert {count for games in on_parts for count in games} == {lanes}
+    on_regions = [games for games in played if len(games) > 1]
+    assert len(on_regions) > 0
+    assert {count for games in on_regions for count in games} == {games}
 
 
-def test_slow_aims_are_given_up(network: ActorCritic) -> None:
-    """An aim that most of the lack still separates from after its share of the budget is halved to what was reached."""
+def test_targets_approached_too_slowly_are_given_up(network: ActorCritic) -> None:
+    """A target is given up for one halfway where, after a share of the budget, most of the shortfall is left."""
     instance = paper_like(40, 8, 170, 0)
     one = planner(network, instance, iterations=100)
     one.play_whole(1.0)
-    aims, first = one.aims, one.aims.hours
+    target, first = one.target, one.target.hours
     for shortfall in (50.0, 49.0, 48.0, 47.0, 46.0):
-        aims.note(np.array([-shortfall, 1.0]))
+        target.record(np.array([-shortfall, 1.0]))
     one.search.iteration = 20
-    aims.set(one.plan)
-    assert aims.hours == first, "the first check has nothing to compare with"
+    target.update(one.plan)
+    assert target.hours == first, "the first check has nothing to compare with"
     for _ in range(5):
-        aims.note(np.array([-30.0, 1.0]))
-    aims.set(one.plan)
-    assert aims.hours == first, "no share of the budget has gone by"
+        target.record(np.array([-30.0, 1.0]))
+    target.update(one.plan)
+    assert target.hours == first, "the share of the budget has not passed"
     one.search.iteration = 40
-    aims.set(one.plan)
-    assert aims.failed == first
-    assert aims.hours > first
+    target.update(one.plan)
+    assert target.failed == first
+    assert target.hours > first
 
 
-def test_little_that_is_lacking_is_worth_the_patience(network: ActorCritic) -> None:
-    """Less than a mean agent's ability in all does not end an aim, and parts get larger only after a while in vain."""
+def test_a_small_shortfall_does_not_end_a_target(network: ActorCritic) -> None:
+    """A shortfall of less than a mean ability ends no target, and stagnation is counted after some sweeps only."""
     one = planner(network, paper_like(40, 8, 170, 0), iterations=100)
     one.play_whole(1.0)
-    aims, first = one.aims, one.aims.hours
+    target, first = one.target, one.target.hours
     for iteration in (20, 40, 60):
         for _ in range(5):
-            aims.note(np.array([-2.0, -1.0, 5.0]))
-        aims.search.iteration = iteration
-        aims.set(one.plan)
-        assert aims.hours == first
-    assert aims.stale == 14
-    assert aims.in_vain == pytest.approx((14 - 5) / (20 - 5))
-    aims.note(np.array([-2.0]))
-    assert aims.in_vain == 0
+            target.record(np.array([-2.0, -1.0, 5.0]))
+        target.search.iteration = iteration
+        target.update(one.plan)
+        assert target.hours == first
+    assert target.stale == 14
+    assert target.stagnation == pytest.approx((14 - 5) / (20 - 5))
+    target.record(np.array([-2.0]))
+    assert target.stagnation == 0
 
 
-def test_a_little_of_everything_is_no_rest(network: ActorCritic) -> None:
-    """Where many tasks lack a little, a slow aim is given up however little that is in all: it may be out of reach."""
+def test_small_shortfalls_of_many_tasks_end_a_target(network: ActorCritic) -> None:
+    """Where many tasks are short, a target is given up however small the total: it may be out of reach."""
     one = planner(network, paper_like(40, 8, 170, 0), iterations=100)
     one.play_whole(1.0)
-    aims, slow = one.aims, []
+    target, slow = one.target, []
     for iteration in (20, 40):
         for _ in range(5):
-            aims.note(np.full(8, -0.1))
-        aims.search.iteration = iteration
-        before = aims.hours
-        aims.set(one.plan)
-        slow.append(aims.hours > before)
+            target.record(np.full(8, -0.1))
+        target.search.iteration = iteration
+        before = target.hours
+        target.update(one.plan)
+        slow.append(target.hours > before)
     assert slow == [False, True]
 
 
 def test_nothing_to_serve_ends_at_once(network: ActorCritic) -> None:
-    """Where nobody can serve anything there is an answer, and no game on parts."""
-    instance = Instance(
-        ability=[1, 1], workload=[1], agent_position=[[0, 0]] * 2, task_position=[[9, 9]], communication_range=[1, 1]
-    )
+    """Where there is no work there is an answer, and no game on regions."""
+    instance = Instance(ability=[1, 1], workload=[0], agent_position=[[0, 0]] * 2, task_position=[[9, 9]])
     search = planned(network, instance, iterations=None, time_limit_s=60.0)
     assert search.best is not None
     assert search.iteration == 0
 
 
 def test_slack_and_limit_buy_energy(network: ActorCritic) -> None:
-    """The more time a plan may take, the less it flies; a limit that is given is what is aimed at."""
+    """The more time a plan may take, the less it flies; a limit that is given is the target."""
     instance = paper_like(24, 5, 100, 3)
     spent = []
     for tolerance in (MakespanTolerance(), MakespanTolerance(slack=0.3), MakespanTolerance(limit=3.0)):
@@ -333,8 +338,8 @@ def test_slack_and_limit_buy_energy(network: ActorCritic) -> None:
         assert search.best.evaluation.makespan <= search.makespan_limit * (1 + 1e-9)
         spent.append(search.best.evaluation.energy)
     assert spent[2] < spent[1] < spent[0]
-    assert planner(network, instance, ENERGY, tolerance=MakespanTolerance(limit=3.0)).aims.hours == 3.0
-    assert planner(network, instance, ENERGY, tolerance=MakespanTolerance(limit=0.5)).aims.hours == pytest.approx(1.0)
+    assert planner(network, instance, ENERGY, tolerance=MakespanTolerance(limit=3.0)).target.hours == 3.0
+    assert planner(network, instance, ENERGY, tolerance=MakespanTolerance(limit=0.5)).target.hours == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("objective", list(Objective))
@@ -348,7 +353,7 @@ def test_same_seed_same_answer(network: ActorCritic, objective: Objective) -> No
     assert traces[0] != traces[3]
 
 
-def test_it_stops_in_time(network: ActorCritic) -> None:
+def test_stops_in_time(network: ActorCritic) -> None:
     """Sweeps and the games in them end when time is up; with no time at all there is still an answer."""
     instance = paper_like(100, 20, 400, 0)
     for limit in (0.0, 0.5):
@@ -378,8 +383,8 @@ def test_idle_agents_are_put_to_work(network: ActorCritic) -> None:
     assert search.best.evaluation.makespan == 1.0
 
 
-def test_networks_take_turns(network: ActorCritic, monkeypatch: pytest.MonkeyPatch) -> None:
-    """All networks of a policy are asked for games on parts, the first one for the game on the whole."""
+def test_all_networks_are_used(network: ActorCritic, monkeypatch: pytest.MonkeyPatch) -> None:
+    """All networks of a policy play games on regions, the first one the game on the whole instance."""
     networks = [network, *(copy.deepcopy(network) for _ in range(2))]
     asked: list[int] = []
 
@@ -395,8 +400,8 @@ def test_networks_take_turns(network: ActorCritic, monkeypatch: pytest.MonkeyPat
     assert set(asked) == {0, 1, 2}
 
 
-def test_with_finite_speeds_the_aim_allows_for_the_flights() -> None:
-    """Two agents of 1 per hour fly 1 h and 3 h to work of 2 in all: shared out without a rest, it ends after 3 h."""
+def test_with_finite_speeds_the_target_allows_for_flights() -> None:
+    """Two agents of 1 per hour fly 1 h and 3 h to work of 2 in all: divided without remainder, it ends after 3 h."""
     instance = Instance(
         ability=[1.0, 1.0],
         workload=[1.0, 1.0],
@@ -406,8 +411,8 @@ def test_with_finite_speeds_the_aim_allows_for_the_flights() -> None:
     )
     planner = Planner(Search(instance, Objective.MAKESPAN, Budget(1.0)), [ActorCritic()])
     planner.search.submit(Allocation([0, 1]))  # done after 2 h and 4 h
-    planner.aims.hours = 2.9
-    planner.aims.set(np.array([IDLE, IDLE]))
-    assert planner.aims.hours == 2.9, "where nobody works there is no work to share out"
-    planner.aims.set(np.array([0, 1]))
-    assert planner.aims.hours == pytest.approx(((1 + 1) + (1 + 3)) / 2)
+    planner.target.hours = 2.9
+    planner.target.update(np.array([IDLE, IDLE]))
+    assert planner.target.hours == 2.9, "where nobody works there is no work to divide"
+    planner.target.update(np.array([0, 1]))
+    assert planner.target.hours == pytest.approx(((1 + 1) + (1 + 3)) / 2)

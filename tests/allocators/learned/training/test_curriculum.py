@@ -62,7 +62,7 @@ def test_energy_weights_and_targets_spread() -> None:
         families=("paper",), max_pairs=3000, energy_weight=(0.2, 3.0), relaxed_fraction=0.3, max_relaxation=1.3
     )
     boards = [drawn(curriculum, seed) for seed in range(40)]
-    weight = torch.cat([board.price for board in boards])
+    weight = torch.cat([board.energy_weight for board in boards])
     assert weight.min() >= 0.2
     assert weight.max() <= 3.0
     assert 0.6 < weight.median() < 1.0
@@ -98,7 +98,7 @@ def test_own_instances_are_played_in_place_of_drawn_ones() -> None:
     seen = {drawn(curriculum, seed).shape[1:] for seed in range(10)}
     assert seen == {(12, 4), (9, 3)}
     board = drawn(curriculum)
-    assert len(board.price.unique()) == len(board.price)
+    assert len(board.energy_weight.unique()) == len(board.energy_weight)
 
 
 def test_own_instances_may_be_large() -> None:

@@ -8,7 +8,7 @@ import torch
 from boards import plan_of
 
 from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize
-from alloc.allocators.learned.play.action_sampling import choose
+from alloc.allocators.learned.play.action_sampling import sample_actions
 from alloc.allocators.learned.training.curriculum import Curriculum, reference_board
 from alloc.allocators.learned.training.families import RECIPES
 from alloc.allocators.learned.training.validation import (
@@ -19,7 +19,7 @@ from alloc.allocators.learned.training.validation import (
     validation_boards,
 )
 from alloc.problems import InputError, Instance, evaluate
-from alloc.problems.game import PLANNING, begin, step
+from alloc.problems.game import PLANNING, reset, step
 from alloc.problems.generate import paper_like
 
 
@@ -35,9 +35,9 @@ def test_time_is_that_of_the_best_plan_met(network: ActorCritic) -> None:
     curriculum, (board,) = games_on([instance], Curriculum())
     got = validate(network, [board], PLANNING, curriculum)
     scale = 0.66 / instance.reach.rows(instance.reach.origin)[0].mean()
-    state, costs = begin(board), []
+    state, costs = reset(board), []
     while not state.done.all():
-        _, slot = choose(board, state, network(board, state))
+        _, slot = sample_actions(board, state, network(board, state))
         state = step(board, state, slot)
         score = evaluate(instance, plan_of(board, state))
         time = score.served_makespan / curriculum.instances[0].reference_h

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from alloc.problems.environments.episode import Game
-from alloc.problems.game import State, hop, tasks_of
+from alloc.problems.game import State, current_tasks, hop_distance
 from alloc.problems.game.rules import TOLERANCE
 
 AGENT_FIGURES, TASK_FIGURES = 7, 9
@@ -17,7 +17,7 @@ LIMIT = 10.0
 Floats = NDArray[np.float32]
 
 
-def look(game: Game, state: State, share: float) -> tuple[Floats, Floats]:
+def observe(game: Game, state: State, share: float) -> tuple[Floats, Floats]:
     """Return what agents see: of themselves, shape (n, AGENT_FIGURES), and of the tasks, shape (n, m, TASK_FIGURES).
 
     Parameters
@@ -35,15 +35,15 @@ def _bounded(figures: Tensor) -> Floats:
 
 def _itself(game: Game, state: State, share: float) -> Tensor:
     board, n = game.board, game.instance.n
-    idle = (tasks_of(board, state)[0] == board.places - 1).float()
-    battery = 1 - (state.hopped[0] / board.endurance[0].clamp(min=TOLERANCE)).clamp(max=1.0)
+    idle = (current_tasks(board, state)[0] == board.places - 1).float()
+    battery = 1 - (state.flown[0] / board.endurance[0].clamp(min=TOLERANCE)).clamp(max=1.0)
     figures = torch.stack([battery, board.ability[0], idle, torch.full((n,), share)], 1)
     return torch.cat([torch.from_numpy(_position(game, state)), figures], 1)
 
 
 def _position(game: Game, state: State) -> Floats:
     """Where agents are, seen from the mean place of the tasks in scaled distances; 0 where unknown; shape (n, 3)."""
-    instance, at = game.instance, state.at[0].numpy()
+    instance, at = game.instance, state.location[0].numpy()
     known = instance.task_position[~np.isnan(instance.task_position[:, 0])]
     scale = game.board.scale.item()
     with np.errstate(over="ignore", invalid="ignore"):
@@ -56,8 +56,8 @@ def _position(game: Game, state: State) -> Floats:
 
 def _tasks(game: Game, state: State) -> Tensor:
     board, (_, n, c) = game.board, game.board.shape
-    flight = hop(board, state)[0, :, :-1]
-    here = torch.nn.functional.one_hot(tasks_of(board, state)[0], c)[:, :-1].float()
+    flight = hop_distance(board, state)[0, :, :-1]
+    here = torch.nn.functional.one_hot(current_tasks(board, state)[0], c)[:, :-1].float()
     within = torch.from_numpy(game.instance.communication_range * board.scale.item()).float()[:, None] + TOLERANCE
     seen = torch.maximum((flight <= within).float(), here)
     need, group, members = board.need[0, :-1], state.group[0, :-1], here.sum(0)
