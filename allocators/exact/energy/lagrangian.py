@@ -137,7 +137,7 @@ class LagrangianBound:
             self._shrink(clusters=add or self._clusters is not None)
 
     def _solve(self) -> Relaxed:
-        """Solve the relaxation at the prices of now."""
+        """Solve the relaxation at the current prices."""
         model, clusters, cluster_group = self._model, self._clusters, np.zeros(0, dtype=np.int64)
         price = model.cost + self._price[model.class_of_pair]
         value = -float(np.where(self._price >= 0, model.count, model.min_agents) @ self._price)
