@@ -83,7 +83,7 @@ def test_generations_follow_each_other(networks: list[ActorCritic], regions: Reg
         tuning = FineTuning(search(seed=seed), networks, FEW)
         for _ in range(2 * GENERATION):
             learned = list(tuning.learn(regions))
-        assert tuning._reports == [], "reports are forgotten with their generation"
+        assert tuning._stats == [], "reports are forgotten with their generation"
         ends.append(weights(learned).clone())
         assert ends[-1].isfinite().all()
     assert torch.equal(ends[0], ends[1])
@@ -99,7 +99,7 @@ def test_the_fittest_survive_a_generation(regions: Regions, rewards: tuple[float
     for _ in range(len(rewards)):
         tuning.learn(regions)
     before = [(weights([one.policy]).clone(), moments(one)) for one in tuning.members]
-    tuning._reports = [TrainingStats(1, 1, reward, 1.0, 0.0, 1e-4) for reward in rewards]
+    tuning._stats = [TrainingStats(1, 1, reward, 1.0, 0.0, 1e-4) for reward in rewards]
     tuning._breed()
     after = [(weights([one.policy]), moments(one)) for one in tuning.members]
     fittest = sorted(range(len(rewards)), key=lambda number: -rewards[number])[: BREEDING.elite]
@@ -136,7 +136,7 @@ def test_the_planner_plays_by_what_was_learned(networks: list[ActorCritic], monk
     monkeypatch.setattr(tuning, "is_due", lambda: True)
     planner = Planner(run, networks, PlannerParameters(pairs_per_stream=1500), tuning)
     planner.run()
-    assert tuning.lessons == 3
+    assert tuning.jobs == 3
     assert [id(one) for one in planner.networks] == [id(member.policy) for member in tuning.members]
     assert run.best is not None
     assert run.best.evaluation.violations == ()
