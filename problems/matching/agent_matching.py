@@ -5,18 +5,19 @@ from collections import deque
 import numpy as np
 
 from alloc.problems.instance import IDLE, Instance, IntArray
-from alloc.problems.matching.assignment import Pairs, match
-from alloc.problems.matching.clock import EVALUATED_PER_SECOND, Clock, unlimited
+from alloc.problems.matching.assignment import Pairs
+from alloc.problems.matching.clock import Clock, unlimited
+from alloc.problems.matching.hopcroft_karp import largest_matching
 from alloc.problems.matching.pairs import bound_by_size, sampled_pairs
 
-SAMPLE_SHARE, MOST_EVALUATED = 0.2, 20_000_000
-"""Share of the time, and distances at most, for the sample."""
+SAMPLE_SHARE, LONGEST_S = 0.2, 2.0
+"""Share of the time for the sample, and the longest that it takes."""
 
-FEWEST_EVALUATED = 256
-"""Distances that the sample takes for each agent, whatever the time."""
+SHORTEST_S = 0.1
+"""How long it takes where there is no time."""
 
-SLOWER = (2.0, 8.0, 32.0)
-"""Makespans that are tried before any will do, as multiples of a bound."""
+SLOWER = (4.0, 16.0, np.inf)
+"""Makespans that are tried in turn, as multiples of a bound."""
 
 
 class AgentMatching:
@@ -39,10 +40,9 @@ class AgentMatching:
         self._wanted = np.zeros(instance.m, dtype=np.bool_)
         self._wanted[tasks] = True
         everyone = np.arange(instance.n)
-        evaluations = min(MOST_EVALUATED, SAMPLE_SHARE * max(0.0, time_left()) * EVALUATED_PER_SECOND)
-        evaluations = max(evaluations, float(FEWEST_EVALUATED * instance.n))
-        pairs, _ = sampled_pairs(instance, everyone, tasks, None, evaluations, unlimited)
-        self.task_of_agent = _fast_matching(pairs, bound_by_size(instance, everyone, tasks))
+        seconds = max(SHORTEST_S, min(LONGEST_S, SAMPLE_SHARE * time_left()))
+        pairs, _ = sampled_pairs(instance, everyone, tasks, None, seconds, unlimited)
+        self.task_of_agent = _fast_matching(pairs, bound_by_size(instance, everyone, tasks), time_left)
         self.replaceable = np.zeros(instance.n, dtype=np.bool_)
         self.their_tasks = np.zeros(instance.m, dtype=np.bool_)
         self._holder = np.full(instance.m, IDLE, dtype=np.intp)
@@ -85,11 +85,13 @@ class AgentMatching:
             task, agent = before, wanted_by[before]
 
 
-def _fast_matching(pairs: Pairs, bound: float) -> IntArray:
-    """Return a largest matching, without the slow pairs where as many agents have a task without them."""
+def _fast_matching(pairs: Pairs, bound: float, time_left: Clock) -> IntArray:
+    """Return a large matching, by the faster pairs as far as they will do."""
+    matched = np.full(len(pairs.first) - 1, IDLE, dtype=np.intp)
+    end = time_left() / 2
     for factor in SLOWER:
         within = pairs.within(factor * bound)
-        found = match(within.first, within.task)
-        if (found != IDLE).all():
-            return found
-    return match(pairs.first, pairs.task)
+        matched, _ = largest_matching(within.first, within.task, matched, lambda: time_left() - end)
+        if (matched != IDLE).all():
+            break
+    return matched

@@ -1,5 +1,6 @@
 """Agents and tasks one to one: the fastest such assignment, and the cheapest."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,7 +64,18 @@ def match(first: IntArray, task: IntArray) -> IntArray:
     return matched
 
 
-def bottleneck(pairs: Pairs, known: IntArray, latest: float, time_left: Clock) -> tuple[IntArray, float]:
+Matcher = Callable[[Pairs, IntArray], IntArray | None]
+"""Gives a largest matching, see `match`, of some pairs, with another to begin with; None where time runs out."""
+
+
+def by_scipy(pairs: Pairs, _: IntArray) -> IntArray:
+    """Match by SciPy."""
+    return match(pairs.first, pairs.task)
+
+
+def bottleneck(
+    pairs: Pairs, known: IntArray, latest: float, time_left: Clock, matcher: Matcher = by_scipy
+) -> tuple[IntArray, float]:
     """Return a task for each agent so that the last is done as early as can be, and a bound on when that is.
 
     By halving the hours in question, with a matching for each; the bound falls short where time runs out.
@@ -78,6 +90,7 @@ def bottleneck(pairs: Pairs, known: IntArray, latest: float, time_left: Clock) -
         When the last agent is done in it.
     time_left : callable
         Seconds.
+    matcher : callable
     """
     best, least = known, 0.0
     bound = float(np.minimum.reduceat(pairs.hours, pairs.first[:-1]).max())  # each takes its fastest
@@ -89,7 +102,9 @@ def bottleneck(pairs: Pairs, known: IntArray, latest: float, time_left: Clock) -
         half = (len(in_question) - 1) // 2
         middle = float(np.partition(in_question, half)[half])
         within = pairs.within(middle)
-        found = match(within.first, within.task)
+        found = matcher(within, best)
+        if found is None:
+            break
         if (found == IDLE).any():
             low = float(np.nextafter(middle, np.inf))
             bound = max(bound, low)

@@ -9,6 +9,9 @@ Clock = Callable[[], float]
 EVALUATED_PER_SECOND = 10_000_000
 """Distances that are worked out in a second, at the least."""
 
+SAMPLED_PER_SECOND = 1_000_000
+"""Pairs of a sample for which a largest matching takes about a second."""
+
 GATHERED_PER_SECOND = 1_000_000
 """Pairs within reach that are gathered in a second, at the least."""
 

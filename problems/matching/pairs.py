@@ -8,16 +8,22 @@ from numpy.typing import NDArray
 from alloc.problems.evaluation import last_equal
 from alloc.problems.instance import FloatArray, Instance, IntArray
 from alloc.problems.matching.assignment import Pairs
-from alloc.problems.matching.clock import Clock
+from alloc.problems.matching.clock import EVALUATED_PER_SECOND, SAMPLED_PER_SECOND, Clock
 
 BLOCK_OF_AGENTS = 64
 """Agents that share a sample of tasks, so that their distances are worked out together."""
+
+TASKS_PER_AGENT = 16
+"""Tasks of a shared sample for each of those agents: with fewer, they would compete for the same tasks."""
 
 LARGEST_BLOCK = 1 << 20
 """Distances that are held at a time."""
 
 MOST_PAIRS = 8_000_000
 """Pairs of a sample that are kept."""
+
+LOOKED_AT = 1_000
+"""Tasks by which the share of those within reach is estimated."""
 
 NEAREST = 32
 """Nearest tasks that a sample for the least energy holds besides."""
@@ -76,13 +82,13 @@ def sampled_pairs(
     agents: IntArray,
     tasks: IntArray,
     known: IntArray | None,
-    evaluations: float,
+    seconds: float,
     time_left: Clock,
     *,
     latest: float = np.inf,
     by_distance: bool = False,
 ) -> tuple[Pairs, bool]:
-    """Return pairs of `agents` with `tasks` after about so many distances, and whether they are as good as all pairs.
+    """Return some pairs of `agents` with `tasks`, and whether they are as good as all pairs.
 
     Each agent looks at tasks of every size: at as many of the smallest, as of the next, which are twice as many, and
     so on. Agents bound to a list look at all of it.
@@ -91,41 +97,68 @@ def sampled_pairs(
     ----------
     known : ndarray of int, shape (k,), optional
         A task of each agent, whose pair is among those returned.
-    evaluations : float
-        Distances that may be worked out.
+    seconds : float
+        How long that may take, and each matching of the pairs, about.
     latest : float
         Hours by which a pair must be done.
     by_distance : bool
         Whether the nearest pairs are wanted, not the fastest.
     """
     found = _Found(instance, agents, latest, by_distance=by_distance)
-    origin = instance.reach.origin[agents]
-    listed = instance.reach.list_of[origin] >= 0
-    wanted = np.zeros(instance.m, dtype=np.bool_)
-    wanted[tasks] = True
-    for row in np.flatnonzero(listed).tolist():
-        choice = instance.reach.lists[instance.reach.list_of[origin[row]]]
-        found.add(np.array([row]), choice[wanted[choice]])
-    free, by_work = np.flatnonzero(~listed), tasks[np.argsort(instance.workload[tasks], kind="stable")]
+    list_of = instance.reach.list_of[instance.reach.origin[agents]]
+    _add_listed(found, list_of, tasks)
+    free = np.flatnonzero(list_of < 0)
     free = free[np.argsort(instance.ability[agents[free]], kind="stable")]
-    each = int(min(len(tasks), evaluations // max(1, len(free))))
-    complete, rng = True, np.random.default_rng(0)
-    size = max(1, min(BLOCK_OF_AGENTS, LARGEST_BLOCK // max(1, each)))
-    for begin in range(0, len(free), size):
-        if time_left() <= 0:
-            complete = False
-            break
-        block = free[begin : begin + size]
-        most = min(found.last * float(instance.ability[agents[block[-1]]]), sys.float_info.max)
-        some = by_work[: np.searchsorted(instance.workload[by_work], most, side="right")]
-        if len(some) > each:
-            complete, some = False, some[_of_every_size(len(some), each, rng)]
-        found.add(block, some)
+    complete = _add_sampled(found, free, tasks, seconds, time_left)
     if by_distance and not complete and len(free):
         _add_nearest(found, free, tasks)
     if known is not None:
         found.add_pairs(np.arange(len(agents)), known)
     return found.pairs(), complete and not found.is_cut
+
+
+def _add_listed(found: "_Found", list_of: IntArray, tasks: IntArray) -> None:
+    """Add the pairs of agents bound to a list."""
+    rows, lists = np.flatnonzero(list_of >= 0), found.instance.reach.lists
+    if not len(rows):
+        return
+    wanted = np.zeros(found.instance.m, dtype=np.bool_)
+    wanted[tasks] = True
+    choices = [lists[number] for number in list_of[rows].tolist()]
+    row, task = np.repeat(rows, list(map(len, choices))), np.concatenate(choices)
+    found.add_pairs(row[wanted[task]], task[wanted[task]])
+
+
+def _add_sampled(found: "_Found", rows: IntArray, tasks: IntArray, seconds: float, time_left: Clock) -> bool:
+    """Add pairs of the agents at `rows`, the least able first, with tasks of every size; whether that is all pairs."""
+    work, ability = found.instance.workload, found.instance.ability[found.agents]
+    by_work = tasks[np.argsort(work[tasks], kind="stable")]
+    rng, complete = np.random.default_rng(0), True
+    each = seconds * EVALUATED_PER_SECOND / max(1, len(rows))
+    if each < len(tasks):
+        each = min(
+            each, seconds * SAMPLED_PER_SECOND / max(1.0, len(rows) * _share_within_reach(found, rows, tasks, rng))
+        )
+    looked_at = min(len(tasks), max(1.0, each))
+    size = int(max(1, min(BLOCK_OF_AGENTS, LARGEST_BLOCK // looked_at, looked_at // TASKS_PER_AGENT)))
+    for begin in range(0, len(rows), size):
+        if time_left() <= 0:
+            return False
+        block = rows[begin : begin + size]
+        most = min(found.last * float(ability[block[-1]]), sys.float_info.max)
+        some = by_work[: np.searchsorted(work[by_work], most, side="right")]
+        if len(some) > each:
+            complete, some = False, some[_of_every_size(len(some), int(each), rng)]
+        found.add(block, some)
+    return complete
+
+
+def _share_within_reach(found: "_Found", rows: IntArray, tasks: IntArray, rng: np.random.Generator) -> float:
+    """Return about which share of pairs of agent and task are within reach."""
+    some = found.agents[rng.permutation(rows)[:BLOCK_OF_AGENTS]]
+    reach = found.instance.reach
+    _, mask = reach.block(reach.origin[some], rng.permutation(tasks)[:LOOKED_AT])
+    return float(mask.mean()) if mask.size else 0.0
 
 
 class _Found:
