@@ -19,7 +19,7 @@ from alloc.allocators.learned.algorithms.schedules import linear, set_learning_r
 from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize, initialised
 from alloc.allocators.learned.play.action_sampling import log_probabilities
 from alloc.allocators.learned.play.trajectories import Trajectories, collect
-from alloc.problems.game import Rules, apply_moves, step
+from alloc.problems.game import Rules, apply_moves, reset, step
 
 
 def n_step_returns(reward: Tensor, alive: Tensor, last_value: Tensor, gamma: float) -> Tensor:

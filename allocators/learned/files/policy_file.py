@@ -14,7 +14,7 @@ from alloc.allocators.learned.files.policy_header import read_header
 from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize, uninitialised
 from alloc.problems import InputError
 from alloc.problems.formats import read_bytes, write_bytes_atomically
-from alloc.problems.game import AGENT_FEATURES, FEATURE_SET, PAIR_FEATURES, TASK_FEATURES
+from alloc.problems.game import AGENT_FEATURES, FEATURE_SET, PAIR_FEATURES, TASK_FEATURES, TurnRule
 
 POLICY_FORMAT = "alloc-policy/1"
 

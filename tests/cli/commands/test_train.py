@@ -25,7 +25,7 @@ from alloc.allocators.parallel.engine import ENGINES, EngineError, SerialEngine
 from alloc.cli.commands import train_options
 from alloc.problems import Instance
 from alloc.problems.formats import write_instance
-from alloc.problems.game import Reward
+from alloc.problems.game import Reward, TurnRule
 from alloc.problems.generate import paper_like
 
 QUICK = ("--instances", "mine", "--generation-steps", "150", "--set", "epochs=1")
