@@ -13,7 +13,7 @@ from typing import Any
 import torch
 
 from alloc.allocators.parallel.engine import PATIENCE_S, Engine, EngineError, R, T, answer, never, request, result
-from alloc.allocators.runtime.processors import available_threads
+from alloc.allocators.parallel.processors import available_threads
 
 TRIES = 3
 """Times that an item is begun at the most; a process that dies three times at it will die again."""
