@@ -83,11 +83,11 @@ BUILT_IN = {
         ),
         Method(
             name="hedonic",
-            summary="decentralised coalition-formation game: agents decide on what they hear (GRAPE)",
+            summary="decentralised coalition-formation game: agents decide on local communication (GRAPE)",
             makespan_slack=True,
             warm_start=True,
             anytime=True,
-            options=("hearing",),
+            options=("communication_radius",),
             citation="Jang, Shin and Tsourdos (2018), doi:10.1109/TRO.2018.2858292",
         ),
         Method(
