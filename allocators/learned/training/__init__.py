@@ -1,1 +1,19 @@
-"""Training of policies: curriculum, validation, trainer, tuning."""
+"""Training of policies: curriculum, validation, the training run, and tuning.
+
+`train` is the whole of it as a function; it is imported when it is first used, since it needs torch.
+"""
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from alloc.allocators.learned.training.run import train
+
+__all__ = ["train"]
+
+
+def __getattr__(name: str) -> object:
+    if name == "train":
+        from alloc.allocators.learned.training.run import train
+
+        return train
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
