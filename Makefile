@@ -36,7 +36,7 @@ STEPS_ppo := 250000
 STEPS_a2c := 250000
 STEPS_dqn := 150000
 STEPS_ddpg := 120000
-OPTIONS_gappo := --population 3 --set highest_rate=0.001
+OPTIONS_gappo := --population 3 --set max_learning_rate=0.001
 
 policies: $(METHODS:%=out/policies/%.safetensors)  ## train all shipped policies from nothing; `make -j 2 policies` on two cores
 	@echo "to ship them: cp out/policies/*.safetensors allocators/learned/files/policies/"

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import torch
 
+from alloc.allocators.runtime.torch_state import torch_threads
+
 
 def square(item: int) -> int:
     """Take longer for the first items, so that they are not the first to end."""
@@ -15,16 +17,13 @@ def square(item: int) -> int:
 
 
 def step(state: dict[str, torch.Tensor]) -> dict[str, torch.Tensor]:
-    """Multiply a seeded random matrix often enough for the last bits to tell how it was done."""
+    """Multiply a seeded random matrix often enough for the last bits to show how it was computed."""
     generator = torch.Generator().manual_seed(int(state["seed"]))
-    weight = state["weight"] + torch.rand(state["weight"].shape, generator=generator)
-    for _ in range(5):
-        weight = torch.softmax(weight @ weight.T, 0) @ weight
+    with torch_threads(1):
+        weight = state["weight"] + torch.rand(state["weight"].shape, generator=generator)
+        for _ in range(5):
+            weight = torch.softmax(weight @ weight.T, 0) @ weight
     return {"seed": state["seed"] + 1, "weight": weight}
-
-
-def threads(item: int) -> int:
-    return torch.get_num_threads()
 
 
 def fail(item: int) -> int:

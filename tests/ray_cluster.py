@@ -47,7 +47,7 @@ def living(cluster: Any) -> int:
 
 def at_work(machine: Any) -> bool:
     """Whether an item is under work there."""
-    return any("ray::_work" in line for line in _each(machine, lambda process: " ".join(process.cmdline())))
+    return any("ray::_run_item" in line for line in _each(machine, lambda process: " ".join(process.cmdline())))
 
 
 def kill_at_work(cluster: Any, goes_on: Callable[[], bool]) -> Any:

@@ -16,8 +16,8 @@ from alloc.allocators.learned.play.batched_games import warm_up as play_once
 from alloc.allocators.learned.search.fine_tuning import FineTuning
 from alloc.allocators.learned.search.limits import too_large
 from alloc.allocators.learned.search.planner import Planner, PlannerParameters
-from alloc.allocators.parallel.torch_state import plain_torch, torch_threads
 from alloc.allocators.registry import BUILT_IN
+from alloc.allocators.runtime.torch_state import plain_torch, torch_threads
 from alloc.problems import Allocation, InputError, Instance, Objective
 from alloc.problems.arguments import text
 

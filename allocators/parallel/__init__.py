@@ -1,1 +1,1 @@
-"""Work on many processors or machines: engines in one process, in several, and on a Ray cluster."""
+"""Parallel execution: engines that apply a function to many items in one process, in several, or on a Ray cluster."""

@@ -1,4 +1,4 @@
-"""Members of a population in processes of this machine; what dies with a process is done again in another."""
+"""The process engine: items in processes of this machine; the item of a process that dies is run again in another."""
 
 import contextlib
 import multiprocessing
@@ -8,79 +8,78 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from multiprocessing import connection, resource_tracker
-from typing import Any
 
-import torch
-
-from alloc.allocators.parallel.engine import PATIENCE_S, Engine, EngineError, R, T, answer, never, request, result
+from alloc.allocators.parallel.engine import POLL_S, Engine, EngineError, R, T, never_stop
 from alloc.allocators.parallel.processors import available_threads
+from alloc.allocators.parallel.remote_call import RemoteCall, run_call
 
-TRIES = 3
-"""Times that an item is begun at the most; a process that dies three times at it will die again."""
+MAX_ATTEMPTS = 3
+"""Attempts at an item; a process that dies at it three times will die again."""
 
 
 class ProcessEngine(Engine):
     """Items in processes of this machine, each with a pipe of its own.
 
-    The executors of the standard library lose all workers with one, and cannot drop an item under work. Here a killed
-    worker costs nothing but its own item's time. Not for use by several threads at once.
+    The executors of the standard library lose all workers with one, and cannot drop a running item. Here a killed
+    worker costs only the time spent on its own item. Not for use by several threads at once.
 
     Parameters
     ----------
     workers : int, optional
-        Processes; as many as this process may use processors if not given.
+        Number of processes; all available processors by default.
     threads : int
-        Threads of torch in each.
-    tries : int
-        Times that an item is begun at the most.
+        Threads that each item may use.
+    max_attempts : int
+        Attempts at an item before it is given up.
     """
 
-    def __init__(self, workers: int | None = None, threads: int = 1, tries: int = TRIES) -> None:
+    def __init__(self, workers: int | None = None, threads: int = 1, max_attempts: int = MAX_ATTEMPTS) -> None:
         self.size = workers or available_threads()
-        self.threads, self.tries = threads, tries
+        self.threads, self.max_attempts = threads, max_attempts
         self._workers: list[_Worker] = []
 
     def map(
-        self, function: Callable[[T], R], items: Sequence[T], should_stop: Callable[[], bool] = never
+        self, function: Callable[[T], R], items: Sequence[T], should_stop: Callable[[], bool] = never_stop
     ) -> list[R] | None:
         """See `Engine.map`."""
+        call = RemoteCall(function)
         waiting = deque(range(len(items)))
-        tries, results = [0] * len(items), dict[int, R]()
+        attempts, results = [0] * len(items), dict[int, R]()
         try:
             while len(results) < len(items):
                 if should_stop():
                     return None
-                self._hand_out(function, items, waiting, tries)
-                for worker in self._ready():
-                    index, answered = worker.end()
-                    if answered is not None:
-                        results[index] = result(answered)
+                self._assign(call, items, waiting, attempts)
+                for worker in self._finished():
+                    index, reply = worker.take_reply()
+                    if reply is not None:
+                        results[index] = call.result(reply)
                         continue
                     self._dismiss([worker])
-                    if tries[index] == self.tries:
-                        raise EngineError(_given_up(self.tries, worker.exit_code))
+                    if attempts[index] == self.max_attempts:
+                        raise EngineError(_given_up(self.max_attempts, worker.exit_code))
                     waiting.appendleft(index)
         finally:
             self._dismiss([worker for worker in self._workers if worker.item is not None])
         return [results[index] for index in range(len(items))]
 
-    def _hand_out(self, function: Callable[[T], R], items: Sequence[T], waiting: deque[int], tries: list[int]) -> None:
-        """Give every idle worker an item, with new workers in the place of dead ones and as far as there is work."""
+    def _assign(self, call: RemoteCall[T, R], items: Sequence[T], waiting: deque[int], attempts: list[int]) -> None:
+        """Give every idle worker an item; start workers in place of dead ones, and as far as there are items."""
         self._dismiss([worker for worker in self._workers if worker.item is None and not worker.alive])
         busy = sum(worker.item is not None for worker in self._workers)
         while len(self._workers) < min(self.size, busy + len(waiting)):
-            self._workers.append(_Worker(self.threads))
+            self._workers.append(_Worker())
         for worker in self._workers:
             if worker.item is None and waiting:
                 index = waiting.popleft()
-                tries[index] += 1
-                worker.begin(index, request(function, items[index]))
+                attempts[index] += 1
+                worker.start(index, call.request(items[index]))
 
-    def _ready(self) -> list["_Worker"]:
-        """Wait a little for workers that answer or die."""
+    def _finished(self) -> list["_Worker"]:
+        """Wait up to `POLL_S` for workers that reply or die."""
         busy = [worker for worker in self._workers if worker.item is not None]
-        signs = connection.wait([sign for worker in busy for sign in worker.signs], PATIENCE_S)
-        return [worker for worker in busy if any(sign in signs for sign in worker.signs)]
+        ready = connection.wait([handle for worker in busy for handle in worker.handles], POLL_S)
+        return [worker for worker in busy if any(handle in ready for handle in worker.handles)]
 
     def _dismiss(self, workers: Sequence["_Worker"]) -> None:
         self._workers = [worker for worker in self._workers if worker not in workers]
@@ -93,15 +92,15 @@ class ProcessEngine(Engine):
 
 
 class _Worker:
-    """A process, our end of its pipe, and the index of the item that it works on."""
+    """A process, the parent's end of its pipe, and the index of the item that it works on."""
 
-    def __init__(self, threads: int) -> None:
-        context = multiprocessing.get_context("spawn")  # a fork would inherit torch's threads in a state of ruin
-        self._pipe, theirs = context.Pipe()
-        self._process = context.Process(target=_serve, args=(theirs, threads), daemon=True)
+    def __init__(self) -> None:
+        context = multiprocessing.get_context("spawn")  # a forked process would inherit the locks of other threads
+        self._pipe, child_end = context.Pipe()
+        self._process = context.Process(target=_serve, args=(child_end,), daemon=True)
         with _interrupts_blocked():
             self._process.start()
-        theirs.close()  # the worker's death closes the last copy, and we read the end of file
+        child_end.close()  # the worker's death then closes the last copy, and the parent reads the end of file
         self.item: int | None = None
         self.exit_code: int | None = None
 
@@ -110,17 +109,17 @@ class _Worker:
         return self._process.is_alive()
 
     @property
-    def signs(self) -> tuple[Any, int]:
-        """What becomes readable when there is an answer, or when the process is dead."""
+    def handles(self) -> tuple["connection.Connection[bytes, bytes]", int]:
+        """What becomes readable when there is a reply, or when the process is dead."""
         return self._pipe, self._process.sentinel
 
-    def begin(self, item: int, asked: bytes) -> None:
+    def start(self, item: int, request: bytes) -> None:
         self.item = item
-        with contextlib.suppress(OSError):  # it is dead, as `end` will find
-            self._pipe.send_bytes(asked)
+        with contextlib.suppress(OSError):  # the process is dead, which `take_reply` finds
+            self._pipe.send_bytes(request)
 
-    def end(self) -> tuple[int, bytes | None]:
-        """Return the item, and the answer or None if the process died."""
+    def take_reply(self) -> tuple[int, bytes | None]:
+        """Return the item, and the reply or None if the process died."""
         assert self.item is not None
         item, self.item = self.item, None
         try:
@@ -136,14 +135,13 @@ class _Worker:
         self._pipe.close()
 
 
-def _serve(pipe: "connection.Connection[bytes, bytes]", threads: int) -> None:
-    """Answer requests until the pipe is closed or the parent is gone."""
+def _serve(pipe: "connection.Connection[bytes, bytes]") -> None:
+    """Run calls until the pipe is closed or the parent is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole process group; the parent decides
     threading.Thread(target=_die_with_parent, daemon=True).start()
-    torch.set_num_threads(threads)
     with contextlib.suppress(EOFError, OSError):
         while True:
-            pipe.send_bytes(answer(pipe.recv_bytes()))
+            pipe.send_bytes(run_call(pipe.recv_bytes()))
 
 
 def _die_with_parent() -> None:
@@ -153,16 +151,16 @@ def _die_with_parent() -> None:
     os._exit(1)
 
 
-def _given_up(tries: int, exit_code: int | None) -> str:
+def _given_up(attempts: int, exit_code: int | None) -> str:
     return (
-        f"a worker process died {tries} times at the same item (exit code {exit_code}); too little memory is the usual "
-        "reason: use fewer workers. A script that trains needs `if __name__ == '__main__':`"
+        f"a worker process died {attempts} times at the same item (exit code {exit_code}); too little memory is the "
+        "usual reason: use fewer workers. A script that starts workers needs `if __name__ == '__main__':`"
     )
 
 
 @contextlib.contextmanager
 def _interrupts_blocked() -> Iterator[None]:
-    """Start processes that Ctrl-C does not reach before they can say so themselves: they inherit the mask."""
+    """Block SIGINT while processes start: they inherit the mask, as they cannot ignore the signal from the first."""
     resource_tracker.ensure_running()  # otherwise it starts with the first process, and unblocks the signal
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:

@@ -1,4 +1,4 @@
-"""Members of a population on the machines of a Ray cluster; what dies with a machine is done again on another."""
+"""The Ray engine: items on the machines of a Ray cluster; the item of a machine that dies is run again on another."""
 
 import contextlib
 import os
@@ -6,85 +6,87 @@ import signal
 import socket
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
+from types import ModuleType
 
-import torch
-
-from alloc.allocators.parallel.engine import PATIENCE_S, Engine, EngineError, R, T, answer, never, request, result
+from alloc.allocators.parallel.engine import POLL_S, Engine, EngineError, R, T, never_stop
+from alloc.allocators.parallel.remote_call import RemoteCall, run_call
 from alloc.problems import InputError, MissingPackageError
 
-TRIES = 5
-"""Times that an item is begun at the most; more than in processes, as whole machines come and go."""
+MAX_ATTEMPTS = 5
+"""Attempts at an item; more than in processes, as whole machines join and leave."""
 
 CONNECT_S = 5.0
-"""How long the head of the cluster may take to answer."""
+"""Seconds that the head of the cluster may take to answer."""
+
+RAY_MISSING = "Ray is not installed: pip install 'alloc-mrta[cluster]'"
 
 
 class RayEngine(Engine):
-    """Items as tasks of a Ray cluster, on whose machines this package must be installed as here.
+    """Items as tasks of a Ray cluster, on whose machines this package must be installed in the same version.
 
     Parameters
     ----------
     address : str, optional
-        Head of the cluster, as ``host:port``; ``local`` starts one on this machine alone. The environment's
-        ``RAY_ADDRESS``, or the cluster that runs on this machine, if not given. A connection that this process has
-        made by itself is used, and left open in the end.
+        Head of the cluster, as ``host:port``; ``local`` starts one on this machine alone. By default the environment
+        variable ``RAY_ADDRESS``, or the cluster that runs on this machine. A connection that this process already has
+        is used, and left open by `close`.
     threads : int
-        Threads of torch for each item, and the processors that Ray sets aside for it.
-    tries : int
-        Times that an item is begun at the most.
+        Threads that each item may use: the processors that Ray reserves for it.
+    max_attempts : int
+        Attempts at an item before it is given up.
 
     Raises
     ------
     InputError
-        If Ray is not installed, nobody is at `address`, or no machine there has so many processors.
+        If Ray is not installed, there is no cluster at `address`, or none of its machines has so many processors.
     """
 
-    def __init__(self, address: str | None = None, threads: int = 1, tries: int = TRIES) -> None:
+    def __init__(self, address: str | None = None, threads: int = 1, max_attempts: int = MAX_ATTEMPTS) -> None:
         try:
             import ray
         except ImportError as error:
-            raise MissingPackageError("Ray is not installed: pip install 'alloc-mrta[cluster]'", "engine") from error
-        self._ray: Any = ray
-        self._ours = not ray.is_initialized()
-        if self._ours:
+            raise MissingPackageError(RAY_MISSING, "engine") from error
+        self._ray: ModuleType = ray
+        self._owns_connection = not ray.is_initialized()
+        if self._owns_connection:
             self._connect(address or os.environ.get("RAY_ADDRESS", "auto"))
         try:
             self._check_processors(threads)
         except InputError:
             self.close()
             raise
-        self._task = ray.remote(num_cpus=threads, max_retries=tries - 1)(_work)
+        self._task = ray.remote(num_cpus=threads, max_retries=max_attempts - 1)(_run_item)
         self.threads = threads
 
     def _connect(self, address: str) -> None:
         _check_reachable(address)
         try:
-            with _terminations_kept():
+            with _sigterm_handler_kept():
                 self._ray.init(address=address, log_to_driver=False, logging_level="ERROR")
-        except Exception as error:  # of whatever kind the versions of Ray raise
+        except Exception as error:  # the types differ between versions of Ray
             raise InputError(f"no Ray cluster at {address!r}: {_reason(error)}", "address") from error
 
     def _check_processors(self, threads: int) -> None:
-        """Raise an `InputError` where Ray would wait forever, without a word, for a machine that is large enough."""
+        """Raise an `InputError` where Ray would wait forever, silently, for a machine that is large enough."""
         most = max((int(node["Resources"].get("CPU", 0)) for node in self._ray.nodes() if node["Alive"]), default=0)
         if 0 < most < threads:  # a cluster without any may grow with the work
             raise InputError(f"no machine of the cluster has {threads} processors; the largest has {most}", "threads")
 
     def map(
-        self, function: Callable[[T], R], items: Sequence[T], should_stop: Callable[[], bool] = never
+        self, function: Callable[[T], R], items: Sequence[T], should_stop: Callable[[], bool] = never_stop
     ) -> list[R] | None:
         """See `Engine.map`."""
-        tasks = {self._task.remote(request(function, item), self.threads): i for i, item in enumerate(items)}
+        call = RemoteCall(function)
+        tasks = {self._task.remote(call.request(item)): index for index, item in enumerate(items)}
         pending, results = list(tasks), dict[int, R]()
         try:
             while pending:
                 if should_stop():
                     return None
-                # fetched at once, so that no machine keeps what could die with it
-                done, pending = self._ray.wait(pending, timeout=PATIENCE_S)
+                # fetched at once, so that results are not lost with the machine that holds them
+                done, pending = self._ray.wait(pending, timeout=POLL_S)
                 for task in done:
-                    results[tasks[task]] = result(self._ray.get(task))
+                    results[tasks[task]] = call.result(self._ray.get(task))
         except self._ray.exceptions.RayError as error:
             raise EngineError(f"Ray gave an item up: {_reason(error)}") from error
         finally:
@@ -94,14 +96,13 @@ class RayEngine(Engine):
 
     def close(self) -> None:
         """See `Engine.close`."""
-        if self._ours:
-            self._ours = False
+        if self._owns_connection:
+            self._owns_connection = False
             self._ray.shutdown()
 
 
-def _work(asked: bytes, threads: int) -> bytes:
-    torch.set_num_threads(threads)
-    return answer(asked)
+def _run_item(request: bytes) -> bytes:
+    return run_call(request)
 
 
 def _reason(error: Exception) -> str:
@@ -109,7 +110,7 @@ def _reason(error: Exception) -> str:
 
 
 def _check_reachable(address: str) -> None:
-    """Raise an `InputError` if nobody listens there, which Ray itself takes minutes to find and then aborts on."""
+    """Raise an `InputError` if nothing listens there, which takes Ray minutes to find before it aborts the process."""
     host, colon, port = address.removeprefix("ray://").rpartition(":")
     if not colon or not port.isdigit():
         return
@@ -120,8 +121,8 @@ def _check_reachable(address: str) -> None:
 
 
 @contextlib.contextmanager
-def _terminations_kept() -> Iterator[None]:
-    """Put our handler of SIGTERM back: Ray replaces it by one that does not ask for a stop, but exits."""
+def _sigterm_handler_kept() -> Iterator[None]:
+    """Restore the handler of SIGTERM: Ray replaces it by one that exits at once."""
     before = signal.getsignal(signal.SIGTERM)
     try:
         yield

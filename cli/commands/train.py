@@ -2,7 +2,7 @@
 
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
@@ -12,20 +12,16 @@ import typer
 
 from alloc.cli.commands import train_options as options
 from alloc.cli.commands.train_options import Engine, Reward, Turn
-from alloc.cli.commands.training import (
-    TrainingFiles,
-    learner_parameters,
-    new_trainer,
-    read_instances,
-    training_parameters,
-)
-from alloc.cli.options import SeedOption, examples
-from alloc.cli.output.console import complain, note, say
+from alloc.cli.options import SeedOption, assignments, examples
+from alloc.cli.output.console import STANDARD, complain, note, say
+from alloc.cli.output.files import check_output, check_outputs, read_instances
 from alloc.problems.text import counted, number
 
 if TYPE_CHECKING:
-    import alloc.allocators.parallel.engine as engines
-    from alloc.allocators.learned.training.trainer import Limits, Report, Trainer
+    from alloc.allocators.learned.training.limits import Limits
+    from alloc.allocators.learned.training.report import Report
+    from alloc.allocators.learned.training.trainer import Trainer
+    from alloc.problems import Instance
 
 EXAMPLES = examples(
     "alloc train gappo --output policy.safetensors --steps 2000000",
@@ -70,72 +66,112 @@ def train_command(
     threads: options.TorchThreadsOption = 1,
 ) -> None:
     """Train a learned method, with a checkpoint after each generation."""
-    files = TrainingFiles.of(output, checkpoint, log, tensorboard, read=init)
-    # checks that need no torch come first, so that mistakes are reported without loading it
-    learner = learner_parameters(method, family or ["mixed"], settings or [], population)
-    from alloc.allocators.parallel.engine import check_engine, make_engine
+    state, lines = _files(output, checkpoint, log, init)
+    from alloc.allocators import TrainingError, train
+    from alloc.allocators.parallel.engines import check_engine, make_engine
 
     check_engine(engine.value, workers, address)
     problems = None if instances is None else read_instances(instances)
-    files.check(init, resume=resume)
-    parameters = training_parameters(
-        method,
-        learner,
-        families=family or ["mixed"],
-        generation_steps=lesson or generation_steps,
-        population=population,
-        turn=turn.value,
-        reward=reward.value,
-        init=init,
-    )
-    trainer = new_trainer(parameters, seed, problems, init, files.checkpoint if resume else None)
-    with make_engine(engine.value, workers, address, threads) as where:
-        _train(trainer, files, _limits(steps, iterations, minutes, patience), where)
-    _close(trainer, files.policy)
-
-
-def _limits(steps: int | None, iterations: int | None, minutes: float | None, patience: int | None) -> "Limits":
-    from alloc.allocators.learned.training.trainer import Limits
-
-    if steps is None and minutes is None and iterations is None:
-        steps = options.STEPS
-    return Limits(steps, iterations, minutes, patience)
-
-
-def _train(trainer: "Trainer", files: TrainingFiles, limits: "Limits", engine: "engines.Engine") -> None:
-    """Train until a limit, an interrupt or a failure of the engine; say what is stored in the last two cases."""
-    from alloc.allocators.learned.training.trainer import train
-    from alloc.allocators.parallel.engine import EngineError
-
+    progress = Progress(problems or [])
     try:
-        with _interrupts():
+        with make_engine(engine.value, workers, address, threads) as where, _interrupts():
             train(
-                trainer,
-                files.policy,
-                checkpoint=files.checkpoint,
-                log=files.log,
-                limits=limits,
-                tensorboard=files.tensorboard,
-                engine=engine,
-                on_report=lambda report: _tell(report, trainer, limits),
+                method,
+                output,
+                steps=steps,
+                minutes=minutes,
+                iterations=iterations,
+                patience=patience,
+                families=family or ["mixed"],
+                instances=problems,
+                init=init,
+                population=population,
+                decisions=lesson or generation_steps,
+                parameters=assignments(settings),
+                turn=turn.value,
+                reward=reward.value,
+                seed=seed,
+                resume=resume,
+                checkpoint=state,
+                log=lines,
+                tensorboard=tensorboard,
+                engine=where,
+                on_start=progress.start,
+                on_report=progress.tell,
             )
     except KeyboardInterrupt:
-        note(f"interrupted; {files.checkpoint} holds {counted(trainer.generation, 'generation')}")
-    except EngineError as error:
-        stored = f"{files.checkpoint} holds {counted(trainer.generation, 'generation')}"
-        complain(f"{error}; {stored}, and --resume continues from there")
+        note(f"interrupted; {state} holds {counted(progress.generations, 'generation')}")
+    except TrainingError as error:
+        complain(str(error))
         raise typer.Exit(1) from None
+    progress.close(output)
 
 
-def _close(trainer: "Trainer", policy: Path) -> None:
-    if trainer.generation == 0:
-        note(f"no generation is complete, and {policy} is not written")
-        raise typer.Exit(1)
-    best = trainer.history[trainer.best_generation - 1]
-    say(
-        f"{policy} holds the networks of generation {best.generation}: T {best.time:.4f}, distance {best.distance:.4f}"
-        f", {number(best.unserved, 3)} tasks unserved"
-    )
+def _files(output: str, checkpoint: str | None, log: str | None, init: str | None) -> tuple[str, str]:
+    """Return the names of checkpoint and log; each file can be written, and none is named twice."""
+    check_output(output)
+    state = checkpoint or str(Path(output).with_suffix(".checkpoint"))
+    lines = log or str(Path(output).with_suffix(".csv"))
+    check_outputs(("--output", output), ("--checkpoint", state), ("--log", lines), read=[("--init", init)])
+    if STANDARD in (output, state, lines):
+        raise typer.BadParameter("policy, checkpoint and log must be files", param_hint="'--output'")
+    return state, lines
+
+
+class Progress:
+    """Prints a line for each generation of a training.
+
+    Parameters
+    ----------
+    instances : sequence of Instance
+        Those that it trains on; none if they are generated.
+    """
+
+    def __init__(self, instances: "Sequence[Instance]") -> None:
+        self._instances = instances
+        self._trainer: Trainer | None = None
+        self._limits: Limits | None = None
+
+    @property
+    def generations(self) -> int:
+        """Number of complete generations."""
+        return 0 if self._trainer is None else self._trainer.generation
+
+    def start(self, trainer: "Trainer", limits: "Limits") -> None:
+        """Note which instances are held out; a callback for `on_start`."""
+        self._trainer, self._limits = trainer, limits
+        if self._instances:
+            from alloc.allocators.learned.training.validation import split_notes
+
+            for line in split_notes(self._instances):
+                note(line)
+
+    def tell(self, report: "Report") -> None:
+        """Print the figures of a generation; a callback for `on_report`."""
+        assert self._trainer is not None
+        assert self._limits is not None
+        done = self._trainer.progress(self._limits)
+        left = report.seconds * (1 - done) / done / 60 if done > 0 else float("inf")
+        say(
+            f"gen {report.generation}  {report.decisions:,} decisions  {number(report.decisions_per_second, 3)}/s"
+            f"  T {report.time:.4f}  distance {report.distance:.4f}  others {report.others_time:.4f}"
+            f"  unserved {number(report.unserved, 3)}"
+            f"  cost {report.cost:.4f} (best {report.best_cost:.4f}, gen {self._trainer.best_generation})"
+            f"  reward {number(report.reward, 3)}  entropy {number(report.entropy, 3)}"
+            f"  KL {number(report.divergence, 2)}  rate {number(report.learning_rate, 2)}"
+            f"  {report.seconds / 60:.1f} min, {left:.1f} left"
+        )
+
+    def close(self, policy: str) -> None:
+        """Say which networks the policy file holds, with exit code 1 if there are none."""
+        if self._trainer is None or self._trainer.generation == 0:
+            note(f"no generation is complete, and {policy} is not written")
+            raise typer.Exit(1)
+        best = self._trainer.history[self._trainer.best_generation - 1]
+        say(
+            f"{policy} holds the networks of generation {best.generation}: T {best.time:.4f},"
+            f" distance {best.distance:.4f}, {number(best.unserved, 3)} tasks unserved"
+        )
 
 
 @contextmanager
@@ -153,16 +189,3 @@ def _interrupts() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGTERM, before)
-
-
-def _tell(report: "Report", trainer: "Trainer", limits: "Limits") -> None:
-    progress = trainer.progress(limits)
-    left = report.seconds * (1 - progress) / progress / 60 if progress > 0 else float("inf")
-    say(
-        f"gen {report.generation}  {report.decisions:,} decisions  {number(report.decisions_per_second, 3)}/s"
-        f"  T {report.time:.4f}  distance {report.distance:.4f}  others {report.others_time:.4f}"
-        f"  unserved {number(report.unserved, 3)}"
-        f"  cost {report.cost:.4f} (best {report.best_cost:.4f}, gen {trainer.best_generation})"
-        f"  reward {number(report.reward, 3)}  entropy {number(report.entropy, 3)}  KL {number(report.divergence, 2)}"
-        f"  rate {number(report.learning_rate, 2)}  {report.seconds / 60:.1f} min, {left:.1f} left"
-    )

@@ -22,7 +22,7 @@ from alloc.allocators.learned.network.actor_critic import ActorCritic
 from alloc.allocators.learned.play.action_sampling import choose
 from alloc.allocators.learned.play.batched_games import Games, play_games
 from alloc.allocators.learned.play.rollout import play
-from alloc.allocators.parallel.torch_state import torch_threads
+from alloc.allocators.runtime.torch_state import torch_threads
 from alloc.problems import paper_like
 from alloc.problems.game import Board, begin, make_board, step
 

@@ -28,7 +28,9 @@ from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSi
 from alloc.allocators.learned.play.action_sampling import choose
 from alloc.allocators.learned.play.rollout import position
 from alloc.allocators.learned.training.curriculum import Curriculum, reference_board
-from alloc.allocators.learned.training.trainer import Limits, Trainer, TrainingParameters
+from alloc.allocators.learned.training.limits import Limits
+from alloc.allocators.learned.training.parameters import TrainingParameters
+from alloc.allocators.learned.training.trainer import Trainer
 from alloc.allocators.learned.training.validation import VALIDATION_SEED
 from alloc.problems.game import PLANNING, Board, battery_left, begin, moved, step, time_over_reference
 from alloc.problems.generate import paper, paper_like
@@ -38,13 +40,13 @@ PRICE = 0.3
 
 GAMES = Curriculum(
     families=("paper",),
-    first_tasks=(4, 8),
+    initial_tasks=(4, 8),
     tasks=(4, 10),
-    most_agents=50,
-    price=(PRICE, PRICE),
-    pairs=1200,
+    max_agents=50,
+    energy_weight=(PRICE, PRICE),
+    max_pairs=1200,
     games=(4, 48),
-    eased_share=0.0,
+    relaxed_fraction=0.0,
 )
 """What is trained on: like the paper's scenarios, at most half as large as the first; few games per update, since
 decisions are few."""
@@ -92,9 +94,9 @@ VARIANTS = {
     **{name: Variant(name, TUNED[name]) for name in ("ppo", "a2c", "dqn", "ddpg")},
     "no GA": replace(GAPPO, population=1),
     "no attention": replace(GAPPO, attention=False),
-    "no adaptive rate": replace(GAPPO, settings={**TUNED["gappo"], "kl_target": "none"}),
+    "no adaptive rate": replace(GAPPO, settings={**TUNED["gappo"], "target_kl": "none"}),
     "no energy term": replace(GAPPO, price=LITTLE),
-    "no replay": replace(GAPPO, settings={**TUNED["gappo"], "capacity": "0"}),
+    "no replay": replace(GAPPO, settings={**TUNED["gappo"], "buffer_size": "0"}),
 }
 
 
@@ -153,7 +155,7 @@ def parameters_of(variant: Variant, budget: int) -> TrainingParameters:
         decisions=-(-budget // (POINTS * variant.population)),
         network=NetworkSize(attention=variant.attention),
         learner=method_parameters(variant.method, variant.settings),
-        curriculum=replace(GAMES, price=(variant.price, variant.price)),
+        curriculum=replace(GAMES, energy_weight=(variant.price, variant.price)),
     )
 
 
@@ -195,7 +197,7 @@ def fittest(trainer: Trainer) -> ActorCritic:
     """Return the network of the fittest member, which breeding puts first."""
     parameters = trainer.parameters
     learner = new_learner(parameters.method, parameters.network, parameters.learner, 0)
-    learner.load(trainer.members[0])
+    learner.load_state_dict(trainer.members[0])
     return learner.policy
 
 

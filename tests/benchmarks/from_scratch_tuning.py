@@ -23,7 +23,7 @@ from from_scratch import GAPPO, PRICE, Variant, parameters_of
 from from_scratch_report import METHODS
 
 from alloc.allocators.learned.training.curriculum import reference_board
-from alloc.allocators.learned.training.trainer import Limits
+from alloc.allocators.learned.training.limits import Limits
 from alloc.allocators.learned.training.tune import open_study, tune
 from alloc.allocators.learned.training.validation import VALIDATION_SEED
 from alloc.problems.game import Board

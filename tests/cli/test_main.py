@@ -157,7 +157,7 @@ def test_bad_usage_is_one_line(alloc, small, arguments):
         (("generate", "covering", "--ability-min", "0"), "--ability-min: must be a whole number >= 1"),
         (("generate", "random", "--tau", "2"), "--tau: must lie strictly between 0 and 1"),
         (("train", "ga", "--output", "p"), "METHOD: 'ga' learns nothing"),
-        (("train", "ppo", "--output", "p", "--set", "clip=x"), "--set: clip must be like"),
+        (("train", "ppo", "--output", "p", "--set", "clip_coef=x"), "--set: clip_coef must be like"),
         (("train", "ppo", "--output", "p", "--workers", "2"), "--workers: belongs to the engine processes"),
         (("train", "ppo", "--output", "p", "--family", "x"), "--family: no such family"),
         (("solve", "small.json", "--set", "hearing"), "Invalid value for '--set': 'hearing' is not NAME=VALUE"),

@@ -1,40 +1,44 @@
-"""Deep Q-learning: the scores of the bids are their values, learned from a memory of single moves.
+"""Deep Q-learning (DQN): the scores of the bids are their values, learned from a replay memory of single moves.
 
-What a bid is worth above stopping is its score above the reserve: Q(s, bid) = score - reserve. Stopping ends the game
-and so brings 0, which need not be learned: the terminal mask of (17) is built in. A game that was cut off is not over,
-and what follows its last move counts like any other.
+The value of a bid is its score above the reserve: Q(s, bid) = score - reserve. Stopping ends the game and has value 0,
+which need not be learned: the terminal mask of (17) is built in. A game that was cut off at the maximum number of steps
+has not ended, and its last move is followed by the value of the next state like any other.
 
-The paper's (17) has neither a target network nor a terminal mask; both are needed, the first for a target that holds
-still, the second because nothing follows the end of a game.
+The paper's (17) has neither a target network nor a terminal mask; both are needed: the first for stable targets, the
+second because nothing follows the end of a game.
 
 References
 ----------
-Mnih et al. (2015), doi:10.1038/nature14236; van Hasselt, Guez and Silver (2016), arXiv:1509.06461, for the double
-estimate; Wang et al. (2016), arXiv:1511.06581, for values as a sum; Fang et al. (2025), equation (17),
+Mnih et al. (2015), doi:10.1038/nature14236; van Hasselt, Guez and Silver (2016), arXiv:1509.06461, for double
+Q-learning; Wang et al. (2016), arXiv:1511.06581, for values as a sum; Fang et al. (2025), equation (17),
 doi:10.20944/preprints202502.0192.v1.
 """
-
-from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
 from alloc.allocators.learned.algorithms.hyperparameters import DqnParameters
-from alloc.allocators.learned.algorithms.learner import Lesson, LessonReport
+from alloc.allocators.learned.algorithms.learner import StateDict, TrainingJob, TrainingStats
+from alloc.allocators.learned.algorithms.schedules import exponential, linear, set_learning_rate
 from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize, fresh
 from alloc.allocators.learned.play.transitions import Memory, after, gains, play
 from alloc.problems.game import Board, Rules, State
 
 
-def td_target(reward: Tensor, following: Tensor, over: Tensor, discount: float) -> Tensor:
-    """Return r + gamma * max Q(s', .) of (17), without what follows where the game is over; all of shape (B,)."""
-    return reward + discount * following.masked_fill(over, 0.0)
+def td_target(reward: Tensor, next_value: Tensor, done: Tensor, gamma: float) -> Tensor:
+    """Return the target r + gamma * V(s') of (17), only r where the game is `done`; all of shape (B,)."""
+    return reward + gamma * next_value.masked_fill(done, 0.0)
 
 
-def best_gain(value: Tensor, picker: Tensor) -> Tensor:
-    """Return the value of the best move, shape (B,), the best by `picker`; both of shape (B, n * c + 1)."""
-    return value.gather(1, picker.argmax(1, keepdim=True))[:, 0]
+def best_move_value(value: Tensor, selector: Tensor) -> Tensor:
+    """Return the value of the move that is best by `selector`, shape (B,); arguments of shape (B, n * c + 1)."""
+    return value.gather(1, selector.argmax(1, keepdim=True))[:, 0]
+
+
+def gradient_steps(moves: int, replay_ratio: float, batch_size: int) -> int:
+    """Return the gradient steps after which each of these new moves is replayed `replay_ratio` times on average."""
+    return max(1, round(replay_ratio * moves / batch_size))
 
 
 class Dqn:
@@ -45,7 +49,7 @@ class Dqn:
     size : NetworkSize, optional
     parameters : DqnParameters, optional
     seed : int
-        Of the first weights.
+        Seed of the initial weights.
     """
 
     def __init__(self, size: NetworkSize | None = None, parameters: DqnParameters | None = None, seed: int = 0) -> None:
@@ -53,7 +57,7 @@ class Dqn:
         self.network, self.target = fresh(size, seed, 2)
         self.target.load_state_dict(self.network.state_dict())
         self.optimiser = torch.optim.Adam(self.network.parameters(), self.parameters.learning_rate)
-        self.memory = Memory(self.parameters.capacity)
+        self.memory = Memory(self.parameters.buffer_size)
         self.updates = 0
 
     @property
@@ -61,57 +65,56 @@ class Dqn:
         """The network whose scores are the values of bids."""
         return self.network
 
-    def take(self, lesson: Lesson) -> LessonReport:
-        """Play on boards of the curriculum and learn from the memory, until the lesson's decisions are made."""
+    def train_on(self, job: TrainingJob) -> TrainingStats:
+        """Play on boards of the curriculum and learn from the memory; see `Learner.train_on`."""
         parameters = self.parameters
-        rng, generator = np.random.default_rng(lesson.seed), torch.Generator().manual_seed(lesson.seed)
-        rate = parameters.learning_rate * (1 - (1 - parameters.final_share) * lesson.progress)
-        for group in self.optimiser.param_groups:
-            group["lr"] = rate
-        warmth = parameters.temperature * (parameters.final_temperature / parameters.temperature) ** lesson.progress
+        rng, generator = np.random.default_rng(job.seed), torch.Generator().manual_seed(job.seed)
+        rate = linear(parameters.learning_rate, parameters.final_lr_fraction, job.progress)
+        set_learning_rate(self.optimiser, rate)
+        temperature = exponential(parameters.temperature, parameters.final_temperature, job.progress)
+        exploring = parameters.exploration_initial_eps * (1 - job.progress)
         decisions = evaluations = 0
         rewards = []
-        while decisions < lesson.decisions:
-            board = lesson.curriculum.draw(rng, lesson.progress)
-            steps = lesson.curriculum.steps(board)
-            exploring, scale = parameters.exploring * (1 - lesson.progress), parameters.reward_scale
-            played = play(self.network, board, steps, generator, lesson.rules, warmth, exploring, scale)
+        while decisions < job.decisions:
+            board = job.curriculum.draw(rng, job.progress)
+            steps, scale = job.curriculum.max_steps(board), parameters.reward_scale
+            played = play(self.network, board, steps, generator, job.rules, temperature, exploring, scale)
             self.memory.add(played.transitions)
-            repeats = max(1, round(parameters.reuse * len(played.transitions.action) / parameters.minibatch))
-            repeats = repeats if self.memory.kept else 0
-            for _ in range(repeats):
-                self.update(lesson.rules, generator)
+            count = gradient_steps(len(played.transitions.action), parameters.replay_ratio, parameters.batch_size)
+            count = count if self.memory.kept else 0
+            for _ in range(count):
+                self.update(job.rules, generator)
             decisions += played.decisions
-            evaluations += played.evaluations + repeats * parameters.minibatch * (3 if parameters.double else 2)
+            evaluations += played.evaluations + count * parameters.batch_size * (3 if parameters.double_q else 2)
             rewards.append(played.reward)
-        return LessonReport(decisions, evaluations, float(np.mean(rewards)), 0.0, 0.0, rate)
+        return TrainingStats(decisions, evaluations, float(np.mean(rewards)), 0.0, 0.0, rate)
 
     def update(self, rules: Rules, generator: torch.Generator) -> None:
-        """Take one gradient step on remembered moves, and now and then renew the target network."""
-        board, state, action, reward = self.memory.draw(self.parameters.minibatch, generator)
+        """Take one gradient step on replayed moves, and update the target network where its interval is over."""
+        board, state, action, reward = self.memory.draw(self.parameters.batch_size, generator)
         scores = self.network(board, state)
         value = gains(scores.bids, scores.reserve, board, state, rules).gather(1, action[:, None])[:, 0]
-        loss = nn.functional.huber_loss(value, self.wanted(board, after(board, state, action), reward, rules))
+        loss = nn.functional.huber_loss(value, self.td_targets(board, after(board, state, action), reward, rules))
         self.optimiser.zero_grad(set_to_none=True)
         loss.backward()
-        nn.utils.clip_grad_norm_(self.network.parameters(), self.parameters.max_gradient_norm)
+        nn.utils.clip_grad_norm_(self.network.parameters(), self.parameters.max_grad_norm)
         self.optimiser.step()
         self.updates += 1
-        if self.updates % self.parameters.target_period == 0:
+        if self.updates % self.parameters.target_update_interval == 0:
             self.target.load_state_dict(self.network.state_dict())
 
     @torch.no_grad()
-    def wanted(self, board: Board, following: State, reward: Tensor, rules: Rules) -> Tensor:
-        """Return the targets of (17), shape (B,)."""
+    def td_targets(self, board: Board, following: State, reward: Tensor, rules: Rules) -> Tensor:
+        """Return the targets of (17), shape (B,), from the states that follow and the rewards, shape (B,)."""
         scores = self.target(board, following)
-        value = picker = gains(scores.bids, scores.reserve, board, following, rules)
-        if self.parameters.double:
+        value = selector = gains(scores.bids, scores.reserve, board, following, rules)
+        if self.parameters.double_q:
             own = self.network(board, following)
-            picker = gains(own.bids, own.reserve, board, following, rules)
-        return td_target(reward, best_gain(value, picker), following.done, self.parameters.discount)
+            selector = gains(own.bids, own.reserve, board, following, rules)
+        return td_target(reward, best_move_value(value, selector), following.done, self.parameters.gamma)
 
-    def state(self) -> dict[str, Any]:
-        """Return weights, optimiser, memory and how many updates were made."""
+    def state_dict(self) -> StateDict:
+        """Return weights, optimiser, memory and the number of updates; see `Learner.state_dict`."""
         return {
             "network": self.network.state_dict(),
             "target": self.target.state_dict(),
@@ -120,8 +123,8 @@ class Dqn:
             "updates": self.updates,
         }
 
-    def load(self, state: dict[str, Any]) -> None:
-        """Take up what `state` returned."""
+    def load_state_dict(self, state: StateDict) -> None:
+        """See `Learner.load_state_dict`."""
         self.network.load_state_dict(state["network"])
         self.target.load_state_dict(state["target"])
         self.optimiser.load_state_dict(state["optimiser"])

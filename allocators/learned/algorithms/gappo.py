@@ -1,4 +1,4 @@
-"""A population of actor-critics, bred by a genetic algorithm with DEAP's operators.
+"""GAPPO's genetic algorithm: a population of learners by PPO, bred with DEAP's operators.
 
 References
 ----------
@@ -11,48 +11,44 @@ import copy
 import random
 from collections.abc import Callable, Sequence
 from types import FunctionType
-from typing import Any
 
 import numpy as np
 import torch
 from deap import base, tools
 
-from alloc.allocators.learned.algorithms.hyperparameters import BreedingParameters, GappoParameters
-from alloc.allocators.learned.algorithms.ppo import Ppo
+from alloc.allocators.learned.algorithms.hyperparameters import BreedingParameters
+from alloc.allocators.learned.algorithms.learner import StateDict
 
-__all__ = ["BreedingParameters", "GappoParameters", "Member", "Ppo", "breed", "fitness"]
-
-Member = dict[str, Any]
-"""State of a learner by PPO, as `Learner.state` returns it: of its parts, breeding changes `network`, the weights by
-name, and the step size in `optimiser`."""
+LEARNING_RATE_FACTORS = (0.8, 1.25)
+"""Factors by which a mutation changes the learning rate."""
 
 
 class _Fitness(base.Fitness):  # type: ignore[misc]
     weights = (1.0,)
 
 
-class _Genome(list):  # type: ignore[type-arg]
-    """All weights of a network, as DEAP's operators want them."""
+class _Genome(list[float]):
+    """All weights of a network in one list, as DEAP's operators expect them, and the index of its member."""
 
-    def __init__(self, weights: Sequence[float], number: int, fitness: float) -> None:
+    def __init__(self, weights: Sequence[float], index: int, fitness: float) -> None:
         super().__init__(weights)
-        self.number = number
+        self.index = index
         self.fitness = _Fitness((fitness,))
 
 
 def fitness(
     returns: Sequence[float], entropies: Sequence[float], evaluations: Sequence[int], parameters: BreedingParameters
 ) -> list[float]:
-    """Equation (12): returns and entropies count for a member, its cost against it, each over the largest.
+    """Return the fitness (12) of each member; each term is divided by its largest magnitude in the population.
 
     Parameters
     ----------
     returns : sequence of float
         Cumulative reward of each member on the validation games.
     entropies : sequence of float
-        Mean entropy of each policy.
+        Mean entropy of each policy in nats.
     evaluations : sequence of int
-        Network evaluations that each member spent, the cost E_i.
+        Network evaluations of each member, the cost E_i, which counts against it.
     """
     terms = (
         (parameters.return_weight, returns),
@@ -67,76 +63,87 @@ def fitness(
 
 
 def breed(
-    members: Sequence[Member], scores: Sequence[float], parameters: BreedingParameters, seed: int
-) -> list[Member]:
-    """Return the next generation: the elite, and children of tournament winners by crossover and mutation."""
+    members: Sequence[StateDict], scores: Sequence[float], parameters: BreedingParameters, seed: int
+) -> list[StateDict]:
+    """Return the next generation: the elite, and children of tournament winners by crossover and mutation.
+
+    Parameters
+    ----------
+    members : sequence of StateDict
+        States of learners by PPO, as `Learner.state_dict` returns them; breeding changes the weights, ``network``, and
+        the learning rate in ``optimiser``.
+    scores : sequence of float
+        Fitness of each.
+    parameters : BreedingParameters
+    seed : int
+    """
     genomes = [
-        _Genome(_weights(member["network"]).tolist(), number, score)
-        for number, (member, score) in enumerate(zip(members, scores, strict=True))
+        _Genome(_flat_weights(member["network"]).tolist(), index, score)
+        for index, (member, score) in enumerate(zip(members, scores, strict=True))
     ]
-    unchanged = min(parameters.elite, max(1, len(genomes) - 1))  # of two or more, one at least is a child
-    elite = tools.selBest(genomes, unchanged)
-    following = [members[genome.number] for genome in elite]
+    unchanged = min(parameters.elite, max(1, len(genomes) - 1))  # at least one of several members is a child
+    following = [members[genome.index] for genome in tools.selBest(genomes, unchanged)]
     rng = random.Random(seed)
     toolbox = _toolbox(parameters, rng)
     while len(following) < len(members):
-        mother, father = toolbox.select(genomes, 2)
-        following.append(_child(members[mother.number], mother, father, parameters, toolbox, rng))
+        first, second = toolbox.select(genomes, 2)
+        following.append(_child(members[first.index], first, second, parameters, toolbox, rng))
     return following
 
 
 def _toolbox(parameters: BreedingParameters, rng: random.Random) -> base.Toolbox:
-    """Return DEAP's tournament, blend and Gaussian mutation, which draw from `rng`."""
+    """Return DEAP's tournament selection, blend crossover and Gaussian mutation, which draw from `rng`."""
     toolbox = base.Toolbox()
-    toolbox.register("select", _drawing_from(rng, tools.selTournament), tournsize=parameters.tournament)
-    toolbox.register("mate", _drawing_from(rng, tools.cxBlend), alpha=0.0)
-    mutation = _drawing_from(rng, tools.mutGaussian)
-    toolbox.register("mutate", mutation, mu=0.0, sigma=parameters.mutation_size, indpb=parameters.mutated_share)
+    toolbox.register("select", _with_generator(rng, tools.selTournament), tournsize=parameters.tournament_size)
+    toolbox.register("mate", _with_generator(rng, tools.cxBlend), alpha=0.0)
+    mutation = _with_generator(rng, tools.mutGaussian)
+    toolbox.register("mutate", mutation, mu=0.0, sigma=parameters.mutation_sigma, indpb=parameters.mutated_fraction)
     return toolbox
 
 
-def _drawing_from(rng: random.Random, operator: FunctionType) -> Callable[..., Any]:
-    """Return an operator of DEAP over a copy of its module, where `random` is `rng` and not the global generator.
+def _with_generator(rng: random.Random, operator: FunctionType) -> Callable[..., object]:
+    """Return an operator of DEAP bound to a copy of its module in which `random` is `rng`.
 
-    That generator is shared by all threads of the process, and with the program that this is part of.
+    DEAP draws from the global generator, which all threads and the embedding program share.
     """
-    module: dict[str, Any] = {**operator.__globals__, "random": rng}
-    for name, thing in operator.__globals__.items():
-        if isinstance(thing, FunctionType) and thing.__globals__ is operator.__globals__:
-            module[name] = FunctionType(thing.__code__, module, name, thing.__defaults__, thing.__closure__)
-    own: Callable[..., Any] = module[operator.__name__]
-    return own
+    module: dict[str, object] = {**operator.__globals__, "random": rng}
+    for name, value in operator.__globals__.items():
+        if isinstance(value, FunctionType) and value.__globals__ is operator.__globals__:
+            module[name] = FunctionType(value.__code__, module, name, value.__defaults__, value.__closure__)
+    bound = module[operator.__name__]
+    assert callable(bound)
+    return bound
 
 
 def _child(
-    parent: Member,
-    mother: _Genome,
-    father: _Genome,
+    parent: StateDict,
+    first: _Genome,
+    second: _Genome,
     parameters: BreedingParameters,
     toolbox: base.Toolbox,
     rng: random.Random,
-) -> Member:
-    """Return a child with the optimiser and the replay buffer of its mother, the parent."""
-    genome = copy.deepcopy(mother)
+) -> StateDict:
+    """Return a child with the optimiser and the replay buffer of its first parent."""
+    genome = copy.deepcopy(first)
     if rng.random() < parameters.crossover_probability:
-        genome, _ = toolbox.mate(genome, copy.deepcopy(father))
+        genome, _ = toolbox.mate(genome, copy.deepcopy(second))
     factor = 1.0
     if rng.random() < parameters.mutation_probability:
         (genome,) = toolbox.mutate(genome)
-        factor = rng.choice((0.8, 1.25))
+        factor = rng.choice(LEARNING_RATE_FACTORS)
     child = copy.deepcopy(parent)
     for group in child["optimiser"]["param_groups"]:
         group["lr"] *= factor
-    child["network"] = _named(torch.tensor(list(genome)), child["network"])
+    child["network"] = _named_weights(torch.tensor(list(genome)), child["network"])
     return child
 
 
-def _weights(network: dict[str, torch.Tensor]) -> torch.Tensor:
-    """All weights of a network in one row."""
+def _flat_weights(network: dict[str, torch.Tensor]) -> torch.Tensor:
+    """Return all weights of a network in one vector."""
     return torch.cat([weight.detach().flatten() for weight in network.values()])
 
 
-def _named(weights: torch.Tensor, like: dict[str, torch.Tensor]) -> dict[str, torch.Tensor]:
-    """Undo `_weights`, with the names and shapes of `like`; each tensor has memory of its own."""
-    rows = weights.split([weight.numel() for weight in like.values()])
-    return {name: row.view_as(old).clone() for (name, old), row in zip(like.items(), rows, strict=True)}
+def _named_weights(weights: torch.Tensor, like: dict[str, torch.Tensor]) -> dict[str, torch.Tensor]:
+    """Undo `_flat_weights`, with the names and shapes of `like`; each tensor has its own storage."""
+    parts = weights.split([weight.numel() for weight in like.values()])
+    return {name: part.view_as(old).clone() for (name, old), part in zip(like.items(), parts, strict=True)}

@@ -1,11 +1,14 @@
-"""What hyperparameters may be, so that nonsense is told when it is set; knows nothing of torch."""
+"""Allowed ranges of hyperparameters, checked when they are set; does not import torch."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from numbers import Integral, Real
-from typing import Any
+from typing import TYPE_CHECKING
 
 from alloc.problems import InputError
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 
 @dataclass(frozen=True)
@@ -16,10 +19,11 @@ class Range:
     ----------
     low, high : float
     above : bool
-        Whether `low` itself is out.
+        Whether `low` itself is excluded.
     whole : bool
+        Whether only integers are allowed.
     optional : bool
-        Whether None will do as well.
+        Whether None is allowed as well.
     """
 
     low: float
@@ -28,11 +32,10 @@ class Range:
     whole: bool = False
     optional: bool = False
 
-    def __contains__(self, value: Any) -> bool:
+    def __contains__(self, value: object) -> bool:
         if value is None:
             return self.optional
-        kind: type[Any] = Integral if self.whole else Real
-        if isinstance(value, bool) or not isinstance(value, kind):
+        if isinstance(value, bool) or not isinstance(value, Integral if self.whole else Real):
             return False
         return bool((self.low < value if self.above else self.low <= value) and value <= self.high)
 
@@ -42,32 +45,35 @@ class Range:
         return f"{kind} {ends}{' or none' if self.optional else ''}"
 
 
-MOST = 1e9
-"""What no hyperparameter need exceed; squares of it are still far from where 32 bits end."""
+MAX_VALUE = 1e9
+"""Upper limit of all hyperparameters; its square is far below the overflow of 32-bit floats."""
 
 COUNT = Range(1, 1_000_000, whole=True)
 SHARE = Range(0, 1)
 RATE = Range(0, 1, above=True)
-POSITIVE = Range(1 / MOST, MOST)
-WEIGHT = Range(0, MOST)
+POSITIVE = Range(1 / MAX_VALUE, MAX_VALUE)
+WEIGHT = Range(0, MAX_VALUE)
 
 RANGES: Mapping[str, Range] = {
-    **dict.fromkeys(("epochs", "minibatch", "steps", "target_period", "tournament"), COUNT),
-    **dict.fromkeys(("final_share", "actor_share", "target_share", "mutated_share"), SHARE),
-    **dict.fromkeys(("smoothing", "exploring", "crossover_probability", "mutation_probability"), SHARE),
-    **dict.fromkeys(("learning_rate", "highest_rate", "discount"), RATE),
-    **dict.fromkeys(("clip", "reward_scale", "max_gradient_norm"), POSITIVE),
-    **dict.fromkeys(("temperature", "final_temperature", "softness"), POSITIVE),
-    **dict.fromkeys(("entropy_weight", "final_entropy_weight", "value_weight"), WEIGHT),
-    **dict.fromkeys(("return_weight", "cost_weight", "mutation_size", "reuse"), WEIGHT),
-    **dict.fromkeys(("capacity", "elite"), Range(0, MOST, whole=True)),
-    "kl_target": Range(1 / MOST, MOST, optional=True),
+    **dict.fromkeys(
+        ("update_epochs", "minibatch_size", "batch_size", "num_steps", "target_update_interval", "tournament_size"),
+        COUNT,
+    ),
+    **dict.fromkeys(("final_lr_fraction", "actor_lr_fraction", "tau", "mutated_fraction"), SHARE),
+    **dict.fromkeys(("gae_lambda", "exploration_initial_eps", "crossover_probability", "mutation_probability"), SHARE),
+    **dict.fromkeys(("learning_rate", "max_learning_rate", "gamma"), RATE),
+    **dict.fromkeys(("clip_coef", "reward_scale", "max_grad_norm"), POSITIVE),
+    **dict.fromkeys(("temperature", "final_temperature", "softmax_temperature"), POSITIVE),
+    **dict.fromkeys(("ent_coef", "final_ent_coef", "vf_coef"), WEIGHT),
+    **dict.fromkeys(("return_weight", "entropy_weight", "cost_weight", "mutation_sigma", "replay_ratio"), WEIGHT),
+    **dict.fromkeys(("buffer_size", "elite"), Range(0, MAX_VALUE, whole=True)),
+    "target_kl": Range(1 / MAX_VALUE, MAX_VALUE, optional=True),
 }
-"""What each may be, whatever the method."""
+"""Range of each by name, whatever the method."""
 
 
-def check_ranges(parameters: Any, **others: Range) -> None:
-    """Raise an `InputError` for the first field out of its range: that in `others`, else that in `RANGES`."""
+def check_ranges(parameters: "DataclassInstance", **others: Range) -> None:
+    """Raise an `InputError` for the first field out of its range, that in `others` or else in `RANGES`."""
     for field in fields(parameters):
         allowed, value = others.get(field.name) or RANGES.get(field.name), getattr(parameters, field.name)
         if allowed is not None and value not in allowed:

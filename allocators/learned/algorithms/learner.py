@@ -1,4 +1,4 @@
-"""What a learner is to its trainer: something that takes lessons, and can be stored and taken up anywhere."""
+"""The protocol of learners: what trains one policy, and can be stored and restored anywhere."""
 
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -8,44 +8,47 @@ import numpy as np
 from alloc.allocators.learned.network.actor_critic import ActorCritic
 from alloc.problems.game import PLANNING, Board, Rules
 
+StateDict = dict[str, Any]
+"""State of a learner by name: tensors, numbers, strings, and lists and dictionaries of these, as torch's own."""
 
-class Games(Protocol):
-    """A source of games, such as a `Curriculum`."""
+
+class GameSource(Protocol):
+    """Where the games of updates come from, such as a `Curriculum`."""
 
     def draw(self, rng: np.random.Generator, progress: float) -> Board:
-        """Draw the games of an update, where `progress` of the training, 0 to 1, is behind."""
+        """Draw the games of an update; `progress` is the share of the training that is done, 0 to 1."""
 
-    def steps(self, board: Board) -> int:
-        """Most steps of a game on `board`."""
+    def max_steps(self, board: Board) -> int:
+        """Return the maximum number of steps of a game on `board`."""
 
 
 @dataclass(frozen=True)
-class Lesson:
-    """What is to be learned next; the same lesson teaches the same learner the same, wherever it is taken.
+class TrainingJob:
+    """A stretch of training for one learner; its result depends on the learner's state and the job alone.
 
     Attributes
     ----------
     seed : int
-        Source of all randomness of this lesson.
+        Seed of all random numbers of this job.
     decisions : int
-        Decisions of agents after which the lesson ends, with the update that reaches them.
-    curriculum : Games
-        Which games are played.
+        Decisions of agents to play; the job ends with the update that reaches them.
+    curriculum : GameSource
+        The games that are played.
     progress : float
-        Share of the whole training that is behind, 0 to 1: for schedules.
+        Share of the whole training that is done before this job, 0 to 1: the schedules follow it.
     rules : Rules
     """
 
     seed: int
     decisions: int
-    curriculum: Games
+    curriculum: GameSource
     progress: float = 0.0
     rules: Rules = PLANNING
 
 
 @dataclass(frozen=True)
-class LessonReport:
-    """What a lesson brought.
+class TrainingStats:
+    """Statistics of a training job.
 
     Attributes
     ----------
@@ -54,34 +57,35 @@ class LessonReport:
     evaluations : int
         States that networks evaluated, in playing and in learning: the cost E_i of (12).
     reward : float
-        Mean reward of a game.
+        Mean undiscounted return of a game.
     entropy : float
-        Mean entropy of the draws, 0 for policies that are not drawn from.
-    divergence : float
-        Mean Kullback-Leibler divergence of an update, 0 where it is not measured.
+        Mean entropy of the policy in nats, 0 for policies that are not sampled from.
+    approx_kl : float
+        Mean Kullback-Leibler divergence of an update in nats, 0 where it is not measured.
     learning_rate : float
+        At the end of the job.
     """
 
     decisions: int
     evaluations: int
     reward: float
     entropy: float
-    divergence: float
+    approx_kl: float
     learning_rate: float
 
 
 class Learner(Protocol):
-    """One policy that learns."""
+    """One policy and the algorithm that trains it."""
 
     @property
     def policy(self) -> ActorCritic:
-        """The network whose scores decide, once trained: the highest bid above the reserve is the best."""
+        """The network whose scores decide once trained: the highest bid above the reserve is the best."""
 
-    def take(self, lesson: Lesson) -> LessonReport:
-        """Play and learn."""
+    def train_on(self, job: TrainingJob) -> TrainingStats:
+        """Play and learn until the job is done."""
 
-    def state(self) -> dict[str, Any]:
-        """Everything that the learner knows, as tensors, numbers, strings, lists and dictionaries of these."""
+    def state_dict(self) -> StateDict:
+        """Return the whole state of the learner; its tensors are those in use, not copies."""
 
-    def load(self, state: dict[str, Any]) -> None:
-        """Take up such a state."""
+    def load_state_dict(self, state: StateDict) -> None:
+        """Restore a state that `state_dict` returned."""

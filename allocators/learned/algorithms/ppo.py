@@ -1,47 +1,49 @@
-"""Proximal policy optimisation: play, estimate advantages, climb the clipped surrogate; again and again.
+"""Proximal policy optimisation (PPO): play, estimate advantages, and maximise the clipped surrogate objective.
 
 References
 ----------
 Schulman et al. (2017), arXiv:1707.06347; Fang et al. (2025), equations (9)-(11) and (13)-(15),
-doi:10.20944/preprints202502.0192.v1. That all who moved in a step share its advantage is MAPPO (Yu et al. 2022,
+doi:10.20944/preprints202502.0192.v1. All agents that move in a step share its advantage, as in MAPPO (Yu et al. 2022,
 arXiv:2103.01955).
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
 from alloc.allocators.learned.algorithms.hyperparameters import PpoParameters
-from alloc.allocators.learned.algorithms.learner import Lesson, LessonReport
-from alloc.allocators.learned.algorithms.replay import Replay
+from alloc.allocators.learned.algorithms.learner import StateDict, TrainingJob, TrainingStats
+from alloc.allocators.learned.algorithms.replay import ReplayBuffer
+from alloc.allocators.learned.algorithms.schedules import linear, set_learning_rate
 from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize, fresh
 from alloc.allocators.learned.play.action_sampling import log_probabilities
 from alloc.allocators.learned.play.trajectories import Trajectories, advantages, collect
 from alloc.problems.game import Board, Rules, State
 
-__all__ = ["Ppo", "PpoParameters", "Samples", "adapted_rate", "reused", "samples_of", "surrogate", "value_loss"]
-
-LOWEST_LEARNING_RATE = 2e-5
-"""Where slowing down ends."""
+MIN_LEARNING_RATE = 2e-5
+"""Lower bound of the adaptive learning rate."""
 
 
 class Samples(NamedTuple):
-    """States of one board with what was done there; all arrays begin with (N,).
+    """N states of the games on one board, with the actions taken there.
 
     Attributes
     ----------
     board : Board
-        The games; `game` says which one each state is of.
-    game : Tensor of int
+    game : Tensor of int, shape (N,)
+        Index on the board of the game that each state is of.
     state : State
+        Arrays begin with (N,).
     actions : Tensor of int, shape (N, k)
+        At most k actions in a state, filled up with -1.
     log_probability : Tensor, shape (N, k)
         By the policy that played.
     centre : Tensor, shape (N, k)
-        How likely each action was when the update began, over how likely it was when it was played; 1 if fresh.
+        Probability ratio of each action at the start of the update, to the policy that played; 1 if on-policy.
     advantage, target : Tensor, shape (N,)
+        Normalised advantage, and the return that the critic learns.
     """
 
     board: Board
@@ -54,30 +56,32 @@ class Samples(NamedTuple):
     target: Tensor
 
 
-def surrogate(ratio: Tensor, advantage: Tensor, clip: float, centre: Tensor | float = 1.0) -> Tensor:
+def clipped_surrogate(ratio: Tensor, advantage: Tensor, clip_coef: float, centre: Tensor | float = 1.0) -> Tensor:
     """Return the clipped surrogate (13), (14), to be maximised; all arguments of one shape.
 
-    Samples that an older policy played are clipped around `centre`, how much likelier the policy at the beginning of
-    the update makes them: what is bounded is how far that policy moves (Queeney et al. 2021, arXiv:2111.00072).
+    Ratios of off-policy samples are clipped around `centre`, the ratio at the start of the update: the bound is on the
+    change of the current policy (Queeney et al. 2021, arXiv:2111.00072).
     """
-    clipped = torch.minimum(torch.maximum(ratio, torch.as_tensor(centre - clip)), torch.as_tensor(centre + clip))
+    low, high = torch.as_tensor(centre - clip_coef), torch.as_tensor(centre + clip_coef)
+    clipped = torch.minimum(torch.maximum(ratio, low), high)
     return torch.minimum(ratio * advantage, clipped * advantage)
 
 
 def value_loss(value: Tensor, target: Tensor) -> Tensor:
-    """Return (15), the mean over all states."""
+    """Return (15), half the mean squared error of the critic over all states."""
     return 0.5 * (target - value).square().mean()
 
 
-def adapted_rate(rate: float, divergence: float, target: float | None, highest: float) -> float:
-    """Slow down where the policy moved more than twice as far as intended, and speed up where less than half.
+def adapted_learning_rate(rate: float, approx_kl: float, target_kl: float | None, max_rate: float) -> float:
+    """Lower the learning rate where the divergence exceeds twice its target, and raise it below half the target.
 
-    The paper's adaptive learning rate by KL target; that it stays below `highest` is ours.
+    The paper's adaptive learning rate; its bounds `MIN_LEARNING_RATE` and `max_rate` are ours. Without a target the
+    rate is only bounded.
     """
     factor = 1.0
-    if target is not None:
-        factor = 1 / 1.5 if divergence > 2 * target else 1.5 if divergence < target / 2 else 1.0
-    return min(highest, max(LOWEST_LEARNING_RATE, rate * factor))
+    if target_kl is not None:
+        factor = 1 / 1.5 if approx_kl > 2 * target_kl else 1.5 if approx_kl < target_kl / 2 else 1.0
+    return min(max_rate, max(MIN_LEARNING_RATE, rate * factor))
 
 
 class Ppo:
@@ -88,146 +92,153 @@ class Ppo:
     size : NetworkSize, optional
     parameters : PpoParameters, optional
     seed : int
-        Of the first weights.
+        Seed of the initial weights.
     """
 
     def __init__(self, size: NetworkSize | None = None, parameters: PpoParameters | None = None, seed: int = 0) -> None:
         self.parameters = parameters or PpoParameters()
         (self.network,) = fresh(size, seed, 1)
         self.optimiser = torch.optim.Adam(self.network.parameters(), self.parameters.learning_rate)
-        self.replay = Replay(self.parameters.capacity)
+        self.replay = ReplayBuffer(self.parameters.buffer_size)
 
     @property
     def policy(self) -> ActorCritic:
         """The network that plays."""
         return self.network
 
-    def take(self, lesson: Lesson) -> LessonReport:
-        """Play on boards of the curriculum and learn from each, until the lesson's decisions are made."""
-        rng, generator = np.random.default_rng(lesson.seed), torch.Generator().manual_seed(lesson.seed)
-        highest = self.parameters.highest_rate * (1 - (1 - self.parameters.final_share) * lesson.progress)
+    def train_on(self, job: TrainingJob) -> TrainingStats:
+        """Play on boards of the curriculum with an update after each; see `Learner.train_on`."""
+        parameters = self.parameters
+        rng, generator = np.random.default_rng(job.seed), torch.Generator().manual_seed(job.seed)
+        max_rate = linear(parameters.max_learning_rate, parameters.final_lr_fraction, job.progress)
         decisions = evaluations = 0
         rewards, outcomes = [], []
-        while decisions < lesson.decisions:
-            board = lesson.curriculum.draw(rng, lesson.progress)
-            steps = lesson.curriculum.steps(board)
-            played = collect(self.network, board, steps, generator, lesson.rules, self.parameters.reward_scale)
+        while decisions < job.decisions:
+            board = job.curriculum.draw(rng, job.progress)
+            steps = job.curriculum.max_steps(board)
+            played = collect(self.network, board, steps, generator, job.rules, parameters.reward_scale)
             old = self.replay.draw(generator)
-            outcomes.append(self.update(played, old, lesson.rules, generator, highest))
+            outcomes.append(self.update(played, old, job.rules, generator, max_rate))
             self.replay.add(played)
             decisions += played.decisions
-            evaluations += played.evaluations * (1 + self.parameters.epochs)
+            evaluations += played.evaluations * (1 + parameters.update_epochs)
             evaluations += 0 if old is None else 2 * old.evaluations
-            rewards.append(float(played.reward.sum(0).mean()) / self.parameters.reward_scale)
-        divergence, entropy = (float(np.mean(column)) for column in zip(*outcomes, strict=True))
-        return LessonReport(decisions, evaluations, float(np.mean(rewards)), entropy, divergence, self.learning_rate)
+            rewards.append(float(played.reward.sum(0).mean()) / parameters.reward_scale)
+        approx_kl, entropy = (float(np.mean(column)) for column in zip(*outcomes, strict=True))
+        return TrainingStats(decisions, evaluations, float(np.mean(rewards)), entropy, approx_kl, self.learning_rate)
 
     @property
     def learning_rate(self) -> float:
-        """Step size of the optimiser."""
+        """Learning rate of the optimiser."""
         return float(self.optimiser.param_groups[0]["lr"])
 
     def update(
-        self, fresh: Trajectories, old: Trajectories | None, rules: Rules, generator: torch.Generator, highest: float
+        self, fresh: Trajectories, old: Trajectories | None, rules: Rules, generator: torch.Generator, max_rate: float
     ) -> tuple[float, float]:
-        """Fit actor and critic to trajectories; return divergence of the fresh ones and mean entropy."""
+        """Train actor and critic on new trajectories, and on `old` ones of an earlier policy where there are any.
+
+        Returns
+        -------
+        float, float
+            Mean divergence from the policy that played the new ones, and mean entropy, both in nats.
+        """
         parameters = self.parameters
-        self._set_rate(min(highest, self.learning_rate))
-        samples = samples_of(fresh, parameters)
-        batches = [(samples, index) for _ in range(parameters.epochs) for index in self._shuffled(samples, generator)]
+        set_learning_rate(self.optimiser, min(max_rate, self.learning_rate))
+        samples = on_policy_samples(fresh, parameters)
+        batches = [
+            (samples, index) for _ in range(parameters.update_epochs) for index in self._minibatches(samples, generator)
+        ]
         if old is not None:
-            again = reused(self.network, old, parameters, rules)
-            batches += [(again, index) for index in self._shuffled(again, generator)]
+            replayed = off_policy_samples(self.network, old, parameters, rules)
+            batches += [(replayed, index) for index in self._minibatches(replayed, generator)]
             order = torch.randperm(len(batches), generator=generator).tolist()
             batches = [batches[number] for number in order]
         divergences, entropies = [], []
         for source, index in batches:
-            divergence, entropy = self._descend(source, index, rules)
+            approx_kl, entropy = self._gradient_step(source, index, rules)
             entropies.append(entropy)
             if source is samples:
-                divergences.append(divergence)
+                divergences.append(approx_kl)
         mean = float(np.mean(divergences))
-        self._set_rate(adapted_rate(self.learning_rate, mean, parameters.kl_target, highest))
+        rate = adapted_learning_rate(self.learning_rate, mean, parameters.target_kl, max_rate)
+        set_learning_rate(self.optimiser, rate)
         return mean, float(np.mean(entropies))
 
-    def _descend(self, samples: Samples, index: Tensor, rules: Rules) -> tuple[float, float]:
-        """Take one gradient step; return divergence from the policy that played, and entropy."""
+    def _gradient_step(self, samples: Samples, index: Tensor, rules: Rules) -> tuple[float, float]:
+        """Take one gradient step on a minibatch; return divergence from the policy that played, and entropy."""
         parameters = self.parameters
         board, state, actions = samples.board[samples.game[index]], samples.state[index], samples.actions[index]
         scores = self.network(board, state)
         log_probability, entropy = log_probabilities(board, state, scores, actions, rules)
         real = actions >= 0
-        shift = (log_probability - samples.log_probability[index])[real]
+        log_ratio = (log_probability - samples.log_probability[index])[real]
         advantage = samples.advantage[index][:, None].expand_as(log_probability)[real]
-        gain = surrogate(shift.exp(), advantage, parameters.clip, samples.centre[index][real]).mean()
-        fault = value_loss(scores.value, samples.target[index])
-        loss = parameters.value_weight * fault - gain - parameters.entropy_weight * entropy.mean()
+        centre = samples.centre[index][real]
+        gain = clipped_surrogate(log_ratio.exp(), advantage, parameters.clip_coef, centre).mean()
+        critic_loss = value_loss(scores.value, samples.target[index])
+        loss = parameters.vf_coef * critic_loss - gain - parameters.ent_coef * entropy.mean()
         self.optimiser.zero_grad(set_to_none=True)
         loss.backward()
-        nn.utils.clip_grad_norm_(self.network.parameters(), parameters.max_gradient_norm)
+        nn.utils.clip_grad_norm_(self.network.parameters(), parameters.max_grad_norm)
         self.optimiser.step()
-        moved = shift.detach()
+        moved = log_ratio.detach()
         return float((moved.exp() - 1 - moved).mean()), float(entropy.detach().mean())
 
-    def _shuffled(self, samples: Samples, generator: torch.Generator) -> tuple[Tensor, ...]:
+    def _minibatches(self, samples: Samples, generator: torch.Generator) -> tuple[Tensor, ...]:
         order = torch.randperm(len(samples.game), generator=generator)
-        batches: tuple[Tensor, ...] = order.split(self.parameters.minibatch)
+        batches: tuple[Tensor, ...] = order.split(self.parameters.minibatch_size)
         return batches
 
-    def _set_rate(self, rate: float) -> None:
-        for group in self.optimiser.param_groups:
-            group["lr"] = rate
-
-    def state(self) -> dict[str, Any]:
-        """Return weights, optimiser and replay buffer."""
+    def state_dict(self) -> StateDict:
+        """Return weights, optimiser and replay buffer; see `Learner.state_dict`."""
         return {
             "network": self.network.state_dict(),
             "optimiser": self.optimiser.state_dict(),
-            "replay": self.replay.state(),
+            "replay": self.replay.state_dict(),
         }
 
-    def load(self, state: dict[str, Any]) -> None:
-        """Take up what `state` returned."""
+    def load_state_dict(self, state: StateDict) -> None:
+        """See `Learner.load_state_dict`."""
         self.network.load_state_dict(state["network"])
         self.optimiser.load_state_dict(state["optimiser"])
-        self.replay.load(state["replay"])
+        self.replay.load_state_dict(state["replay"])
 
 
-def samples_of(played: Trajectories, parameters: PpoParameters) -> Samples:
-    """Return the samples of fresh trajectories, with advantages (9) and the returns that the critic is to learn."""
+def on_policy_samples(played: Trajectories, parameters: PpoParameters) -> Samples:
+    """Return the samples of new trajectories, with advantages (9) and the returns that the critic learns."""
     gain = advantages(
-        played.reward, played.value, played.alive, played.last_value, parameters.discount, parameters.smoothing
+        played.reward, played.value, played.alive, played.last_value, parameters.gamma, parameters.gae_lambda
     )
     return _samples(played, gain, gain + played.value, torch.ones_like(played.log_probability))
 
 
 @torch.no_grad()
-def reused(network: ActorCritic, old: Trajectories, parameters: PpoParameters, rules: Rules) -> Samples:
-    """Return the samples of trajectories that an older policy played, corrected for what this one would do.
+def off_policy_samples(network: ActorCritic, old: Trajectories, parameters: PpoParameters, rules: Rules) -> Samples:
+    """Return the samples of trajectories that an earlier policy played, corrected for the current policy.
 
-    Values are those of the critic today, and traces are cut where today's policy is less likely to act as the older
-    one did, whose probabilities were kept.
+    Values are those of the current critic, and traces are cut (as in V-trace) where the current policy is less likely
+    to take the actions than the earlier one, whose probabilities were stored.
     """
     value, log_probability = torch.zeros_like(old.value), torch.zeros_like(old.log_probability)
     when, game = torch.nonzero(old.alive, as_tuple=True)
-    for index in torch.arange(len(when)).split(4 * parameters.minibatch):
+    for index in torch.arange(len(when)).split(4 * parameters.minibatch_size):
         t, b = when[index], game[index]
         board, state, actions = old.board[b], old.state[t, b], old.actions[t, b]
         scores = network(board, state)
         value[t, b] = scores.value
         log_probability[t, b] = log_probabilities(board, state, scores, actions, rules)[0]
-    shift = (log_probability - old.log_probability) * (old.actions >= 0)
-    likelihood = shift.sum(2).exp()
+    log_ratio = (log_probability - old.log_probability) * (old.actions >= 0)
+    likelihood = log_ratio.sum(2).exp()
     last = old.last_value
-    gain = advantages(old.reward, value, old.alive, last, parameters.discount, parameters.smoothing, likelihood)
-    return _samples(old, gain, value + likelihood.clamp(max=1.0) * gain, shift.exp())
+    gain = advantages(old.reward, value, old.alive, last, parameters.gamma, parameters.gae_lambda, likelihood)
+    return _samples(old, gain, value + likelihood.clamp(max=1.0) * gain, log_ratio.exp())
 
 
 def _samples(played: Trajectories, gain: Tensor, target: Tensor, centre: Tensor) -> Samples:
     when, game = torch.nonzero(played.alive, as_tuple=True)
     advantage = gain[when, game]
     actions = played.actions[when, game]
-    several = advantage[:, None].expand_as(actions)[actions >= 0]
+    per_action = advantage[:, None].expand_as(actions)[actions >= 0]
     return Samples(
         played.board,
         game,
@@ -235,6 +246,6 @@ def _samples(played: Trajectories, gain: Tensor, target: Tensor, centre: Tensor)
         actions,
         played.log_probability[when, game],
         centre[when, game],
-        (advantage - several.mean()) / (several.std(correction=0) + 1e-6),
+        (advantage - per_action.mean()) / (per_action.std(correction=0) + 1e-6),
         target[when, game],
     )

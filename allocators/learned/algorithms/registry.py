@@ -1,11 +1,19 @@
-"""The learning methods by name; knows nothing of torch until one of them is built."""
+"""The learning methods by name; torch is not imported before a learner is made."""
 
+from collections.abc import Mapping
 from dataclasses import fields
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from alloc.allocators.learned.algorithms import hyperparameters
 from alloc.allocators.learned.algorithms.hyperparameter_ranges import RANGES
+from alloc.allocators.learned.algorithms.hyperparameters import (
+    A2cParameters,
+    DdpgParameters,
+    DqnParameters,
+    GappoParameters,
+    Hyperparameters,
+    PpoParameters,
+)
 from alloc.problems import InputError
 from alloc.problems.errors import nearest
 
@@ -13,72 +21,74 @@ if TYPE_CHECKING:
     from alloc.allocators.learned.algorithms.learner import Learner
     from alloc.allocators.learned.network.actor_critic import NetworkSize
 
-METHODS = {
-    "gappo": ("ppo", "Ppo", "GappoParameters"),
-    "ppo": ("ppo", "Ppo", "PpoParameters"),
-    "a2c": ("a2c", "A2c", "A2cParameters"),
-    "dqn": ("dqn", "Dqn", "DqnParameters"),
-    "ddpg": ("ddpg", "Ddpg", "DdpgParameters"),
+METHODS: dict[str, tuple[str, str, type[Hyperparameters]]] = {
+    "gappo": ("ppo", "Ppo", GappoParameters),
+    "ppo": ("ppo", "Ppo", PpoParameters),
+    "a2c": ("a2c", "A2c", A2cParameters),
+    "dqn": ("dqn", "Dqn", DqnParameters),
+    "ddpg": ("ddpg", "Ddpg", DdpgParameters),
 }
-"""Module, learner and parameters of each; `gappo` breeds a population of learners by `ppo`."""
+"""Module, learner and hyperparameters of each; `gappo` breeds a population of learners by `ppo`."""
 
 
-def _names(method: str) -> tuple[str, str, str]:
+def _entry(method: str) -> tuple[str, str, type[Hyperparameters]]:
     if method not in METHODS:
         raise InputError(f"{method!r} learns nothing{nearest(method, tuple(METHODS))}", "method")
     return METHODS[method]
 
 
-def new_learner(method: str, size: "NetworkSize", parameters: Any, seed: int) -> "Learner":
-    """Return a learner that knows nothing yet.
+def new_learner(method: str, size: "NetworkSize", parameters: Hyperparameters | None, seed: int) -> "Learner":
+    """Return an untrained learner, with the default hyperparameters where `parameters` is None.
 
     Raises
     ------
     InputError
         If there is no such method.
     """
-    module, name, _ = _names(method)
+    module, name, _ = _entry(method)
     learner: Learner = getattr(import_module(f"alloc.allocators.learned.algorithms.{module}"), name)(
         size, parameters, seed
     )
     return learner
 
 
-def method_parameters(method: str, settings: dict[str, str] | None = None) -> Any:
-    """Return the hyperparameters of a method, with some of them set by the user.
+def method_parameters(method: str, settings: Mapping[str, object] | None = None) -> Hyperparameters:
+    """Return the hyperparameters of a method, the defaults but for `settings`.
 
     Parameters
     ----------
-    settings : dict of str to str
-        Texts as on the command line, by field.
+    method : str
+        One of `METHODS`.
+    settings : mapping of str to object
+        Values by field; text is parsed, as on the command line.
 
     Raises
     ------
     InputError
-        If there is no such method or field, a text does not read as the field's type, or a value is out of its range.
+        If there is no such method or field, a text does not parse as the field's type, or a value is out of range.
     """
-    kind = getattr(hyperparameters, _names(method)[2])
+    kind = _entry(method)[2]
     default = kind()
     known = [field.name for field in fields(kind)]
-    values = {}
-    for name, text in (settings or {}).items():
+    values: dict[str, object] = {}
+    for name, value in (settings or {}).items():
         if name not in known:
             defaults = ", ".join(f"{one}={_text(getattr(default, one))}" for one in known)
             raise InputError(f"{method} has no parameter {name!r}; its parameters and defaults: {defaults}", "settings")
-        values[name] = _read(name, text, getattr(default, name))
+        values[name] = _parse(name, value, getattr(default, name)) if isinstance(value, str) else value
     try:
-        return kind(**values)
+        return kind(**values)  # type: ignore[arg-type]
     except InputError as error:
         raise InputError(f"{error.place} {error.message}", "settings") from error
 
 
-def _text(value: Any) -> str:
-    """Return a value as `_read` takes it."""
+def _text(value: object) -> str:
+    """Return a value as `_parse` reads it."""
     return str(value).lower()
 
 
-def _read(name: str, text: str, default: Any) -> Any:
-    """Read a text as the kind of value that the default is."""
+def _parse(name: str, text: str, default: object) -> object:
+    """Return a text as a value of the default's type."""
     try:
         if isinstance(default, bool):
             return {"true": True, "false": False}[text.lower()]

@@ -1,18 +1,20 @@
-"""The replay buffer: trajectories of older policies, with the probabilities by which they acted."""
+"""The replay buffer of PPO: trajectories of earlier policies, with the probabilities of their actions."""
 
 from dataclasses import fields
-from typing import Any
 
 import torch
 
+from alloc.allocators.learned.algorithms.learner import StateDict
 from alloc.allocators.learned.play.trajectories import Trajectories
 from alloc.problems.game import Board, State
 
+_NESTED = ("board", "state")
 
-class Replay:
-    """The latest trajectories, up to `capacity` states in all; the oldest go first.
 
-    Whole trajectories are kept, since advantages are anew estimated along them when they are used.
+class ReplayBuffer:
+    """The latest trajectories, up to `capacity` states in all; the oldest are dropped first.
+
+    Whole trajectories are kept, since advantages are estimated along them again at each use.
     """
 
     def __init__(self, capacity: int) -> None:
@@ -24,33 +26,30 @@ class Replay:
         return sum(one.evaluations for one in self._kept)
 
     def add(self, played: Trajectories) -> None:
-        """Keep a trajectory, if there is room for it at all."""
+        """Keep a trajectory, if it fits into the capacity at all."""
         self._kept.append(played)
         while self._kept and len(self) > self.capacity:
             self._kept.pop(0)
 
     def draw(self, generator: torch.Generator) -> Trajectories | None:
-        """Return one of the trajectories, None from an empty buffer."""
+        """Return one of the trajectories at random, None from an empty buffer."""
         if not self._kept:
             return None
         return self._kept[int(torch.randint(len(self._kept), (1,), generator=generator))]
 
-    def state(self) -> list[dict[str, Any]]:
+    def state_dict(self) -> list[StateDict]:
         """Return all trajectories as dictionaries of tensors."""
         return [
             {
-                **{field.name: getattr(one, field.name) for field in fields(Trajectories) if field.name not in _PARTS},
+                **{field.name: getattr(one, field.name) for field in fields(Trajectories) if field.name not in _NESTED},
                 "board": {field.name: getattr(one.board, field.name) for field in fields(Board)},
                 "state": {field.name: getattr(one.state, field.name) for field in fields(State)},
             }
             for one in self._kept
         ]
 
-    def load(self, state: list[dict[str, Any]]) -> None:
-        """Take up what `state` returned."""
+    def load_state_dict(self, state: list[StateDict]) -> None:
+        """Restore what `state_dict` returned."""
         self._kept = [
             Trajectories(**{**one, "board": Board(**one["board"]), "state": State(**one["state"])}) for one in state
         ]
-
-
-_PARTS = ("board", "state")

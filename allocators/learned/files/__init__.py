@@ -1,1 +1,1 @@
-"""Files of learning: policies and checkpoints."""
+"""Files of the learned methods: policies and checkpoints."""

@@ -1,76 +1,88 @@
-"""Checkpoints: a whole training run in one file, which says what it is a run of; reading it never runs code."""
+"""Checkpoints: a whole training run in one file, with the description of the run; reading one never runs code."""
 
-import hashlib
 import io
 import zipfile
-from dataclasses import asdict, fields, is_dataclass, replace
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import BinaryIO
 
 import torch
 
-from alloc.allocators.learned.training.validation import VALIDATION
-from alloc.problems import Instance
-from alloc.problems.errors import InputError
+from alloc.allocators.learned.algorithms.learner import StateDict
+from alloc.problems import InputError
 from alloc.problems.formats import write_bytes_atomically
 from alloc.problems.formats.files import reason
-from alloc.problems.game import FEATURE_SET
-
-if TYPE_CHECKING:
-    from alloc.allocators.learned.training.trainer import TrainingParameters
 
 CHECKPOINT_FORMAT = "alloc-checkpoint/3"
 
+STORED_NAMES = {
+    "curriculum.energy_weight": "curriculum.price",
+    "curriculum.growth_fraction": "curriculum.grown",
+    "curriculum.initial_tasks": "curriculum.first_tasks",
+    "curriculum.instances": "curriculum.own",
+    "curriculum.max_agents": "curriculum.most_agents",
+    "curriculum.max_pairs": "curriculum.pairs",
+    "curriculum.max_relaxation": "curriculum.easing",
+    "curriculum.relaxed_fraction": "curriculum.eased_share",
+    "breeding.mutated_fraction": "breeding.mutated_share",
+    "breeding.mutation_sigma": "breeding.mutation_size",
+    "breeding.tournament_size": "breeding.tournament",
+    "learner.actor_lr_fraction": "learner.actor_share",
+    "learner.batch_size": "learner.minibatch",
+    "learner.buffer_size": "learner.capacity",
+    "learner.clip_coef": "learner.clip",
+    "learner.double_q": "learner.double",
+    "learner.ent_coef": "learner.entropy_weight",
+    "learner.exploration_initial_eps": "learner.exploring",
+    "learner.final_ent_coef": "learner.final_entropy_weight",
+    "learner.final_lr_fraction": "learner.final_share",
+    "learner.gae_lambda": "learner.smoothing",
+    "learner.gamma": "learner.discount",
+    "learner.max_grad_norm": "learner.max_gradient_norm",
+    "learner.max_learning_rate": "learner.highest_rate",
+    "learner.minibatch_size": "learner.minibatch",
+    "learner.num_steps": "learner.steps",
+    "learner.replay_ratio": "learner.reuse",
+    "learner.softmax_temperature": "learner.softness",
+    "learner.target_kl": "learner.kl_target",
+    "learner.target_update_interval": "learner.target_period",
+    "learner.tau": "learner.target_share",
+    "learner.update_epochs": "learner.epochs",
+    "learner.vf_coef": "learner.value_weight",
+}
+"""Names in descriptions of this format, of parameters that have other names in the program."""
 
-def described(parameters: "TrainingParameters", seed: int) -> dict[str, str]:
-    """Return all that decides a training curve, flat, as text."""
-    own = parameters.curriculum.own
-    plain = replace(parameters, curriculum=replace(parameters.curriculum, own=()))
-    text = {"seed": str(seed), "features": FEATURE_SET, "validation": VALIDATION, **_flat("", asdict(plain))}
-    text["instances"] = ", ".join(_digest(aimed.instance) for aimed in own) or "none"
-    return text
 
+def write_checkpoint(path: Path, description: Mapping[str, str], state: StateDict) -> None:
+    """Write a checkpoint completely or not at all.
 
-def _flat(prefix: str, values: dict[str, Any]) -> dict[str, str]:
-    flat = {}
-    for name, value in values.items():
-        if isinstance(value, dict):
-            flat.update(_flat(f"{prefix}{name}.", value))
-        else:
-            flat[prefix + name] = ", ".join(map(str, value)) if isinstance(value, tuple) else str(value)
-    return flat
-
-
-def _digest(instance: Instance) -> str:
-    """Short name of an instance that no other one has."""
-    assert is_dataclass(instance)
-    digest = hashlib.sha256()
-    for column in fields(instance):
-        value = getattr(instance, column.name)
-        digest.update(value.tobytes() if hasattr(value, "tobytes") else repr(value).encode())
-    return f"{instance.name} ({digest.hexdigest()[:8]})"
-
-
-def write_checkpoint(path: Path, description: dict[str, str], state: dict[str, Any]) -> None:
-    """Write a checkpoint whole or not at all."""
+    Parameters
+    ----------
+    path : Path
+    description : mapping of str to str
+        All that decides the learning curve.
+    state : StateDict
+        With the reports of all generations as ``history``.
+    """
+    stored = {STORED_NAMES.get(name, name): value for name, value in description.items()}
     buffer = io.BytesIO()
-    torch.save({"format": CHECKPOINT_FORMAT, "description": description, **state}, buffer)
+    torch.save({"format": CHECKPOINT_FORMAT, "description": stored, **state}, buffer)
     write_bytes_atomically(path, buffer.getvalue())
 
 
 def generations_in(path: Path) -> int:
-    """Return how many generations a checkpoint of any version holds.
+    """Return the number of generations in a checkpoint of any version.
 
     Raises
     ------
     InputError
-        If there is none at `path`.
+        If there is no checkpoint at `path`.
     """
     return len(_stored(path)["history"])
 
 
-def _stored(path: Path) -> dict[str, Any]:
-    """Read a checkpoint of any version; only of a file whose content is wrong it is said that it may be removed."""
+def _stored(path: Path) -> StateDict:
+    """Read a checkpoint of any version; only where the content of the file is wrong, removing it is advised."""
     source = str(path)
     try:
         with path.open("rb") as file:
@@ -85,17 +97,17 @@ def _stored(path: Path) -> dict[str, Any]:
         raise InputError("does not fit into memory", "", source) from error
 
 
-def _unpacked(file: BinaryIO, source: str) -> dict[str, Any]:
+def _unpacked(file: BinaryIO, source: str) -> StateDict:
     message = "is no checkpoint, or is damaged; name another checkpoint, or remove it"
     if not zipfile.is_zipfile(file):
         raise InputError(message, "", source)
     file.seek(0)
     try:
-        state: dict[str, Any] = torch.load(file, weights_only=True)
+        state: StateDict = torch.load(file, weights_only=True)
     except (OSError, MemoryError, torch.OutOfMemoryError):
         raise
-    except Exception as error:  # torch's own words are about pickles, and its kinds of errors are many
-        if "allocate memory" in str(error):  # what torch raises where the CPU has none left is a RuntimeError
+    except Exception as error:  # of many types, with messages about pickles
+        if "allocate memory" in str(error):  # torch raises a RuntimeError where the CPU has no memory left
             raise MemoryError(str(error)) from error
         raise InputError(message, "", source) from error
     if not isinstance(state, dict) or not {"format", "description", "history"} <= state.keys():
@@ -103,22 +115,27 @@ def _unpacked(file: BinaryIO, source: str) -> dict[str, Any]:
     return state
 
 
-def read_checkpoint(path: Path, description: dict[str, str]) -> dict[str, Any]:
-    """Return the state that was stored in a checkpoint of a run like this.
+def read_checkpoint(path: Path, description: Mapping[str, str]) -> StateDict:
+    """Return the state in a checkpoint of a run with this description.
 
     Raises
     ------
     InputError
-        If there is no checkpoint of this version at `path`, or it is one of a run with another description.
+        If there is no checkpoint of this version at `path`, or its run has another description.
     """
     source, state = str(path), _stored(path)
     if state["format"] != CHECKPOINT_FORMAT:
         message = f"is a checkpoint of another version ({state['format']}, not {CHECKPOINT_FORMAT}); train anew"
         raise InputError(message, "", source)
-    stored = state["description"]
-    for name in sorted(stored.keys() | description.keys(), key=lambda name: (name != "method", name)):
-        ours, theirs = description.get(name), stored.get(name)
-        if ours != theirs:
-            message = f"is a run with {name} {theirs}, not {ours}; use the same, or another checkpoint"
+    theirs = dict(state["description"])
+    ours = {name: (value, theirs.pop(STORED_NAMES.get(name, name), None)) for name, value in description.items()}
+    pairs: dict[str, tuple[str | None, str | None]] = {
+        **ours,
+        **{name: (None, value) for name, value in theirs.items()},
+    }
+    for name in sorted(pairs, key=lambda name: (name != "method", name)):
+        expected, found = pairs[name]
+        if expected != found:
+            message = f"is a run with {name} {found}, not {expected}; use the same, or another checkpoint"
             raise InputError(message, "", source)
     return state

@@ -1,4 +1,4 @@
-"""Stored policies: weights in safetensors with a description that must match; a policy file never runs code."""
+"""Policy files: weights in safetensors, with metadata that must match; reading one never runs code."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -20,9 +20,9 @@ POLICY_FORMAT = "alloc-policy/1"
 
 
 def save_policy(
-    path: Path | str, networks: Sequence[ActorCritic], method: str, figures: Mapping[str, str | float] | None = None
+    path: Path | str, networks: Sequence[ActorCritic], method: str, training: Mapping[str, str | float] | None = None
 ) -> None:
-    """Store networks, the best first.
+    """Write networks to a policy file, the best first.
 
     Parameters
     ----------
@@ -31,24 +31,24 @@ def save_policy(
         All of one size.
     method : str
         The method that trained them.
-    figures : mapping, optional
-        Figures of the training, for whoever looks at the file.
+    training : mapping, optional
+        Figures of the training, stored as metadata for information.
     """
     tensors = {
         f"{number}.{name}": weight.contiguous()
         for number, network in enumerate(networks)
         for name, weight in network.state_dict().items()
     }
-    said = {
-        **_description(networks[0].size, len(networks), method),
+    metadata = {
+        **_metadata(networks[0].size, len(networks), method),
         "version": version("alloc-mrta"),
-        "training": json.dumps(dict(figures or {})),
+        "training": json.dumps(dict(training or {})),
     }
-    write_bytes_atomically(path, _sorted(save(tensors, metadata=said)))
+    write_bytes_atomically(path, _sorted(save(tensors, metadata=metadata)))
 
 
 def _sorted(data: bytes) -> bytes:
-    """Return a file of safetensors with its metadata in order, else that of a hash table: another every time."""
+    """Return a safetensors file with its metadata sorted; the library writes them in random order."""
     end = 8 + int.from_bytes(data[:8], "little")
     header = json.loads(data[8:end])
     header["__metadata__"] = dict(sorted(header["__metadata__"].items()))
@@ -56,7 +56,7 @@ def _sorted(data: bytes) -> bytes:
     return data[:8] + text.ljust(end - 8) + data[end:]
 
 
-def _description(size: NetworkSize, count: int, method: str) -> dict[str, str]:
+def _metadata(size: NetworkSize, count: int, method: str) -> dict[str, str]:
     return {
         "format": POLICY_FORMAT,
         "method": method,
@@ -68,35 +68,35 @@ def _description(size: NetworkSize, count: int, method: str) -> dict[str, str]:
 
 
 def load_policy(path: Path | str, method: str | None, device: torch.device | None = None) -> list[ActorCritic]:
-    """Read networks, the best first, ready to be used.
+    """Read the networks of a policy file, the best first, in evaluation mode and without gradients.
 
     Parameters
     ----------
     path : Path or str
     method : str or None
-        The method that trained them; None for any.
+        The method that must have trained them; None for any.
     device : torch.device, optional
 
     Raises
     ------
     InputError
-        If the file cannot be read, was made by another method, or for other features or sizes than this version has,
-        or holds weights that are not finite.
+        If the file cannot be read, is of another method, or of other features or sizes than this version has, or
+        contains weights that are not finite.
     """
-    source, said = str(path), read_header(path)
-    tensors = load(read_bytes(path))  # opened by Python, to which every name of a file is one
+    source, metadata = str(path), read_header(path)
+    tensors = load(read_bytes(path))  # safetensors itself cannot open every file name
     try:
-        size, count = NetworkSize(**json.loads(said["size"])), int(said["networks"])
+        size, count = NetworkSize(**json.loads(metadata["size"])), int(metadata["networks"])
     except (KeyError, TypeError, ValueError) as error:
         raise InputError("does not describe its networks; use a file by `alloc train`", "metadata", source) from error
-    theirs = said.get("method", "")
+    theirs = metadata.get("method", "")
     if method not in (None, theirs) and theirs in METHODS:
         raise InputError(f"holds a policy of {theirs}; use it with the method {theirs}", "", source)
-    expected = _description(size, count, theirs if method is None else method)
+    expected = _metadata(size, count, theirs if method is None else method)
     for key in ("format", "method", "features", "feature_counts"):
-        if said.get(key) != expected[key]:
-            raise InputError(f"is {said.get(key)!r}, this version needs {expected[key]!r}; train anew", key, source)
-    turn = _turn(said, source)
+        if metadata.get(key) != expected[key]:
+            raise InputError(f"is {metadata.get(key)!r}, this version needs {expected[key]!r}; train anew", key, source)
+    turn = _turn(metadata, source)
     if method is not None and turn != Turn.BIDDING:
         raise InputError(f"was trained for turns by {turn}, but plans are made by {Turn.BIDDING}", "turn", source)
     if not all(bool(tensor.isfinite().all()) for tensor in tensors.values()):
@@ -108,9 +108,9 @@ def load_policy(path: Path | str, method: str | None, device: torch.device | Non
         raise InputError(f"holds other weights than its size says ({reason})", "size", source) from error
 
 
-def _turn(said: Mapping[str, str], source: str) -> str:
+def _turn(metadata: Mapping[str, str], source: str) -> str:
     try:
-        turn: str = json.loads(said.get("training", "{}")).get("turn", Turn.BIDDING)
+        turn: str = json.loads(metadata.get("training", "{}")).get("turn", Turn.BIDDING)
     except (AttributeError, ValueError) as error:
         raise InputError("does not describe its training; use a file by `alloc train`", "training", source) from error
     return turn

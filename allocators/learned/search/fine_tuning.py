@@ -9,9 +9,10 @@ import numpy as np
 import torch
 
 from alloc.allocators.contract.search import Search
-from alloc.allocators.learned.algorithms.gappo import BreedingParameters, breed, fitness
-from alloc.allocators.learned.algorithms.learner import Lesson, LessonReport
-from alloc.allocators.learned.algorithms.ppo import Ppo, PpoParameters
+from alloc.allocators.learned.algorithms.gappo import breed, fitness
+from alloc.allocators.learned.algorithms.hyperparameters import BreedingParameters, PpoParameters
+from alloc.allocators.learned.algorithms.learner import TrainingJob, TrainingStats
+from alloc.allocators.learned.algorithms.ppo import Ppo
 from alloc.allocators.learned.network.actor_critic import ActorCritic
 from alloc.problems.game import Board
 from alloc.problems.game.parts import Parts
@@ -19,7 +20,7 @@ from alloc.problems.game.parts import Parts
 GENERATION = 4
 """Lessons of each member between two generations."""
 
-BREEDING = BreedingParameters(mutation_size=0.002)
+BREEDING = BreedingParameters(mutation_sigma=0.002)
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,9 @@ class FineTuningParameters:
     pairs: int = 12_000
     rounds: int = 15
     price: tuple[float, float] = (0.4, 2.4)
-    ppo: PpoParameters = field(default_factory=lambda: PpoParameters(learning_rate=1e-4, highest_rate=3e-4, epochs=2))
+    ppo: PpoParameters = field(
+        default_factory=lambda: PpoParameters(learning_rate=1e-4, max_learning_rate=3e-4, update_epochs=2)
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +71,7 @@ class _PartGames:
         price = torch.from_numpy(np.exp(rng.uniform(low, high, games)).astype(np.float32))
         return replace(board[rows], price=price, start=torch.where(back, self.parts.home[rows], board.start[rows]))
 
-    def steps(self, board: Board) -> int:
+    def max_steps(self, board: Board) -> int:
         """Most rounds."""
         return self.parameters.rounds
 
@@ -92,7 +95,7 @@ class FineTuning:
         self.members: list[Ppo] = []
         self.spent_s = 0.0
         self.lessons = 0
-        self._reports: list[LessonReport] = []
+        self._reports: list[TrainingStats] = []
 
     def is_due(self) -> bool:
         """Whether it is time to learn; runs without a time limit never learn on, so that they repeat."""
@@ -106,8 +109,8 @@ class FineTuning:
         if not self.members:
             self.members = [_learner(network, self.parameters.ppo) for network in self.shipped]
         games = _PartGames(parts, self.parameters)
-        lesson = Lesson(seed=(self.search.seed + self.lessons) % 2**63, decisions=1, curriculum=games)
-        self._reports.append(self.members[self.lessons % len(self.members)].take(lesson))
+        job = TrainingJob(seed=(self.search.seed + self.lessons) % 2**63, decisions=1, curriculum=games)
+        self._reports.append(self.members[self.lessons % len(self.members)].train_on(job))
         self.lessons += 1
         if self.lessons % (GENERATION * len(self.members)) == 0:
             self._breed()
@@ -125,9 +128,9 @@ class FineTuning:
             [sum(report.evaluations for report in reports) for reports in latest],
             BREEDING,
         )
-        members = [copy.deepcopy(member.state()) for member in self.members]  # loading one changes what it shares
+        members = [copy.deepcopy(member.state_dict()) for member in self.members]  # loading one changes what it shares
         for member, state in zip(self.members, breed(members, scores, BREEDING, self.lessons), strict=True):
-            member.load(copy.deepcopy(state))
+            member.load_state_dict(copy.deepcopy(state))
 
 
 def _learner(network: ActorCritic, parameters: PpoParameters) -> Ppo:

@@ -6,14 +6,14 @@
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from alloc.allocators.learned.training.trainer import train
+    from alloc.allocators.learned.training.run import train
 
 __all__ = ["train"]
 
 
 def __getattr__(name: str) -> object:
     if name == "train":
-        from alloc.allocators.learned.training.trainer import train
+        from alloc.allocators.learned.training.run import train
 
         return train
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,7 +1,7 @@
-"""Games to train on: small instances of many kinds, drawn anew for every update.
+"""The curriculum: games on small instances of many kinds, drawn anew for every update.
 
-Sizes are below those of the paper's scenarios, which are never trained on. Seeds start where nobody else's do:
-10^9 for training, 2 * 10^9 for validation.
+Sizes are below those of the paper's scenarios, which are never trained on. Seeds are disjoint from all others: from
+10^9 on for training, from 2 * 10^9 on for validation.
 """
 
 from collections.abc import Sequence
@@ -17,111 +17,108 @@ TRAINING_SEED = 10**9
 
 
 @dataclass(frozen=True)
-class Aimed:
-    """An instance, and the makespan in hours at which it is aimed: a lower bound."""
+class TrainingInstance:
+    """An instance, and its reference makespan T_ref in hours: a lower bound, which sets the target of its games."""
 
     instance: Instance
-    hours: float
+    reference_h: float
 
 
 @dataclass(frozen=True)
 class Curriculum:
-    """What games are drawn.
+    """The distribution of the games that are trained on.
 
     Attributes
     ----------
     families : tuple of str
         Of `families.FAMILIES`; each game draws one of them.
-    first_tasks, tasks : (int, int)
-        Least and most tasks, when training begins and when all of it is `grown`.
-    grown : float
-        Share of the training after which sizes are at their full range.
+    initial_tasks, tasks : (int, int)
+        Minimum and maximum number of tasks, at the beginning of the training and after `growth_fraction` of it.
+    growth_fraction : float
+        Share of the training after which sizes have their full range.
     agents_per_task : (float, float)
-        Least and most agents per task.
-    most_agents : int
-    price : (float, float)
-        Least and most weight of energy, drawn in proportion.
-    eased_share, easing : float
-        Share of games that aim at a longer makespan than the bound, and how much longer at most: there is ability to
-        spare, and some agents may stay idle.
-    pairs : int
-        Pairs of agent and place on a board, about, whatever the size of its games: an update always takes as long.
+        Minimum and maximum number of agents per task.
+    max_agents : int
+    energy_weight : (float, float)
+        Minimum and maximum weight of energy, drawn log-uniformly.
+    relaxed_fraction, max_relaxation : float
+        Share of games whose target makespan is longer than T_ref, and the largest factor: there is more ability than
+        needed, and some agents may stay idle.
+    max_pairs : int
+        Approximate number of agent-place pairs on a board, whatever the size of its games, so that updates take
+        equally long.
     games : (int, int)
-        Least and most games on a board.
-    own : tuple of Aimed
-        Instances to play instead of drawn ones.
+        Minimum and maximum number of games on a board.
+    instances : tuple of TrainingInstance
+        Given instances to play instead of drawn ones.
     """
 
     families: tuple[str, ...] = ("mixed",)
-    first_tasks: tuple[int, int] = (4, 8)
+    initial_tasks: tuple[int, int] = (4, 8)
     tasks: tuple[int, int] = (3, 16)
-    grown: float = 0.4
+    growth_fraction: float = 0.4
     agents_per_task: tuple[float, float] = (3.5, 12.0)
-    most_agents: int = 80
-    price: tuple[float, float] = (0.2, 3.0)
-    eased_share: float = 0.2
-    easing: float = 1.3
-    pairs: int = 12_000
+    max_agents: int = 80
+    energy_weight: tuple[float, float] = (0.2, 3.0)
+    relaxed_fraction: float = 0.2
+    max_relaxation: float = 1.3
+    max_pairs: int = 12_000
     games: tuple[int, int] = (8, 48)
-    own: tuple[Aimed, ...] = ()
+    instances: tuple[TrainingInstance, ...] = ()
 
     def draw(self, rng: np.random.Generator, progress: float = 1.0) -> Board:
-        """Draw a board of games for one update.
+        """Draw a board of games for one update; `progress` is the share of the training that is done."""
+        drawn = self._given(rng) if self.instances else self._new(rng, progress)
+        count = len(drawn)
+        relaxed = rng.random(count) < self.relaxed_fraction
+        factors = np.where(relaxed, rng.uniform(1.0, self.max_relaxation, count), 1.0)
+        targets = [one.reference_h * float(factor) for one, factor in zip(drawn, factors, strict=True)]
+        low, high = self.energy_weight
+        energy_weights = (low * (high / low) ** rng.random(count)).tolist()
+        n, m = drawn[0].instance.n, drawn[0].instance.m
+        near = max(8, self.max_pairs // n) if n * m > self.max_pairs else None
+        return make_board([one.instance for one in drawn], targets, energy_weights, rng, near=near)
 
-        Parameters
-        ----------
-        progress : float
-            Share of the training that is behind.
-        """
-        aimed = self._own(rng) if self.own else self._new(rng, progress)
-        eased = np.where(rng.random(len(aimed)) < self.eased_share, rng.uniform(1.0, self.easing, len(aimed)), 1.0)
-        hours = [one.hours * float(ease) for one, ease in zip(aimed, eased, strict=True)]
-        cheap, dear = self.price
-        prices = (cheap * (dear / cheap) ** rng.random(len(aimed))).tolist()
-        n, m = aimed[0].instance.n, aimed[0].instance.m
-        near = max(8, self.pairs // n) if n * m > self.pairs else None
-        return make_board([one.instance for one in aimed], hours, prices, rng, near=near)
-
-    def steps(self, board: Board) -> int:
-        """Return how many rounds games on `board` last at most."""
+    def max_steps(self, board: Board) -> int:
+        """Return the maximum number of steps of a game on `board`."""
         return 8 + board.shape[1] // 6
 
-    def _new(self, rng: np.random.Generator, progress: float) -> list[Aimed]:
-        along = min(1.0, progress / self.grown) if self.grown > 0 else 1.0
-        low, high = (round(a + along * (b - a)) for a, b in zip(self.first_tasks, self.tasks, strict=True))
+    def _new(self, rng: np.random.Generator, progress: float) -> list[TrainingInstance]:
+        growth = min(1.0, progress / self.growth_fraction) if self.growth_fraction > 0 else 1.0
+        low, high = (round(a + growth * (b - a)) for a, b in zip(self.initial_tasks, self.tasks, strict=True))
         m = int(rng.integers(low, high + 1))
-        n = max(1, min(self.most_agents, round(m * rng.uniform(*self.agents_per_task))))
+        n = max(1, min(self.max_agents, round(m * rng.uniform(*self.agents_per_task))))
         instances = []
         for seed in TRAINING_SEED + rng.integers(0, 10**8, self._count(n, m)):
             family = self.families[int(rng.integers(len(self.families)))]
             instances.append(draw_instance(family, n, m, int(seed), rng))
-        return aim(instances)
+        return with_reference(instances)
 
-    def _own(self, rng: np.random.Generator) -> list[Aimed]:
-        """Draw from those instances that are as large as one drawn before."""
-        first = self.own[int(rng.integers(len(self.own)))].instance
-        alike = [one for one in self.own if (one.instance.n, one.instance.m) == (first.n, first.m)]
+    def _given(self, rng: np.random.Generator) -> list[TrainingInstance]:
+        """Draw from the given instances of one size, that of a random one."""
+        first = self.instances[int(rng.integers(len(self.instances)))].instance
+        alike = [one for one in self.instances if (one.instance.n, one.instance.m) == (first.n, first.m)]
         return [alike[int(number)] for number in rng.integers(0, len(alike), self._count(first.n, first.m))]
 
     def _count(self, n: int, m: int) -> int:
-        """Games of this size on a board."""
-        least = self.games[0] if n * (m + 1) <= self.pairs else 1
-        return int(np.clip(self.pairs // (n * (m + 1)), least, self.games[1]))
+        """Return the number of games of this size on a board."""
+        least = self.games[0] if n * (m + 1) <= self.max_pairs else 1
+        return int(np.clip(self.max_pairs // (n * (m + 1)), least, self.games[1]))
 
 
-def reference_makespan(instance: Instance, patience_s: float = 1.0) -> float:
-    """Return the best lower bound at hand on the makespan, in hours: demands are set by it."""
+def reference_makespan(instance: Instance, lp_time_limit_s: float = 1.0) -> float:
+    """Return T_ref, the best lower bound on the makespan that is cheap to compute, in hours."""
     bound = makespan_lower_bound(instance)
     if not instance.reach.is_complete:
-        bound = max(bound, lp_makespan_lower_bound(instance, patience_s) or 0.0)
+        bound = max(bound, lp_makespan_lower_bound(instance, lp_time_limit_s) or 0.0)
     return bound
 
 
-def aim(instances: Sequence[Instance]) -> list[Aimed]:
-    """Aim each instance at its lower bound."""
-    return [Aimed(instance, reference_makespan(instance)) for instance in instances]
+def with_reference(instances: Sequence[Instance]) -> list[TrainingInstance]:
+    """Return each instance with its reference makespan."""
+    return [TrainingInstance(instance, reference_makespan(instance)) for instance in instances]
 
 
-def reference_board(instances: Sequence[Instance], price: Sequence[float], rng: np.random.Generator) -> Board:
-    """Lay out games with demands at the lower bound of each instance."""
-    return make_board(instances, [reference_makespan(instance) for instance in instances], price, rng)
+def reference_board(instances: Sequence[Instance], energy_weight: Sequence[float], rng: np.random.Generator) -> Board:
+    """Return a board of games whose target is the reference makespan of each instance."""
+    return make_board(instances, [reference_makespan(instance) for instance in instances], energy_weight, rng)

@@ -1,17 +1,18 @@
-"""Kinds of instances to train on: each stresses one trait, and `varied` draws them all at once."""
+"""Families of instances to train on: each stresses one property, and `varied` combines them all."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from alloc.problems import Instance
+from alloc.problems import InputError, Instance
+from alloc.problems.errors import nearest
 from alloc.problems.generate import paper_like, random_instance
 from alloc.problems.generate.family import Family
 
 Recipe = Callable[[int, int, np.random.Generator], Family]
 
-MEAN_FLIGHT = 0.5
-"""Distance between two places of the unit square or cube, roughly."""
+MEAN_DISTANCE = 0.5
+"""Approximate mean distance of two points in the unit square or cube."""
 
 
 def _real(n: int, m: int, rng: np.random.Generator) -> Family:
@@ -20,7 +21,7 @@ def _real(n: int, m: int, rng: np.random.Generator) -> Family:
 
 
 def _elsewhere(n: int, m: int, rng: np.random.Generator) -> Family:
-    """Whole numbers that can be shared out without a rest, as the paper's, by agents that start anywhere."""
+    """Integer workloads that can be matched exactly, as in the paper, and agents that start anywhere."""
     return Family(agents=n, tasks=m, workload="dirichlet", starts="own", dimensions=_dimensions(rng), battery=None)
 
 
@@ -63,7 +64,7 @@ def _short_range(n: int, m: int, rng: np.random.Generator) -> Family:
 
 
 def _travel(n: int, m: int, rng: np.random.Generator) -> Family:
-    """A flight takes from a twentieth to a half of the time that the work alone would take."""
+    """Travel takes from 5 % to 50 % of the time of the work alone."""
     return Family(
         agents=n,
         tasks=m,
@@ -84,7 +85,7 @@ def _priority(n: int, m: int, rng: np.random.Generator) -> Family:
 
 
 def _unbalanced(n: int, m: int, rng: np.random.Generator) -> Family:
-    """Total ability from 0.7 to 2 times the load, so that whole workloads need broken ability."""
+    """Total ability from 0.7 to 2 times the total workload, so that shares of ability are fractional."""
     return Family(agents=n, tasks=m, load=1 / rng.uniform(0.7, 2.0))
 
 
@@ -115,7 +116,7 @@ def _dimensions(rng: np.random.Generator) -> int:
 
 
 def _speeds(load: float, rng: np.random.Generator) -> tuple[float, float]:
-    speed = MEAN_FLIGHT / (load * rng.uniform(0.05, 0.5))
+    speed = MEAN_DISTANCE / (load * rng.uniform(0.05, 0.5))
     return 0.7 * speed, 1.4 * speed
 
 
@@ -134,10 +135,17 @@ RECIPES: dict[str, Recipe] = {
 }
 
 FAMILIES = ("mixed", "paper", *RECIPES)
-"""What ``--family`` knows; `mixed` is like the paper in two of five, and anything else in the others."""
+"""Names of all families; `mixed` draws instances like the paper's and all others."""
 
 PAPER_SHARE = 0.4
-"""Share of instances like the paper's among the mixed."""
+"""Share of instances like the paper's in `mixed`."""
+
+
+def check_families(names: Iterable[str]) -> None:
+    """Raise an `InputError` if one of the names is not in `FAMILIES`."""
+    for name in names:
+        if name not in FAMILIES:
+            raise InputError(f"no such family: {name!r}{nearest(name, FAMILIES)}", "family")
 
 
 def draw_instance(family: str, n: int, m: int, seed: int, rng: np.random.Generator) -> Instance:
@@ -148,10 +156,10 @@ def draw_instance(family: str, n: int, m: int, seed: int, rng: np.random.Generat
     n, m : int
         Agents and tasks.
     seed : int
-        Of the instance; `rng` draws what kind it is.
+        Seed of the instance; `rng` draws the parameters of its family.
     """
     if family == "mixed":
-        kinds = ("elsewhere", "elsewhere", *RECIPES)  # games on parts of an instance look like that
+        kinds = ("elsewhere", "elsewhere", *RECIPES)  # doubled: games on parts of an instance look like it
         family = "paper" if rng.random() < PAPER_SHARE else kinds[int(rng.integers(len(kinds)))]
     if family == "paper":
         least = max(4 * n, m * (m + 1) // 2)

@@ -2,29 +2,45 @@
 
 import csv
 import io
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, fields
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import TYPE_CHECKING, Protocol, Self
 
 from alloc.problems import MissingPackageError
 from alloc.problems.formats import write_text_atomically
 
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+
+class Writer(Protocol):
+    """As much of TensorBoard's `SummaryWriter` as is used."""
+
+    def add_scalar(self, tag: str, scalar_value: float, global_step: int) -> object:
+        """Add a value at a step."""
+
+    def flush(self) -> object:
+        """Write all events to disk."""
+
+    def close(self) -> object:
+        """Close the file."""
+
 
 class TrainingLog:
-    """Writes one line per generation.
+    """The log of a training run, one line per generation.
 
     Parameters
     ----------
-    kind : dataclass
-        Whose fields are the columns.
+    kind : type of dataclass
+        Its fields are the columns; one is ``decisions``.
     path : Path
-        CSV file; it is written anew with what is in `history`.
+        CSV file; it is overwritten with `history`.
     tensorboard : Path or None
         Folder for event files, whose steps are decisions of agents.
     history : sequence of `kind`
-        Generations that are behind.
+        Generations before.
 
     Raises
     ------
@@ -32,7 +48,13 @@ class TrainingLog:
         If TensorBoard is asked for and not installed, or a file cannot be written.
     """
 
-    def __init__(self, kind: type[Any], path: Path, tensorboard: Path | None, history: Sequence[Any]) -> None:
+    def __init__(
+        self,
+        kind: "type[DataclassInstance]",
+        path: Path,
+        tensorboard: Path | None,
+        history: "Sequence[DataclassInstance]",
+    ) -> None:
         self._path = path
         self._columns = [field.name for field in fields(kind)]
         text = io.StringIO(newline="")
@@ -42,7 +64,7 @@ class TrainingLog:
         self._events = None if tensorboard is None else _event_writer(tensorboard, history)
         write_text_atomically(path, text.getvalue())
 
-    def append(self, report: Any) -> None:
+    def append(self, report: "DataclassInstance") -> None:
         """Add a generation."""
         values = asdict(report)
         with self._path.open("a", newline="", encoding="utf-8") as file:
@@ -62,8 +84,8 @@ class TrainingLog:
             self._events.close()
 
 
-def summary_writer() -> Any:
-    """Return TensorBoard's class of writers, one of which hides what is in its folder from its first step on.
+def summary_writer() -> Callable[..., Writer]:
+    """Return TensorBoard's `SummaryWriter`.
 
     Raises
     ------
@@ -75,10 +97,11 @@ def summary_writer() -> Any:
     except ImportError as error:
         message = "needs TensorBoard, which is not installed; pip install 'alloc-mrta[train]'"
         raise MissingPackageError(message, "tensorboard") from error
-    return SummaryWriter
+    writer: Callable[..., Writer] = SummaryWriter
+    return writer
 
 
-def _event_writer(folder: Path, history: Sequence[Any]) -> Any:
-    """Return a writer that hides what an interrupted run wrote after the end of `history`."""
-    following = history[-1].decisions + 1 if history else 0
+def _event_writer(folder: Path, history: "Sequence[DataclassInstance]") -> Writer:
+    """Return a writer that purges what an interrupted run wrote after the end of `history`."""
+    following = asdict(history[-1])["decisions"] + 1 if history else 0
     return summary_writer()(str(folder), purge_step=following)

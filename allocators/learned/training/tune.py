@@ -1,66 +1,85 @@
-"""Tuning: many short trainings with other hyperparameters, the hopeless ones ended early.
+"""Tuning of hyperparameters: many short trainings, the unpromising ones pruned.
 
 References
 ----------
-Akiba et al. (2019), arXiv:1907.10902 (Optuna), whose tree-structured Parzen estimator draws what is tried and whose
-median rule ends trials.
+Akiba et al. (2019), arXiv:1907.10902 (Optuna), whose tree-structured Parzen estimator samples the trials and whose
+median rule prunes them.
 """
 
 import os
 from collections.abc import Callable
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Protocol
 
-from alloc.allocators.learned.training.trainer import Limits, Trainer, TrainingParameters
+from alloc.allocators.learned.algorithms.hyperparameters import Hyperparameters
+from alloc.allocators.learned.algorithms.registry import method_parameters
+from alloc.allocators.learned.training.limits import Limits
+from alloc.allocators.learned.training.parameters import TrainingParameters
+from alloc.allocators.learned.training.trainer import Trainer
 from alloc.problems import InputError, MissingPackageError
 from alloc.problems.game import Board
 
 if TYPE_CHECKING:
     import optuna
 
-SPACES: dict[str, tuple[float, float] | tuple[int, int]] = {
+LOG_SPACES: dict[str, tuple[float, float] | tuple[int, int]] = {
     "learning_rate": (1e-4, 5e-3),
-    "entropy_weight": (1e-4, 0.3),
-    "kl_target": (3e-3, 5e-2),
-    "epochs": (1, 6),
-    "minibatch": (32, 256),
-    "steps": (2, 20),
-    "softness": (0.1, 3.0),
-    "target_share": (1e-3, 0.1),
-    "target_period": (20, 500),
+    "ent_coef": (1e-4, 0.3),
+    "target_kl": (3e-3, 5e-2),
+    "update_epochs": (1, 6),
+    "minibatch_size": (32, 256),
+    "batch_size": (32, 256),
+    "num_steps": (2, 20),
+    "softmax_temperature": (0.1, 3.0),
+    "tau": (1e-3, 0.1),
+    "target_update_interval": (20, 500),
     "temperature": (0.02, 1.0),
 }
-"""Least and most of what is tuned, drawn in proportion; a method is tuned in those that it has and uses."""
+"""Bounds of the hyperparameters that are sampled log-uniformly; a method is tuned in those that it has and uses."""
 
-SHARES: dict[str, tuple[float, float]] = {"discount": (0.4, 1.0), "clip": (0.05, 0.4), "smoothing": (0.8, 1.0)}
-"""The same, drawn evenly."""
+UNIFORM_SPACES: dict[str, tuple[float, float]] = {
+    "gamma": (0.4, 1.0),
+    "clip_coef": (0.05, 0.4),
+    "gae_lambda": (0.8, 1.0),
+}
+"""Bounds of those that are sampled uniformly."""
 
 
-def suggested(trial: "optuna.Trial", default: Any) -> dict[str, float]:
-    """Draw hyperparameters for a trial; None in `default` is left so."""
+class Sampler(Protocol):
+    """As much of `optuna.Trial` as samples values."""
+
+    def suggest_float(self, name: str, low: float, high: float, *, log: bool = False) -> float:
+        """Return a number from `low` to `high`."""
+
+    def suggest_int(self, name: str, low: int, high: int, *, log: bool = False) -> int:
+        """Return an integer from `low` to `high`."""
+
+
+def suggested(trial: Sampler, default: Hyperparameters) -> dict[str, float]:
+    """Sample the hyperparameters of a trial; those that are None in `default` stay so."""
     values: dict[str, float] = {}
     for field in fields(default):
         name = field.name
         if getattr(default, name) is None:
             continue
-        if name in SHARES:
-            values[name] = trial.suggest_float(name, *SHARES[name])
-        elif name in SPACES and isinstance(getattr(default, name), int):
-            low, high = SPACES[name]
+        if name in UNIFORM_SPACES:
+            values[name] = trial.suggest_float(name, *UNIFORM_SPACES[name])
+        elif name in LOG_SPACES and isinstance(getattr(default, name), int):
+            low, high = LOG_SPACES[name]
             values[name] = trial.suggest_int(name, int(low), int(high), log=True)
-        elif name in SPACES:
-            values[name] = trial.suggest_float(name, *SPACES[name], log=True)
+        elif name in LOG_SPACES:
+            values[name] = trial.suggest_float(name, *LOG_SPACES[name], log=True)
     return values
 
 
 def open_study(path: Path, method: str, seed: int) -> "optuna.Study":
-    """Open the study of a method in an SQLite file, or begin it.
+    """Open the study of a method in an SQLite file, which is created where it does not exist.
 
     Raises
     ------
     InputError
-        If Optuna is not installed, or the file holds no studies.
+        If Optuna is not installed, or the file is not one of studies.
     """
     try:
         import optuna
@@ -77,11 +96,11 @@ def open_study(path: Path, method: str, seed: int) -> "optuna.Study":
             load_if_exists=True,
             pruner=optuna.pruners.MedianPruner(n_startup_trials=5, n_warmup_steps=1),
         )
-        study.sampler = optuna.samplers.TPESampler(seed=seed + len(study.trials))  # nothing is drawn twice
+        study.sampler = optuna.samplers.TPESampler(seed=seed + len(study.trials))  # a resumed study draws anew
         return study
     except MemoryError:
         raise
-    except Exception as error:  # of Optuna, SQLAlchemy, Alembic or sqlite3: of what is in the file
+    except Exception as error:  # of Optuna, SQLAlchemy, Alembic or sqlite3, depending on the content of the file
         reason = next(iter(str(error).splitlines()), type(error).__name__)[:100]
         raise InputError(f"is not a file of studies ({reason})", source=str(path)) from error
 
@@ -96,18 +115,36 @@ def tune(
     boards: list[Board] | None = None,
     on_trial: Callable[["optuna.Study", "optuna.trial.FrozenTrial"], None] = lambda study, trial: None,
 ) -> None:
-    """Train with other hyperparameters until the study holds so many trials that ended.
+    """Train with sampled hyperparameters until the study has so many finished trials.
 
-    Every trial has a seed of its own, so that no hyperparameters win by a lucky one. The first trial of a study takes
-    the defaults.
+    Every trial has its own seed, so that no hyperparameters win by a lucky one. The first trial of a study has the
+    defaults.
+
+    Parameters
+    ----------
+    study : optuna.Study
+        As `open_study` returns it.
+    parameters : TrainingParameters
+        Of each training, but for the hyperparameters sampled.
+    trials : int
+        Finished trials, those already in the study included.
+    limits : Limits
+        Of each training.
+    seed : int
+        Seed of the first trial; those of the others follow.
+    boards : list of Board, optional
+        Validation games; those of the curriculum by default.
+    on_trial : callable
+        Called with study and trial after each trial.
     """
     import optuna
     from optuna.trial import TrialState
 
+    default = parameters.learner or method_parameters(parameters.method)
+
     def objective(trial: optuna.Trial) -> float:
-        values = suggested(trial, parameters.learner)
-        trained = replace(parameters, learner=replace(parameters.learner, **values))
-        trainer = Trainer(trained, seed + trial.number, boards)
+        learner = replace(default, **suggested(trial, default))
+        trainer = Trainer(replace(parameters, learner=learner), seed + trial.number, boards)
         while not trainer.is_over(limits):
             report = trainer.advance(limits)
             assert report is not None
@@ -117,20 +154,19 @@ def tune(
         return trainer.history[-1].best_cost
 
     if not study.trials:
-        defaults = suggested(_Defaults(parameters.learner), parameters.learner)
-        study.enqueue_trial(defaults)
-    ended = study.get_trials(deepcopy=False, states=(TrialState.COMPLETE, TrialState.PRUNED))
-    study.optimize(objective, max(0, trials - len(ended)), callbacks=[on_trial])
+        study.enqueue_trial(suggested(_Defaults(default), default))
+    finished = study.get_trials(deepcopy=False, states=(TrialState.COMPLETE, TrialState.PRUNED))
+    study.optimize(objective, max(0, trials - len(finished)), callbacks=[on_trial])
 
 
 class _Defaults:
-    """Suggests what a method's parameters are by default, cut to the space."""
+    """A `Sampler` of a method's default hyperparameters, clipped to their bounds."""
 
-    def __init__(self, default: Any) -> None:
+    def __init__(self, default: Hyperparameters) -> None:
         self._default = default
 
-    def suggest_float(self, name: str, low: float, high: float, log: bool = False) -> float:
+    def suggest_float(self, name: str, low: float, high: float, *, log: bool = False) -> float:
         return float(min(high, max(low, getattr(self._default, name))))
 
-    def suggest_int(self, name: str, low: int, high: int, log: bool = False) -> int:
+    def suggest_int(self, name: str, low: int, high: int, *, log: bool = False) -> int:
         return int(min(high, max(low, getattr(self._default, name))))

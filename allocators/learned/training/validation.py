@@ -1,4 +1,4 @@
-"""How good a policy is: greedy games on fixed instances that are never trained on."""
+"""Validation of policies: greedy games on fixed instances that are never trained on."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -10,45 +10,48 @@ from torch import Tensor
 
 from alloc.allocators.learned.network.actor_critic import ActorCritic
 from alloc.allocators.learned.play.action_sampling import choose
-from alloc.allocators.learned.training.curriculum import Aimed, Curriculum, aim
+from alloc.allocators.learned.training.curriculum import Curriculum, TrainingInstance, with_reference
 from alloc.allocators.learned.training.families import RECIPES, draw_instance
 from alloc.problems import InputError, Instance
 from alloc.problems.game import Board, Rules, begin, flown, make_board, step, time_over_reference, worth
 from alloc.problems.generate import paper_like
 
 VALIDATION = "shortfall-1"
-"""Name of what `cost` is; runs that were judged otherwise are not gone on with."""
+"""Identifier of the definition of `cost`; runs with another one are not resumed."""
 
 VALIDATION_SEED = 2 * 10**9
 
-PRICE = 1.0
+ENERGY_WEIGHT = 1.0
 """Weight of energy in all validation games."""
 
 DISTANCE_WEIGHT = 0.25
-"""What a unit of distance per agent counts in `cost`: a sixth of the least energy as much as 0.5 % of the makespan."""
+"""Weight of the distance per agent in `cost`: a sixth of the minimum energy weighs as much as 0.5 % of the makespan."""
 
-MOST_OWN = 24
-"""Own instances that are validated on at the most."""
+MAX_HELD_OUT = 24
+"""Maximum number of given instances to validate on."""
+
+MAX_NAMES = 10
+"""Maximum number of instances that a note names."""
 
 
 @dataclass(frozen=True)
 class Validation:
-    """How one network plays the validation games, at the best position of each.
+    """Performance of one network in the validation games, at the best position of each.
 
     Attributes
     ----------
     cost : float
-        What the best networks are chosen by, the lower the better: mean over the boards of 1 - T_ref / T, which a
-        single bad game cannot dominate, and of the distance, weighed. A task left unserved counts 1.
+        Criterion by which the best networks are selected, to be minimised: mean over the boards of 1 - T_ref / T, which
+        no single bad game can dominate, plus the weighted distance, plus 1 for each unserved task.
     unserved : float
-        Mean over the boards of the tasks left unserved in a game: their part of the cost.
+        Mean over the boards of the unserved tasks in a game: their part of the cost.
     time, distance : float
         Mean T / T_ref, and mean distance per agent in the board's scale, on the first board: instances like the
-        paper's scenario 1, or one's own.
+        paper's scenario 1, or the given ones.
     others_time : float
-        Harmonic mean of T / T_ref on the other boards; T_ref is a bound there that cannot always be met.
+        Harmonic mean of T / T_ref on the other boards, where the bound T_ref cannot always be attained.
     reward : float
-        Rise of the worth in a game: the cumulative reward of (12).
+        Increase of the utility in a game: the cumulative reward of (12).
     """
 
     cost: float
@@ -60,55 +63,73 @@ class Validation:
 
 
 def validation_boards(curriculum: Curriculum) -> list[Board]:
-    """Return the games on which networks are compared, always the same: like the paper's, and of the families."""
+    """Return the fixed games on which networks are compared: like the paper's, and of the families."""
     rng = np.random.default_rng(VALIDATION_SEED)
     seeds = iter(range(VALIDATION_SEED, VALIDATION_SEED + 1000))
     kinds = [[paper_like(100, 20, 400, next(seeds)) for _ in range(12)]]
     if curriculum.families != ("paper",):
         named = tuple(RECIPES) if "mixed" in curriculum.families else curriculum.families
         kinds.append([draw_instance(name, 60, 10, next(seeds), rng) for name in named for _ in range(2)])
-    return [_board(aim(kind), rng) for kind in kinds]
+    return [_board(with_reference(kind), rng) for kind in kinds]
 
 
 def hold_out(instances: Sequence[Instance]) -> tuple[list[Instance], list[Instance]]:
-    """Split instances into those to train on, and a fifth to validate on: drawn at random, but always the same.
+    """Split instances into a training set and a validation set: a fifth of them, drawn with a fixed seed.
 
-    Those without any work are left out: whatever is done there costs nothing. Of fewer than five others, all are for
-    both.
+    Instances without any work are left out, as every allocation of them costs nothing. Fewer than five others are all
+    in both sets.
 
     Raises
     ------
     InputError
-        If there is nothing to do in any.
+        If no instance has any work.
     """
     busy = [instance for instance in instances if (instance.workload > 0).any()]
     if not busy:
         raise InputError("there is no work to do in any instance; nothing can be learned", "instances")
-    count = min(MOST_OWN, len(busy) // 5)
+    count = min(MAX_HELD_OUT, len(busy) // 5)
     if not count:
         return busy, busy
     held = set(np.random.default_rng(VALIDATION_SEED).choice(len(busy), count, replace=False).tolist())
     return [one for i, one in enumerate(busy) if i not in held], [one for i, one in enumerate(busy) if i in held]
 
 
-def own_games(instances: Sequence[Instance], curriculum: Curriculum) -> tuple[Curriculum, list[Board]]:
-    """Return a curriculum of the instances to train on, and boards of those to validate on; see `hold_out`."""
+def games_on(instances: Sequence[Instance], curriculum: Curriculum) -> tuple[Curriculum, list[Board]]:
+    """Return `curriculum` on given instances, and boards of those to validate on; see `hold_out`."""
     train, held = hold_out(instances)
-    sizes: dict[tuple[int, int], list[Aimed]] = {}
-    for one in aim(held[:MOST_OWN]):
+    sizes: dict[tuple[int, int], list[TrainingInstance]] = {}
+    for one in with_reference(held[:MAX_HELD_OUT]):
         sizes.setdefault((one.instance.n, one.instance.m), []).append(one)
     rng = np.random.default_rng(VALIDATION_SEED)
-    return replace(curriculum, own=tuple(aim(train))), [_board(alike, rng) for alike in sizes.values()]
+    return replace(curriculum, instances=tuple(with_reference(train))), [_board(alike, rng) for alike in sizes.values()]
 
 
-def _board(aimed: Sequence[Aimed], rng: np.random.Generator) -> Board:
-    return make_board([one.instance for one in aimed], [one.hours for one in aimed], [PRICE] * len(aimed), rng)
+def split_notes(instances: Sequence[Instance]) -> list[str]:
+    """Return sentences that say which instances are left out, and which are held out for validation."""
+    train, held = hold_out(instances)
+    notes = []
+    idle = sum(not (instance.workload > 0).any() for instance in instances)
+    if idle:
+        notes.append(f"{idle} of {len(instances)} instances left out: there is no work to do")
+    if train == held:
+        reason = "with five or more, a fifth is held out"
+        notes.append(f"the networks are judged on the instances that they learn from; {reason}")
+    else:
+        names = ", ".join(instance.name for instance in held[:MAX_NAMES])
+        more = f" and {len(held) - MAX_NAMES} more" if len(held) > MAX_NAMES else ""
+        notes.append(f"{len(held)} of {len(instances)} instances held out to judge the networks: {names}{more}")
+    return notes
+
+
+def _board(games: Sequence[TrainingInstance], rng: np.random.Generator) -> Board:
+    targets = [one.reference_h for one in games]
+    return make_board([one.instance for one in games], targets, [ENERGY_WEIGHT] * len(games), rng)
 
 
 @torch.no_grad()
 def validate(network: ActorCritic, boards: Sequence[Board], rules: Rules, curriculum: Curriculum) -> Validation:
-    """Play `boards` greedily, and judge the best position of each game."""
-    played = [_play(network, board, rules, 2 * curriculum.steps(board)) for board in boards]
+    """Play `boards` greedily, and evaluate the best position of each game."""
+    played = [_play(network, board, rules, 2 * curriculum.max_steps(board)) for board in boards]
     others = torch.cat([outcome.time for outcome in played[1:] or played])
     return Validation(
         cost=float(np.mean([outcome.cost.mean() for outcome in played])),
@@ -116,18 +137,18 @@ def validate(network: ActorCritic, boards: Sequence[Board], rules: Rules, curric
         time=float(played[0].time.mean()),
         distance=float(played[0].distance.mean()),
         others_time=float(1 / others.clamp(min=1).reciprocal().mean()),
-        reward=float(np.mean([outcome.rise.mean() for outcome in played])),
+        reward=float(np.mean([outcome.reward.mean() for outcome in played])),
     )
 
 
 class _Outcome(NamedTuple):
-    """Cost, tasks unserved, T / T_ref, distance and rise of the worth of each game, all of shape (B,)."""
+    """Cost, unserved tasks, T / T_ref, distance and increase of the utility of each game, all of shape (B,)."""
 
     cost: Tensor
     unserved: Tensor
     time: Tensor
     distance: Tensor
-    rise: Tensor
+    reward: Tensor
 
 
 def _play(network: ActorCritic, board: Board, rules: Rules, steps: int) -> _Outcome:

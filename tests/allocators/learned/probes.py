@@ -1,4 +1,4 @@
-"""Probe games: so small that the best play is known, each asking for one thing that a method must be able to learn."""
+"""Probe games: so small that the optimum is known, each requiring one ability that a method must be able to learn."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from alloc.allocators.learned.algorithms.learner import Learner, Lesson
+from alloc.allocators.learned.algorithms.learner import Learner, TrainingJob
 from alloc.allocators.learned.play.action_sampling import choose
 from alloc.problems import Instance
 from alloc.problems.game import PLANNING, Board, Rules, begin, group_ability, make_board, step, worth
@@ -25,7 +25,7 @@ class Probe:
     def draw(self, rng: np.random.Generator, progress: float = 1.0) -> Board:
         return self.board[torch.from_numpy(rng.integers(0, GAMES, 16))]
 
-    def steps(self, board: Board) -> int:
+    def max_steps(self, board: Board) -> int:
         return 6
 
 
@@ -46,33 +46,33 @@ def pairing(rng: np.random.Generator) -> tuple[Instance, float]:
 
 
 def when_to_stop(rng: np.random.Generator) -> tuple[Instance, float]:
-    """All is as it should be in half of the games; in the others one of three agents must move."""
+    """The initial allocation is optimal in half of the games; in the others one of three agents must move."""
     start = [0, 0, 1] if rng.random() < 0.5 else [0, 1, 1]
     place = rng.random((2, 2))
     return Instance(ability=[1, 1, 1], workload=[2, 1], task_position=place, start_task=start), 0.5
 
 
-def price_of_energy(rng: np.random.Generator) -> tuple[Instance, float]:
-    """Help is worth its flight where energy is cheap, and is not where it is dear."""
+def energy_weight(rng: np.random.Generator) -> tuple[Instance, float]:
+    """Moving an agent pays off at a low weight of energy, and does not at a high one."""
     place = np.array([[0.0, 0.0], rng.uniform(0.5, 1.0, 2)])
     instance = Instance(ability=[1, 1], workload=[1, 1], task_position=place, start_task=[0, 0])
     return instance, float(rng.choice([0.0, 15.0]))
 
 
 PROBES: dict[str, Callable[[np.random.Generator], tuple[Instance, float]]] = {
-    one.__name__: one for one in (right_task, pairing, when_to_stop, price_of_energy)
+    one.__name__: one for one in (right_task, pairing, when_to_stop, energy_weight)
 }
 
 
 def probe(name: str) -> Probe:
     """Return the probe of this name."""
     rng = np.random.default_rng(0)
-    instances, prices = zip(*(PROBES[name](rng) for _ in range(GAMES)), strict=True)
-    return Probe(make_board(instances, [1.0] * GAMES, prices, rng))
+    instances, weights = zip(*(PROBES[name](rng) for _ in range(GAMES)), strict=True)
+    return Probe(make_board(instances, [1.0] * GAMES, weights, rng))
 
 
-def best_worth(board: Board) -> Tensor:
-    """Return the most that any allocation is worth in each game, by trying all of them, shape (B,)."""
+def best_utility(board: Board) -> Tensor:
+    """Return the maximum utility over all allocations in each game, by enumeration, shape (B,)."""
     batch, n, c = board.shape
     start = begin(board)
     found = torch.full((batch,), -torch.inf)
@@ -92,14 +92,14 @@ def share_solved(learner: Learner, board: Board, rules: Rules = PLANNING) -> flo
     for _ in range(6):
         _, slot = choose(board, state, learner.policy(board, state), rules)
         state = step(board, state, slot)
-    return float((worth(board, state, rules) > best_worth(board) - 1e-4).float().mean())
+    return float((worth(board, state, rules) > best_utility(board) - 1e-4).float().mean())
 
 
-def share_learned(learner: Learner, name: str, lessons: int = 40, decisions: int = 150) -> float:
-    """Return the share of the games of a probe that a learner solves after these lessons, or sooner once it is 1."""
+def share_learned(learner: Learner, name: str, jobs: int = 40, decisions: int = 150) -> float:
+    """Return the share of the games of a probe that a learner solves after these jobs, or sooner once it is 1."""
     games, share = probe(name), 0.0
-    for number in range(lessons):
-        learner.take(Lesson(number, decisions, games, number / lessons))
+    for number in range(jobs):
+        learner.train_on(TrainingJob(number, decisions, games, number / jobs))
         share = share_solved(learner, games.board) if number % 4 == 3 else 0.0
         if share == 1.0:
             break

@@ -2,18 +2,18 @@
 
 import pytest
 import torch
-from probes import PROBES, best_worth, probe, share_learned, share_solved
-from same_lesson import assert_taken_up_elsewhere
+from probes import PROBES, best_utility, probe, share_learned, share_solved
+from resuming import assert_resumes_elsewhere
 
-from alloc.allocators.learned.algorithms.gappo import GappoParameters
-from alloc.allocators.learned.algorithms.ppo import Ppo, PpoParameters
+from alloc.allocators.learned.algorithms.hyperparameters import GappoParameters, PpoParameters
+from alloc.allocators.learned.algorithms.ppo import Ppo
 from alloc.problems.game import State, begin, group_ability, worth
 
 PARAMETERS = {"ppo": PpoParameters(), "gappo": GappoParameters()}
 
 
 def known_answer(name: str) -> torch.Tensor:
-    """Where everybody must be at the end of each game of a probe, by thinking and not by trying, shape (B, n)."""
+    """Return the optimal place of each agent in each game of a probe, by reasoning, shape (B, n)."""
     board = probe(name).board
     if name == "right_task":
         return board.need[:, :-1].argmin(1, keepdim=True)
@@ -26,19 +26,19 @@ def known_answer(name: str) -> torch.Tensor:
 
 @pytest.mark.parametrize("name", PROBES)
 def test_answers_are_known(name: str) -> None:
-    """What is best is common sense: the task that can be done, like to like, enough is enough, and mind the price."""
+    """The optimum found by enumeration is the one known by reasoning."""
     board = probe(name).board
     slot = known_answer(name)
     state = State(**{**vars(begin(board)), "slot": slot, "group": group_ability(board, slot)})
-    torch.testing.assert_close(worth(board, state), best_worth(board))
+    torch.testing.assert_close(worth(board, state), best_utility(board))
 
 
 @pytest.mark.parametrize("name", PROBES)
 def test_playing_without_learning_is_not_enough(name: str) -> None:
-    """A network that has learned nothing does not solve all games, nor does staying where one is."""
+    """An untrained network does not solve all games, nor does the initial allocation."""
     board = probe(name).board
     assert share_solved(Ppo(), board) < 1
-    assert (worth(board, begin(board)) < best_worth(board) - 1e-3).any()
+    assert (worth(board, begin(board)) < best_utility(board) - 1e-3).any()
 
 
 @pytest.mark.parametrize("method", PARAMETERS)
@@ -49,6 +49,6 @@ def test_ppo_solves_probes(name: str, method: str) -> None:
 
 
 @pytest.mark.parametrize("method", PARAMETERS)
-def test_a_lesson_depends_on_state_and_lesson_only(method: str) -> None:
-    """Stored with its replay buffer between lessons and taken up by another learner, training goes on bit for bit."""
-    assert_taken_up_elsewhere(lambda seed: Ppo(parameters=PARAMETERS[method], seed=seed))
+def test_a_job_depends_on_state_and_job_only(method: str) -> None:
+    """Stored with its replay buffer between jobs and restored in another learner, training continues bit for bit."""
+    assert_resumes_elsewhere(lambda seed: Ppo(parameters=PARAMETERS[method], seed=seed))

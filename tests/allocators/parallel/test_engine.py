@@ -13,9 +13,10 @@ import engine_jobs as jobs
 import pytest
 import torch
 
-from alloc.allocators.parallel.engine import Engine, EngineError, SerialEngine, make_engine
+from alloc.allocators.parallel.engine import Engine, EngineError
+from alloc.allocators.parallel.engines import make_engine
 from alloc.allocators.parallel.processes import ProcessEngine
-from alloc.allocators.parallel.torch_state import torch_threads
+from alloc.allocators.parallel.serial import SerialEngine
 from alloc.problems import InputError
 
 
@@ -55,19 +56,15 @@ def engine(request: pytest.FixtureRequest, pair: ProcessEngine) -> Iterator[Engi
 
 
 def test_same_results_in_order(engine: Engine) -> None:
-    """Every engine returns what a loop over one thread returns, to the last bit."""
+    """Every engine returns what a loop returns, to the last bit."""
     assert engine.map(jobs.square, range(7)) == [0, 1, 4, 9, 16, 25, 36]
     assert engine.map(jobs.square, []) == []
-    assert engine.map(jobs.threads, [0]) == [1]
-    before = torch.get_num_threads()
-    with torch_threads(1):
-        expected = [jobs.step(state) for state in states(4)]
+    expected = [jobs.step(state) for state in states(4)]
     got = engine.map(jobs.step, states(4))
     assert got is not None
     for a, b in zip(got, expected, strict=True):
         assert a["seed"] == b["seed"]
         assert torch.equal(a["weight"], b["weight"])
-    assert torch.get_num_threads() == before
 
 
 def test_workers_are_kept_until_closed() -> None:
@@ -91,11 +88,11 @@ def test_a_killed_worker_loses_nothing(tmp_path: Path, pair: ProcessEngine) -> N
 
 def test_an_item_that_always_kills_is_given_up(tmp_path: Path) -> None:
     """After the last try there is one error; what is killed while idle costs no try; the engine goes on."""
-    with ProcessEngine(1, tries=2) as engine:
+    with ProcessEngine(1, max_attempts=2) as engine:
         with pytest.raises(EngineError, match=r"died 2 times .* \(exit code -9\)"):
             engine.map(jobs.die, [str(tmp_path / "tries")])
         assert (tmp_path / "tries").read_text().count("tried") == 2
-    with ProcessEngine(1, tries=1) as engine:
+    with ProcessEngine(1, max_attempts=1) as engine:
         first = engine.map(jobs.pid, [0])
         assert first is not None
         os.kill(first[0], signal.SIGKILL)
@@ -145,9 +142,10 @@ def test_no_orphans(number: signal.Signals, tmp_path: Path) -> None:
     """Ctrl-C of a whole process group, SIGTERM and even SIGKILL of the parent end the workers; the first two tidily."""
     script, markers = tmp_path / "script.py", [tmp_path / name for name in ("a", "b")]
     script.write_text(SCRIPT)
+    path = [str(Path(jobs.__file__).parent), os.environ.get("PYTHONPATH", "")]
     parent = subprocess.Popen(
         [sys.executable, str(script), *map(str, markers)],
-        env=os.environ | {"PYTHONPATH": str(Path(jobs.__file__).parent)},
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(path)},
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

@@ -17,7 +17,9 @@ import torch
 from ray_cluster import add_machine, at_work, kill_at_work, living, ray_cluster
 from safetensors.torch import load_file
 
-from alloc.allocators.parallel.engine import Engine, EngineError, SerialEngine, make_engine
+from alloc.allocators.parallel.engine import Engine, EngineError
+from alloc.allocators.parallel.engines import make_engine
+from alloc.allocators.parallel.serial import SerialEngine
 from alloc.cli.main import main
 from alloc.problems import InputError
 from alloc.problems.formats import write_instance
@@ -70,7 +72,6 @@ def engine(cluster: Any) -> Iterator[Engine]:
 def test_same_results_in_order(engine: Engine) -> None:
     """A cluster returns what this process returns, to the last bit, and raises what it raises."""
     assert engine.map(jobs.square, range(5)) == [0, 1, 4, 9, 16]
-    assert engine.map(jobs.threads, [0]) == [1]
     states = [{"seed": torch.tensor(seed), "weight": torch.full((40, 40), 0.1 * seed)} for seed in range(3)]
     got, expected = engine.map(jobs.step, states), SerialEngine().map(jobs.step, states)
     assert got is not None
@@ -196,7 +197,7 @@ def assert_same_end(policy: Path, expected: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_a_machine_dies_in_a_training(cluster: Any, options: list[str], undisturbed: Path, tmp_path: Path) -> None:
-    """The lesson that a killed machine was at is taken again on another, and nobody needs to do anything."""
+    """The member that a killed machine trained is trained again on another, without any action of the user."""
     add_machine(cluster)
     before, policy = living(cluster), tmp_path / "p"
     with training(cluster, *options, "--output", str(policy)) as process:
@@ -208,7 +209,7 @@ def test_a_machine_dies_in_a_training(cluster: Any, options: list[str], undistur
         assert len(curve(policy)) < 5
         told = process.stderr.read()
         assert process.wait() == 0, told
-    while living(cluster) == before:  # the cluster may hear later of the machine than of its lesson
+    while living(cluster) == before:  # the cluster may hear later of the machine than of its item
         time.sleep(0.1)
     assert living(cluster) == before - 1
     cluster.remove_node(killed)

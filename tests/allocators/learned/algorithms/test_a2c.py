@@ -3,10 +3,11 @@
 import pytest
 import torch
 from probes import PROBES, probe, share_learned
-from same_lesson import assert_taken_up_elsewhere, weights
+from resuming import assert_resumes_elsewhere, weights
 
-from alloc.allocators.learned.algorithms.a2c import A2c, A2cParameters, n_step_returns
-from alloc.allocators.learned.algorithms.learner import Lesson
+from alloc.allocators.learned.algorithms.a2c import A2c, n_step_returns
+from alloc.allocators.learned.algorithms.hyperparameters import A2cParameters
+from alloc.allocators.learned.algorithms.learner import TrainingJob
 from alloc.allocators.learned.play.action_sampling import log_probabilities
 from alloc.allocators.learned.play.trajectories import collect
 from alloc.problems.game import PAPER, PLANNING, Rules, Turn, begin, moved, step
@@ -43,7 +44,7 @@ def test_likelier_after_a_gain_and_unlikelier_after_a_loss() -> None:
     """One step raises the probability of what earned more than expected, and lowers that of what earned less."""
     board = probe("right_task").board
     for sign in (1.0, -1.0):
-        learner = A2c(parameters=A2cParameters(entropy_weight=0.0, value_weight=0.0))
+        learner = A2c(parameters=A2cParameters(ent_coef=0.0, vf_coef=0.0))
         played = collect(learner.network, board, 1, torch.Generator().manual_seed(0), PLANNING)
         told = type(played)(**{**vars(played), "reward": 10 * sign * torch.ones_like(played.reward)})
         told = type(told)(**{**vars(told), "last_value": torch.zeros_like(told.last_value)})
@@ -53,16 +54,16 @@ def test_likelier_after_a_gain_and_unlikelier_after_a_loss() -> None:
         assert torch.sign((again - played.log_probability[0]).sum()).item() == sign
 
 
-def test_a_lesson_depends_on_state_and_lesson_only() -> None:
-    """Stored between lessons and taken up by another learner, training goes on bit for bit as without a break."""
-    assert_taken_up_elsewhere(A2c)
+def test_a_job_depends_on_state_and_job_only() -> None:
+    """Stored between jobs and restored in another learner, training continues bit for bit as without a break."""
+    assert_resumes_elsewhere(A2c)
 
 
-def test_agents_that_choose_at_once_can_be_taught() -> None:
-    """The paper's turn rule works as well, and its report is finite."""
+def test_simultaneous_turns_can_be_trained_on() -> None:
+    """The paper's turn rule works as well, and weights stay finite."""
     learner = A2c()
     before = weights(learner)
-    report = learner.take(Lesson(0, 50, curriculum=probe("pairing"), rules=Rules(turn=Turn.SIMULTANEOUS)))
+    report = learner.train_on(TrainingJob(0, 50, curriculum=probe("pairing"), rules=Rules(turn=Turn.SIMULTANEOUS)))
     assert report.decisions >= 50
     assert torch.isfinite(weights(learner)).all()
     assert not torch.equal(weights(learner), before)

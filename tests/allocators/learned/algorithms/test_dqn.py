@@ -3,11 +3,12 @@
 import pytest
 import torch
 from probes import PROBES, probe, share_learned
-from same_lesson import assert_taken_up_elsewhere
+from resuming import assert_resumes_elsewhere
 from torch import Tensor
 
-from alloc.allocators.learned.algorithms.dqn import Dqn, DqnParameters, best_gain, td_target
-from alloc.allocators.learned.algorithms.learner import Lesson
+from alloc.allocators.learned.algorithms.dqn import Dqn, best_move_value, td_target
+from alloc.allocators.learned.algorithms.hyperparameters import DqnParameters
+from alloc.allocators.learned.algorithms.learner import TrainingJob
 from alloc.allocators.learned.play.transitions import after
 from alloc.problems.game import PLANNING, State, begin, open_bids
 
@@ -21,8 +22,8 @@ def test_target_by_hand() -> None:
 def test_double_estimate_by_hand() -> None:
     """One network picks the move, the other one values it."""
     value, picker = torch.tensor([[1.0, 5.0, 0.0]]), torch.tensor([[3.0, 2.0, 0.0]])
-    assert best_gain(value, value).tolist() == [5.0]
-    assert best_gain(value, picker).tolist() == [1.0]
+    assert best_move_value(value, value).tolist() == [5.0]
+    assert best_move_value(value, picker).tolist() == [1.0]
 
 
 def without_heads(learner: Dqn, bid: float, reserve: float) -> None:
@@ -39,25 +40,25 @@ def without_heads(learner: Dqn, bid: float, reserve: float) -> None:
 )
 def test_targets_of_states(bid: float, reserve: float, following: float) -> None:
     """Stopping follows for 0 where all bids are below the reserve; where no bid is open, nothing else can follow."""
-    learner = Dqn(parameters=DqnParameters(discount=0.5, double=False))
+    learner = Dqn(parameters=DqnParameters(gamma=0.5, double_q=False))
     without_heads(learner, bid, reserve)
     board = probe("right_task").board[torch.arange(2)]
     state = begin(board)
     none = State(**{**vars(state), "left": torch.ones_like(state.left)})
     reward = torch.tensor([1.0, 2.0])
-    assert learner.wanted(board, state, reward, PLANNING).tolist() == [1 + 0.5 * following, 2 + 0.5 * following]
-    assert learner.wanted(board, none, reward, PLANNING).tolist() == [1.0, 2.0]
+    assert learner.td_targets(board, state, reward, PLANNING).tolist() == [1 + 0.5 * following, 2 + 0.5 * following]
+    assert learner.td_targets(board, none, reward, PLANNING).tolist() == [1.0, 2.0]
 
 
 def test_a_game_that_was_cut_off_is_not_over() -> None:
     """The last move of a game cut off by the number of steps is followed by the value of the state after it."""
-    learner = Dqn(parameters=DqnParameters(discount=0.5, double=False))
+    learner = Dqn(parameters=DqnParameters(gamma=0.5, double_q=False))
     without_heads(learner, 7.0, 3.0)
     board = probe("pairing").board[torch.arange(3)]
     first = open_bids(board, begin(board)).flatten(1).float().argmax(1)
     following = after(board, begin(board), first)
     assert not following.done.any()
-    assert learner.wanted(board, following, torch.zeros(3), PLANNING).tolist() == [2.0, 2.0, 2.0]
+    assert learner.td_targets(board, following, torch.zeros(3), PLANNING).tolist() == [2.0, 2.0, 2.0]
 
 
 def flat(network: torch.nn.Module) -> Tensor:
@@ -66,8 +67,8 @@ def flat(network: torch.nn.Module) -> Tensor:
 
 def test_target_network_is_renewed_in_periods() -> None:
     """The target network holds still for as many updates as the parameter says, and is then the one that learns."""
-    learner = Dqn(parameters=DqnParameters(target_period=3, reuse=0.0))
-    learner.take(Lesson(0, 50, curriculum=probe("pairing")))
+    learner = Dqn(parameters=DqnParameters(target_update_interval=3, replay_ratio=0.0))
+    learner.train_on(TrainingJob(0, 50, curriculum=probe("pairing")))
     learner.updates = 0
     learner.target.load_state_dict(learner.network.state_dict())
     still, generator = flat(learner.target), torch.Generator().manual_seed(0)
@@ -77,13 +78,13 @@ def test_target_network_is_renewed_in_periods() -> None:
         assert torch.equal(flat(learner.target), flat(learner.network)) == (number == 3)
 
 
-def test_a_lesson_depends_on_state_and_lesson_only() -> None:
-    """Stored with its memory between lessons and taken up by another learner, training goes on bit for bit."""
-    assert_taken_up_elsewhere(Dqn)
+def test_a_job_depends_on_state_and_job_only() -> None:
+    """Stored with its memory between jobs and restored in another learner, training continues bit for bit."""
+    assert_resumes_elsewhere(Dqn)
 
 
 @pytest.mark.parametrize("name", PROBES)
 def test_dqn_solves_probes(name: str) -> None:
     """Games with known answers are solved, all of them."""
-    learner = Dqn(parameters=DqnParameters(learning_rate=3e-3, reuse=8.0))
+    learner = Dqn(parameters=DqnParameters(learning_rate=3e-3, replay_ratio=8.0))
     assert share_learned(learner, name, decisions=60) == 1.0

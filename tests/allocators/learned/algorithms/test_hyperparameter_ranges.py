@@ -19,10 +19,10 @@ from alloc.allocators.learned.algorithms.hyperparameters import (
     GappoParameters,
     PpoParameters,
 )
-from alloc.allocators.learned.algorithms.learner import Lesson
+from alloc.allocators.learned.algorithms.learner import TrainingJob
 from alloc.allocators.learned.network.actor_critic import NetworkSize
 from alloc.allocators.learned.training.curriculum import Curriculum
-from alloc.allocators.learned.training.validation import own_games
+from alloc.allocators.learned.training.validation import games_on
 from alloc.problems import InputError
 from alloc.problems.generate import paper_like
 
@@ -44,25 +44,25 @@ def test_every_number_has_a_range(kind: type[Any]) -> None:
 @pytest.mark.parametrize(
     ("kind", "name", "wrong"),
     [
-        (PpoParameters, "epochs", 0),
-        (PpoParameters, "epochs", 1.5),
-        (PpoParameters, "epochs", None),
-        (GappoParameters, "minibatch", 0),
-        (GappoParameters, "kl_target", 0.0),
+        (PpoParameters, "update_epochs", 0),
+        (PpoParameters, "update_epochs", 1.5),
+        (PpoParameters, "update_epochs", None),
+        (GappoParameters, "minibatch_size", 0),
+        (GappoParameters, "target_kl", 0.0),
         (PpoParameters, "reward_scale", 0.0),
-        (PpoParameters, "clip", 0.0),
-        (PpoParameters, "discount", 0.0),
-        (PpoParameters, "discount", 1.01),
-        (PpoParameters, "smoothing", 1.01),
+        (PpoParameters, "clip_coef", 0.0),
+        (PpoParameters, "gamma", 0.0),
+        (PpoParameters, "gamma", 1.01),
+        (PpoParameters, "gae_lambda", 1.01),
         (PpoParameters, "learning_rate", 0.0),
         (PpoParameters, "learning_rate", 1.1),
-        (A2cParameters, "steps", 0),
+        (A2cParameters, "num_steps", 0),
         (DqnParameters, "temperature", 0.0),
-        (DqnParameters, "capacity", 0),
-        (DdpgParameters, "capacity", 0),
-        (DdpgParameters, "softness", 0.0),
-        (DdpgParameters, "target_share", 1.01),
-        (BreedingParameters, "tournament", 0),
+        (DqnParameters, "buffer_size", 0),
+        (DdpgParameters, "buffer_size", 0),
+        (DdpgParameters, "softmax_temperature", 0.0),
+        (DdpgParameters, "tau", 1.01),
+        (BreedingParameters, "tournament_size", 0),
         (BreedingParameters, "mutation_probability", 1.01),
     ],
 )
@@ -76,16 +76,16 @@ def test_ends_of_ranges(kind: type[Any], name: str, wrong: Any) -> None:
 
 def test_what_is_in_range() -> None:
     """The ends that make sense are in, and so are numbers of numpy's."""
-    assert PpoParameters(capacity=0, smoothing=0, discount=1, learning_rate=1, entropy_weight=0.0, kl_target=None)
-    assert PpoParameters(epochs=np.int64(2), clip=np.float32(0.5))  # type: ignore[arg-type]
-    assert BreedingParameters(elite=0, mutation_probability=0, crossover_probability=1, mutation_size=0)
+    assert PpoParameters(buffer_size=0, gae_lambda=0, gamma=1, learning_rate=1, ent_coef=0.0, target_kl=None)
+    assert PpoParameters(update_epochs=np.int64(2), clip_coef=np.float32(0.5))  # type: ignore[arg-type]
+    assert BreedingParameters(elite=0, mutation_probability=0, crossover_probability=1, mutation_sigma=0)
 
 
 def test_no_entropy_bonus() -> None:
     """A bonus that begins at 0 stays there."""
-    curriculum, _ = own_games([paper_like(8, 2, 35, 0)], Curriculum(games=(2, 2)))
-    learner = Ddpg(NetworkSize(4, 4, 1), DdpgParameters(entropy_weight=0.0))
-    assert learner.take(Lesson(0, 20, curriculum, progress=0.5)).decisions >= 20
+    curriculum, _ = games_on([paper_like(8, 2, 35, 0)], Curriculum(games=(2, 2)))
+    learner = Ddpg(NetworkSize(4, 4, 1), DdpgParameters(ent_coef=0.0))
+    assert learner.train_on(TrainingJob(0, 20, curriculum, progress=0.5)).decisions >= 20
 
 
 def test_torch_is_not_loaded() -> None:

@@ -4,18 +4,17 @@ import pytest
 import torch
 from boards import layout
 from probes import PROBES, probe, share_learned
-from same_lesson import assert_taken_up_elsewhere, weights
+from resuming import assert_resumes_elsewhere, weights
 
-from alloc.allocators.learned.algorithms.gappo import GappoParameters
-from alloc.allocators.learned.algorithms.learner import Lesson
+from alloc.allocators.learned.algorithms.hyperparameters import GappoParameters, PpoParameters
+from alloc.allocators.learned.algorithms.learner import TrainingJob
 from alloc.allocators.learned.algorithms.ppo import (
-    LOWEST_LEARNING_RATE,
+    MIN_LEARNING_RATE,
     Ppo,
-    PpoParameters,
-    adapted_rate,
-    reused,
-    samples_of,
-    surrogate,
+    adapted_learning_rate,
+    clipped_surrogate,
+    off_policy_samples,
+    on_policy_samples,
     value_loss,
 )
 from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize
@@ -56,14 +55,14 @@ def played(learner: Ppo, board: Board, rules: Rules = PLANNING, steps: int = 3, 
 )
 def test_clipped_surrogate(ratio: float, advantage: float, centre: float, expected: float) -> None:
     """(13), (14) with epsilon 0.2 around 1 and around other centres: gains are clipped, losses are not."""
-    got = surrogate(torch.tensor([ratio]), torch.tensor([advantage]), 0.2, torch.tensor([centre]))
+    got = clipped_surrogate(torch.tensor([ratio]), torch.tensor([advantage]), 0.2, torch.tensor([centre]))
     assert got.item() == pytest.approx(expected)
 
 
 def test_beyond_the_clip_nothing_pulls() -> None:
     """The surrogate has a slope within the clip, and none where a gain lies beyond it."""
     ratio = torch.tensor([1.1, 1.3, 0.7, 1.3, 0.7], requires_grad=True)
-    surrogate(ratio, torch.tensor([2.0, 2.0, -2.0, -2.0, 2.0]), 0.2).sum().backward()
+    clipped_surrogate(ratio, torch.tensor([2.0, 2.0, -2.0, -2.0, 2.0]), 0.2).sum().backward()
     assert ratio.grad is not None
     assert ratio.grad.tolist() == [2.0, 0.0, 0.0, -2.0, 2.0]
 
@@ -86,31 +85,31 @@ def test_value_loss_by_hand() -> None:
 )
 def test_the_rate_follows_the_divergence(divergence: float, target: float | None, expected: float) -> None:
     """Twice too far slows learning down, half too near speeds it up, and without a target nothing does."""
-    assert adapted_rate(1e-3, divergence, target, 1.0) == pytest.approx(expected)
+    assert adapted_learning_rate(1e-3, divergence, target, 1.0) == pytest.approx(expected)
 
 
 def test_the_rate_has_bounds() -> None:
     """It does not grow beyond the highest, nor fall below the lowest, but for a highest that is lower still."""
-    assert adapted_rate(1e-3, 0.0, 0.01, 1.2e-3) == 1.2e-3
-    assert adapted_rate(1.1 * LOWEST_LEARNING_RATE, 1.0, 0.01, 1.0) == LOWEST_LEARNING_RATE
-    assert adapted_rate(1e-3, 0.0, 0.01, 1e-6) == 1e-6
+    assert adapted_learning_rate(1e-3, 0.0, 0.01, 1.2e-3) == 1.2e-3
+    assert adapted_learning_rate(1.1 * MIN_LEARNING_RATE, 1.0, 0.01, 1.0) == MIN_LEARNING_RATE
+    assert adapted_learning_rate(1e-3, 0.0, 0.01, 1e-6) == 1e-6
 
 
 def test_a_schedule_lowers_the_rate() -> None:
     """Without a target the step size falls with progress, from the highest to a share of it."""
-    learner = Ppo(SMALL, PpoParameters(learning_rate=1.0, highest_rate=1e-3, final_share=0.1))
+    learner = Ppo(SMALL, PpoParameters(learning_rate=1.0, max_learning_rate=1e-3, final_lr_fraction=0.1))
     for progress, expected in ((0.0, 1e-3), (0.5, 0.55e-3), (1.0, 1e-4)):
-        learner.take(Lesson(0, 1, probe("pairing"), progress))
+        learner.train_on(TrainingJob(0, 1, probe("pairing"), progress))
         assert learner.learning_rate == pytest.approx(expected)
 
 
 @both_turns
 def test_samples_of_fresh_games(board: Board, rules: Rules) -> None:
     """A sample for each state of a game still on; advantages have mean 0 and deviation 1 over the actions."""
-    parameters = PpoParameters(discount=0.9, smoothing=0.5)
+    parameters = PpoParameters(gamma=0.9, gae_lambda=0.5)
     learner = Ppo(SMALL, parameters)
     fresh = played(learner, board, rules, steps=30)
-    samples = samples_of(fresh, parameters)
+    samples = on_policy_samples(fresh, parameters)
     assert len(samples.game) == fresh.evaluations
     assert (samples.centre == 1).all()
     real = samples.actions >= 0
@@ -130,10 +129,10 @@ def test_samples_of_fresh_games(board: Board, rules: Rules) -> None:
 @both_turns
 def test_a_step_goes_against_the_loss_written_out(board: Board, rules: Rules) -> None:
     """One update by plain gradient descent changes the weights by the gradient of (13), (15) and the entropy."""
-    parameters = PpoParameters(epochs=1, minibatch=10_000, max_gradient_norm=1e9, value_weight=0.7, entropy_weight=0.1)
+    parameters = PpoParameters(update_epochs=1, minibatch_size=10_000, max_grad_norm=1e9, vf_coef=0.7, ent_coef=0.1)
     learner = Ppo(SMALL, parameters, seed=3)
     fresh = played(learner, board, rules)
-    samples = samples_of(fresh, parameters)
+    samples = on_policy_samples(fresh, parameters)
     network = ActorCritic(SMALL)
     network.load_state_dict(learner.network.state_dict())
     scores = network(board[samples.game], samples.state)
@@ -146,7 +145,7 @@ def test_a_step_goes_against_the_loss_written_out(board: Board, rules: Rules) ->
     loss = loss / count + 0.7 * 0.5 * ((samples.target - scores.value) ** 2).mean() - 0.1 * entropy.mean()
     loss.backward()
     learner.optimiser = torch.optim.SGD(learner.network.parameters(), lr=0.1)
-    learner.update(fresh, None, rules, torch.Generator().manual_seed(0), highest=0.1)
+    learner.update(fresh, None, rules, torch.Generator().manual_seed(0), max_rate=0.1)
     for new, old in zip(learner.network.parameters(), network.parameters(), strict=True):
         slope = torch.zeros_like(old) if old.grad is None else old.grad
         torch.testing.assert_close(new, old - 0.1 * slope, atol=1e-5, rtol=1e-4)
@@ -154,10 +153,10 @@ def test_a_step_goes_against_the_loss_written_out(board: Board, rules: Rules) ->
 
 def test_what_went_better_than_expected_becomes_likelier(board: Board) -> None:
     """After an update the change of each action's probability goes with its advantage."""
-    learner = Ppo(SMALL, PpoParameters(entropy_weight=0.0, value_weight=0.0))
+    learner = Ppo(SMALL, PpoParameters(ent_coef=0.0, vf_coef=0.0))
     fresh = played(learner, board)
-    samples = samples_of(fresh, learner.parameters)
-    learner.update(fresh, None, PLANNING, torch.Generator().manual_seed(0), highest=1e-3)
+    samples = on_policy_samples(fresh, learner.parameters)
+    learner.update(fresh, None, PLANNING, torch.Generator().manual_seed(0), max_rate=1e-3)
     scores = learner.network(board[samples.game], samples.state)
     now, _ = log_probabilities(board[samples.game], samples.state, scores, samples.actions)
     real = samples.actions >= 0
@@ -171,7 +170,7 @@ def test_divergence_tells_how_far_the_policy_moved(board: Board) -> None:
     for rate in (0.0, 1e-4, 1e-2):
         learner = Ppo(SMALL, PpoParameters(learning_rate=1e-2))
         fresh = played(learner, board)
-        found.append(learner.update(fresh, None, PLANNING, torch.Generator().manual_seed(0), highest=rate)[0])
+        found.append(learner.update(fresh, None, PLANNING, torch.Generator().manual_seed(0), max_rate=rate)[0])
     assert found[0] == pytest.approx(0, abs=1e-6)
     assert 0 < found[1] < found[2]
 
@@ -179,9 +178,12 @@ def test_divergence_tells_how_far_the_policy_moved(board: Board) -> None:
 @both_turns
 def test_reuse_by_the_same_network_is_no_reuse(board: Board, rules: Rules) -> None:
     """Trajectories that today's network played itself are the same samples, fresh or from the buffer."""
-    learner = Ppo(SMALL, PpoParameters(minibatch=2))
+    learner = Ppo(SMALL, PpoParameters(minibatch_size=2))
     fresh = played(learner, board, rules, steps=30)
-    new, again = samples_of(fresh, learner.parameters), reused(learner.network, fresh, learner.parameters, rules)
+    new, again = (
+        on_policy_samples(fresh, learner.parameters),
+        off_policy_samples(learner.network, fresh, learner.parameters, rules),
+    )
     assert torch.equal(new.game, again.game)
     assert torch.equal(new.actions, again.actions)
     for name in ("centre", "advantage", "target", "log_probability"):
@@ -191,10 +193,10 @@ def test_reuse_by_the_same_network_is_no_reuse(board: Board, rules: Rules) -> No
 @both_turns
 def test_reuse_by_another_network_is_corrected(board: Board, rules: Rules) -> None:
     """Ratios of old samples are centred where today's policy is, and traces cut by how likely whole steps are."""
-    parameters = PpoParameters(discount=0.9, smoothing=0.8)
+    parameters = PpoParameters(gamma=0.9, gae_lambda=0.8)
     old, new = Ppo(SMALL, seed=1), Ppo(SMALL, seed=2)
     kept = played(old, board, rules, steps=4)
-    samples = reused(new.network, kept, parameters, rules)
+    samples = off_policy_samples(new.network, kept, parameters, rules)
     scores = new.network(board[samples.game], samples.state)
     now, _ = log_probabilities(board[samples.game], samples.state, scores, samples.actions, rules)
     shift = now - samples.log_probability
@@ -217,7 +219,7 @@ def test_a_single_decision_does_not_spoil_the_weights() -> None:
     """One agent, one task, one step: nothing can be compared, and nothing breaks."""
     board = layout(Instance(ability=[1], workload=[1]))
     learner = Ppo(SMALL)
-    learner.update(played(learner, board, steps=1), None, PLANNING, torch.Generator(), highest=1e-3)
+    learner.update(played(learner, board, steps=1), None, PLANNING, torch.Generator(), max_rate=1e-3)
     assert weights(learner).isfinite().all()
 
 
@@ -234,17 +236,17 @@ def test_extreme_games_do_not_spoil_the_weights() -> None:
         for seed in range(3):
             fresh = played(learner, board, seed=seed, steps=5)
             old = learner.replay.draw(torch.Generator().manual_seed(seed))
-            learner.update(fresh, old, PLANNING, torch.Generator(), highest=1e-2)
+            learner.update(fresh, old, PLANNING, torch.Generator(), max_rate=1e-2)
             learner.replay.add(fresh)
         assert weights(learner).isfinite().all()
 
 
 def test_the_buffer_is_learned_from() -> None:
-    """With a buffer the second lesson's updates differ from those without, and cost more evaluations."""
+    """With a buffer the second job's updates differ from those without, and cost more evaluations."""
     costs, ends = [], []
     for capacity in (0, 10_000):
-        learner = Ppo(SMALL, PpoParameters(capacity=capacity))
-        reports = [learner.take(Lesson(seed, 1, probe("pairing"))) for seed in range(2)]
+        learner = Ppo(SMALL, PpoParameters(buffer_size=capacity))
+        reports = [learner.train_on(TrainingJob(seed, 1, probe("pairing"))) for seed in range(2)]
         costs.append([report.evaluations for report in reports])
         ends.append(weights(learner))
         assert len(learner.replay) == (0 if capacity == 0 else sum(cost // 4 for cost in costs[0]))
@@ -253,35 +255,37 @@ def test_the_buffer_is_learned_from() -> None:
     assert not torch.equal(*ends)
 
 
-def test_a_lesson_reports_what_it_took() -> None:
-    """Decisions reach what the lesson asked for; rewards are in the units of worth, whatever their scale."""
+def test_the_statistics_of_a_job() -> None:
+    """Decisions reach those of the job; rewards are in the units of the utility, whatever their scale."""
     games = probe("pairing")
-    reports = [Ppo(SMALL, PpoParameters(reward_scale=scale)).take(Lesson(0, 100, games)) for scale in (1.0, 50.0)]
+    reports = [
+        Ppo(SMALL, PpoParameters(reward_scale=scale)).train_on(TrainingJob(0, 100, games)) for scale in (1.0, 50.0)
+    ]
     assert all(report.decisions >= 100 for report in reports)
     assert all(-1 < report.reward < 1 for report in reports)
-    assert all(report.entropy > 0 and report.divergence > 0 for report in reports)
-    single = Ppo(SMALL).take(Lesson(0, 1, games))
+    assert all(report.entropy > 0 and report.approx_kl > 0 for report in reports)
+    single = Ppo(SMALL).train_on(TrainingJob(0, 1, games))
     fresh = played(Ppo(SMALL), games.board, seed=0, steps=6)
-    assert single.evaluations % (1 + PpoParameters().epochs) == 0
+    assert single.evaluations % (1 + PpoParameters().update_epochs) == 0
     assert 0 < single.decisions <= fresh.decisions
 
 
 @pytest.mark.parametrize("parameters", [PpoParameters(), GappoParameters()], ids=["ppo", "gappo"])
-def test_a_lesson_depends_on_state_and_lesson_only(parameters: PpoParameters) -> None:
-    """Stored between lessons and taken up by another learner, training goes on bit for bit as without a break."""
-    assert_taken_up_elsewhere(lambda seed: Ppo(SMALL, parameters, seed))
+def test_a_job_depends_on_state_and_job_only(parameters: PpoParameters) -> None:
+    """Stored between jobs and restored in another learner, training continues bit for bit as without a break."""
+    assert_resumes_elsewhere(lambda seed: Ppo(SMALL, parameters, seed))
 
 
 @pytest.mark.parametrize("name", list(PROBES))
 def test_it_learns_a_probe_game(name: str) -> None:
-    """Within a few lessons it plays a game best whose best play is known."""
+    """Within a few jobs it plays a game with a known optimum optimally."""
     assert share_learned(Ppo(NetworkSize(16, 16, 2), PpoParameters(learning_rate=3e-3)), name) >= 0.95
 
 
 def test_it_learns_when_all_choose_at_once() -> None:
     """Rewards rise under the other turn rule as well."""
     games, learner = probe("right_task"), Ppo(SMALL, PpoParameters(learning_rate=3e-3))
-    rewards = [learner.take(Lesson(seed, 150, games, rules=AT_ONCE)).reward for seed in range(16)]
+    rewards = [learner.train_on(TrainingJob(seed, 150, games, rules=AT_ONCE)).reward for seed in range(16)]
     assert sum(rewards[-4:]) > sum(rewards[:4])
 
 

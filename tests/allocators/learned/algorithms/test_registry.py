@@ -4,7 +4,8 @@ from dataclasses import fields
 
 import pytest
 
-from alloc.allocators.learned.algorithms.ppo import Ppo, PpoParameters
+from alloc.allocators.learned.algorithms.hyperparameters import PpoParameters
+from alloc.allocators.learned.algorithms.ppo import Ppo
 from alloc.allocators.learned.algorithms.registry import METHODS, method_parameters, new_learner
 from alloc.allocators.learned.network.actor_critic import NetworkSize
 from alloc.problems import InputError
@@ -19,22 +20,22 @@ def test_learners_by_name() -> None:
 
 def test_settings_are_read_as_the_kind_of_their_defaults() -> None:
     """Whole numbers, broken ones and none are told apart."""
-    read = method_parameters("ppo", {"epochs": "5", "clip": "0.1", "kl_target": "none"})
-    assert read == PpoParameters(epochs=5, clip=0.1, kl_target=None)
+    read = method_parameters("ppo", {"update_epochs": "5", "clip_coef": "0.1", "target_kl": "none"})
+    assert read == PpoParameters(update_epochs=5, clip_coef=0.1, target_kl=None)
 
 
 @pytest.mark.parametrize(
     ("method", "settings", "message"),
     [
         ("gapo", {}, "did you mean 'gappo'"),
-        ("ppo", {"clipp": "1"}, "ppo has no parameter 'clipp'"),
-        ("ppo", {"epochs": "1.5"}, "epochs must be like 3, got '1.5'"),
-        ("ppo", {"epochs": "none"}, "epochs must be like 3, got 'none'"),
-        ("dqn", {"double": "maybe"}, "double must be like true, got 'maybe'"),
+        ("ppo", {"clip_coeff": "1"}, "ppo has no parameter 'clip_coeff'"),
+        ("ppo", {"update_epochs": "1.5"}, "update_epochs must be like 3, got '1.5'"),
+        ("ppo", {"update_epochs": "none"}, "update_epochs must be like 3, got 'none'"),
+        ("dqn", {"double_q": "maybe"}, "double_q must be like true, got 'maybe'"),
         ("ppo", {"learning_rate": "-1"}, "learning_rate must be a number above 0 and at most 1, got -1$"),
         ("ppo", {"reward_scale": "0"}, "reward_scale must be a number from 1e-09 to 1e[+]09, got 0$"),
-        ("ppo", {"clip": "nan"}, "clip must be a number from 1e-09 to 1e[+]09, got nan$"),
-        ("ppo", {"epochs": "0"}, "epochs must be a whole number from 1 to 1e[+]06, got 0$"),
+        ("ppo", {"clip_coef": "nan"}, "clip_coef must be a number from 1e-09 to 1e[+]09, got nan$"),
+        ("ppo", {"update_epochs": "0"}, "update_epochs must be a whole number from 1 to 1e[+]06, got 0$"),
     ],
 )
 def test_mistakes_are_named(method: str, settings: dict[str, str], message: str) -> None:

@@ -6,7 +6,7 @@ import pytest
 import torch
 from boards import layout
 
-from alloc.allocators.learned.algorithms.replay import Replay
+from alloc.allocators.learned.algorithms.replay import ReplayBuffer
 from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize
 from alloc.allocators.learned.play.trajectories import Trajectories, collect
 from alloc.problems.generate import paper_like
@@ -30,7 +30,7 @@ def same(one: Trajectories, two: Trajectories) -> bool:
     return all(torch.equal(a, b) for a, b in zip(numbers(one), numbers(two), strict=True))
 
 
-def drawn(replay: Replay, draws: int = 60) -> list[Trajectories]:
+def drawn(replay: ReplayBuffer, draws: int = 60) -> list[Trajectories]:
     """What turns up in many draws, each once."""
     generator = torch.Generator().manual_seed(0)
     return list({id(one): one for one in (replay.draw(generator) for _ in range(draws)) if one is not None}.values())
@@ -38,14 +38,14 @@ def drawn(replay: Replay, draws: int = 60) -> list[Trajectories]:
 
 def test_an_empty_buffer_has_nothing_to_draw() -> None:
     """None comes from a buffer in which nothing was put."""
-    assert Replay(100).draw(torch.Generator()) is None
-    assert len(Replay(100)) == 0
+    assert ReplayBuffer(100).draw(torch.Generator()) is None
+    assert len(ReplayBuffer(100)) == 0
 
 
 def test_the_oldest_go_first(trajectories: list[Trajectories]) -> None:
     """The states kept never exceed the capacity, and are those of the latest trajectories that fit in."""
     sizes = [one.evaluations for one in trajectories]
-    replay = Replay(sum(sizes[2:]))
+    replay = ReplayBuffer(sum(sizes[2:]))
     for number, one in enumerate(trajectories):
         replay.add(one)
         assert len(replay) <= replay.capacity
@@ -58,7 +58,7 @@ def test_the_oldest_go_first(trajectories: list[Trajectories]) -> None:
 def test_what_is_too_large_is_not_kept(trajectories: list[Trajectories]) -> None:
     """A trajectory beyond the capacity does not stay, and a buffer without capacity keeps nothing."""
     for capacity in (0, trajectories[0].evaluations - 1):
-        replay = Replay(capacity)
+        replay = ReplayBuffer(capacity)
         replay.add(trajectories[0])
         assert len(replay) == 0
         assert replay.draw(torch.Generator()) is None
@@ -66,7 +66,7 @@ def test_what_is_too_large_is_not_kept(trajectories: list[Trajectories]) -> None
 
 def test_all_are_drawn_as_often(trajectories: list[Trajectories]) -> None:
     """Of 3,000 draws each of five trajectories gets 600, within four standard deviations."""
-    replay, generator = Replay(10_000), torch.Generator().manual_seed(2)
+    replay, generator = ReplayBuffer(10_000), torch.Generator().manual_seed(2)
     for one in trajectories:
         replay.add(one)
     draws = [id(replay.draw(generator)) for _ in range(3_000)]
@@ -75,12 +75,12 @@ def test_all_are_drawn_as_often(trajectories: list[Trajectories]) -> None:
 
 def test_round_trip_through_a_file(trajectories: list[Trajectories]) -> None:
     """Stored as tensors alone and read into another buffer, every number is the same, and so are the draws."""
-    replay, again, file = Replay(10_000), Replay(10_000), io.BytesIO()
+    replay, again, file = ReplayBuffer(10_000), ReplayBuffer(10_000), io.BytesIO()
     for one in trajectories:
         replay.add(one)
-    torch.save(replay.state(), file)
+    torch.save(replay.state_dict(), file)
     file.seek(0)
-    again.load(torch.load(file, weights_only=True))
+    again.load_state_dict(torch.load(file, weights_only=True))
     assert len(again) == len(replay)
     first, second = (torch.Generator().manual_seed(5) for _ in range(2))
     for _ in range(8):

@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from alloc.allocators import Budget, Search
-from alloc.allocators.learned.algorithms.learner import LessonReport
+from alloc.allocators.learned.algorithms.learner import TrainingStats
 from alloc.allocators.learned.algorithms.ppo import Ppo
 from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize
 from alloc.allocators.learned.search.fine_tuning import (
@@ -99,7 +99,7 @@ def test_the_fittest_survive_a_generation(parts: Parts, rewards: tuple[float, ..
     for _ in range(len(rewards)):
         tuning.learn(parts)
     before = [(weights([one.policy]).clone(), moments(one)) for one in tuning.members]
-    tuning._reports = [LessonReport(1, 1, reward, 1.0, 0.0, 1e-4) for reward in rewards]
+    tuning._reports = [TrainingStats(1, 1, reward, 1.0, 0.0, 1e-4) for reward in rewards]
     tuning._breed()
     after = [(weights([one.policy]), moments(one)) for one in tuning.members]
     fittest = sorted(range(len(rewards)), key=lambda number: -rewards[number])[: BREEDING.elite]

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 import torch
 
-from alloc.allocators.learned.training.curriculum import Curriculum, aim, reference_makespan
+from alloc.allocators.learned.training.curriculum import Curriculum, reference_makespan, with_reference
 from alloc.allocators.learned.training.families import FAMILIES, RECIPES, draw_instance
 from alloc.problems import makespan_lower_bound
 from alloc.problems.game import Board
 from alloc.problems.generate import paper_like
 
-SMALL = Curriculum(pairs=1500, games=(2, 6))
+SMALL = Curriculum(max_pairs=1500, games=(2, 6))
 
 
 def drawn(curriculum: Curriculum, seed: int = 0, progress: float = 1.0) -> Board:
@@ -42,9 +42,9 @@ def test_sizes_grow_with_progress() -> None:
     """Boards have the tasks of the beginning at first, and all sizes once all is grown."""
     early = [drawn(replace(SMALL, families=("paper",)), seed, 0.0).places - 1 for seed in range(20)]
     late = [drawn(replace(SMALL, families=("paper",)), seed, 0.7).places - 1 for seed in range(20)]
-    assert (min(early), max(early)) == SMALL.first_tasks
+    assert (min(early), max(early)) == SMALL.initial_tasks
     assert min(late) >= SMALL.tasks[0]
-    assert SMALL.first_tasks[1] < max(late) <= SMALL.tasks[1]
+    assert SMALL.initial_tasks[1] < max(late) <= SMALL.tasks[1]
 
 
 def test_boards_are_about_equally_large() -> None:
@@ -56,14 +56,16 @@ def test_boards_are_about_equally_large() -> None:
         assert games * n * board.places <= 12_000 or games == 8
 
 
-def test_prices_and_aims_spread() -> None:
-    """Prices fill their range in proportion; a share of the games aim beyond the bound, so that ability is left."""
-    curriculum = Curriculum(families=("paper",), pairs=3000, price=(0.2, 3.0), eased_share=0.3, easing=1.3)
+def test_energy_weights_and_targets_spread() -> None:
+    """Energy weights are log-uniform; a share of the games have targets beyond the bound, with ability to spare."""
+    curriculum = Curriculum(
+        families=("paper",), max_pairs=3000, energy_weight=(0.2, 3.0), relaxed_fraction=0.3, max_relaxation=1.3
+    )
     boards = [drawn(curriculum, seed) for seed in range(40)]
-    price = torch.cat([board.price for board in boards])
-    assert price.min() >= 0.2
-    assert price.max() <= 3.0
-    assert 0.6 < price.median() < 1.0
+    weight = torch.cat([board.price for board in boards])
+    assert weight.min() >= 0.2
+    assert weight.max() <= 3.0
+    assert 0.6 < weight.median() < 1.0
     load = torch.cat([board.need.sum(1) / board.ability.sum(1) for board in boards])
     assert load.max() <= 1 + 1e-5
     assert 0.2 < (load < 0.99).float().mean() < 0.4
@@ -72,27 +74,27 @@ def test_prices_and_aims_spread() -> None:
 
 def test_travel_costs_ability() -> None:
     """At finite speeds agents bring from a half to nearly all of their ability, less the farther they fly."""
-    board = drawn(replace(SMALL, families=("travel",), eased_share=0.0))
+    board = drawn(replace(SMALL, families=("travel",), relaxed_fraction=0.0))
     share = (board.contribution / board.ability[..., None])[:, :, :-1]
     assert 0.4 < share.mean() < 0.99
     assert share.min() < 0.9
 
 
-def test_lowest_bounds_aim() -> None:
-    """The aim is the best bound at hand; with short ranges the linear programme's may be the higher one."""
+def test_the_reference_is_the_best_bound() -> None:
+    """With short communication ranges the bound of the linear programme may be the higher one."""
     rng = np.random.default_rng(0)
     instances = [draw_instance("short-range", 20, 5, seed, rng) for seed in range(6)]
     bounds = [makespan_lower_bound(instance) for instance in instances]
-    aims = [one.hours for one in aim(instances)]
-    assert aims == [reference_makespan(instance) for instance in instances]
-    assert all(hours >= bound for hours, bound in zip(aims, bounds, strict=True))
-    assert aims != bounds
+    references = [one.reference_h for one in with_reference(instances)]
+    assert references == [reference_makespan(instance) for instance in instances]
+    assert all(hours >= bound for hours, bound in zip(references, bounds, strict=True))
+    assert references != bounds
 
 
 def test_own_instances_are_played_in_place_of_drawn_ones() -> None:
-    """A board holds copies of those instances that are equally large, at prices of their own."""
-    own = tuple(aim([paper_like(12, 3, 50, seed) for seed in range(3)] + [paper_like(9, 2, 40, 5)]))
-    curriculum = replace(SMALL, own=own, eased_share=0.0)
+    """A board holds copies of those instances that are equally large, with their own energy weights."""
+    given = tuple(with_reference([paper_like(12, 3, 50, seed) for seed in range(3)] + [paper_like(9, 2, 40, 5)]))
+    curriculum = replace(SMALL, instances=given, relaxed_fraction=0.0)
     seen = {drawn(curriculum, seed).shape[1:] for seed in range(10)}
     assert seen == {(12, 4), (9, 3)}
     board = drawn(curriculum)
@@ -101,7 +103,7 @@ def test_own_instances_are_played_in_place_of_drawn_ones() -> None:
 
 def test_own_instances_may_be_large() -> None:
     """Where one game alone has more pairs than a board should, agents bid for near tasks only."""
-    board = drawn(replace(SMALL, own=tuple(aim([paper_like(100, 20, 400, 1)]))))
+    board = drawn(replace(SMALL, instances=tuple(with_reference([paper_like(100, 20, 400, 1)]))))
     assert board.shape[0] == 1
     assert board.shape[2] < 21
 
@@ -120,6 +122,6 @@ def test_training_seeds_are_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_longer_games_for_more_agents() -> None:
     """A game has rounds enough for its agents."""
-    few, many = (drawn(replace(SMALL, own=tuple(aim([paper_like(n, 3, 4 * n, 0)])))) for n in (12, 72))
-    assert SMALL.steps(few) < SMALL.steps(many)
+    few, many = (drawn(replace(SMALL, instances=tuple(with_reference([paper_like(n, 3, 4 * n, 0)])))) for n in (12, 72))
+    assert SMALL.max_steps(few) < SMALL.max_steps(many)
     assert set(RECIPES) < set(FAMILIES)

@@ -9,28 +9,35 @@ import pytest
 import torch
 from safetensors import safe_open
 
-from alloc.allocators.learned.algorithms.learner import Lesson, LessonReport
-from alloc.allocators.learned.algorithms.ppo import Ppo, PpoParameters
+from alloc.allocators.learned.algorithms.hyperparameters import PpoParameters
+from alloc.allocators.learned.algorithms.learner import TrainingJob, TrainingStats
+from alloc.allocators.learned.algorithms.ppo import Ppo
 from alloc.allocators.learned.algorithms.registry import METHODS
 from alloc.allocators.learned.files import checkpoint
 from alloc.allocators.learned.files.policy_file import load_policy
 from alloc.allocators.learned.network.actor_critic import NetworkSize
+from alloc.allocators.learned.training import member as module_of_members
 from alloc.allocators.learned.training import trainer as module
 from alloc.allocators.learned.training.curriculum import Curriculum
-from alloc.allocators.learned.training.trainer import Limits, Report, Trainer, TrainingParameters, train
-from alloc.allocators.learned.training.validation import Validation, own_games
-from alloc.allocators.parallel.engine import SerialEngine
+from alloc.allocators.learned.training.limits import Limits
+from alloc.allocators.learned.training.loop import run_training
+from alloc.allocators.learned.training.parameters import TrainingParameters
+from alloc.allocators.learned.training.report import Report
+from alloc.allocators.learned.training.run_files import RunFiles
+from alloc.allocators.learned.training.trainer import Trainer
+from alloc.allocators.learned.training.validation import Validation, games_on
 from alloc.allocators.parallel.processes import ProcessEngine
+from alloc.allocators.parallel.serial import SerialEngine
 from alloc.problems import InputError
 from alloc.problems.game import PAPER
 from alloc.problems.generate import paper_like
 
-CURRICULUM, BOARDS = own_games([paper_like(10, 3, 44, seed) for seed in range(3)], Curriculum(games=(2, 4)))
+CURRICULUM, BOARDS = games_on([paper_like(10, 3, 44, seed) for seed in range(3)], Curriculum(games=(2, 4)))
 TINY = TrainingParameters(
     population=3,
     decisions=60,
     network=NetworkSize(8, 8, 2),
-    learner=PpoParameters(epochs=1, minibatch=64, capacity=200),
+    learner=PpoParameters(update_epochs=1, minibatch_size=64, buffer_size=200),
     curriculum=CURRICULUM,
 )
 TIMES = ("seconds", "decisions_per_second")
@@ -50,8 +57,8 @@ def weights(run: Trainer) -> torch.Tensor:
 
 
 @pytest.fixture
-def paths(tmp_path: Path) -> dict[str, Path]:
-    return {"output": tmp_path / "p", "checkpoint": tmp_path / "c", "log": tmp_path / "log.csv"}
+def paths(tmp_path: Path) -> RunFiles:
+    return RunFiles(tmp_path / "p", tmp_path / "c", tmp_path / "log.csv")
 
 
 @pytest.fixture
@@ -60,7 +67,7 @@ def planned(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
 
     def plan(*costs: float) -> None:
         coming = iter(costs)
-        monkeypatch.setattr(module, "validate", lambda *_: Validation(next(coming), 0.5, 1.0, 0.1, 1.0, 0.0))
+        monkeypatch.setattr(module_of_members, "validate", lambda *_: Validation(next(coming), 0.5, 1.0, 0.1, 1.0, 0.0))
 
     return plan
 
@@ -102,17 +109,17 @@ def test_processes_train_the_same() -> None:
 
 
 def test_seeds_matter() -> None:
-    """Another seed begins with other weights and gives members other lessons."""
+    """Another seed begins with other weights, and every job has its own seed."""
     one, other = trainer(1), trainer(2)
     assert not torch.equal(weights(one), weights(other))
-    lessons = {one._lesson(member, Limits()).seed for member in range(3)}
+    seeds = {one._job(member, Limits()).seed for member in range(3)}
     one.advance()
-    lessons |= {one._lesson(member, Limits()).seed for member in range(3)}
-    assert len(lessons) == 6
+    seeds |= {one._job(member, Limits()).seed for member in range(3)}
+    assert len(seeds) == 6
 
 
-def test_lessons_change_nothing_but_their_own_learner() -> None:
-    """A generation that is dropped leaves the run as it was, weights and optimisers, though its lessons were taken."""
+def test_jobs_change_nothing_but_their_own_learner() -> None:
+    """A generation that is dropped leaves weights and optimisers as they were, though members were trained in it."""
     run, undisturbed = trainer(), trainer()
     for one in (run, undisturbed):
         one.advance()
@@ -126,38 +133,38 @@ def test_lessons_change_nothing_but_their_own_learner() -> None:
     assert torch.equal(weights(run), weights(undisturbed))
 
 
-def test_train_writes_policy_checkpoint_and_log(paths: dict[str, Path]) -> None:
+def test_train_writes_policy_checkpoint_and_log(paths: RunFiles) -> None:
     """After every generation all three files are whole; the policy holds the population, and how it came about."""
     run = trainer(1)
-    train(run, **paths, limits=Limits(iterations=2))
-    assert len(load_policy(paths["output"], "gappo")) == 3
-    with safe_open(paths["output"], framework="pt") as file:
+    run_training(run, paths, limits=Limits(iterations=2))
+    assert len(load_policy(paths.policy, "gappo")) == 3
+    with safe_open(paths.policy, framework="pt") as file:
         said = file.metadata()
     assert f'"generation": {run.best_generation}' in said["training"]
     again = trainer(1)
-    again.resume(paths["checkpoint"])
+    again.resume(paths.checkpoint)
     assert again.generation == 2
-    lines = paths["log"].read_text().splitlines()
+    lines = paths.log.read_text().splitlines()
     assert len(lines) == 3
     assert lines[0].startswith("generation,decisions,evaluations,cost,unserved,time")
 
 
-def test_the_log_and_the_policy_are_put_right(paths: dict[str, Path]) -> None:
+def test_the_log_and_the_policy_are_put_right(paths: RunFiles) -> None:
     """A run that was killed after its checkpoint, before the other files, writes them when it is taken up."""
     run = trainer(1)
-    train(run, **paths, limits=Limits(iterations=2))
-    log = paths["log"].read_bytes()
-    paths["log"].write_bytes(log[: len(log) // 2])
-    paths["output"].unlink()
+    run_training(run, paths, limits=Limits(iterations=2))
+    log = paths.log.read_bytes()
+    paths.log.write_bytes(log[: len(log) // 2])
+    paths.policy.unlink()
     again = trainer(1)
-    again.resume(paths["checkpoint"])
-    train(again, **paths, limits=Limits(iterations=2))
-    assert paths["log"].read_bytes() == log
-    for one, two in zip(load_policy(paths["output"], "gappo"), run.best, strict=True):
+    again.resume(paths.checkpoint)
+    run_training(again, paths, limits=Limits(iterations=2))
+    assert paths.log.read_bytes() == log
+    for one, two in zip(load_policy(paths.policy, "gappo"), run.best, strict=True):
         assert all(torch.equal(weight, two[name]) for name, weight in one.state_dict().items())
 
 
-def test_the_best_networks_are_kept(paths: dict[str, Path], planned: Callable[..., None]) -> None:
+def test_the_best_networks_are_kept(paths: RunFiles, planned: Callable[..., None]) -> None:
     """The policy is that of the generation with the least cost, not the last one."""
     planned(0.5, 0.2, 0.3, 0.4)
     run = trainer(population=1, method="ppo")
@@ -168,26 +175,26 @@ def test_the_best_networks_are_kept(paths: dict[str, Path], planned: Callable[..
     assert run.best_generation == 2
     assert [report.best_cost for report in run.history] == [0.5, 0.2, 0.2, 0.2]
     assert [report.unserved for report in run.history] == [0.5] * 4
-    run.write_policy(paths["output"])
-    (kept,) = load_policy(paths["output"], "ppo")
+    run.write_policy(paths.policy)
+    (kept,) = load_policy(paths.policy, "ppo")
     assert all(torch.equal(weight, second[name]) for name, weight in kept.state_dict().items())
 
 
-def test_patience_ends_a_run_that_gets_no_better(paths: dict[str, Path], planned: Callable[..., None]) -> None:
+def test_patience_ends_a_run_that_gets_no_better(paths: RunFiles, planned: Callable[..., None]) -> None:
     """Two generations in a row without better networks end it, one does not."""
     planned(0.5, 0.6, 0.4, 0.4, 0.5, 0.1)
     run = trainer(population=1, method="ppo")
-    train(run, **paths, limits=Limits(iterations=9, patience=2))
+    run_training(run, paths, limits=Limits(iterations=9, patience=2))
     assert [report.cost for report in run.history] == [0.5, 0.6, 0.4, 0.4, 0.5]
 
 
-def test_steps_are_those_of_all_members_together(paths: dict[str, Path]) -> None:
-    """Training ends with the update that reaches the steps, and the last lessons are shorter."""
+def test_steps_are_those_of_all_members_together(paths: RunFiles) -> None:
+    """Training ends with the update that reaches the steps, and the last jobs are shorter."""
     run = trainer()
-    train(run, **paths, limits=Limits(steps=400))
+    run_training(run, paths, limits=Limits(steps=400))
     assert run.history[-1].decisions >= 400
     assert run.history[-2].decisions < 400
-    assert run._lesson(0, Limits(steps=run.history[-1].decisions + 6)).decisions == 2
+    assert run._job(0, Limits(steps=run.history[-1].decisions + 6)).decisions == 2
 
 
 def test_progress_follows_the_first_limit_given() -> None:
@@ -216,11 +223,11 @@ def test_members_begin_with_given_weights() -> None:
 def test_cost_and_decisions_of_all_members_count(monkeypatch: pytest.MonkeyPatch) -> None:
     """A report adds up what the members did, and fitness (12) gets their network evaluations."""
 
-    def take(self: Ppo, lesson: Lesson) -> LessonReport:
-        return LessonReport(10, 100, 1.0, 2.0, 0.0, 1e-3)
+    def train_on(self: Ppo, job: TrainingJob) -> TrainingStats:
+        return TrainingStats(10, 100, 1.0, 2.0, 0.0, 1e-3)
 
     seen = []
-    monkeypatch.setattr(Ppo, "take", take)
+    monkeypatch.setattr(Ppo, "train_on", train_on)
     monkeypatch.setattr(module, "fitness", lambda *columns: seen.append(columns[2]) or [1.0, 3.0, 2.0])
     run = trainer()
     run.advance()
@@ -248,7 +255,7 @@ def test_damaged_checkpoints(tmp_path: Path) -> None:
         path.write_bytes(content)
         with pytest.raises(InputError) as caught:
             trainer().resume(path)
-        assert caught.value.message == "is no checkpoint, or is damaged; name another by --checkpoint, or remove it"
+        assert caught.value.message == "is no checkpoint, or is damaged; name another checkpoint, or remove it"
 
 
 def test_checkpoints_of_other_versions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -270,9 +277,9 @@ def test_checkpoints_of_other_versions(tmp_path: Path, monkeypatch: pytest.Monke
         ({"population": 2}, "is a run with population 3, not 2"),
         ({"seed": 6}, "is a run with seed 5, not 6"),
         ({"method": "ppo"}, "is a run with method gappo, not ppo"),
-        ({"learner": PpoParameters(epochs=2)}, "is a run with learner"),
+        ({"learner": PpoParameters(update_epochs=2)}, "is a run with learner"),
         ({"curriculum": Curriculum(("travel",))}, "is a run with curriculum.families mixed, not travel"),
-        ({"curriculum": replace(CURRICULUM, own=CURRICULUM.own[:1])}, "is a run with instances"),
+        ({"curriculum": replace(CURRICULUM, instances=CURRICULUM.instances[:1])}, "is a run with instances"),
     ],
 )
 def test_checkpoints_of_other_runs_are_refused(tmp_path: Path, changes: dict[str, Any], message: str) -> None:

@@ -8,15 +8,16 @@ import pytest
 
 from alloc.allocators.learned.algorithms.registry import METHODS, method_parameters
 from alloc.allocators.learned.network.actor_critic import NetworkSize
-from alloc.allocators.learned.training import trainer as module
+from alloc.allocators.learned.training import member as module
 from alloc.allocators.learned.training.curriculum import Curriculum
-from alloc.allocators.learned.training.trainer import Limits, TrainingParameters
-from alloc.allocators.learned.training.tune import SHARES, SPACES, open_study, suggested, tune
-from alloc.allocators.learned.training.validation import Validation, own_games
+from alloc.allocators.learned.training.limits import Limits
+from alloc.allocators.learned.training.parameters import TrainingParameters
+from alloc.allocators.learned.training.tune import LOG_SPACES, UNIFORM_SPACES, open_study, suggested, tune
+from alloc.allocators.learned.training.validation import Validation, games_on
 from alloc.problems import InputError
 from alloc.problems.generate import paper_like
 
-CURRICULUM, BOARDS = own_games([paper_like(8, 2, 35, 0)], Curriculum(games=(2, 2)))
+CURRICULUM, BOARDS = games_on([paper_like(8, 2, 35, 0)], Curriculum(games=(2, 2)))
 TINY = TrainingParameters("ppo", 1, 20, NetworkSize(4, 4, 1), method_parameters("ppo"), curriculum=CURRICULUM)
 
 
@@ -56,7 +57,7 @@ def test_every_method_has_something_to_tune(method: str) -> None:
 
     default = method_parameters(method)
     got = suggested(Lowest(), default)
-    assert {"learning_rate", "discount"} <= got.keys() <= SPACES.keys() | SHARES.keys()
+    assert {"learning_rate", "gamma"} <= got.keys() <= LOG_SPACES.keys() | UNIFORM_SPACES.keys()
 
 
 def test_without_optuna_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,8 +13,8 @@ from alloc.allocators.learned.training.curriculum import Curriculum, reference_b
 from alloc.allocators.learned.training.families import RECIPES
 from alloc.allocators.learned.training.validation import (
     DISTANCE_WEIGHT,
+    games_on,
     hold_out,
-    own_games,
     validate,
     validation_boards,
 )
@@ -32,7 +32,7 @@ def network() -> ActorCritic:
 def test_time_is_that_of_the_best_plan_met(network: ActorCritic) -> None:
     """T, distance and cost agree with the evaluator's of every plan along the game, at its cheapest."""
     instance = paper_like(10, 3, 44, 1)
-    curriculum, (board,) = own_games([instance], Curriculum())
+    curriculum, (board,) = games_on([instance], Curriculum())
     got = validate(network, [board], PLANNING, curriculum)
     scale = 0.66 / instance.reach.rows(instance.reach.origin)[0].mean()
     state, costs = begin(board), []
@@ -40,7 +40,7 @@ def test_time_is_that_of_the_best_plan_met(network: ActorCritic) -> None:
         _, slot = choose(board, state, network(board, state))
         state = step(board, state, slot)
         score = evaluate(instance, plan_of(board, state))
-        time = score.served_makespan / curriculum.own[0].hours
+        time = score.served_makespan / curriculum.instances[0].reference_h
         distance = score.distance * scale / instance.n
         unserved = len(score.unserved_tasks)
         costs.append((1 - 1 / time + unserved + DISTANCE_WEIGHT * distance, unserved, time, distance))
@@ -59,7 +59,7 @@ def test_a_bad_game_does_not_decide(network: ActorCritic) -> None:
 def test_unserved_tasks_are_their_part_of_the_cost(network: ActorCritic) -> None:
     """What nobody can serve is told, as a mean over boards as the cost is; the rest of the cost is small."""
     served, unserved = paper_like(10, 3, 44, 1), Instance(ability=[1], workload=[1, 1, 1], allowed_tasks=[[]])
-    curriculum, boards = own_games([served, unserved], Curriculum())
+    curriculum, boards = games_on([served, unserved], Curriculum())
     got = validate(network, boards, PLANNING, curriculum)
     assert got.unserved == 1.5
     assert 0 <= got.cost - got.unserved < 1
@@ -73,11 +73,11 @@ def test_a_fifth_of_own_instances_is_held_out() -> None:
     assert sorted([*train, *held], key=instances.index) == instances
     assert held != instances[-2:]
     assert hold_out(instances) == (train, held)
-    curriculum, boards = own_games(instances, Curriculum())
-    assert [one.instance for one in curriculum.own] == train
+    curriculum, boards = games_on(instances, Curriculum())
+    assert [one.instance for one in curriculum.instances] == train
     assert [board.shape[0] for board in boards] == [2]
-    few, (board,) = own_games(instances[:3], Curriculum())
-    assert len(few.own) == board.shape[0] == 3
+    few, (board,) = games_on(instances[:3], Curriculum())
+    assert len(few.instances) == board.shape[0] == 3
 
 
 def test_instances_without_work_judge_nobody(network: ActorCritic) -> None:
@@ -87,7 +87,7 @@ def test_instances_without_work_judge_nobody(network: ActorCritic) -> None:
     train, held = hold_out([idle, *busy, idle, idle, idle])
     assert (len(train), len(held)) == (5, 1)
     assert idle not in train + held
-    curriculum, boards = own_games([*busy, *[idle] * 4], Curriculum())
+    curriculum, boards = games_on([*busy, *[idle] * 4], Curriculum())
     assert validate(network, boards, PLANNING, curriculum).cost > 0
     with pytest.raises(InputError, match="no work to do in any instance"):
         hold_out([idle, idle])

@@ -17,8 +17,7 @@ from alloc.allocators.learned.algorithms.dqn import Dqn
 from alloc.allocators.learned.algorithms.ppo import Ppo
 from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize
 from alloc.allocators.learned.search.fine_tuning import FineTuning, FineTuningParameters
-from alloc.allocators.parallel.engine import SerialEngine
-from alloc.allocators.parallel.torch_state import torch_threads
+from alloc.allocators.runtime.torch_state import plain_torch, torch_threads
 from alloc.problems.generate import paper_like
 
 pytestmark = pytest.mark.timeout(400)  # the first game waits for the compiler, long on a busy machine
@@ -134,14 +133,10 @@ def test_first_weights_are_torchs_own(learner: Callable[..., Ppo]) -> None:
     assert all(torch.equal(made[name], expected[name]) for name in expected)
 
 
-def learned(seed: int) -> dict[str, torch.Tensor]:
-    return dict(Ppo(NetworkSize(8, 8, 2), seed=seed).policy.state_dict())
-
-
-def test_training_works_in_the_callers_torch() -> None:
-    """An engine gives its work gradients and the CPU."""
-    with torch.inference_mode(), torch.device("meta"):
-        (weights,) = SerialEngine().map(learned, [3]) or []
+def test_tensors_made_within_are_plain() -> None:
+    """What is made in `plain_torch` can be trained and is on the CPU, whatever the caller has set."""
+    with torch.inference_mode(), torch.device("meta"), plain_torch():
+        weights = Ppo(NetworkSize(8, 8, 2), seed=3).policy.state_dict()
     assert all(not weight.is_inference() and weight.device.type == "cpu" for weight in weights.values())
 
 

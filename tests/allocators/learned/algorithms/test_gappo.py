@@ -9,30 +9,33 @@ import pytest
 import torch
 from deap import tools
 
-from alloc.allocators.learned.algorithms.gappo import BreedingParameters, Member, _drawing_from, _Genome, breed, fitness
-from alloc.allocators.learned.algorithms.ppo import Ppo, PpoParameters
+from alloc.allocators.learned.algorithms.gappo import _Genome, _with_generator, breed, fitness
+from alloc.allocators.learned.algorithms.hyperparameters import BreedingParameters, PpoParameters
+from alloc.allocators.learned.algorithms.learner import StateDict
+from alloc.allocators.learned.algorithms.ppo import Ppo
 from alloc.allocators.learned.network.actor_critic import NetworkSize
 
 SMALL = NetworkSize(pair_width=4, task_width=4, heads=1)
 
 
-def members(count: int) -> list[Member]:
-    """States of learners with different weights and step sizes."""
+def members(count: int) -> list[StateDict]:
+    """States of learners with different weights and learning rates."""
     return [
-        Ppo(SMALL, PpoParameters(learning_rate=1e-3 * (number + 1)), seed=number).state() for number in range(count)
+        Ppo(SMALL, PpoParameters(learning_rate=1e-3 * (number + 1)), seed=number).state_dict()
+        for number in range(count)
     ]
 
 
-def weights(member: Member) -> torch.Tensor:
+def weights(member: StateDict) -> torch.Tensor:
     return torch.cat([weight.flatten() for weight in member["network"].values()])
 
 
-def rate(member: Member) -> float:
+def rate(member: StateDict) -> float:
     return float(member["optimiser"]["param_groups"][0]["lr"])
 
 
 def test_fitness_by_hand() -> None:
-    """(12): each term over the largest of the population; the cost counts against."""
+    """(12): each term relative to the largest of the population; the cost is subtracted."""
     parameters = BreedingParameters(return_weight=1.0, entropy_weight=0.5, cost_weight=0.25)
     got = fitness([2.0, 4.0], [1.0, 0.5], [100, 50], parameters)
     assert got == pytest.approx([0.5 + 0.5 - 0.25, 1.0 + 0.25 - 0.125])
@@ -68,7 +71,7 @@ def test_children_without_mutation_lie_between_their_parents() -> None:
 
 
 def test_mutation_changes_some_weights_and_the_step_size_a_little() -> None:
-    """About a tenth of the weights are disturbed, the learning rate by a quarter; the parent keeps its own."""
+    """About a tenth of the weights change, the learning rate by a quarter; the parent keeps its own."""
     before = members(2)
     kept = [weights(member).clone() for member in before]
     rates = [rate(member) for member in before]
@@ -81,20 +84,20 @@ def test_mutation_changes_some_weights_and_the_step_size_a_little() -> None:
     assert [rate(member) for member in before] == rates
 
 
-def test_children_are_states_that_a_learner_takes_up() -> None:
-    """A child has its parent's optimiser and weights of its own, and no memory in common with the parent."""
+def test_children_are_states_that_a_learner_loads() -> None:
+    """A child has its parent's optimiser and weights of its own, and shares no storage with the parent."""
     before = members(2)
     child = breed(before, [1.0, 0.0], BreedingParameters(elite=1, mutation_probability=1.0), seed=0)[1]
     learner = Ppo(SMALL)
-    learner.load(child)
-    assert torch.equal(weights(learner.state()), weights(child))
+    learner.load_state_dict(child)
+    assert torch.equal(weights(learner.state_dict()), weights(child))
     assert learner.learning_rate == rate(child)
     held = {weight.untyped_storage().data_ptr() for member in before for weight in member["network"].values()}
     assert not held & {weight.untyped_storage().data_ptr() for weight in child["network"].values()}
 
 
 def test_breeding_is_seeded_and_leaves_the_global_generator_alone() -> None:
-    """The same seed breeds the same children, and Python's own generator goes on as if nothing had happened."""
+    """The same seed breeds the same children, and Python's global generator is not drawn from."""
     random.seed(42)
     expected = random.Random(42).random()
     one = breed(members(4), [1.0, 2.0, 3.0, 4.0], BreedingParameters(), seed=7)
@@ -104,7 +107,7 @@ def test_breeding_is_seeded_and_leaves_the_global_generator_alone() -> None:
 
 
 def test_operators_draw_as_deaps_do_but_from_their_own_generator(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Given the same seed, the outcome is that of DEAP's own; the generator that all threads share is not asked."""
+    """With the same seed the outcome is that of DEAP's own operators, without the global generator."""
     parents = [_Genome([float(number), -1.0, 2.5], number, float(number % 3)) for number in range(5)]
 
     def bred(select: Callable[..., Any], mate: Callable[..., Any], mutate: Callable[..., Any]) -> list[list[float]]:
@@ -117,4 +120,4 @@ def test_operators_draw_as_deaps_do_but_from_their_own_generator(monkeypatch: py
     for name in ("random", "choice", "gauss"):
         monkeypatch.setattr(random, name, None)
     rng = random.Random(7)
-    assert bred(*(_drawing_from(rng, operator) for operator in operators)) == expected
+    assert bred(*(_with_generator(rng, operator) for operator in operators)) == expected

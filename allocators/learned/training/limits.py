@@ -1,0 +1,55 @@
+"""Limits of a training run: when it ends, and how much of it is done."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from alloc.allocators.learned.training.report import Report, best_generation
+
+
+@dataclass(frozen=True)
+class Limits:
+    """When a training run ends: at the first limit that is reached. All count from the beginning of the run.
+
+    Attributes
+    ----------
+    steps : int or None
+        Decisions of agents, of all members together.
+    iterations : int or None
+        Generations.
+    minutes : float or None
+        Training time.
+    patience : int or None
+        Consecutive generations without better networks.
+    """
+
+    steps: int | None = None
+    iterations: int | None = None
+    minutes: float | None = None
+    patience: int | None = None
+
+    def progress(self, history: Sequence[Report]) -> float:
+        """Return the share of the training that is done, 0 to 1: of the steps, else the generations, else the time."""
+        decisions, seconds = _spent(history)
+        for limit, done in (
+            (self.steps, decisions),
+            (self.iterations, len(history)),
+            (self.minutes and 60 * self.minutes, seconds),
+        ):
+            if limit is not None:
+                return min(1.0, done / limit) if limit > 0 else 1.0
+        return 0.0
+
+    def reached(self, history: Sequence[Report]) -> bool:
+        """Whether a limit is reached."""
+        decisions, seconds = _spent(history)
+        return (
+            (self.steps is not None and decisions >= self.steps)
+            or (self.iterations is not None and len(history) >= self.iterations)
+            or (self.minutes is not None and seconds >= 60 * self.minutes)
+            or (self.patience is not None and len(history) - best_generation(history) >= max(1, self.patience))
+        )
+
+
+def _spent(history: Sequence[Report]) -> tuple[int, float]:
+    """Return the decisions and the seconds of a run up to now."""
+    return (history[-1].decisions, history[-1].seconds) if history else (0, 0.0)

@@ -1,0 +1,54 @@
+"""The training loop: generation after generation, with all files written after each."""
+
+from collections.abc import Callable
+
+from alloc.allocators.learned.training.limits import Limits
+from alloc.allocators.learned.training.log import TrainingLog
+from alloc.allocators.learned.training.report import Report
+from alloc.allocators.learned.training.run_files import RunFiles
+from alloc.allocators.learned.training.trainer import Trainer
+from alloc.allocators.parallel.engine import Engine, never_stop
+
+
+def run_training(
+    trainer: Trainer,
+    files: RunFiles,
+    limits: Limits,
+    *,
+    engine: Engine | None = None,
+    should_stop: Callable[[], bool] = never_stop,
+    on_report: Callable[[Report], None] = lambda report: None,
+) -> None:
+    """Train until a limit is reached, with checkpoint, policy and log written after every generation.
+
+    The checkpoint is written first and contains what the other files say: a run that is killed between two of them
+    repairs the others when it is resumed.
+
+    Parameters
+    ----------
+    trainer : Trainer
+    files : RunFiles
+        The policy file gets the networks of all members of the best generation, the best first.
+    limits : Limits
+    engine : Engine, optional
+        Where the members are trained; one after the other in this process by default.
+    should_stop : callable
+        As for `Engine.map`; an unfinished generation is dropped.
+    on_report : callable
+        Called with every `Report`.
+    """
+    trainer.save(files.checkpoint)
+    if trainer.best:
+        trainer.write_policy(files.policy)
+    with TrainingLog(Report, files.log, files.tensorboard, trainer.history) as lines:
+        while not trainer.is_over(limits) and not should_stop():
+            report = trainer.advance(limits, engine, should_stop)
+            if report is None:
+                return
+            try:
+                trainer.save(files.checkpoint)
+            finally:  # the disk may have room for one of the two
+                if report.generation == trainer.best_generation:
+                    trainer.write_policy(files.policy)
+            lines.append(report)
+            on_report(report)
