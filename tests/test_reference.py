@@ -40,8 +40,9 @@ def test_no_public_name_is_missing(module: ModuleType) -> None:
 
 def test_sections_of_docstrings_become_lists(script: ModuleType) -> None:
     """Parameters are items with their types, exceptions with their reasons, and plain sections stay text."""
-    docstring = "Do it.\n\nParameters\n----------\nx, y : int\n    How often,\n    at most.\n\nRaises\n------\nInputError\n    If not.\n"
-    assert script.markdown(docstring) == [
+    parameters = "Parameters\n----------\nx, y : int\n    How often,\n    at most.\n"
+    raises = "Raises\n------\nInputError\n    If not.\n"
+    assert script.markdown(f"Do it.\n\n{parameters}\n{raises}") == [
         "Do it.",
         "",
         "**Parameters**",

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 from ortools.sat.python import cp_model
 
+from alloc.allocators.contract.built_in import BUILT_IN
 from alloc.allocators.exact.demand import Demand
 from alloc.allocators.exact.monitor import SolverMonitor
 from alloc.allocators.exact.solver_model import Answer, SolverModel, Verdict
 from alloc.allocators.exact.stages import ExactAllocator
-from alloc.allocators.registry import BUILT_IN
 from alloc.problems.instance import IntArray
 
 NEED_STEPS = 2**40

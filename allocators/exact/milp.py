@@ -11,11 +11,11 @@ import highspy
 import numpy as np
 from scipy.sparse import csc_array, csr_array, diags_array
 
+from alloc.allocators.contract.built_in import BUILT_IN
 from alloc.allocators.exact.demand import Demand
 from alloc.allocators.exact.monitor import SolverMonitor
 from alloc.allocators.exact.solver_model import Answer, SolverModel, Verdict
 from alloc.allocators.exact.stages import ExactAllocator
-from alloc.allocators.registry import BUILT_IN
 from alloc.problems.bounds import scale_to_one
 from alloc.problems.instance import FloatArray, IntArray
 

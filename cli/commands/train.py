@@ -2,7 +2,7 @@
 
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
@@ -12,10 +12,9 @@ import typer
 
 from alloc.cli.commands import train_options as options
 from alloc.cli.commands.train_options import Engine, Reward, Turn
-from alloc.cli.commands.training import check_training_files, learner_parameters, note_held_out, read_instances
-from alloc.cli.options import SeedOption, examples
-from alloc.cli.output.console import complain, note, say
-from alloc.problems import TrainingError
+from alloc.cli.options import SeedOption, assignments, examples
+from alloc.cli.output.console import STANDARD, complain, note, say
+from alloc.cli.output.files import check_output, check_outputs, read_instances
 from alloc.problems.text import counted, number
 
 if TYPE_CHECKING:
@@ -67,110 +66,126 @@ def train_command(
     threads: options.TorchThreadsOption = 1,
 ) -> None:
     """Train a learned method, with a checkpoint after each generation."""
-    from alloc.allocators.learned.training.run import train
+    state, lines = _files(output, checkpoint, log, init)
+    from alloc.allocators import TrainingError, train
     from alloc.allocators.parallel.engines import check_engine, make_engine
 
-    # what needs neither torch nor a cluster is checked first
-    hyperparameters = learner_parameters(method, family or ["mixed"], settings or [], population)
     check_engine(engine.value, workers, address)
     problems = None if instances is None else read_instances(instances)
-    check_training_files(output, checkpoint, log, tensorboard, init, resume=resume)
-    run = _Progress(checkpoint or str(Path(output).with_suffix(".checkpoint")), problems)
-    with make_engine(engine.value, workers, address, threads) as where, _interrupts(run):
-        train(
-            method,
-            output,
-            steps=steps,
-            minutes=minutes,
-            iterations=iterations,
-            patience=patience,
-            families=family or ["mixed"],
-            instances=problems,
-            init=init,
-            population=population,
-            decisions=lesson or generation_steps,
-            parameters=hyperparameters,
-            turn=turn.value,
-            reward=reward.value,
-            seed=seed,
-            resume=resume,
-            checkpoint=checkpoint,
-            log=log,
-            tensorboard=tensorboard,
-            engine=where,
-            on_start=run.begin,
-            on_report=run.report,
-        )
-    _close(run, output)
+    progress = Progress(problems or [])
+    try:
+        with make_engine(engine.value, workers, address, threads) as where, _interrupts():
+            train(
+                method,
+                output,
+                steps=steps,
+                minutes=minutes,
+                iterations=iterations,
+                patience=patience,
+                families=family or ["mixed"],
+                instances=problems,
+                init=init,
+                population=population,
+                decisions=lesson or generation_steps,
+                parameters=assignments(settings),
+                turn=turn.value,
+                reward=reward.value,
+                seed=seed,
+                resume=resume,
+                checkpoint=state,
+                log=lines,
+                tensorboard=tensorboard,
+                engine=where,
+                on_start=progress.start,
+                on_report=progress.tell,
+            )
+    except KeyboardInterrupt:
+        note(f"interrupted; {state} holds {counted(progress.generations, 'generation')}")
+    except TrainingError as error:
+        complain(str(error))
+        raise typer.Exit(1) from None
+    progress.close(output)
 
 
-class _Progress:
-    """What a training has reached, and a line for each generation."""
+def _files(output: str, checkpoint: str | None, log: str | None, init: str | None) -> tuple[str, str]:
+    """Return the names of checkpoint and log; each file can be written, and none is named twice."""
+    check_output(output)
+    state = checkpoint or str(Path(output).with_suffix(".checkpoint"))
+    lines = log or str(Path(output).with_suffix(".csv"))
+    check_outputs(("--output", output), ("--checkpoint", state), ("--log", lines), read=[("--init", init)])
+    if STANDARD in (output, state, lines):
+        raise typer.BadParameter("policy, checkpoint and log must be files", param_hint="'--output'")
+    return state, lines
 
-    def __init__(self, checkpoint: str, instances: "list[Instance] | None") -> None:
-        self.checkpoint, self._instances = checkpoint, instances
-        self.trainer: Trainer | None = None
+
+class Progress:
+    """Prints a line for each generation of a training.
+
+    Parameters
+    ----------
+    instances : sequence of Instance
+        Those that it trains on; none if they are generated.
+    """
+
+    def __init__(self, instances: "Sequence[Instance]") -> None:
+        self._instances = instances
+        self._trainer: Trainer | None = None
         self._limits: Limits | None = None
 
     @property
-    def stored(self) -> str:
-        """How many generations the checkpoint holds."""
-        return f"{self.checkpoint} holds {counted(self.trainer.generation if self.trainer else 0, 'generation')}"
+    def generations(self) -> int:
+        """Number of complete generations."""
+        return 0 if self._trainer is None else self._trainer.generation
 
-    def begin(self, trainer: "Trainer", limits: "Limits") -> None:
-        """Take note of a run before its first generation."""
-        self.trainer, self._limits = trainer, limits
-        if self._instances is not None:
-            note_held_out(self._instances)
+    def start(self, trainer: "Trainer", limits: "Limits") -> None:
+        """Note which instances are held out; a callback for `on_start`."""
+        self._trainer, self._limits = trainer, limits
+        if self._instances:
+            from alloc.allocators.learned.training.validation import split_notes
 
-    def report(self, report: "Report") -> None:
-        """Print the line of a generation."""
-        assert self.trainer is not None
+            for line in split_notes(self._instances):
+                note(line)
+
+    def tell(self, report: "Report") -> None:
+        """Print the figures of a generation; a callback for `on_report`."""
+        assert self._trainer is not None
         assert self._limits is not None
-        _tell(report, self.trainer, self._limits)
+        done = self._trainer.progress(self._limits)
+        left = report.seconds * (1 - done) / done / 60 if done > 0 else float("inf")
+        say(
+            f"gen {report.generation}  {report.decisions:,} decisions  {number(report.decisions_per_second, 3)}/s"
+            f"  T {report.time:.4f}  distance {report.distance:.4f}  others {report.others_time:.4f}"
+            f"  unserved {number(report.unserved, 3)}"
+            f"  cost {report.cost:.4f} (best {report.best_cost:.4f}, gen {self._trainer.best_generation})"
+            f"  reward {number(report.reward, 3)}  entropy {number(report.entropy, 3)}"
+            f"  KL {number(report.divergence, 2)}  rate {number(report.learning_rate, 2)}"
+            f"  {report.seconds / 60:.1f} min, {left:.1f} left"
+        )
 
-
-def _close(run: _Progress, policy: str) -> None:
-    trainer = run.trainer
-    if trainer is None or trainer.generation == 0:
-        note(f"no generation is complete, and {policy} is not written")
-        raise typer.Exit(1)
-    best = trainer.history[trainer.best_generation - 1]
-    say(
-        f"{policy} holds the networks of generation {best.generation}: T {best.time:.4f}, distance {best.distance:.4f}"
-        f", {number(best.unserved, 3)} tasks unserved"
-    )
+    def close(self, policy: str) -> None:
+        """Say which networks the policy file holds, with exit code 1 if there are none."""
+        if self._trainer is None or self._trainer.generation == 0:
+            note(f"no generation is complete, and {policy} is not written")
+            raise typer.Exit(1)
+        best = self._trainer.history[self._trainer.best_generation - 1]
+        say(
+            f"{policy} holds the networks of generation {best.generation}: T {best.time:.4f},"
+            f" distance {best.distance:.4f}, {number(best.unserved, 3)} tasks unserved"
+        )
 
 
 @contextmanager
-def _interrupts(run: _Progress) -> Iterator[None]:
-    """End a training by Ctrl-C or SIGTERM, and say what is stored: files are complete at any moment."""
+def _interrupts() -> Iterator[None]:
+    """Treat SIGTERM as Ctrl-C: files are complete at any moment, so neither has to wait."""
 
     def interrupt(_number: int, _frame: FrameType | None) -> None:
         raise KeyboardInterrupt
 
-    main = threading.current_thread() is threading.main_thread()
-    before = signal.signal(signal.SIGTERM, interrupt) if main else None
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, interrupt)
     try:
         yield
-    except KeyboardInterrupt:
-        note(f"interrupted; {run.stored}")
-    except TrainingError as error:
-        complain(f"{error.__cause__ or error}; {run.stored}, and --resume continues from there")
-        raise typer.Exit(1) from None
     finally:
-        if main:
-            signal.signal(signal.SIGTERM, before)
-
-
-def _tell(report: "Report", trainer: "Trainer", limits: "Limits") -> None:
-    progress = trainer.progress(limits)
-    left = report.seconds * (1 - progress) / progress / 60 if progress > 0 else float("inf")
-    say(
-        f"gen {report.generation}  {report.decisions:,} decisions  {number(report.decisions_per_second, 3)}/s"
-        f"  T {report.time:.4f}  distance {report.distance:.4f}  others {report.others_time:.4f}"
-        f"  unserved {number(report.unserved, 3)}"
-        f"  cost {report.cost:.4f} (best {report.best_cost:.4f}, gen {trainer.best_generation})"
-        f"  reward {number(report.reward, 3)}  entropy {number(report.entropy, 3)}  KL {number(report.divergence, 2)}"
-        f"  rate {number(report.learning_rate, 2)}  {report.seconds / 60:.1f} min, {left:.1f} left"
-    )
+        signal.signal(signal.SIGTERM, before)

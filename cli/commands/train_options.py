@@ -24,7 +24,7 @@ class Reward(StrEnum):
 
 
 class Engine(StrEnum):
-    """As `alloc.allocators.parallel.engine.ENGINES`, without numpy."""
+    """As `alloc.allocators.parallel.engines.ENGINES`, without numpy."""
 
     SERIAL = "serial"
     PROCESSES = "processes"

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from alloc.cli.commands.training import learner_parameters, training_parameters
+from alloc.cli.commands.train_options import MethodArgument
 from alloc.cli.options import examples
 from alloc.cli.output.console import note, say
 from alloc.cli.output.files import check_output
@@ -28,7 +28,7 @@ def register(app: typer.Typer) -> None:
 
 
 def tune_command(
-    method: Annotated[str, typer.Argument(metavar="METHOD", help="What to tune: gappo, ppo, a2c, dqn or ddpg.")],
+    method: MethodArgument,
     study: Annotated[str, typer.Option(metavar="FILE", help="SQLite file of the study; an existing one is continued.")],
     trials: Annotated[int, typer.Option(min=1, help="Trainings, including those in the file.")] = 40,
     steps: Annotated[int, typer.Option(min=1, help="Decisions of agents in each.")] = 100_000,
@@ -40,17 +40,27 @@ def tune_command(
 ) -> None:
     """Tune the hyperparameters of a learned method on validation games."""
     check_output(study)
-    families = family or ["mixed"]
-    learner = learner_parameters(method, families)
-    parameters = training_parameters(
-        method, learner, families=families, generation_steps=max(1, min(20_000, steps // 5))
-    )
+    from alloc.allocators.learned.algorithms.registry import method_parameters
+    from alloc.allocators.learned.training.families import check_families
+
+    learner, families = method_parameters(method), tuple(family or ["mixed"])
+    check_families(families)
     import torch
 
     torch.set_num_threads(1)
+    from alloc.allocators.learned.training.curriculum import Curriculum
     from alloc.allocators.learned.training.limits import Limits
+    from alloc.allocators.learned.training.parameters import TrainingParameters
+    from alloc.allocators.learned.training.run import DEFAULT_POPULATION
     from alloc.allocators.learned.training.tune import open_study, tune
 
+    parameters = TrainingParameters(
+        method=method,
+        population=DEFAULT_POPULATION if method == "gappo" else 1,
+        decisions=max(1, min(20_000, steps // 5)),
+        learner=learner,
+        curriculum=Curriculum(families),
+    )
     opened = open_study(Path(study), method, seed)
     try:
         tune(opened, parameters, trials, Limits(steps=steps), seed=seed, on_trial=_tell)

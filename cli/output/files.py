@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from alloc.cli.output.console import STANDARD, note, say, write_out
@@ -29,6 +30,20 @@ def read_pair(
     if warning is not None and not quiet:
         note(warning)
     return problem, answer, claims
+
+
+def read_instances(name: str) -> "list[Instance]":
+    """Read an instance, or all instances in a folder."""
+    from alloc.problems import InputError
+    from alloc.problems.formats import read_instance
+
+    folder = Path(name)
+    if not folder.is_dir() or (folder / "agents.csv").exists():
+        return [read_instance(name)]
+    found = [path for path in sorted(folder.iterdir()) if path.suffix in (".json", ".npz") or path.is_dir()]
+    if not found:
+        raise InputError("holds no instances", source=name)
+    return [read_instance(str(path)) for path in found]
 
 
 def read_known(instance: str, front: str | None, *, quiet: bool = False) -> "tuple[Instance, list[Allocation]]":

@@ -6,6 +6,7 @@ import numpy as np
 
 from alloc.allocators.contract.base import Allocator, Proposal
 from alloc.allocators.contract.budget import Budget
+from alloc.allocators.contract.built_in import BUILT_IN
 from alloc.allocators.contract.parameters import with_settings
 from alloc.allocators.contract.search import Search
 from alloc.allocators.heuristic.decentralised import auction_rounds, game_rounds
@@ -17,7 +18,6 @@ from alloc.allocators.heuristic.decentralised.coalition_game import (
 )
 from alloc.allocators.heuristic.decentralised.communication import communication_graph
 from alloc.allocators.heuristic.decentralised.deadlines import AuctionParameters, DeadlineSeries
-from alloc.allocators.registry import BUILT_IN
 from alloc.problems import Allocation, Instance, Objective
 
 

@@ -4,6 +4,7 @@ from typing import ClassVar
 
 from alloc.allocators.contract.base import Allocator, Proposal
 from alloc.allocators.contract.budget import Budget
+from alloc.allocators.contract.built_in import BUILT_IN
 from alloc.allocators.contract.parameters import with_settings
 from alloc.allocators.contract.search import Search
 from alloc.allocators.heuristic.decentralised.coalition_game import (
@@ -14,7 +15,6 @@ from alloc.allocators.heuristic.decentralised.coalition_game import (
 )
 from alloc.allocators.heuristic.decentralised.communication import communication_graph
 from alloc.allocators.heuristic.decentralised.game_rounds import MESSAGES, ROUNDS
-from alloc.allocators.registry import BUILT_IN
 from alloc.problems import Allocation, Instance, Objective
 
 

@@ -6,12 +6,12 @@ import numpy as np
 
 from alloc.allocators.contract.base import Allocator, Proposal
 from alloc.allocators.contract.budget import Budget
+from alloc.allocators.contract.built_in import BUILT_IN
 from alloc.allocators.contract.parameters import with_settings
 from alloc.allocators.contract.search import Search
 from alloc.allocators.heuristic.genetic.encoding import Encoding
 from alloc.allocators.heuristic.genetic.evolution import Evolution, GeneticParameters
 from alloc.allocators.heuristic.greedy.list_schedule import greedy
-from alloc.allocators.registry import BUILT_IN
 from alloc.problems import Allocation, Instance, Objective, serve_all
 
 TARGETS = (0.0, 0.5, 0.8, 0.95)

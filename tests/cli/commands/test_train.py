@@ -21,14 +21,16 @@ from alloc.allocators.learned.files.policy_file import save_policy
 from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize
 from alloc.allocators.learned.training import trainer as module_of_training
 from alloc.allocators.learned.training.families import FAMILIES
-from alloc.allocators.parallel.engine import ENGINES, EngineError, SerialEngine
+from alloc.allocators.parallel.engine import EngineError
+from alloc.allocators.parallel.engines import ENGINES
+from alloc.allocators.parallel.serial import SerialEngine
 from alloc.cli.commands import train_options
 from alloc.problems import Instance
 from alloc.problems.formats import write_instance
-from alloc.problems.game import Reward, TurnRule
+from alloc.problems.game import Reward, Turn
 from alloc.problems.generate import paper_like
 
-QUICK = ("--instances", "mine", "--generation-steps", "150", "--set", "epochs=1")
+QUICK = ("--instances", "mine", "--generation-steps", "150", "--set", "update_epochs=1")
 
 
 @pytest.fixture
@@ -64,12 +66,12 @@ def weights(path: Path) -> dict[str, torch.Tensor]:
         ("--checkpoint", "nowhere/c"),
         ("--population", "0"),
         ("--family", "mixt"),
-        ("--set", "clip"),
-        ("--set", "clipp=1"),
+        ("--set", "clip_coef"),
+        ("--set", "clip_coeff=1"),
         ("--seed", str(2**63)),
         ("--minutes", "nan"),
         ("--set", "learning_rate=-1"),
-        ("--set", "clip=nan"),
+        ("--set", "clip_coef=nan"),
         ("--instances", "nowhere.json"),
         ("--init", "nowhere.safetensors"),
         ("--workers", "2"),
@@ -100,14 +102,14 @@ def test_tensorboard_that_is_not_installed_is_told_before_training(alloc, monkey
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_interrupted_before_the_first_generation_writes_no_policy(alloc, monkeypatch, mine, number):
-    """A signal ends a training in the midst of a lesson; without a whole generation there is no policy."""
+    """A signal ends a training in the middle of a generation; without a whole generation there is no policy."""
 
-    def take(self, lesson):
+    def train_on(self, job):
         os.kill(os.getpid(), number)
         time.sleep(10)
         raise AssertionError("not interrupted")
 
-    monkeypatch.setattr(Ppo, "take", take)
+    monkeypatch.setattr(Ppo, "train_on", train_on)
     before = signal.getsignal(number)
     ran = alloc("train", "ppo", "--output", "p.safetensors", *QUICK)
     assert ran.code == 1
@@ -127,7 +129,7 @@ def test_an_engine_that_gives_up_is_told_in_one_line(alloc, monkeypatch, mine):
     assert (ran.code, ran.out) == (1, "")
     judges, told = ran.err.splitlines()
     assert judges.startswith("note: ")
-    assert "died 3 times at the same item; p.checkpoint holds 0 generations, and --resume" in told
+    assert "died 3 times at the same item; p.checkpoint holds 0 generations, and resuming" in told
 
 
 def test_a_run_is_not_overwritten_by_mistake(alloc, mine):
@@ -136,7 +138,7 @@ def test_a_run_is_not_overwritten_by_mistake(alloc, mine):
     before = files()
     ran = alloc("train", "ppo", "--output", "p.safetensors", *QUICK)
     assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
-    assert "p.checkpoint: holds a training run; continue with --resume" in ran.err
+    assert "p.checkpoint: holds a training run; resume it" in ran.err
     assert files() == before
     Path("p.safetensors").unlink()  # without the policy the checkpoint alone says it
     assert "p.checkpoint: holds a training run" in alloc("train", "ppo", "--output", "p.safetensors", *QUICK).err
@@ -160,7 +162,7 @@ def test_a_run_without_a_generation_blocks_none(alloc, mine):
     [
         (("gapo",), "did you mean 'gappo'"),
         (("gappo", "--family", "mixt"), "did you mean 'mixed'"),
-        (("gappo", "--set", "clip=-1"), "clip must be"),
+        (("gappo", "--set", "clip_coef=-1"), "clip_coef must be"),
         (("gappo", "--instances", "nowhere.json"), "nowhere.json: there is no such file"),
         (("gappo", "--init", "nowhere"), "nowhere: no such policy file"),
         (("gappo", "--workers", "2"), "belongs to the engine processes"),
@@ -177,13 +179,13 @@ def test_what_is_wrong_in_any_case_comes_first(alloc, more, message):
 @pytest.mark.parametrize(
     ("more", "message"),
     [
-        (("--output", "small.json"), "small.json: exists and is no policy file"),
-        (("--output", "tensors"), "tensors: exists and is no policy file"),
+        (("--output", "small.json"), "small.json: is there already, and no policy file"),
+        (("--output", "tensors"), "tensors: is there already, and no policy file"),
         (("--output", "small.json", "--resume", "--checkpoint", "small.json"), "small.json: is --output and"),
-        (("--output", "policy"), "policy: holds a policy, and there is no checkpoint to continue from"),
+        (("--output", "policy"), "policy: holds a policy, and no checkpoint to resume is beside it"),
         (("--output", "policy", "--init", "policy"), "policy: is --init and --output at once"),
-        (("--output", "new", "--checkpoint", "small.json"), "small.json: exists and is no checkpoint"),
-        (("--output", "new", "--log", "small.json"), "small.json: exists and is no log of a training"),
+        (("--output", "new", "--checkpoint", "small.json"), "small.json: is there already, and no checkpoint"),
+        (("--output", "new", "--log", "small.json"), "small.json: is there already, and no log of a training"),
         (("--output", "new", "--log", "new"), "new: is --output and --log at once"),
         (("--output", "q.pt"), "q.pt: has the suffix '.pt', but policies are safetensors; end it in .safetensors"),
         (("--output", "q.safetensors.gz"), "q.safetensors.gz: has the suffix '.gz', but policies are safetensors"),
@@ -214,8 +216,8 @@ def test_empty_files_hold_nothing(alloc, mine):
     [
         ("gapo",),
         ("gappo", "--family", "mixt"),
-        ("gappo", "--set", "clipp=1"),
-        ("gappo", "--set", "clip=-1"),
+        ("gappo", "--set", "clip_coeff=1"),
+        ("gappo", "--set", "clip_coef=-1"),
         ("gappo", "--resume"),
         ("gappo", "--init", "nowhere"),
         ("gappo", "--init", "small.json"),
@@ -308,14 +310,14 @@ def test_a_policy_is_a_beginning(alloc, mine):
 def test_what_judges_the_networks_is_named(alloc, mine):
     """Some of one's own instances are held out, and named; those with nothing to do count for nothing."""
     ran = alloc("train", "ppo", "--output", "p", *QUICK, "--iterations", "1")
-    assert "note: validation is on the instances of the training" in ran.err
+    assert "note: the networks are judged on the instances that they learn from" in ran.err
     for seed in range(2, 6):
         write_instance(paper_like(8, 2, 35, seed), mine / f"{seed}.json")
     for name in ("x", "y"):
         write_instance(Instance(name=name, ability=[1], workload=[0]), mine / f"{name}.json")
     ran = alloc("train", "ppo", "--output", "q", *QUICK, "--iterations", "1")
     assert "note: 2 of 8 instances left out: there is no work to do\n" in ran.err
-    assert "note: 1 of 8 instances held out for validation: paper-like-" in ran.err
+    assert "note: 1 of 8 instances held out to judge the networks: paper-like-" in ran.err
 
 
 def test_the_game_of_the_paper_can_be_trained_on(alloc, mine):
@@ -328,7 +330,7 @@ def test_the_game_of_the_paper_can_be_trained_on(alloc, mine):
 
 def test_options_are_those_of_the_library():
     """The command line, which must not wait for torch, names the same turns, rewards, engines and families."""
-    assert set(train_options.Turn) == set(TurnRule)
+    assert set(train_options.Turn) == set(Turn)
     assert set(train_options.Reward) == set(Reward)
     assert {engine.value for engine in train_options.Engine} == set(ENGINES)
     for name in FAMILIES:
