@@ -1,9 +1,9 @@
-"""What `auto` picks, and why.
+"""The method that `auto` picks, and why.
 
-The thresholds were measured on two cores. Exact methods search as well as they prove, and on the makespan they are
-worth trying as long as the solver's model can be built at all, 60,000 pairs a second. On the energy they prove 1 %, or
-nearly so, up to about 1,000 pairs for each second, and up to 5,000 they still come as low as the local search, with a
-far better bound. Beyond, the local search finds better allocations in the same time.
+The thresholds were measured on two cores. For the makespan, exact methods find good plans as long as the solver's model
+can be built at all, 60,000 pairs a second. For the energy they reach a gap of about 1 % up to about 1,000 pairs per
+second of the time limit; up to 5,000 their plans are as good as those of the local search, with a far better bound.
+Beyond that, the local search finds better allocations in the same time.
 """
 
 from alloc.allocators.contract.budget import Budget

@@ -14,7 +14,7 @@ from alloc.allocators.result import Result
 from alloc.problems import Instance, Objective, contested_tasks
 
 MOST_NAMES = 10
-"""Ids of contested tasks in a note before it is cut."""
+"""Ids of competing tasks in a note before it is cut."""
 
 
 def conclude(

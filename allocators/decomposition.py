@@ -1,4 +1,4 @@
-"""Runs on instances in which not every task can be served, decomposed into the contested tasks and the rest."""
+"""Runs on instances in which not every task can be served, decomposed into the competing tasks and the rest."""
 
 import sys
 
@@ -11,15 +11,16 @@ from alloc.problems import Allocation, Objective, Shortage, only_allowed
 class Decomposition:
     """A run on an instance in which not every task can be served.
 
-    The contested tasks are allocated by matching: at the least makespan beforehand, and again at the end, at the least
-    energy in the time that the rest takes. The method allocates the rest, where every task can be served.
+    The competing tasks, which too few agents can do, are allocated by matching: at the least makespan beforehand, and
+    again at the end, at the least energy in the time that the rest takes. The method allocates the rest, where every
+    task can be served.
 
     Parameters
     ----------
     whole : Search
         The run on the whole instance; it gets every allocation, the start of the request first of all.
     shortage : Shortage
-        The contested tasks and the rest.
+        The competing tasks and the rest.
     request : Request
 
     Attributes
@@ -46,7 +47,7 @@ class Decomposition:
             seed=request.seed,
             start=None if start is None else shortage.part_of(start),
             threads=request.threads,
-            # the rest need not be faster than the contested tasks
+            # the rest need not be faster than the competing tasks
             tolerance=MakespanTolerance(tolerance.slack, self._hours),
             on_improvement=lambda found: self._submit(found.allocation),
             stop=request.stop,
@@ -57,7 +58,7 @@ class Decomposition:
         self._whole.submit(self._shortage.merged(rest))
 
     def conclude(self) -> None:
-        """Submit the best of the rest together with the cheapest allocation of the contested tasks that is as fast."""
+        """Submit the best of the rest together with the cheapest allocation of the competing tasks that is as fast."""
         if self.rest is not None and self.rest.best is not None:
             self._whole.submit(self._merged(self.rest.best.allocation, self.rest.makespan_limit))
 

@@ -1,4 +1,4 @@
-"""What holds the makespan up: the last task, and what one more agent there would gain."""
+"""The bottleneck of an allocation: the last task, and what one more agent there would gain."""
 
 import sys
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from alloc.problems.instance import FloatArray, IntArray
 
 @dataclass(frozen=True)
 class Gain:
-    """What one more agent on the last task would change.
+    """The makespan with one more agent on the last task.
 
     Attributes
     ----------
@@ -28,27 +28,27 @@ class Gain:
 
 @dataclass(frozen=True)
 class Bottleneck:
-    """The last task of an allocation that serves all tasks.
+    """The last task of an allocation that serves all tasks, and what would make it sooner.
 
     Attributes
     ----------
     last : tuple of int
-        The tasks that are done at the makespan, within 1e-9 relative; more than one if they are last together.
+        The tasks that are done at the makespan, within 1e-9 relative; several if they are last together.
     makespan : float
         In hours.
     agents : tuple of int
-        The agents on the first of `last`.
+        The agents on the first task of `last`.
     next_task : int or None
         The latest of the other tasks; None if there is none with workload.
     next_time : float
         When that one is done, in hours; 0 if there is none.
     use : float
-        Share of all ability, from hour 0 to the makespan, that does work; the rest is idle, done early, or travels.
+        Share of all ability, from hour 0 to the makespan, that is at work; the rest is idle, done early, or travels.
     enough : Gain or None
-        The least ability of one more agent on the last task with which `next_task` is the last one: beyond it, more
-        ability there gains nothing. None if several tasks are last together, or there is no next one.
+        With the least ability of one more agent there for which `next_task` is the last one; more ability gains
+        nothing. None if several tasks are last together, or there is no next one.
     typical : Gain or None
-        The same with the median ability of the agents there are; None if several tasks are last together.
+        With one more agent of the median ability of all agents; None if several tasks are last together.
     """
 
     last: tuple[int, ...]
@@ -62,14 +62,25 @@ class Bottleneck:
 
 
 def explain(instance: Instance, allocation: Allocation) -> Bottleneck | None:
-    """Say which task holds the makespan up, and what one more agent there would gain.
+    """Return the bottleneck of an allocation: its last task, and what one more agent there would gain.
 
-    The further agent is on the task from hour 0 on, however fast the others are, and everything else stays as it is.
+    The additional agent is on the task from hour 0 on, whatever the speeds of the others; all other agents stay where
+    they are.
+
+    Parameters
+    ----------
+    instance : Instance
+    allocation : Allocation
 
     Returns
     -------
     Bottleneck or None
-        None while a task is unserved, and if there is no work at all.
+        None if a task is unserved, or there is no work at all.
+
+    Raises
+    ------
+    InputError
+        If the allocation does not belong to the instance.
     """
     evaluation = evaluate(instance, allocation)
     makespan = evaluation.makespan
@@ -103,7 +114,10 @@ def makespan_with_agent(instance: Instance, found: Evaluation, agents: IntArray,
     found : Evaluation
         Scores without that agent.
     agents : ndarray of int, shape (k,)
-        Who is on `task` already, and can take it.
+        The agents that are on `task` already, and can do it.
+    task : int
+    ability : float
+        Work per hour of the additional agent.
     """
     abilities = np.append(instance.ability[agents], ability)
     time = found.completion_time.copy()
@@ -112,19 +126,19 @@ def makespan_with_agent(instance: Instance, found: Evaluation, agents: IntArray,
 
 
 def _arrival(instance: Instance, agents: IntArray, task: int) -> FloatArray:
-    """Hour at which each agent is at `task`."""
+    """Return the hour at which each agent arrives at `task`."""
     with np.errstate(over="ignore"):
         return instance.reach.distance_of(agents, np.full(len(agents), task)) / instance.speed[agents]
 
 
 def _working(instance: Instance, allocation: Allocation, task: int) -> IntArray:
-    """Who is on `task`, and can take it."""
+    """Return the agents that are on `task` and can do it."""
     there = np.flatnonzero(allocation.task_of_agent == task)
     return there[instance.reach.allows(there, np.full(len(there), task))]
 
 
 def _enough(instance: Instance, found: Evaluation, agents: IntArray, task: int, next_time: float) -> Gain:
-    """What the group leaves undone at `next_time`, over `next_time`."""
+    """Return the gain with the ability for what the group leaves undone at `next_time`."""
     hours = np.maximum(0.0, next_time - _arrival(instance, agents, task))
     left = instance.workload[task] - float((instance.ability[agents] * hours).sum())
     return _gain(instance, found, agents, task, left / next_time)

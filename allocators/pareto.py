@@ -132,8 +132,9 @@ def pareto(
     handle_signals = flag(handle_signals, "handle_signals")
     if isinstance(method, str) and method != "auto":
         method, parameters, settings = load(method, parameters, **settings), None, {}
+    run: Callable[..., Result] = solve
     run = partial(
-        solve,
+        run,
         instance,
         method,
         objective=Objective.MAKESPAN_ENERGY,

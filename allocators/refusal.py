@@ -2,8 +2,8 @@
 
 from alloc.allocators.contract.base import Allocator
 from alloc.allocators.contract.budget import Budget
+from alloc.allocators.contract.built_in import BUILT_IN
 from alloc.allocators.contract.tolerance import EXACT, MakespanTolerance
-from alloc.allocators.registry import BUILT_IN
 from alloc.problems import Instance, Objective, RefusedError
 
 

@@ -161,7 +161,7 @@ class Result:
         }
 
     @classmethod
-    def from_dict(cls, document: Mapping[str, Any], instance: Instance) -> "Result":
+    def from_dict(cls, document: Mapping[str, object], instance: Instance) -> "Result":
         """Return the result that `to_dict` turned into `document`.
 
         Notes, the lower bounds in the trace, and the slack of the makespan are not in the document.

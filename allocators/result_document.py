@@ -3,14 +3,14 @@
 import json
 import math
 from collections.abc import Mapping
-from typing import Any, TypedDict
+from typing import TypedDict
 
 from alloc.allocators.contract.budget import StopReason
 from alloc.allocators.contract.improvement import TracePoint
 from alloc.allocators.contract.status import Status
 from alloc.allocators.contract.tolerance import EXACT, MakespanTolerance
 from alloc.problems import Allocation, Evaluation, InputError, Instance, Objective, evaluate
-from alloc.problems.arguments import choice, listed, of_type, real, shown, text, whole
+from alloc.problems.arguments import choice, of_type, real, shown, text, whole
 from alloc.problems.evaluation import RELATIVE_TOLERANCE
 from alloc.problems.formats import json_text, read_text
 from alloc.problems.formats.allocation_file import RESULT_FORMAT
@@ -42,7 +42,7 @@ class ResultFields(TypedDict):
     tolerance: MakespanTolerance
 
 
-def read_document(path: PathLike) -> dict[str, Any]:
+def read_document(path: PathLike) -> dict[str, object]:
     """Return the object in a JSON file; ``-`` is standard input.
 
     Raises
@@ -62,7 +62,7 @@ def read_document(path: PathLike) -> dict[str, Any]:
     return document
 
 
-def result_fields(document: Mapping[str, Any], instance: Instance) -> ResultFields:
+def result_fields(document: Mapping[str, object], instance: Instance) -> ResultFields:
     """Return what a document says of a result on `instance`.
 
     Parameters
@@ -98,7 +98,7 @@ def result_fields(document: Mapping[str, Any], instance: Instance) -> ResultFiel
         "runtime_s": real(fields.get("runtime_s"), "runtime_s"),
         "trace": tuple(
             _trace_point(point, f"trace[{number}]")
-            for number, point in enumerate(listed(fields.get("trace", ()), "trace", "objects"))
+            for number, point in enumerate(of_type(fields.get("trace", []), list, "trace"))
         ),
         "makespan_limit": limit,
         # the slack is not in the document; that there was one matters only where it was needed for the proof
@@ -106,7 +106,7 @@ def result_fields(document: Mapping[str, Any], instance: Instance) -> ResultFiel
     }
 
 
-def _require_scores(fields: Mapping[str, Any], evaluation: Evaluation) -> None:
+def _require_scores(fields: Mapping[str, object], evaluation: Evaluation) -> None:
     """Raise an error unless the scores of the document are those on this instance."""
     for name in SCORES:
         found, expected = _nullable(fields, name, low=-math.inf), getattr(evaluation, name)
@@ -124,7 +124,7 @@ def _trace_point(point: object, place: str) -> TracePoint:
     )
 
 
-def _nullable(fields: Mapping[str, Any], name: str, low: float = 0.0) -> float | None:
+def _nullable(fields: Mapping[str, object], name: str, low: float = 0.0) -> float | None:
     value = fields.get(name)
     return None if value is None else real(value, name, low)
 

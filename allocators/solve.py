@@ -15,12 +15,12 @@ from alloc.allocators.contract.budget import Budget, StopReason
 from alloc.allocators.contract.improvement import Improvement
 from alloc.allocators.contract.search import Search
 from alloc.allocators.decomposition import Decomposition
+from alloc.allocators.parallel.processors import available_threads
 from alloc.allocators.refusal import refuse
 from alloc.allocators.registry import load
 from alloc.allocators.request import Request, Start, as_allocation, checked_seed, checked_threads, checked_tolerance
 from alloc.allocators.result import Result
 from alloc.allocators.runtime.interrupts import ended_with_process, signals_set
-from alloc.allocators.runtime.processors import available_threads
 from alloc.problems import InputError, Instance, Objective, find_shortage, serve_all
 from alloc.problems.arguments import choice, event, flag, function, of_type
 

@@ -26,7 +26,7 @@ STOPS = {
 MOST_NAMES = 8
 """Ids in a list before it is cut."""
 
-SETTLED = PROVEN + RELATIVE_TOLERANCE
+CLOSED_GAP = PROVEN + RELATIVE_TOLERANCE
 """Relative gap up to which no allocation is sooner, as for the status `optimal` without slack."""
 
 
@@ -158,7 +158,7 @@ def _gain(instance: Instance, found: Bottleneck) -> str:
 
 def _room(result: "Result", found: Bottleneck) -> str:
     used = f"{percent(found.use)} of all ability is at work until then"
-    if result.gap is None or result.gap <= SETTLED:
+    if result.gap is None or result.gap <= CLOSED_GAP:
         return f"{used}; the same agents cannot be done sooner."
     return f"{used}; the same agents, allocated otherwise, gain {percent(result.gap)} at most."
 

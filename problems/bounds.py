@@ -48,6 +48,10 @@ def makespan_lower_bound(instance: Instance) -> float:
     m - k smallest workloads against all but the k largest abilities, as k agents serve at most k tasks; and, where
     abilities are integers, the least T at which the demands rounded up, ceil(h_j / T), fit into the sum of abilities.
     Takes O(n log n + origins * m) time.
+
+    Parameters
+    ----------
+    instance : Instance
     """
     of_type(instance, Instance, "instance")
     work = np.sort(instance.workload[instance.workload > 0])
@@ -134,6 +138,12 @@ def lp_makespan_lower_bound(instance: Instance, time_limit_s: float = 10.0) -> f
 
     The linear programme gives fractions of agents, per class and task, to the tasks that they can reach. Not for
     instances with travel times, nor where it would take more than `time_limit_s` or `LP_SIZE_LIMIT` pairs.
+
+    Parameters
+    ----------
+    instance : Instance
+    time_limit_s : float
+        Seconds for the solver, >= 0.
     """
     _check(instance, time_limit_s)
     work = instance.workload

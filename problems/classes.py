@@ -79,6 +79,10 @@ def agent_classes(instance: Instance, *, by_place: bool) -> AgentClasses:
         Whether the place matters, as it does for energy; if not, agents with the same ability that can take the same
         tasks are alike wherever they are, unless travel takes time, or the table of who reaches what is too large to
         compare its rows (`Reach.has_table`).
+
+    Returns
+    -------
+    AgentClasses
     """
     example, class_of_agent = _group(instance, by_place=by_place)
     distance, mask = instance.reach.rows(instance.reach.origin[example])
@@ -93,7 +97,14 @@ def agent_classes(instance: Instance, *, by_place: bool) -> AgentClasses:
 
 
 def count_classes(instance: Instance, *, by_place: bool) -> int:
-    """Return how many classes `agent_classes` would make, without the table of what they can take."""
+    """Return how many classes `agent_classes` would make, without the table of what they can take.
+
+    Parameters
+    ----------
+    instance : Instance
+    by_place : bool
+        As in `agent_classes`.
+    """
     return len(_group(instance, by_place=by_place)[0])
 
 

@@ -99,6 +99,16 @@ def evaluate(instance: Instance, allocation: Allocation) -> Evaluation:
 
     Takes O(n + m) time, O(n log n) where agents have speeds.
 
+    Parameters
+    ----------
+    instance : Instance
+    allocation : Allocation
+        Of `instance`; it may break rules, see `Evaluation.violations`.
+
+    Returns
+    -------
+    Evaluation
+
     Raises
     ------
     InputError

@@ -39,7 +39,7 @@ CASES: dict[str, Instance] = {
         _bare("nothing to do", ability=(2, 1), workload=(0, 0)),
         _bare("fewer agents than tasks", ability=(3, 1), workload=(2, 5, 1, 4)),
         _case("unreachable task", task_position=((0, 0), (4, 0), (99, 99)), communication_range=(9,) * 5),
-        _bare("contested agent", ability=(3, 2, 2), workload=(4, 1, 2), allowed_tasks=([0, 1], [2], [2])),
+        _bare("competing tasks", ability=(3, 2, 2), workload=(4, 1, 2), allowed_tasks=([0, 1], [2], [2])),
         _bare("one way to serve all", ability=(9, 1, 1), workload=(1, 5, 5), allowed_tasks=(None, [0], [0, 2])),
         _case(
             "missing positions",

@@ -38,7 +38,7 @@ class IsolationChecks(Runner):
         assert [one.result() for one in runs] == alone
         assert changed(before, process_state()) == [], "state of the process changed"
 
-    @pytest.mark.parametrize("case", ["integer", "batteries", "zero workloads", "contested agent", "some travel times"])
+    @pytest.mark.parametrize("case", ["integer", "batteries", "zero workloads", "competing tasks", "some travel times"])
     def test_nothing_else_changes(self, subject: Allocator, case: str, capfd: pytest.CaptureFixture[str]) -> None:
         """The instance, the generators and settings shared by the process, and the terminal are left alone."""
         self.solve(subject, CASES[case])  # what is imported on first use may set itself up

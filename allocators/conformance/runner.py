@@ -28,7 +28,7 @@ class Runner:
     """Loads the allocator under test once, and runs it within a budget; `AllocatorConformance` says what may be set."""
 
     name: ClassVar[str] = ""
-    options: ClassVar[dict[str, Any]] = {}
+    options: ClassVar[dict[str, object]] = {}
     iterations: ClassVar[int] = 10
     patience_s: ClassVar[float] = 20.0
 

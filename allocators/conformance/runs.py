@@ -3,7 +3,6 @@
 import threading
 import time
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import pytest
@@ -84,7 +83,7 @@ class RunChecks(Runner):
         assert first.runtime_s <= allowed or next(runs).runtime_s <= allowed  # one more try, for a busy machine
 
     @pytest.mark.parametrize("budget", [{"iterations": 0}, {"target_gap": 1.0}])
-    def test_empty_budget_gives_an_answer(self, subject: Allocator, budget: dict[str, Any]) -> None:
+    def test_empty_budget_gives_an_answer(self, subject: Allocator, budget: dict[str, float]) -> None:
         """No iterations at all, or a gap that any answer has, still give a sound answer at once."""
         result = self.solve(subject, large_case(), **budget)
         assert result.evaluation is not None

@@ -46,10 +46,10 @@ def process_state() -> dict[str, object]:
     return state
 
 
-def _in_a_new_thread(ask: Callable[[], object]) -> object:
-    """Call `ask` in a new thread, which starts with the defaults of the process."""
+def _in_a_new_thread(value: Callable[[], object]) -> object:
+    """Call `value` in a new thread, which starts with the defaults of the process."""
     answers: list[object] = []
-    thread = threading.Thread(target=lambda: answers.append(ask()))
+    thread = threading.Thread(target=lambda: answers.append(value()))
     thread.start()
     thread.join()
     return answers[0]

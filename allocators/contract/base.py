@@ -62,7 +62,6 @@ class Allocator(ABC):
 
     method: ClassVar[Method]
     parameters_type: ClassVar[type[Any] | None] = None
-    parameters: object
 
     def __init__(self, parameters: object = None, **settings: object) -> None:
         if self.parameters_type is not None:

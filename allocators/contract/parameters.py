@@ -44,13 +44,27 @@ def with_settings(parameters_type: type[P], parameters: P | None, settings: Mapp
     for name in settings:
         if name not in names:
             raise InputError(f"is not a parameter of this method{nearest(name, names)}", name)
-    checked = {name: _converted(value, hints[name], name) for name, value in settings.items()}
+    checked = {name: _converted(value, hints[name], name, infinite=True) for name, value in settings.items()}
     return dataclasses.replace(start, **checked)
 
 
-def bounded(default: Value, low: float = -math.inf, high: float = math.inf, *, above: bool = False) -> Value:
-    """Return the field of a `CheckedParameters` with this default and range; `above` excludes `low` itself."""
-    field: Any = dataclasses.field(default=default, metadata={"low": low, "high": high, "above": above})
+def bounded(
+    default: Value, low: float = -math.inf, high: float = math.inf, *, above: bool = False, infinite: bool = False
+) -> Value:
+    """Return a field of a `CheckedParameters` with its default and range.
+
+    Parameters
+    ----------
+    default : Value
+    low, high : float
+        Range of the value, or of each entry of a tuple.
+    above : bool
+        Whether `low` itself is excluded.
+    infinite : bool
+        Whether infinity is a value.
+    """
+    limits = {"low": low, "high": high, "above": above, "infinite": infinite}
+    field: Any = dataclasses.field(default=default, metadata=limits)
     return field  # type: ignore[no-any-return]
 
 
@@ -66,7 +80,13 @@ class CheckedParameters:
 
 
 def _converted(
-    value: object, hint: Any, name: str, low: float = -math.inf, high: float = math.inf, above: bool = False
+    value: object,
+    hint: Any,
+    name: str,
+    low: float = -math.inf,
+    high: float = math.inf,
+    above: bool = False,
+    infinite: bool = False,
 ) -> object:
     """Return a value as Python's own of the type `hint`, checked to be of that type and in that range."""
     kinds = get_args(hint) if get_origin(hint) is types.UnionType else (hint,)
@@ -77,13 +97,15 @@ def _converted(
         entries = listed(value, name, "numbers")  # type: ignore[arg-type]
         if not entries:
             raise InputError("must not be empty", name)
-        return tuple(_converted(entry, get_args(kind)[0], name, low, high, above) for entry in entries)
+        return tuple(_converted(entry, get_args(kind)[0], name, low, high, above, infinite) for entry in entries)
     if kind is bool:
         return flag(value, name)
     if kind is int:
-        first = -LARGEST_INTEGER if low == -math.inf else int(low) + above
-        return whole(value, name, first, None if high == math.inf else int(high))
+        least = -LARGEST_INTEGER if low == -math.inf else int(low) + above
+        return whole(value, name, least, None if high == math.inf else int(high))
     if kind is float:
+        if infinite and value == math.inf:
+            return math.inf
         return float(real(value, name, low, high, above=above))
     if kind is str:
         return text(value, name)

@@ -1,26 +1,27 @@
 """Exact by constraint programming: OR-Tools CP-SAT over classes of agents."""
 
 import sys
-from collections.abc import Callable, Iterable
-from itertools import islice
+from collections.abc import Callable, Iterable, Iterator
+from itertools import chain, islice
 
 import numpy as np
 from numpy.typing import NDArray
 from ortools.sat.python import cp_model
 
-from alloc.allocators.exact.model import Demand
-from alloc.allocators.exact.solver_model import UNKNOWN, Answer, Question, Watch
+from alloc.allocators.contract.built_in import BUILT_IN
+from alloc.allocators.exact.demand import Demand
+from alloc.allocators.exact.monitor import SolverMonitor
+from alloc.allocators.exact.solver_model import Answer, SolverModel, Verdict
 from alloc.allocators.exact.stages import ExactAllocator
-from alloc.allocators.registry import BUILT_IN
 from alloc.problems.instance import IntArray
 
-FINE = 2**40
+NEED_STEPS = 2**40
 """Steps into which the need of a task is divided where it is no integer; each agent rounds up by at most one."""
 
-FINE_COST = 2**36
+COST_STEPS = 2**36
 """Steps into which the cost of the plan to begin with is divided; each agent rounds down by at most one."""
 
-LARGEST = 2**58
+MAX_SUM = 2**58
 """No sum in the model exceeds this, far enough below 2^63 for the solver's own arithmetic."""
 
 REPEATABLE_EFFORT = 20.0
@@ -32,6 +33,27 @@ CHUNK = 10_000
 WholeArray = NDArray[np.int64]
 
 
+class CpSatSolver:
+    """The back end of OR-Tools."""
+
+    max_pairs = 2_000_000
+    pairs_per_second = 60_000
+
+    def solve_model(self, model: SolverModel, monitor: SolverMonitor) -> Answer:
+        """Solve `model` by CP-SAT."""
+        solver = cp_model.CpSolver()
+        _set_parameters(solver, model)
+
+        def work() -> Answer:
+            program = formulate(model, monitor.stopped.is_set)
+            if program is None:
+                return Answer()
+            reporter = None if model.cost is None else _Reporter(len(model.demand.class_of_pair), monitor)
+            return _read(solver, solver.solve(program, reporter), model)
+
+        return monitor.run(work, solver.stop_search) or Answer()
+
+
 class CpSat(ExactAllocator):
     """Proven optima by CP-SAT.
 
@@ -41,135 +63,131 @@ class CpSat(ExactAllocator):
     """
 
     method = BUILT_IN["cpsat"]
-    most_pairs = 2_000_000
-    pairs_per_second = 60_000
-
-    def ask(self, question: Question, watch: Watch) -> Answer:
-        """Put `question` to CP-SAT."""
-        solver = cp_model.CpSolver()
-        _set_parameters(solver, question)
-
-        def work() -> Answer:
-            built = build(question, watch.halted.is_set)
-            if built is None:
-                return UNKNOWN
-            model, scale = built
-            reporter = None if question.cost is None else _Reporter(len(question.demand.kind), watch)
-            return _read(solver, solver.solve(model, reporter), question, scale)
-
-        return watch.run(work, solver.stop_search)
+    solver = CpSatSolver()
 
 
 class _Reporter(cp_model.CpSolverSolutionCallback):
-    """Tells every plan that the solver finds on its way."""
+    """Reports every plan that the solver finds on its way."""
 
-    def __init__(self, pairs: int, watch: Watch) -> None:
+    def __init__(self, pairs: int, monitor: SolverMonitor) -> None:
         super().__init__()
-        self._pairs, self._watch = pairs, watch
+        self._pairs, self._monitor = pairs, monitor
 
     def on_solution_callback(self) -> None:
-        self._watch.tell(_agents(self.response_proto.solution, self._pairs))
+        self._monitor.report(_counts(self.response_proto.solution, self._pairs))
 
 
-def build(question: Question, halted: Callable[[], bool] = lambda: False) -> tuple[cp_model.CpModel, float] | None:
-    """State the question in integers, its first variables being the agents per pair.
+def formulate(model: SolverModel, stopped: Callable[[], bool] = lambda: False) -> cp_model.CpModel | None:
+    """Write the model of `exact.model` down in integers; its first variables are x.
 
     Returns
     -------
-    (CpModel, float) or None
-        The model and the scale of its costs; None if `halted` says so before it is built.
+    CpModel or None
+        None if `stopped` says so before it is complete.
     """
-    demand = question.demand
-    model, x = cp_model.CpModel(), []
-    for most in np.split(demand.most, range(CHUNK, len(demand.most), CHUNK)):
-        x += [model.new_int_var(0, agents, "") for agents in most.tolist()]
-        if halted():
-            return None
-    weight, need = whole_numbers(demand)
-    enough, least_used = demand.enough, demand.least_used.tolist()
-    served = [model.new_bool_var("") if demand.partial else 1 for _ in need]
-    for row, pairs in enumerate(_by(demand.goal, len(need))):
+    demand, program = model.demand, cp_model.CpModel()
+    x: list[cp_model.IntVar] = []
+    steps = chain(
+        _add_variables(program, x, demand),
+        _add_work(program, x, demand),
+        _add_agents(program, x, demand),
+    )
+    if any(stopped() for _ in steps):
+        return None
+    for variable, agents in zip(x, [] if model.hint is None else model.hint.tolist(), strict=False):
+        program.add_hint(variable, agents)
+    if model.cost is not None:
+        cost, _ = integer_costs(model)
+        program.minimize(cp_model.LinearExpr.weighted_sum(x, cost.tolist()))
+    return program
+
+
+def _add_variables(program: cp_model.CpModel, x: list[cp_model.IntVar], demand: Demand) -> Iterator[None]:
+    """Variables 0 <= x_kj <= max_count_kj."""
+    for most in np.split(demand.max_count, range(CHUNK, len(demand.max_count), CHUNK)):
+        x += [program.new_int_var(0, agents, "") for agents in most.tolist()]
+        yield
+
+
+def _add_work(program: cp_model.CpModel, x: list[cp_model.IntVar], demand: Demand) -> Iterator[None]:
+    """(work): need_j <= sum_k weight_kj x_kj <= max_weight_j, or need_j y_j with sum_j y_j = min_served."""
+    weight, need = integer_weights(demand)
+    max_weight = demand.max_weight
+    served = [program.new_bool_var("") if demand.partial else 1 for _ in need]
+    for j, pairs in enumerate(_grouped(demand.task_of_pair, len(need))):
         done = cp_model.LinearExpr.weighted_sum([x[p] for p in pairs], weight[pairs].tolist())
         if np.isfinite(demand.spare):
-            model.add_linear_constraint(done, int(need[row]), int(enough[row]))
+            program.add_linear_constraint(done, int(need[j]), int(max_weight[j]))
         else:
-            model.add(done >= int(need[row]) * served[row])
-        if halted():
-            return None
+            program.add(done >= int(need[j]) * served[j])
+        yield
     if demand.partial:
-        model.add(cp_model.LinearExpr.sum(served) == demand.serve)
-    for kind, pairs in enumerate(_by(demand.kind, len(demand.count))):
-        if least_used[kind] > 0 or demand.most[pairs].sum() > demand.count[kind]:
+        program.add(cp_model.LinearExpr.sum(served) == demand.min_served)
+
+
+def _add_agents(program: cp_model.CpModel, x: list[cp_model.IntVar], demand: Demand) -> Iterator[None]:
+    """(agents): min_agents_k <= sum_j x_kj <= count_k, where that says more than the bounds of the variables."""
+    min_agents = demand.min_agents.tolist()
+    for k, pairs in enumerate(_grouped(demand.class_of_pair, len(demand.count))):
+        if min_agents[k] > 0 or demand.max_count[pairs].sum() > demand.count[k]:
             working = cp_model.LinearExpr.sum([x[p] for p in pairs])
-            model.add_linear_constraint(working, least_used[kind], int(demand.count[kind]))
-        if halted():
-            return None
-    for variable, agents in zip(x, [] if question.hint is None else question.hint.tolist(), strict=False):
-        model.add_hint(variable, agents)
-    return model, _minimise(model, x, question)
+            program.add_linear_constraint(working, min_agents[k], int(demand.count[k]))
+        yield
 
 
-def _minimise(model: cp_model.CpModel, x: list[cp_model.IntVar], question: Question) -> float:
-    """Set the objective, if there is one, and return its scale."""
-    if question.cost is None:
-        return 1.0
-    cost, scale = whole_costs(question)
-    model.minimize(cp_model.LinearExpr.weighted_sum(x, cost.tolist()))
-    return scale
-
-
-def whole_numbers(demand: Demand) -> tuple[WholeArray, WholeArray]:
+def integer_weights(demand: Demand) -> tuple[WholeArray, WholeArray]:
     """Return weights and needs in integers such that every plan that meets `demand` meets these.
 
-    Weights are rounded up and needs down, so that what is impossible here is impossible indeed.
+    Weights are rounded up and needs down, so that what is infeasible here is infeasible indeed.
     """
     scale = 1.0
-    if not demand.whole:
-        most_done = np.bincount(demand.goal, weights=demand.weight * demand.most, minlength=len(demand.need))
-        scale = min(FINE, LARGEST / max(1.0, float(most_done.max(initial=1.0))))
+    if not demand.integral:
+        largest = np.bincount(demand.task_of_pair, weights=demand.weight * demand.max_count, minlength=len(demand.need))
+        scale = min(NEED_STEPS, MAX_SUM / max(1.0, float(largest.max(initial=1.0))))
     return np.ceil(demand.weight * scale).astype(np.int64), np.floor(demand.need * scale).astype(np.int64)
 
 
-def whole_costs(question: Question) -> tuple[WholeArray, float]:
+def integer_costs(model: SolverModel) -> tuple[WholeArray, float]:
     """Return costs in integers, rounded down, and their scale: a bound on them bounds the true costs too.
 
     A pair that alone costs more than the plan at hand is cut to that cost, which no bound can exceed anyway.
     """
-    assert question.cost is not None
-    known = 0.0 if question.hint is None else float(question.cost @ question.hint)
-    known = known or float(question.cost.sum()) or 1.0
-    scale = min(FINE_COST / known, sys.float_info.max)
-    return np.floor(np.minimum(question.cost, known) * scale).astype(np.int64), scale
+    assert model.cost is not None
+    known = 0.0 if model.hint is None else float(model.cost @ model.hint)
+    known = known or float(model.cost.sum()) or 1.0
+    scale = min(COST_STEPS / known, sys.float_info.max)
+    return np.floor(np.minimum(model.cost, known) * scale).astype(np.int64), scale
 
 
-def _by(group: IntArray, groups: int) -> list[IntArray]:
+def _grouped(group: IntArray, groups: int) -> list[IntArray]:
     """Indices of the pairs in each group."""
     order = np.argsort(group, kind="stable")
     return np.split(order, np.searchsorted(group[order], np.arange(1, groups)))
 
 
-def _set_parameters(solver: cp_model.CpSolver, question: Question) -> None:
-    parameters = solver.parameters
+def _set_parameters(solver: cp_model.CpSolver, model: SolverModel) -> None:
+    parameters, limits = solver.parameters, model.limits
     parameters.catch_sigint_signal = False
     parameters.presolve_inclusion_work_limit = 0  # with wide coefficients it cuts off solutions (OR-Tools 9.15)
-    parameters.random_seed = question.seed % 2**31
-    parameters.num_workers = 1 if question.repeatable else question.threads
-    if question.cost is None and question.demand.spare == 0:  # all equations: presolve finds nothing and takes long
+    parameters.random_seed = limits.seed % 2**31
+    parameters.num_workers = 1 if limits.repeatable else limits.threads
+    if model.cost is None and model.demand.spare == 0:  # all equations: presolve finds nothing and takes long
         parameters.cp_model_presolve = False
-    if np.isfinite(question.seconds):
-        parameters.max_time_in_seconds = question.seconds
-    if question.repeatable:
+    if np.isfinite(limits.seconds):
+        parameters.max_time_in_seconds = limits.seconds
+    if limits.repeatable:
         parameters.max_deterministic_time = REPEATABLE_EFFORT
 
 
-def _read(solver: cp_model.CpSolver, status: cp_model.CpSolverStatus, question: Question, scale: float) -> Answer:
+def _read(solver: cp_model.CpSolver, status: cp_model.CpSolverStatus, model: SolverModel) -> Answer:
     if status == cp_model.INFEASIBLE:
-        return Answer(impossible=True)
-    bound = 0.0 if question.cost is None else solver.best_objective_bound / scale
+        return Answer(Verdict.INFEASIBLE)
+    bound = 0.0 if model.cost is None else max(0.0, solver.best_objective_bound / integer_costs(model)[1])
     if status not in (cp_model.OPTIMAL, cp_model.FEASIBLE):
-        return Answer(bound=max(0.0, bound))
-    return Answer(_agents(solver.response_proto.solution, len(question.demand.kind)), bound=max(0.0, bound))
+        return Answer(bound=bound)
+    counts = _counts(solver.response_proto.solution, len(model.demand.class_of_pair))
+    return Answer(Verdict.FEASIBLE, counts, bound)
 
 
-def _agents(solution: Iterable[int], pairs: int) -> IntArray:
+def _counts(solution: Iterable[int], pairs: int) -> IntArray:
     return np.fromiter(islice(solution, pairs), dtype=np.intp, count=pairs)

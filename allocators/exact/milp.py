@@ -1,6 +1,6 @@
-"""Exact by mixed-integer programming: stated in cvxpy over classes of agents, solved by HiGHS.
+"""Exact by mixed-integer programming: formulated in cvxpy over classes of agents, solved by HiGHS.
 
-cvxpy compiles the model; HiGHS then gets the compiled arrays, as only so can it be halted and asked for what it found.
+cvxpy compiles the model; HiGHS gets the compiled arrays itself, so that it can be stopped and read at any time.
 """
 
 from collections.abc import Sequence
@@ -11,33 +11,35 @@ import highspy
 import numpy as np
 from scipy.sparse import csc_array, csr_array, diags_array
 
-from alloc.allocators.exact.solver_model import UNKNOWN, Answer, Question, Watch
+from alloc.allocators.contract.built_in import BUILT_IN
+from alloc.allocators.exact.demand import Demand
+from alloc.allocators.exact.monitor import SolverMonitor
+from alloc.allocators.exact.solver_model import Answer, SolverModel, Verdict
 from alloc.allocators.exact.stages import ExactAllocator
-from alloc.allocators.registry import BUILT_IN
 from alloc.problems.bounds import scale_to_one
 from alloc.problems.instance import FloatArray, IntArray
 
 TOLERANCE = 1e-9
 """How far HiGHS may be off a row or an integer."""
 
-SMALL_WHOLE = 100_000
+MAX_UNSCALED = 100_000
 """Needs up to this are left in whole numbers, which HiGHS makes use of; rows with larger ones are scaled to 1."""
 
-DEAREST = 2.0**20
-"""Scaled cost to which pairs are cut that are dearer than the plan at hand, lest they blur the others."""
+COST_CAP = 2.0**20
+"""Scaled cost to which that of a pair is cut if it exceeds the cost of the plan at hand: it would blur the others."""
 
-FAINT, FINE = 1e-6, 2.0**10
-"""Part of a need below which an agent is told from nobody only if rows are scaled by so much against the tolerance."""
+SMALL_WEIGHT, SMALL_WEIGHT_SCALE = 1e-6, 2.0**10
+"""Weights below this part of a need are within the tolerance, unless rows are scaled up by this factor."""
 
-SMALLEST = 1e-12
-"""Coefficients below this count as 0, as little as HiGHS can be told."""
+SMALLEST_COEFFICIENT = 1e-12
+"""Coefficients below this count as 0: the least value that HiGHS takes for this option."""
 
 REPEATABLE_NODES = 5_000
 """Limit of one call in nodes of the search tree where runs must be repeatable."""
 
 
 @dataclass(frozen=True, eq=False)
-class Programme:
+class CompiledModel:
     """Compiled: minimise ``cost @ x`` with ``matrix @ x <= limit`` and ``0 <= x <= upper``, x integer.
 
     Attributes
@@ -56,6 +58,32 @@ class Programme:
     pair_at: IntArray
 
 
+class HighsSolver:
+    """The back end of cvxpy and HiGHS."""
+
+    max_pairs = 2_000_000
+    pairs_per_second = 200_000
+
+    def solve_model(self, model: SolverModel, monitor: SolverMonitor) -> Answer:
+        """Solve `model` by HiGHS."""
+        highs = highspy.Highs()
+        highs.HandleUserInterrupt = True
+
+        def work() -> Answer:
+            compiled = compile_model(model)
+            if monitor.stopped.is_set():
+                return Answer()
+            _load(highs, compiled, model)
+            if model.cost is not None:
+                highs.cbMipImprovingSolution += lambda event: monitor.report(
+                    _counts(event.data_out.mip_solution, compiled)
+                )
+            highs.solve()
+            return _read(highs, compiled, model)
+
+        return monitor.run(work, highs.cancelSolve) or Answer()
+
+
 class Milp(ExactAllocator):
     """Proven optima by cvxpy and HiGHS.
 
@@ -65,74 +93,62 @@ class Milp(ExactAllocator):
     """
 
     method = BUILT_IN["milp"]
-    most_pairs = 2_000_000
-    pairs_per_second = 200_000
-
-    def ask(self, question: Question, watch: Watch) -> Answer:
-        """Put `question` to HiGHS."""
-        highs = highspy.Highs()
-        highs.HandleUserInterrupt = True
-
-        def work() -> Answer:
-            programme = compile_programme(question)
-            if watch.halted.is_set():
-                return UNKNOWN
-            _load(highs, programme, question)
-            if question.cost is not None:
-                highs.cbMipImprovingSolution += lambda event: watch.tell(
-                    _agents(event.data_out.mip_solution, programme)
-                )
-            highs.solve()
-            return _read(highs, programme, question)
-
-        return watch.run(work, highs.cancelSolve)
+    solver = HighsSolver()
 
 
-def state(question: Question) -> tuple[cp.Problem, cp.Variable]:
-    """State the question in cvxpy; the variable holds the agents per pair."""
-    demand, pairs = question.demand, np.arange(len(question.demand.kind))
-    x = cp.Variable(len(pairs), integer=True, bounds=[np.zeros(len(pairs)), demand.most.astype(float)])
-    scale = 1.0 if demand.need.max() <= SMALL_WHOLE else 1 / demand.need
-    if not demand.whole and demand.weight.min(initial=1.0) < FAINT:
-        scale = FINE * scale
+def formulate(model: SolverModel) -> tuple[cp.Problem, cp.Variable]:
+    """Write the model of `exact.model` down in cvxpy; the variable returned is x."""
+    demand, pairs = model.demand, np.arange(len(model.demand.class_of_pair))
+    scale = _row_scale(demand)
     need = demand.need * scale
-    weight = demand.weight * (need / demand.need)[demand.goal]
-    done = csr_array((weight, (demand.goal, pairs)), shape=(len(need), len(pairs))) @ x
-    used = csr_array((np.ones(len(pairs)), (demand.kind, pairs)), shape=(len(demand.count), len(pairs))) @ x
-    rows = [used <= demand.count]
+    weight = demand.weight * (need / demand.need)[demand.task_of_pair]
+    weights = csr_array((weight, (demand.task_of_pair, pairs)), shape=(len(need), len(pairs)))
+    ones = csr_array((np.ones(len(pairs)), (demand.class_of_pair, pairs)), shape=(len(demand.count), len(pairs)))
+
+    x = cp.Variable(len(pairs), integer=True, bounds=[np.zeros(len(pairs)), demand.max_count.astype(float)])
+    done, used = weights @ x, ones @ x
+    rows = [used <= demand.count]  # (agents)
     if demand.partial:
         served = cp.Variable(len(need), boolean=True)
-        rows += [done >= diags_array(need) @ served, np.ones(len(need)) @ served >= demand.serve]
+        rows += [done >= diags_array(need) @ served, np.ones(len(need)) @ served >= demand.min_served]
     else:
-        rows += [done >= need]
+        rows += [done >= need]  # (work)
     if np.isfinite(demand.spare):
-        rows += [done <= demand.enough * scale, used >= demand.least_used]
-    cost = np.zeros(len(pairs)) if question.cost is None else scaled_costs(question)[0]
+        rows += [done <= demand.max_weight * scale, used >= demand.min_agents]
+    cost = np.zeros(len(pairs)) if model.cost is None else scaled_costs(model)[0]
     return cp.Problem(cp.Minimize(cost @ x), rows), x
 
 
-def scaled_costs(question: Question) -> tuple[FloatArray, float]:
-    """Return costs such that the plan at hand costs about 1 for each agent there is, and their scale, a power of two.
+def _row_scale(demand: Demand) -> float | FloatArray:
+    """Return the factor of each row of (work) that keeps coefficients well above the tolerance."""
+    scale: float | FloatArray = 1.0 if demand.need.max() <= MAX_UNSCALED else 1 / demand.need
+    if not demand.integral and demand.weight.min(initial=1.0) < SMALL_WEIGHT:
+        scale = SMALL_WEIGHT_SCALE * scale
+    return scale
 
-    A pair that alone costs more than the plan at hand, and much more than agents do, is cut: it is in no better plan.
+
+def scaled_costs(model: SolverModel) -> tuple[FloatArray, float]:
+    """Return costs at which the plan at hand costs about 1 per agent, and their scale, a power of two.
+
+    The cost of a pair is cut where it exceeds that of the plan at hand and is large: no better plan has the pair.
     """
-    assert question.cost is not None
-    agents = float(question.demand.count.sum())
-    known = np.zeros(0) if question.hint is None else question.cost / agents * question.hint
-    typical = float(known.sum()) or float(question.cost.max(initial=0.0)) or 1.0
+    assert model.cost is not None
+    agents = float(model.demand.count.sum())
+    known = np.zeros(0) if model.hint is None else model.cost / agents * model.hint
+    typical = float(known.sum()) or float(model.cost.max(initial=0.0)) or 1.0
     scale = scale_to_one(typical)
     with np.errstate(over="ignore"):
-        return np.minimum(question.cost * scale, max(DEAREST, typical * agents * scale)), scale
+        return np.minimum(model.cost * scale, max(COST_CAP, typical * agents * scale)), scale
 
 
-def compile_programme(question: Question) -> Programme:
-    """Let cvxpy compile the question to arrays."""
-    problem, x = state(question)
+def compile_model(model: SolverModel) -> CompiledModel:
+    """Let cvxpy compile the model to arrays."""
+    problem, x = formulate(model)
     data, _, _ = problem.get_problem_data(cp.HIGHS)
     upper = np.array(data["upper_bounds"], dtype=float)
     upper[data["bool_vars_idx"]] = 1.0
     first = data["param_prob"].var_id_to_col[x.id]
-    return Programme(
+    return CompiledModel(
         cost=np.asarray(data["c"], dtype=float),
         upper=upper,
         matrix=csc_array(data["A"]),
@@ -141,60 +157,60 @@ def compile_programme(question: Question) -> Programme:
     )
 
 
-def _load(highs: highspy.Highs, programme: Programme, question: Question) -> None:
-    rows, columns = programme.matrix.shape
+def _load(highs: highspy.Highs, compiled: CompiledModel, model: SolverModel) -> None:
+    rows, columns = compiled.matrix.shape
     lp = highspy.HighsLp()
     lp.num_col_, lp.num_row_ = columns, rows
-    lp.col_cost_, lp.col_lower_, lp.col_upper_ = programme.cost, np.zeros(columns), programme.upper
-    lp.row_lower_, lp.row_upper_ = np.full(rows, -np.inf), programme.limit
+    lp.col_cost_, lp.col_lower_, lp.col_upper_ = compiled.cost, np.zeros(columns), compiled.upper
+    lp.row_lower_, lp.row_upper_ = np.full(rows, -np.inf), compiled.limit
     lp.a_matrix_.format_ = highspy.MatrixFormat.kColwise
-    lp.a_matrix_.start_, lp.a_matrix_.index_ = programme.matrix.indptr, programme.matrix.indices
-    lp.a_matrix_.value_ = programme.matrix.data
+    lp.a_matrix_.start_, lp.a_matrix_.index_ = compiled.matrix.indptr, compiled.matrix.indices
+    lp.a_matrix_.value_ = compiled.matrix.data
     lp.integrality_ = [highspy.HighsVarType.kInteger] * columns
-    for option, value in _options(question).items():
+    for option, value in _options(model).items():
         highs.setOptionValue(option, value)
     highs.passModel(lp)
-    if question.hint is not None and question.cost is not None and not question.demand.partial:
-        highs.setSolution(len(programme.pair_at), programme.pair_at.astype(np.int32), question.hint.astype(float))
+    if model.hint is not None and model.cost is not None and not model.demand.partial:
+        highs.setSolution(len(compiled.pair_at), compiled.pair_at.astype(np.int32), model.hint.astype(float))
 
 
-def _options(question: Question) -> dict[str, bool | int | float | str]:
+def _options(model: SolverModel) -> dict[str, bool | int | float | str]:
     options: dict[str, bool | int | float | str] = {
         "output_flag": False,
         "parallel": "off",
-        "random_seed": question.seed % 2**31,
-        "small_matrix_value": SMALLEST,
+        "random_seed": model.limits.seed % 2**31,
+        "small_matrix_value": SMALLEST_COEFFICIENT,
         "mip_rel_gap": 1e-8,
         "mip_abs_gap": 0.0,
         "mip_feasibility_tolerance": TOLERANCE,
         "primal_feasibility_tolerance": TOLERANCE,
         "dual_feasibility_tolerance": TOLERANCE,
     }
-    if np.isfinite(question.seconds):
-        options["time_limit"] = question.seconds
-    if question.repeatable:
+    if np.isfinite(model.limits.seconds):
+        options["time_limit"] = model.limits.seconds
+    if model.limits.repeatable:
         options["mip_max_nodes"] = REPEATABLE_NODES
     return options
 
 
-def _read(highs: highspy.Highs, programme: Programme, question: Question) -> Answer:
+def _read(highs: highspy.Highs, compiled: CompiledModel, model: SolverModel) -> Answer:
     """Trust a solution only if HiGHS itself calls it feasible: at a limit without one, it hands out zeros."""
     status, info = highs.getModelStatus(), highs.getInfo()
     if status in (highspy.HighsModelStatus.kInfeasible, highspy.HighsModelStatus.kUnboundedOrInfeasible):
-        return Answer(impossible=True)
-    bound = _safe_bound(info.mip_dual_bound, question)
+        return Answer(Verdict.INFEASIBLE)
+    bound = _safe_bound(info.mip_dual_bound, model)
     if info.primal_solution_status != highspy.SolutionStatus.kSolutionStatusFeasible:
         return Answer(bound=bound)
-    return Answer(_agents(highs.getSolution().col_value, programme), bound=bound)
+    return Answer(Verdict.FEASIBLE, _counts(highs.getSolution().col_value, compiled), bound)
 
 
-def _safe_bound(dual_bound: float, question: Question) -> float:
+def _safe_bound(dual_bound: float, model: SolverModel) -> float:
     """Lower what HiGHS proves by its tolerances, which count for each agent, and undo the scale of the costs."""
-    if question.cost is None or not np.isfinite(dual_bound):
+    if model.cost is None or not np.isfinite(dual_bound):
         return 0.0
-    least = min(dual_bound * (1 - 10 * TOLERANCE), dual_bound - TOLERANCE * float(question.demand.count.sum()))
-    return max(0.0, least) / scaled_costs(question)[1]
+    least = min(dual_bound * (1 - 10 * TOLERANCE), dual_bound - TOLERANCE * float(model.demand.count.sum()))
+    return max(0.0, least) / scaled_costs(model)[1]
 
 
-def _agents(solution: Sequence[float], programme: Programme) -> IntArray:
-    return np.round(np.asarray(solution)[programme.pair_at]).astype(np.intp)
+def _counts(solution: Sequence[float], compiled: CompiledModel) -> IntArray:
+    return np.round(np.asarray(solution)[compiled.pair_at]).astype(np.intp)

@@ -1,57 +1,72 @@
-"""What the stages ask a solver, what it answers, and what goes on in the calling thread meanwhile."""
+"""The model that a stage gives to a solver, the answer, and the protocol that back ends implement."""
 
-import threading
-from collections import deque
-from collections.abc import Callable
 from dataclasses import dataclass
+from enum import Enum
+from typing import Protocol
 
-from alloc.allocators.contract.budget import StopReason
 from alloc.allocators.contract.search import Search
-from alloc.allocators.exact.model import Demand, Model
-from alloc.allocators.runtime.interrupts import run_native
+from alloc.allocators.exact.model import Demand
+from alloc.allocators.exact.monitor import SolverMonitor
 from alloc.problems.instance import FloatArray, IntArray
 
 
+class Verdict(Enum):
+    """Whether a makespan, or a model, has a plan."""
+
+    FEASIBLE = "feasible"
+    """A plan is at hand."""
+
+    INFEASIBLE = "infeasible"
+    """It is proven that there is none."""
+
+    UNKNOWN = "unknown"
+    """Neither a plan nor a proof was found within the limits."""
+
+
 @dataclass(frozen=True)
-class Test:
-    """A makespan to be tried, the seconds that it may take, and whether nothing is lost or left if they pass in vain.
-
-    A test at the `top`, just below the best plan, comes early, to see whether the plan is the optimum already; the
-    `last` one comes when bisection has met nothing but open tests.
-    """
-
-    time: float
-    seconds: float
-    top: bool = False
-    last: bool = False
-
-
-@dataclass(frozen=True, eq=False)
-class Question:
-    """Whether there is a plan with this demand, and which costs least.
+class SolverLimits:
+    """The effort that a solver may spend.
 
     Attributes
     ----------
-    demand : Demand
-    cost : ndarray, shape (p,), or None
-        Cost >= 0 of one agent of each pair, to be minimised; None if any plan will do.
-    hint : ndarray of int, shape (p,), or None
-        Agents per pair of a plan to begin with.
     seconds : float
         Time limit, possibly ``inf``.
     threads : int
     seed : int
     repeatable : bool
-        Whether effort is to be limited by counting work, so that the same seed gives the same answer.
+        Whether effort is limited by counting work, so that the same seed gives the same answer.
+    """
+
+    seconds: float
+    threads: int
+    seed: int
+    repeatable: bool
+
+    @classmethod
+    def of(cls, search: Search, seconds: float, threads: int) -> "SolverLimits":
+        """Return the limits of one call within a run."""
+        return cls(seconds, threads, search.seed, is_repeatable(search))
+
+
+@dataclass(frozen=True, eq=False)
+class SolverModel:
+    """The integer programme at a fixed T, see `exact.model`: constraints, and an objective if there is one.
+
+    Attributes
+    ----------
+    demand : Demand
+        The constraints.
+    cost : ndarray, shape (p,), or None
+        Cost >= 0 of one agent of each pair, to be minimised; None if any plan will do.
+    hint : ndarray of int, shape (p,), or None
+        Agents per pair of a plan to begin with.
+    limits : SolverLimits
     """
 
     demand: Demand
     cost: FloatArray | None
     hint: IntArray | None
-    seconds: float
-    threads: int
-    seed: int
-    repeatable: bool
+    limits: SolverLimits
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,83 +75,37 @@ class Answer:
 
     Attributes
     ----------
+    verdict : Verdict
     counts : ndarray of int, shape (p,), or None
-        Agents per pair of the best plan; the evaluator has the last word on it.
-    impossible : bool
-        Whether there is proven to be no plan.
+        Agents per pair of the best plan where the verdict is FEASIBLE; the evaluator decides whether it holds.
     bound : float
         No plan costs less.
     """
 
+    verdict: Verdict = Verdict.UNKNOWN
     counts: IntArray | None = None
-    impossible: bool = False
     bound: float = 0.0
 
 
-UNKNOWN = Answer()
+class Solver(Protocol):
+    """A solver for integer programmes.
 
-
-class Watch:
-    """Keeps the calling thread at work while a solver runs: it submits what the solver finds and sees when to halt.
-
-    Parameters
+    Attributes
     ----------
-    search : Search
-    model : Model
-    demand : Demand
-        What the counts given to `tell` are about.
-    until_s : float
-        Seconds since the run began at which the solver must end.
-    meanwhile : callable, optional
-        What the calling thread does each time that it looks at the solver, for 50 ms at most; returns whether the
-        solver is no longer needed.
+    max_pairs : int
+        Pairs of agent class and task above which no model is built.
+    pairs_per_second : int
+        Pairs of which a model is built in a second.
     """
 
-    def __init__(
-        self,
-        search: Search,
-        model: Model,
-        demand: Demand,
-        until_s: float,
-        meanwhile: Callable[[], bool] = lambda: False,
-    ) -> None:
-        self._search, self._model, self._demand, self._until_s = search, model, demand, until_s
-        self._meanwhile = meanwhile
-        self._finds: deque[IntArray] = deque(maxlen=1)
-        self._error: BaseException | None = None
-        self.halted = threading.Event()
+    max_pairs: int
+    pairs_per_second: int
 
-    def tell(self, counts: IntArray) -> None:
-        """Report a plan, from any thread."""
-        self._finds.append(counts)
-
-    def run(self, work: Callable[[], Answer], halt: Callable[[], None]) -> Answer:
-        """Run `work` in its own thread until it ends, time is up or the run is stopped; UNKNOWN if it did not obey."""
-
-        def halt_all() -> None:
-            self.halted.set()
-            halt()
-
-        answer = run_native(work, self._should_stop, halt_all)
-        self._submit()
-        if self._error is not None:
-            raise self._error
-        return answer or UNKNOWN
-
-    def _should_stop(self) -> bool:
-        self._submit()
-        over = self._error is not None or is_over(self._search) or self._search.elapsed_s >= self._until_s
-        return over or self._meanwhile()
-
-    def _submit(self) -> None:
-        """Submit the last find; what a callback of the user raises waits until the solver has ended."""
-        try:
-            while self._finds and self._error is None:
-                self._search.submit(self._model.allocation(self._demand, self._finds.popleft()))
-        except BaseException as error:
-            self._error = error
+    def solve_model(self, model: SolverModel, monitor: SolverMonitor) -> Answer:
+        """Solve `model` in a thread of its own, reporting the plans on the way to `monitor`."""
+        ...
 
 
-def is_over(search: Search) -> bool:
-    """Whether the run must end; a makespan proven to 1e-6 alone is no reason, as exact methods go on to the end."""
-    return search.stop_reason() not in (None, StopReason.PROVEN)
+def is_repeatable(search: Search) -> bool:
+    """Whether the run is limited by iterations alone, so that effort must be counted and not timed."""
+    return search.budget.time_limit_s is None and search.budget.iterations is not None

@@ -1,6 +1,5 @@
 """The recipe of the exact methods: a start, the least makespan, then the least energy at it."""
 
-from abc import abstractmethod
 from typing import ClassVar
 
 import numpy as np
@@ -10,49 +9,41 @@ import scipy.sparse.csgraph  # noqa: F401 - both are loaded with the method, so 
 from alloc.allocators.contract.base import Allocator, Proposal
 from alloc.allocators.contract.budget import Budget
 from alloc.allocators.contract.search import Search
-from alloc.allocators.exact.energy import narrowing
+from alloc.allocators.exact.energy import primal_dual
 from alloc.allocators.exact.energy.least_energy import least_energy
-from alloc.allocators.exact.makespan import enumeration
-from alloc.allocators.exact.makespan import repartition_search as wandering
-from alloc.allocators.exact.makespan.bisection import LeastMakespan
-from alloc.allocators.exact.solver_model import Answer, Question, Watch, is_over
+from alloc.allocators.exact.makespan import enumeration, repartition_search
+from alloc.allocators.exact.makespan.bisection import least_makespan
+from alloc.allocators.exact.monitor import is_over
+from alloc.allocators.exact.solver_model import Solver
 from alloc.allocators.heuristic.greedy.list_schedule import greedy
 from alloc.problems import Instance, Objective, count_classes, fewest_unserved, serve_all
 
 MAKESPAN_SHARE = 0.6
-"""Part of the time limit after which the makespan gives way to the energy, proven or not."""
+"""Part of the time limit after which the makespan stage gives way to the energy stage, proven or not."""
 
 
 class ExactAllocator(Allocator):
-    """Proves optima with a solver for integer programmes; subclasses say how to ask it.
+    """Proves optima with a solver for integer programmes; subclasses name the solver.
 
     Parameters
     ----------
     descent : bool
-        Whether a descent looks for a plan before the solver is asked.
-
-    Attributes
-    ----------
-    most_pairs : int
-        Pairs of agent class and task beyond which no model is built.
-    pairs_per_second : int
-        Pairs of which a model is built in a second.
+        Whether plans are looked for before the solver is asked.
     """
 
-    most_pairs: ClassVar[int]
-    pairs_per_second: ClassVar[int]
+    solver: ClassVar[Solver]
 
     def __init__(self, *, descent: bool = True) -> None:
         self._descent = descent
         enumeration.compile_loops()
-        wandering.compile_loops()
-        narrowing.compile_loops()
+        repartition_search.compile_loops()
+        primal_dual.compile_loops()
 
     def refusal(self, instance: Instance, objective: Objective, budget: Budget) -> str | None:
         """Refuse models that would take most of the time only to be built."""
-        limit, seconds = self.most_pairs, budget.time_limit_s
+        limit, per_second, seconds = self.solver.max_pairs, self.solver.pairs_per_second, budget.time_limit_s
         if seconds is not None:
-            limit = min(limit, max(self.pairs_per_second // 4, int(self.pairs_per_second * seconds / 2)))
+            limit = min(limit, max(per_second // 4, int(per_second * seconds / 2)))
         pairs = count_pairs(instance, objective)
         if pairs <= limit:
             return None
@@ -63,33 +54,33 @@ class ExactAllocator(Allocator):
         """Return bounds; every plan on the way is submitted."""
         instance = search.instance
         search.submit(serve_all(instance, greedy(instance, search)))
-        serve = int((instance.workload > 0).sum()) - fewest_unserved(instance)
-        if serve == 0:
+        min_served = int((instance.workload > 0).sum()) - fewest_unserved(instance)
+        if min_served == 0:
             return Proposal(energy_lower_bound=0.0)
         if search.objective is Objective.MAKESPAN:
-            self._lessen_makespan(search, serve, 1.0)
+            self._minimise_makespan(search, min_served, 1.0)
             return Proposal()
+        return Proposal(energy_lower_bound=self._minimise_both(search, min_served))
+
+    def _minimise_both(self, search: Search, min_served: int) -> float | None:
+        """Run both stages, again where the energy was proven early and the makespan had not had all of its time."""
         bound: float | None = None
-        while True:  # again where the energy was settled early, and the makespan had not had all its time
-            in_vain = self._lessen_makespan(search, serve, MAKESPAN_SHARE)
+        while True:
+            complete = self._minimise_makespan(search, min_served, MAKESPAN_SHARE)
             found = None
             with search.improving("the search for the least energy"):
-                found = least_energy(search, self.ask, serve)
+                found = least_energy(search, self.solver, min_served)
             bound = max((known for known in (bound, found) if known is not None), default=None)
-            if found is None or in_vain or search.fast_enough or is_over(search):
-                return Proposal(energy_lower_bound=bound)  # what holds within a makespan holds within a lesser one
+            if found is None or complete or search.fast_enough or is_over(search):
+                return bound  # what holds within a makespan holds within a lesser one
 
-    def _lessen_makespan(self, search: Search, serve: int, share: float) -> bool:
-        """Look for the least makespan within a share of the time left; whether more time would be of no use."""
+    def _minimise_makespan(self, search: Search, min_served: int, share: float) -> bool:
+        """Run the makespan stage for a share of the time left; return whether it ended before its time was up."""
         until_s = np.inf
         if search.budget.time_limit_s is not None:
             until_s = search.elapsed_s + share * search.remaining_s
-        LeastMakespan(search, self.ask, serve, until_s, self.pairs_per_second, descent=self._descent).run()
+        least_makespan(search, self.solver, min_served, until_s, descent=self._descent)
         return search.elapsed_s < until_s
-
-    @abstractmethod
-    def ask(self, question: Question, watch: Watch) -> Answer:
-        """Put `question` to the solver."""
 
 
 def count_pairs(instance: Instance, objective: Objective) -> int:

@@ -8,6 +8,7 @@ import torch
 
 from alloc.allocators.contract.base import Allocator, Proposal
 from alloc.allocators.contract.budget import Budget
+from alloc.allocators.contract.built_in import BUILT_IN
 from alloc.allocators.contract.search import Search
 from alloc.allocators.learned.algorithms.hyperparameters import DqnParameters
 from alloc.allocators.learned.files.policy_file import load_policy
@@ -16,7 +17,6 @@ from alloc.allocators.learned.play.batched_games import warm_up as play_once
 from alloc.allocators.learned.search.fine_tuning import FineTuning
 from alloc.allocators.learned.search.limits import too_large
 from alloc.allocators.learned.search.planner import Planner, PlannerParameters
-from alloc.allocators.registry import BUILT_IN
 from alloc.allocators.runtime.torch_state import plain_torch, torch_threads
 from alloc.problems import Allocation, InputError, Instance, Objective
 from alloc.problems.arguments import text

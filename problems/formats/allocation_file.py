@@ -118,6 +118,13 @@ def _other_instance(source: str, name: str | None, instance: Instance) -> str | 
 def write_allocation(allocation: Allocation, instance: Instance, path: PathLike) -> None:
     """Write an allocation as JSON; ``-`` is standard output.
 
+    Parameters
+    ----------
+    allocation : Allocation
+    instance : Instance
+        The instance of the allocation.
+    path : str or path
+
     Raises
     ------
     InputError

@@ -31,6 +31,10 @@ def read_instance(path: PathLike) -> Instance:
     path : str or path
         ``*.json``, ``*.npz``, a folder with agents.csv and tasks.csv, or ``-`` for JSON from standard input.
 
+    Returns
+    -------
+    Instance
+
     Raises
     ------
     InputError

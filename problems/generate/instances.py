@@ -96,7 +96,16 @@ def paper_like(
 
 
 def random_instance(family: Family, seed: int, *, name: str | None = None) -> Instance:
-    """Return a random instance of `family`; the same seed gives the same instance."""
+    """Return a random instance of `family`; the same seed gives the same instance.
+
+    Parameters
+    ----------
+    family : Family
+    seed : int
+        Seed of all random numbers, >= 0.
+    name : str, optional
+        Name of the instance.
+    """
     of_type(family, Family, "family")
     rng = _generator(seed)
     n, m = family.agents, family.tasks

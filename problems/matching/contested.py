@@ -12,7 +12,12 @@ FEW, SAMPLE = 8, 20
 
 
 def fewest_unserved(instance: Instance) -> int:
-    """Return how many tasks with workload no allocation can serve, at the least."""
+    """Return how many tasks with workload no allocation can serve, at the least.
+
+    Parameters
+    ----------
+    instance : Instance
+    """
     tasks = needs_agent(instance)
     if instance.reach.is_complete:
         return max(0, len(tasks) - instance.n)
@@ -154,6 +159,10 @@ def contested_tasks(instance: Instance) -> IntArray | None:
 
     Such a set has one task more than agents that can take any of them; without any one of its tasks, the rest could
     be served (Hall 1935, doi:10.1112/jlms/s1-10.37.26).
+
+    Parameters
+    ----------
+    instance : Instance
     """
     tasks, reach = needs_agent(instance), instance.reach
     if reach.is_complete:

@@ -93,7 +93,13 @@ def needs_agent(instance: Instance) -> IntArray:
 
 
 def only_allowed(instance: Instance, allocation: Allocation) -> Allocation:
-    """Return `allocation` with the agents idle that are sent where they cannot go."""
+    """Return `allocation` with the agents idle that are sent where they cannot go.
+
+    Parameters
+    ----------
+    instance : Instance
+    allocation : Allocation
+    """
     task = require_fit(instance, allocation).copy()
     working = np.flatnonzero(task != IDLE)
     task[working[~instance.reach.allows(working, task[working])]] = IDLE
@@ -105,6 +111,16 @@ def serve_all(instance: Instance, allocation: Allocation) -> Allocation:
 
     Agents sent where they cannot go are idle in the answer. A task that is served stays served. Agents change places
     along augmenting paths alone, each with the fewest moves, at whose end an idle agent is preferred, then the nearest.
+
+    Parameters
+    ----------
+    instance : Instance
+    allocation : Allocation
+
+    Returns
+    -------
+    Allocation
+        A new one; `allocation` stays as it is.
     """
     task = only_allowed(instance, allocation).task_of_agent
     served = np.zeros(instance.m, dtype=bool)

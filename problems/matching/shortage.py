@@ -90,6 +90,12 @@ def find_shortage(instance: Instance, time_left: Clock = lambda: np.inf) -> Shor
 
     Of the allocations with that makespan, one with little work is taken. Where `time_left` runs out, the makespan may
     be more, and None may be returned although some task cannot be served.
+
+    Parameters
+    ----------
+    instance : Instance
+    time_left : callable
+        Returns the seconds that are left.
     """
     part = contested_part(instance) or _by_least_work(instance, time_left)
     if part is None:

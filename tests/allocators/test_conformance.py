@@ -40,9 +40,9 @@ class TestHedonic(AllocatorConformance):
     iterations = 100
 
 
-class TestHedonicWithinHearing(AllocatorConformance):
+class TestHedonicWithinRadius(AllocatorConformance):
     name = "hedonic"
-    options: ClassVar = {"hearing": 0.5}
+    options: ClassVar = {"communication_radius": 0.5}
     iterations = 100
 
 

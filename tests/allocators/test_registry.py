@@ -1,9 +1,26 @@
-"""Methods by name."""
+"""Methods by name, and their parameters."""
+
+import sys
+from dataclasses import dataclass
+from functools import partial
+from types import SimpleNamespace
 
 import pytest
 
-from alloc.allocators import Allocator, Method, describe, load, names, registry
-from alloc.problems import InputError
+from alloc.allocators import (
+    Allocator,
+    Method,
+    Proposal,
+    Search,
+    describe,
+    load,
+    method_parameters,
+    names,
+    registry,
+    solve,
+)
+from alloc.allocators.contract.parameters import CheckedParameters, bounded
+from alloc.problems import Allocation, InputError, Instance
 
 
 @pytest.mark.parametrize("name", list(registry.BUILT_IN))
@@ -46,3 +63,89 @@ def test_what_is_missing_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(registry.BUILT_IN, "greedy", Method(name="greedy", summary="", requires=("no_such_module",)))
     with pytest.raises(InputError, match="pip install no_such_module"):
         load("greedy")
+
+
+@dataclass(frozen=True)
+class Faces(CheckedParameters):
+    """Parameters for tests."""
+
+    faces: int = bounded(6, 1)
+    bias: float = 0.0
+
+
+class Dice(Allocator):
+    """A method with parameters, as a plugin would have it."""
+
+    method = Method(name="dice", summary="for tests")
+    parameters_type = Faces
+    parameters: Faces
+
+    def allocate(self, search: Search) -> Proposal:
+        return Proposal(Allocation.idle(search.instance), notes=(f"{self.parameters.faces} faces",))
+
+
+@pytest.fixture
+def dice(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Make `Dice` known by name."""
+    monkeypatch.setitem(registry.BUILT_IN, "dice", Dice.method)
+    monkeypatch.setitem(registry.TARGETS, "dice", f"{__name__}:Dice")
+    monkeypatch.setitem(sys.modules, __name__, sys.modules.get(__name__) or SimpleNamespace(Dice=Dice))
+
+
+@pytest.mark.usefixtures("dice")
+def test_parameters_reach_the_method() -> None:
+    """By name with one of them set, with all of them, or as an object: the method has what was given."""
+    instance = Instance(ability=[1], workload=[1])
+    for result in (
+        solve(instance, "dice", faces=20),
+        solve(instance, "dice", parameters=Faces(faces=20)),
+        solve(instance, Dice(faces=20)),
+        solve(instance, Dice(Faces(bias=1.0), faces=20)),
+        solve(instance, load("dice", faces=20)),
+    ):
+        assert result.notes[0] == "20 faces"
+    assert load("dice", Faces(bias=1.0), faces=3).parameters == Faces(faces=3, bias=1.0)
+    assert method_parameters("dice") == {"faces": 6, "bias": 0.0}
+
+
+@pytest.mark.usefixtures("dice")
+@pytest.mark.parametrize(
+    ("settings", "place", "words"),
+    [
+        ({"face": 3}, "face", "did you mean 'faces'"),
+        ({"faces": 1.5}, "faces", "whole number"),
+        ({"faces": 0}, "faces", ">= 1"),
+        ({"bias": "much"}, "bias", "finite number"),
+        ({"parameters": 5}, "parameters", "must be a Faces"),
+    ],
+)
+def test_wrong_parameters_are_named(settings: dict[str, object], place: str, words: str) -> None:
+    """An unknown name gets the nearest one, a wrong value its parameter, at `load`, `solve` and the class alike."""
+    for run in (partial(load, "dice"), partial(solve, Instance(ability=[1], workload=[1]), "dice")):
+        with pytest.raises(InputError, match=words) as caught:
+            run(**settings)
+        assert caught.value.place == place
+    if place != "face":
+        with pytest.raises(InputError, match=words):
+            Dice(**settings)
+
+
+def test_methods_without_parameters_take_none() -> None:
+    """What would be ignored is an error."""
+
+    class Plain(Allocator):
+        method = Method(name="plain", summary="for tests")
+
+        def allocate(self, search: Search) -> Proposal:
+            return Proposal()
+
+    for wrong in ({"parameters": 5}, {"faces": 5}):
+        with pytest.raises(InputError, match="has no parameters"):
+            Plain(**wrong)
+
+
+def test_parameters_of_every_method_can_be_listed() -> None:
+    """Each built-in method tells what can be set, with defaults that it takes."""
+    assert {"policy": None, "device": "cpu"}.items() <= method_parameters("gappo").items()
+    for name in ("greedy", "local-search", "ga", "hedonic", "auction", "lp-round"):
+        load(name, **method_parameters(name))

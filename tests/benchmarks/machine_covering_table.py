@@ -9,9 +9,11 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
 from alloc.allocators import load, solve
-from alloc.allocators.exact.makespan.configuration import Configurations
-from alloc.allocators.exact.makespan.enumeration import choose_groups, enumerate_groups
+from alloc.allocators.exact.makespan.configuration import ConfigurationProgramme
+from alloc.allocators.exact.makespan.enumeration import enumerate_groups
+from alloc.allocators.exact.makespan.set_partitioning import solve_set_partitioning
 from alloc.allocators.exact.model import Model
+from alloc.allocators.exact.solver_model import Verdict
 from alloc.problems import Instance, agent_classes, machine_covering, makespan_lower_bound
 from alloc.problems.generate.covering import EQUAL_WORKLOAD
 
@@ -78,15 +80,17 @@ def proof(instance: Instance, bound: float) -> str:
         return time.monotonic() > until_s
 
     model = Model.build(instance, agent_classes(instance, by_place=False), len(instance.workload))
-    configurations = Configurations(model, makespan_lower_bound(instance))
-    prices, _ = configurations.best_prices(below, over, converge=True)
+    configurations = ConfigurationProgramme(model, makespan_lower_bound(instance))
+    prices = configurations.dual_prices(below, over, converge=True)
     if prices is None:
         return "search"
     if prices.theta > 1:
         return "prices"
-    choice = enumerate_groups(configurations, prices, below, over)
-    impossible = choice is not None and not over() and choose_groups(choice, 0, over)[1]
-    return "groups" if impossible else "search"
+    programme = enumerate_groups(configurations, prices, below, over)
+    if programme is None or over():
+        return "search"
+    verdict, _ = solve_set_partitioning(programme, 0, over)
+    return "groups" if verdict is Verdict.INFEASIBLE else "search"
 
 
 def write_table(entries: list[Entry], file: Path) -> None:

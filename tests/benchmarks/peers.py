@@ -133,7 +133,7 @@ def chosen_methods(options: argparse.Namespace) -> list[str]:
     else:
         chosen = QUICK_METHODS if options.methods == "quick" else options.methods.split(",")
     if options.pygrape:
-        chosen = [*chosen, *(name for name in options.hearing.split(",") if name)]
+        chosen = [*chosen, *(name for name in options.communication.split(",") if name)]
     return chosen
 
 
@@ -146,7 +146,9 @@ def main() -> None:
     parser.add_argument("--time-limit", type=float, default=2.0, help="seconds per run")
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--pygrape", type=Path, help="folder with pyGRAPE.py; left out without")
-    parser.add_argument("--hearing", default="pygrape,pygrape@0.5,hedonic@0.5", help="methods to add with --pygrape")
+    parser.add_argument(
+        "--communication", default="pygrape,pygrape@0.5,hedonic@0.5", help="methods to add with --pygrape"
+    )
     parser.add_argument("--write", action="store_true", help=f"put the table into {PAGE.name}")
     options = parser.parse_args()
     known = families()

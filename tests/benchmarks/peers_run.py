@@ -18,7 +18,7 @@ IMPOSSIBLE = "beyond it: "
 def ours(name: str, instance: Instance, objective: str, limit_s: float, threads: int, radius: float | None) -> Answer:
     from alloc.allocators import RefusedError, load, solve
 
-    allocator = load(name, hearing=radius)
+    allocator = load(name, communication_radius=radius)
     try:
         result = solve(instance, allocator, objective=objective, time_limit_s=limit_s, threads=threads)
     except RefusedError as refused:
@@ -130,7 +130,7 @@ def prtpy(instance: Instance, limit_s: float) -> Answer:
 
 
 def pygrape(instance: Instance, folder: str, radius: float | None) -> Answer:
-    """Play with its utility for unequal agents, by shares of abilities; agents hear each other within `radius`."""
+    """Play with its utility for unequal agents, by shares of abilities; agents communicate within `radius`."""
     if not folder:
         return {"why": "not at hand (--pygrape)"}
     if not instance.reach.is_complete:
@@ -140,13 +140,13 @@ def pygrape(instance: Instance, folder: str, radius: float | None) -> Answer:
     sys.path.insert(0, folder)
     import pyGRAPE  # type: ignore[import-not-found]
 
-    from alloc.allocators.heuristic.decentralised.communication import hearing
+    from alloc.allocators.heuristic.decentralised.communication import communication_graph
 
-    graph, n = hearing(instance, np.inf if radius is None else radius), instance.n
+    graph, n = communication_graph(instance, np.inf if radius is None else radius), instance.n
     heard = np.ones((n, n), dtype=int) - np.eye(n, dtype=int)
-    if not graph.everybody:
+    if not graph.is_complete:
         heard[:] = 0
-        heard[np.repeat(np.arange(n), np.diff(graph.first)), graph.neighbour] = 1
+        heard[np.repeat(np.arange(n), np.diff(graph.begin)), graph.neighbour] = 1
     np.random.seed(0)  # noqa: NPY002 (the one that it draws from)
     scenario = {
         "num_agents": n,

@@ -1,11 +1,11 @@
-"""The configuration linear programme: which groups tasks would take if groups could be mixed.
+"""The configuration linear programme: which groups of agents tasks would take if groups could be mixed.
 
-At a fixed T, a *group* covers a task if its agents have done the work by then. The programme mixes groups for tasks,
-weights summing to 1, such that the busiest class of agents is used as little as possible:
+At a fixed T, a *group* is of use to a task if its agents do the work by then. The programme mixes groups for tasks,
+weights summing to 1, such that the class of agents in greatest demand is used as little as possible:
 
     minimise theta:  sum_p x_jp = 1 for each task j,   sum_jp agents_pk x_jp <= theta count_k for each class k.
 
-If theta > 1, there is no plan. Groups are found as they are needed, by a knapsack at the prices of the classes
+If theta > 1, there is no plan. Groups are found as they are needed, by a knapsack at the dual prices of the classes
 (column generation). For any prices >= 0, theta is at least what the cheapest groups of all tasks cost together, over
 what all agents cost together: that comparison, in whole numbers, is the proof; the programme only finds the prices.
 
@@ -16,61 +16,56 @@ Gilmore and Gomory (1961), A linear programming approach to the cutting-stock pr
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-import highspy
 import numpy as np
 
-from alloc.allocators.exact.makespan.patterns import Table, WholeArray, fill_table, read_group
+from alloc.allocators.exact.knapsack import Table, WholeArray, fill_table
+from alloc.allocators.exact.makespan.restricted_master import CLOSE, RestrictedMaster, TaskNeeds
 from alloc.allocators.exact.model import Model
-from alloc.problems.instance import FloatArray, IntArray
+from alloc.problems.instance import FloatArray
 
-MOST_NEED = 20_000
-"""Largest need in units up to which these are kept as they are."""
+MAX_NEED = 20_000
+"""Largest need in units up to which needs are kept as they are."""
 
 GRID = 8192
-"""Steps of the largest need otherwise: what agents add is rounded up to them, what tasks need is rounded down."""
+"""Steps of the largest need otherwise: weights are rounded up to them, needs are rounded down."""
 
-MOST_CELLS = 30_000_000
-"""Agents times steps times tables beyond which prices are not tried at all."""
+MAX_CELLS = 30_000_000
+"""Agents times steps times tables above which no prices are computed."""
 
-PRICES = 2.0**40
+PRICE_SUM = 2.0**40
 """What all agents cost together, about; prices are whole, so that sums of them are exact."""
 
-SMOOTH = 0.6
+SMOOTHING = 0.6
 """Part of the best prices so far in those that are tried next."""
 
-CLOSE = 1e-9
-"""Gap at which the programme counts as solved, and by which theta may exceed 1 without a proof to come."""
+MAX_REUSED = 2000
+"""Groups found at one T that are offered at the next, the latest ones."""
 
 
 @dataclass(frozen=True, eq=False)
-class Needs:
-    """What tasks that can use the same agents alike need at some T, in whole steps.
+class DualPrices:
+    """Prices of the classes, and what they prove.
 
     Attributes
     ----------
-    tasks : ndarray of int, shape (g,)
-    weight : ndarray of int64, shape (k,)
-        What one agent of each class adds.
-    need : ndarray of int64, shape (g,)
+    price : ndarray, shape (k,)
+        Whole numbers >= 0.
+    theta : float
+        Cost of the cheapest groups of all tasks over that of all agents; above 1 it proves T impossible. ``inf`` if all
+        agents are too few for a task.
+    converged : bool
+        Whether the programme is solved as far as was asked for.
     """
-
-    tasks: IntArray
-    weight: WholeArray
-    need: WholeArray
-
-
-@dataclass(frozen=True, eq=False)
-class Prices:
-    """Prices of the classes, whole numbers, shape (k,), and the part theta of all that the cheapest groups cost."""
 
     price: FloatArray
     theta: float
+    converged: bool = False
 
 
-class Configurations:
-    """Tells which T are impossible by prices, and remembers prices and groups for the next T.
+class ConfigurationProgramme:
+    """Proves by dual prices which T are impossible; keeps the groups found at one T for the next.
 
     Parameters
     ----------
@@ -83,46 +78,46 @@ class Configurations:
     ----------
     count : ndarray of int64, shape (k,)
         Agents in each class.
-    able : bool
-        Whether the model is of a size for this.
+    is_tractable : bool
+        Whether its tables are of a size that can be computed.
     """
 
     def __init__(self, model: Model, low: float) -> None:
         self._model = model
         _, need = model.uncapped(low)
-        self._step = 1.0 if model.unit is not None and need.max() <= MOST_NEED else float(need.max()) / GRID
+        self._step = 1.0 if model.unit is not None and need.max() <= MAX_NEED else float(need.max()) / GRID
         mask = model.classes.mask[:, model.tasks]
-        if model.delay is None:
+        if model.travel_time is None:
             _, group = np.unique(mask, axis=1, return_inverse=True)
             group = group.reshape(-1)
         else:
             group = np.arange(len(model.tasks))
-        self._groups = [np.flatnonzero(group == g) for g in range(group.max() + 1)]
+        self._tasks_alike = [np.flatnonzero(group == g) for g in range(group.max() + 1)]
         self.count = model.classes.count.astype(np.int64)
         agents = int(np.minimum(self.count, GRID).sum())
-        self.able = bool(agents * need.max() / self._step * len(self._groups) <= MOST_CELLS)
+        self.is_tractable = bool(agents * need.max() / self._step * len(self._tasks_alike) <= MAX_CELLS)
         self._known: list[WholeArray] = []
 
-    def needs(self, time: float) -> list[Needs]:
-        """Return what the tasks need at T = `time`, rounded such that what is impossible so is impossible indeed."""
-        able, need = self._model.uncapped(time)
+    def needs(self, time: float) -> list[TaskNeeds]:
+        """Return the needs at T = `time`, rounded such that what is impossible so is impossible indeed."""
+        weight, need = self._model.uncapped(time)
         if self._step == 1.0:
-            whole, most = able.astype(np.int64), need.astype(np.int64)
+            whole_weight, whole_need = weight.astype(np.int64), need.astype(np.int64)
         else:
-            whole = np.ceil(able / self._step).astype(np.int64)
-            most = np.maximum(1, np.floor(need / self._step * (1 - 1e-12))).astype(np.int64)
-        return [Needs(tasks, whole[:, tasks[0]], most[tasks]) for tasks in self._groups]
+            whole_weight = np.ceil(weight / self._step).astype(np.int64)
+            whole_need = np.maximum(1, np.floor(need / self._step * (1 - 1e-12))).astype(np.int64)
+        return [TaskNeeds(tasks, whole_weight[:, tasks[0]], whole_need[tasks]) for tasks in self._tasks_alike]
 
-    def reach_of(self, prices: Prices, low: float, high: float) -> float:
+    def largest_infeasible(self, prices: DualPrices, low: float, high: float) -> float:
         """Return the largest T from `low` to `high`, or close to it, that these prices prove impossible, else `low`."""
-        if self._model.delay is not None:
+        if self._model.travel_time is not None:
             return low
-        every, total = self.needs(low), float(prices.price @ self.count)
-        costs = [self._table(needs, prices.price)[0] for needs in every]
+        total = float(prices.price @ self.count)
+        costs = [self.group_costs(needs, prices.price) for needs in self.needs(low)]
 
         def impossible(time: float) -> bool:
             found = self.needs(time)
-            return bool(sum(cost[each.need].sum() for cost, each in zip(costs, found, strict=True)) > total)
+            return bool(sum(cost[needs.need].sum() for cost, needs in zip(costs, found, strict=True)) > total)
 
         proven = low
         while high - low > 1e-10 * high:
@@ -133,10 +128,8 @@ class Configurations:
                 high = middle
         return proven
 
-    def best_prices(
-        self, time: float, should_stop: Callable[[], bool], *, converge: bool = False
-    ) -> tuple[Prices | None, bool]:
-        """Solve the programme at T = `time`, as far as it takes to see whether T is impossible.
+    def dual_prices(self, time: float, should_stop: Callable[[], bool], *, converge: bool = False) -> DualPrices | None:
+        """Solve the programme at T = `time` by column generation, as far as it takes to see whether T is impossible.
 
         Parameters
         ----------
@@ -145,117 +138,54 @@ class Configurations:
 
         Returns
         -------
-        Prices or None
-            The best ones met; a theta > 1 proves T impossible. ``inf`` if a task cannot be covered by all agents.
-        bool
-            Whether the programme is solved, so far as was asked for.
+        DualPrices or None
+            The best ones found; None if it was stopped before there were any.
         """
-        every = self.needs(time)
-        master = _Master(every, self.count)
-        for group in self._known[-2000:]:
+        tasks = self.needs(time)
+        master = RestrictedMaster(tasks, self.count)
+        for group in self._known[-MAX_REUSED:]:
             master.add_known(group)
-        usable = np.any([needs.weight > 0 for needs in every], axis=0)
-        typical = np.maximum.reduce([np.minimum(needs.weight, needs.need.max()) for needs in every]).astype(float)
-        price = np.where(usable, typical, 0.0) / max(1e-300, float(typical @ self.count))
-        best: Prices | None = None
-        smooth = 0.0
+        price, smoothing = self._first_price(tasks), 0.0
+        best: DualPrices | None = None
         while not should_stop():
-            tables, found = [], self._whole(price)
-            total = float(found @ self.count)
-            worth = 0.0
-            for needs in every:
-                table = self._table(needs, found)
-                tables.append(table)
-                worth += float(table[0][needs.need].sum())
-            if not np.isfinite(worth):
-                return Prices(found, np.inf), True
-            if best is None or worth / total > best.theta:
-                # not merely close to 1: the sums of whole numbers decide
-                theta = worth / total if worth != total else 1.0
-                best = Prices(found, max(theta, np.nextafter(1.0, 2.0)) if worth > total else min(theta, 1.0))
+            priced, tables = self._solve_pricing(tasks, price)
+            if best is None or priced.theta > best.theta:
+                best = priced
             if best.theta > 1 or (master.solved and best.theta >= master.theta - CLOSE):
-                return best, True
+                return replace(best, converged=True)
             new = master.add_groups(tables, self._known)
-            if not new and smooth == 0.0 and master.solved:
-                return best, True
+            if not new and smoothing == 0.0 and master.solved:
+                return replace(best, converged=True)
             if not master.solve():
-                return best, False
+                return best
             if master.theta <= 1 + CLOSE and not converge:
-                return best, True
-            smooth = SMOOTH if new else 0.0
-            price = smooth * best.price / max(1.0, float(best.price @ self.count)) + (1 - smooth) * master.price
-        return best, False
+                return replace(best, converged=True)
+            smoothing = SMOOTHING if new else 0.0
+            total = max(1.0, float(best.price @ self.count))
+            price = smoothing * best.price / total + (1 - smoothing) * master.price
+        return best
 
-    def costs(self, needs: Needs, price: FloatArray) -> FloatArray:
+    def group_costs(self, needs: TaskNeeds, price: FloatArray) -> FloatArray:
         """Return the cost of the cheapest group for each need up to the largest."""
         return self._table(needs, price)[0]
 
-    def _whole(self, price: FloatArray) -> FloatArray:
-        whole: FloatArray = np.round(np.maximum(0.0, price) * PRICES)
-        return whole
+    def _first_price(self, tasks: list[TaskNeeds]) -> FloatArray:
+        """Price every class by the largest weight of one of its agents, all agents costing 1 together."""
+        usable = np.any([needs.weight > 0 for needs in tasks], axis=0)
+        typical = np.maximum.reduce([np.minimum(needs.weight, needs.need.max()) for needs in tasks]).astype(float)
+        return np.where(usable, typical, 0.0) / max(1e-300, float(typical @ self.count))
 
-    def _table(self, needs: Needs, price: FloatArray) -> Table:
+    def _solve_pricing(self, tasks: list[TaskNeeds], price: FloatArray) -> tuple[DualPrices, list[Table]]:
+        """Find the cheapest groups at `price` made whole: what these prove, and the tables of the groups."""
+        whole: FloatArray = np.round(np.maximum(0.0, price) * PRICE_SUM)
+        total, cost = float(whole @ self.count), 0.0
+        tables = [self._table(needs, whole) for needs in tasks]
+        for needs, table in zip(tasks, tables, strict=True):
+            cost += float(table[0][needs.need].sum())
+        if not np.isfinite(cost):
+            return DualPrices(whole, np.inf), tables
+        theta = cost / total if cost != total else 1.0  # not merely close to 1: the sums of whole numbers decide
+        return DualPrices(whole, max(theta, np.nextafter(1.0, 2.0)) if cost > total else min(theta, 1.0)), tables
+
+    def _table(self, needs: TaskNeeds, price: FloatArray) -> Table:
         return fill_table(needs.weight, price, self.count, int(needs.need.max()), False)
-
-
-class _Master:
-    """The programme restricted to the groups known so far; tasks of the same need and weights are one row."""
-
-    def __init__(self, every: list[Needs], count: WholeArray) -> None:
-        self._rows: list[tuple[int, int, int]] = []  # set of needs, need, how many tasks
-        for index, needs in enumerate(every):
-            values, times = np.unique(needs.need, return_counts=True)
-            self._rows += [(index, int(v), int(c)) for v, c in zip(values, times, strict=True)]
-        self._every, self._count = every, count
-        self._seen: set[tuple[int, bytes]] = set()
-        self.solved, self.theta = False, np.inf
-        self.price = self._mu = np.zeros(0)
-        self._highs = highspy.Highs()
-        for option, value in (("output_flag", False), ("threads", 1), ("presolve", "off")):
-            self._highs.setOptionValue(option, value)
-        for _, _, alike in self._rows:
-            self._highs.addRow(float(alike), float(alike), 0, np.zeros(0, dtype=np.int32), np.zeros(0))
-        for _ in count:
-            self._highs.addRow(-highspy.kHighsInf, 0.0, 0, np.zeros(0, dtype=np.int32), np.zeros(0))
-        uses = (len(self._rows) + np.arange(len(count))).astype(np.int32)
-        self._highs.addCol(1.0, 0.0, highspy.kHighsInf, len(uses), uses, -count.astype(float))
-
-    def add_known(self, group: WholeArray) -> None:
-        """Offer a group of earlier days to the task with the largest need that it covers."""
-        done = [int(needs.weight @ group) for needs in self._every]
-        covered = [(need, row) for row, (index, need, _) in enumerate(self._rows) if done[index] >= need]
-        if covered:
-            self._add(max(covered)[1], group)
-
-    def add_groups(self, tables: list[Table], known: list[WholeArray]) -> bool:
-        """Add the cheapest groups where they are cheaper than those in use; whether there was any."""
-        new = False
-        for row, (index, need, _) in enumerate(self._rows):
-            group = read_group(tables[index], len(self._count), need)
-            if self.solved and group @ self.price >= self._mu[row] - CLOSE / 10:
-                continue
-            if self._add(row, group):
-                known.append(group)
-                new = True
-        return new
-
-    def _add(self, row: int, group: WholeArray) -> bool:
-        key = (row, group.tobytes())
-        if key in self._seen:
-            return False
-        self._seen.add(key)
-        classes = np.flatnonzero(group)
-        index = np.append(row, len(self._rows) + classes).astype(np.int32)
-        value = np.append(1.0, group[classes]).astype(float)
-        self._highs.addCol(0.0, 0.0, highspy.kHighsInf, len(index), index, value)
-        return True
-
-    def solve(self) -> bool:
-        """Solve, if that works out."""
-        self._highs.run()
-        if self._highs.getModelStatus() != highspy.HighsModelStatus.kOptimal:
-            return False
-        dual = np.asarray(self._highs.getSolution().row_dual)
-        self._mu, self.price = dual[: len(self._rows)], np.maximum(0.0, -dual[len(self._rows) :])
-        self.theta, self.solved = self._highs.getInfo().objective_function_value, True
-        return True

@@ -1,6 +1,7 @@
-"""A quick plan for a given T: the shortest task takes over or swaps an agent, as long as that lessens all shortage.
+"""A quick plan for a given T: the task done least gets another agent, alone or in a swap, while that helps.
 
-On the paper's scenarios this reaches T = 1 in milliseconds, from the greedy allocation and without a solver.
+Helps means: lessens the sum over tasks of the squared shortfall. On the paper's scenarios this reaches T = 1 in
+milliseconds, from the greedy allocation and without a solver.
 """
 
 from collections.abc import Callable
@@ -11,64 +12,64 @@ import numpy as np
 from alloc.problems.instance import FloatArray, IntArray
 
 DONE = 1 - 1e-12
-"""Part of its workload at which a task counts as done; rounding takes the rest."""
+"""Part of its workload at which a task counts as done; the rest is rounding."""
 
 EMPTY = 1e-12
 """Part of its workload below which a task counts as served by nobody."""
 
-MOST_SWAPS = 100_000
-"""Swaps looked at in one step; beyond, agents are sampled."""
+MAX_SWAPS = 100_000
+"""Swaps looked at in one step; of more, a sample is drawn."""
 
 
 @dataclass(frozen=True, eq=False)
 class Descent:
-    """The state that is descended: agents per class and task, the last column being the idle ones.
+    """The state of the descent: agents per class and task, the last column being the idle ones.
 
     Attributes
     ----------
     share : ndarray, shape (k, t + 1)
         Part of each task that one agent of each class does; 0 in the last column.
-    able : ndarray of bool, shape (k, t + 1)
+    allowed : ndarray of bool, shape (k, t + 1)
         Where agents of each class may go.
     counts : ndarray of int, shape (k, t + 1)
         Agents of each class on each task; changed in place.
-    cover : ndarray, shape (t + 1,)
+    progress : ndarray, shape (t + 1,)
         Sum of the shares on each task, 1 in the last column; changed in place.
     """
 
     share: FloatArray
-    able: np.ndarray[tuple[int, int], np.dtype[np.bool_]]
+    allowed: np.ndarray[tuple[int, int], np.dtype[np.bool_]]
     counts: IntArray
-    cover: FloatArray
+    progress: FloatArray
 
     @classmethod
     def begin(cls, share: FloatArray, counts: IntArray, free: IntArray) -> "Descent":
         """Start from `counts`, shape (k, t), with `free` idle agents of each class, shape (k,)."""
         idle = np.zeros((len(share), 1))
         padded = np.hstack([share, idle])
-        able = padded > 0
-        able[:, -1] = True
+        allowed = padded > 0
+        allowed[:, -1] = True
         table = np.column_stack([counts, free])
-        cover = (table * padded).sum(axis=0)
-        cover[-1] = 1.0
-        return cls(padded, able, table, cover)
+        progress = (table * padded).sum(axis=0)
+        progress[-1] = 1.0
+        return cls(padded, allowed, table, progress)
 
     @property
-    def shortage(self) -> float:
-        """Sum over tasks of the squared missing part."""
-        return float(_shortage(self.cover).sum())
+    def shortfall(self) -> float:
+        """Sum over tasks of the squared shortfall."""
+        return float(_shortfall(self.progress).sum())
 
     @property
     def reached(self) -> bool:
         """Whether every task is done."""
-        return bool(self.cover.min() >= DONE)
+        return bool(self.progress.min() >= DONE)
 
     def run(self, rng: np.random.Generator, should_stop: Callable[[], bool]) -> None:
-        """Take the best move or swap for the shortest task that has one, until none has."""
-        stuck = np.zeros(len(self.cover), dtype=bool)
+        """Take the best move or swap for the task done least of those that have one, until none has."""
+        stuck = np.zeros(len(self.progress), dtype=bool)
         while not should_stop():
-            task = int(np.where(stuck, np.inf, self.cover).argmin())
-            if stuck[task] or self.cover[task] >= DONE:
+            task = int(np.where(stuck, np.inf, self.progress).argmin())
+            if stuck[task] or self.progress[task] >= DONE:
                 return
             change = self._best_change(task, rng)
             if change is None:
@@ -77,56 +78,56 @@ class Descent:
             self._apply(task, *change)
             stuck[:] = False
 
-    def restore(self, counts: IntArray, cover: FloatArray) -> None:
+    def restore(self, counts: IntArray, progress: FloatArray) -> None:
         """Go back to an earlier state."""
-        self.counts[:], self.cover[:] = counts, cover
+        self.counts[:], self.progress[:] = counts, progress
 
     def kick(self, rng: np.random.Generator) -> None:
         """Move two to four random agents to random tasks within their reach."""
         for _ in range(int(rng.integers(2, 5))):
-            kind, task = divmod(int(rng.choice(np.flatnonzero(self.counts))), self.counts.shape[1])
-            goal = int(rng.choice(np.flatnonzero(self.able[kind])))
-            self._move(kind, task, goal)
+            agent_class, task = divmod(int(rng.choice(np.flatnonzero(self.counts))), self.counts.shape[1])
+            target = int(rng.choice(np.flatnonzero(self.allowed[agent_class])))
+            self._move(agent_class, task, target)
 
     def _best_change(self, task: int, rng: np.random.Generator) -> tuple[int, int, int] | None:
-        """Return who comes to `task` (class and where from) and which class goes there instead (-1: none)."""
-        kind, home = np.divmod(np.flatnonzero(self.counts), self.counts.shape[1])
-        comes = (home != task) & (self.share[kind, task] > 0)
-        kind, home = kind[comes], home[comes]
+        """Return the class that comes to `task`, where from, and the class that goes there in exchange (-1: none)."""
+        agent_class, origin = np.divmod(np.flatnonzero(self.counts), self.counts.shape[1])
+        comes = (origin != task) & (self.share[agent_class, task] > 0)
+        agent_class, origin = agent_class[comes], origin[comes]
         leaver = np.flatnonzero(self.counts[:, task])
-        if len(kind) * (len(leaver) + 1) > MOST_SWAPS:
-            sample = rng.choice(len(kind), max(1, MOST_SWAPS // (len(leaver) + 1)), replace=False)
-            kind, home = kind[sample], home[sample]
-        if not len(kind):
+        if len(agent_class) * (len(leaver) + 1) > MAX_SWAPS:
+            sample = rng.choice(len(agent_class), max(1, MAX_SWAPS // (len(leaver) + 1)), replace=False)
+            agent_class, origin = agent_class[sample], origin[sample]
+        if not len(agent_class):
             return None
         lost = np.concatenate([[0.0], self.share[leaver, task]])
-        here = self.cover[task] + self.share[kind, task][:, None] - lost
-        given = np.hstack([np.zeros((len(kind), 1)), self.share[leaver][:, home].T])
-        there = (self.cover[home] - self.share[kind, home])[:, None] + given
-        gain = _shortage(here) + np.where((home == self.counts.shape[1] - 1)[:, None], 0.0, _shortage(there))
-        gain -= _shortage(self.cover[task]) + _shortage(self.cover[home])[:, None]
-        gain[:, 1:][~self.able[leaver][:, home].T] = np.inf
+        here = self.progress[task] + self.share[agent_class, task][:, None] - lost
+        given = np.hstack([np.zeros((len(agent_class), 1)), self.share[leaver][:, origin].T])
+        there = (self.progress[origin] - self.share[agent_class, origin])[:, None] + given
+        gain = _shortfall(here) + np.where((origin == self.counts.shape[1] - 1)[:, None], 0.0, _shortfall(there))
+        gain -= _shortfall(self.progress[task]) + _shortfall(self.progress[origin])[:, None]
+        gain[:, 1:][~self.allowed[leaver][:, origin].T] = np.inf
         best, swap = divmod(int(gain.argmin()), gain.shape[1])
         if gain[best, swap] > -1e-15:
             return None
-        return int(kind[best]), int(home[best]), int(leaver[swap - 1]) if swap else -1
+        return int(agent_class[best]), int(origin[best]), int(leaver[swap - 1]) if swap else -1
 
-    def _apply(self, task: int, kind: int, home: int, leaver: int) -> None:
-        self._move(kind, home, task)
+    def _apply(self, task: int, agent_class: int, origin: int, leaver: int) -> None:
+        self._move(agent_class, origin, task)
         if leaver >= 0:
-            self._move(leaver, task, home)
+            self._move(leaver, task, origin)
 
-    def _move(self, kind: int, home: int, goal: int) -> None:
-        self.counts[kind, home] -= 1
-        self.counts[kind, goal] += 1
-        for task in {home, goal} - {len(self.cover) - 1}:
-            self.cover[task] = self.counts[:, task] @ self.share[:, task]
+    def _move(self, agent_class: int, origin: int, target: int) -> None:
+        self.counts[agent_class, origin] -= 1
+        self.counts[agent_class, target] += 1
+        for task in {origin, target} - {len(self.progress) - 1}:
+            self.progress[task] = self.counts[:, task] @ self.share[:, task]
 
 
-def _shortage(cover: FloatArray) -> FloatArray:
-    """Square of the missing part, and a penalty where nobody is left."""
-    missing: FloatArray = np.maximum(0.0, 1 - cover)
-    return missing * missing + 1e3 * (cover <= EMPTY)
+def _shortfall(progress: FloatArray) -> FloatArray:
+    """Square of the part that is not done, and a penalty where nobody is left."""
+    part: FloatArray = np.maximum(0.0, 1 - progress)
+    return part * part + 1e3 * (progress <= EMPTY)
 
 
 def descend(
@@ -150,7 +151,7 @@ def descend(
         Idle agents of each class.
     rng : numpy.random.Generator
     kicks : int
-        Fresh descents from the best state, shaken.
+        Descents from the best state after a perturbation.
     should_stop : callable
 
     Returns
@@ -162,14 +163,14 @@ def descend(
     """
     state = Descent.begin(share, counts, free)
     state.run(rng, should_stop)
-    best, table, cover = state.shortage, state.counts.copy(), state.cover.copy()
+    best, table, progress = state.shortfall, state.counts.copy(), state.progress.copy()
     for _ in range(kicks):
-        if cover.min() >= DONE or should_stop():
+        if progress.min() >= DONE or should_stop():
             break
         state.kick(rng)
         state.run(rng, should_stop)
-        if state.shortage <= best:
-            best, table, cover = state.shortage, state.counts.copy(), state.cover.copy()
+        if state.shortfall <= best:
+            best, table, progress = state.shortfall, state.counts.copy(), state.progress.copy()
         else:
-            state.restore(table, cover)
-    return table[:, :-1], bool(cover.min() >= DONE)
+            state.restore(table, progress)
+    return table[:, :-1], bool(progress.min() >= DONE)

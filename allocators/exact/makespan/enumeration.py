@@ -1,8 +1,8 @@
-"""All groups that a task could have in any plan with makespan T, and which of them together make a plan.
+"""All groups that a task could have in any plan with makespan T.
 
-With the prices of the configuration linear programme all agents cost a known sum, and the cheapest groups of all tasks
-cost nearly as much. So a group that costs more than the cheapest one of its task and what is left over is in no plan
-(reduced cost fixing). Where few are left, a plan is a choice among them, by an integer programme, or there is none.
+At the dual prices of the configuration linear programme all agents cost a known sum, and the cheapest groups of all
+tasks cost nearly as much. So a group that costs more than the cheapest one of its task and what is left over is in no
+plan (reduced cost fixing). Where few are left, they are the columns of a set partitioning problem.
 
 References
 ----------
@@ -11,34 +11,32 @@ partitioning formulation with additional cuts, doi:10.1007/s10107-007-0178-5.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
-import highspy
 import numpy as np
-from scipy.sparse import csc_array
 
-from alloc.allocators.exact.makespan.configuration import Configurations, Prices
-from alloc.allocators.exact.makespan.patterns import WholeArray, fill_table, read_group
+from alloc.allocators.exact.knapsack import WholeArray, fill_table, read_group
+from alloc.allocators.exact.makespan.configuration import ConfigurationProgramme, DualPrices
+from alloc.allocators.exact.makespan.restricted_master import TaskNeeds
+from alloc.allocators.exact.makespan.set_partitioning import SetPartitioning
 from alloc.allocators.runtime.compiled import compiled
-from alloc.allocators.runtime.interrupts import run_native
-from alloc.problems.instance import FloatArray, IntArray
+from alloc.problems.instance import FloatArray
 
-MOST_GROUPS = 60_000
-"""Groups in all beyond which the integer programme takes too long."""
+MAX_GROUPS = 60_000
+"""Groups in all above which the set partitioning problem takes too long."""
 
-MOST_NODES = 3_000_000
-"""Nodes of one enumeration, some hundredths of a second."""
+MAX_NODES = 3_000_000
+"""Nodes of one enumeration; they take some hundredths of a second."""
 
-MOST_CELLS = 20_000_000
-"""Classes times steps of the need beyond which groups are not enumerated."""
+MAX_CELLS = 20_000_000
+"""Classes times steps of the need above which groups are not enumerated."""
 
-LONGEST = 64
+MAX_GROUP_SIZE = 64
 """Agents in a group at the most."""
 
 
 @compiled
 def fill_least(weight: WholeArray, price: FloatArray, count: WholeArray, least: FloatArray) -> None:
-    """Write the least cost of every need covered by the classes from each one on; `least` is (k + 1, most + 1)."""
+    """Write the least cost of meeting every need by the classes from each one on; `least` is (k + 1, most + 1)."""
     k, most = len(weight), least.shape[1] - 1
     for i in range(k, -1, -1):
         least[i, 0] = 0.0
@@ -57,10 +55,10 @@ def list_groups(
     count: WholeArray,
     least: FloatArray,
     limit: float,
-    most_nodes: int,
+    max_nodes: int,
     groups: WholeArray,
 ) -> int:
-    """List the groups that cover a need, none of whose agents can be spared, at a cost of at most `limit`.
+    """List the groups that meet a need, none of whose agents can be spared, at a cost of at most `limit`.
 
     Parameters
     ----------
@@ -71,23 +69,20 @@ def list_groups(
     count : ndarray of int64, shape (k,)
     least : ndarray, shape (k + 1, need + 1)
         As `fill_least` writes it; need >= 1.
-    limit : float
-    most_nodes : int
-        Nodes of the search tree at which it gives up.
-    groups : ndarray of int64, shape (most, LONGEST)
+    groups : ndarray of int64, shape (most, MAX_GROUP_SIZE)
         Gets the classes of the agents in each; -1 where there are no more.
 
     Returns
     -------
     int
-        How many there are, -1 if they are too many.
+        How many there are; -1 if they are too many, or the search tree has more than `max_nodes` nodes.
     """
     k, found, depth = len(weight), 0, 0
-    member = np.zeros(LONGEST + 1, dtype=np.int64)  # class tried at each depth
-    left, cost = np.zeros(LONGEST + 1, dtype=np.int64), np.zeros(LONGEST + 1)
+    member = np.zeros(MAX_GROUP_SIZE + 1, dtype=np.int64)  # class tried at each depth
+    left, cost = np.zeros(MAX_GROUP_SIZE + 1, dtype=np.int64), np.zeros(MAX_GROUP_SIZE + 1)
     used = np.zeros(k, dtype=np.int64)
     left[0] = least.shape[1] - 1
-    for _ in range(most_nodes):
+    for _ in range(max_nodes):
         i = member[depth]
         if i == k or cost[depth] + least[i, left[depth]] > limit:  # nor with any later class
             depth -= 1
@@ -100,7 +95,7 @@ def list_groups(
         if used[i] == count[i] or paid + least[i, max(0, rest)] > limit:
             member[depth] += 1
         elif rest > 0:
-            if depth == LONGEST - 1:
+            if depth == MAX_GROUP_SIZE - 1:
                 return -1
             used[i] += 1
             depth += 1
@@ -108,131 +103,76 @@ def list_groups(
         else:
             if found == len(groups):
                 return -1
-            for place in range(LONGEST):
-                groups[found, place] = member[place] if place <= depth else -1
+            write_group(groups[found], member, depth + 1)
             found += 1
             member[depth] += 1
     return -1
 
 
-@dataclass(frozen=True, eq=False)
-class Choice:
-    """The integer programme: a group for each task.
-
-    Attributes
-    ----------
-    groups : ndarray of int64, shape (p, k)
-        Agents of each class in each group.
-    row : ndarray of int, shape (p,)
-        Row of tasks alike that each group is for.
-    tasks : list of ndarray of int
-        Tasks alike, per row.
-    count : ndarray of int64, shape (k,)
-    """
-
-    groups: WholeArray
-    row: IntArray
-    tasks: list[IntArray]
-    count: WholeArray
+@compiled
+def write_group(row: WholeArray, member: WholeArray, size: int) -> None:
+    """Write the first `size` members, and -1 after them."""
+    for place in range(len(row)):
+        row[place] = member[place] if place < size else -1
 
 
 def enumerate_groups(
-    configurations: Configurations, prices: Prices, time: float, should_stop: Callable[[], bool]
-) -> Choice | None:
-    """Return the groups that can be part of a plan at T = `time`; None if they are too many."""
-    every, count, price = configurations.needs(time), configurations.count, prices.price
-    spare = float(price @ count) - sum(float(configurations.costs(each, price)[each.need].sum()) for each in every)
+    configurations: ConfigurationProgramme, prices: DualPrices, time: float, should_stop: Callable[[], bool]
+) -> SetPartitioning | None:
+    """Return the choice among all groups that can be part of a plan at T = `time`; None if they are too many."""
+    needs, count, price = configurations.needs(time), configurations.count, prices.price
+    costs = [configurations.group_costs(each, price) for each in needs]
+    cheapest = sum(float(cost[each.need].sum()) for cost, each in zip(costs, needs, strict=True))
+    spare = float(price @ count) - cheapest
     found: list[WholeArray] = []
-    rows: list[int] = []
-    tasks: list[IntArray] = []
+    row_of_group: list[int] = []
+    tasks_of_row: list[WholeArray] = []
     total = 0
-    for each in every:
-        costs = configurations.costs(each, price)
-        able = np.flatnonzero((each.weight > 0) & (count > 0))
-        order = able[np.argsort(-each.weight[able], kind="stable")]
-        if len(order) * int(each.need.max()) > MOST_CELLS:
+    for each, cost in zip(needs, costs, strict=True):
+        table = _least_costs(each, price, count)
+        if table is None:
             return None
-        least = np.empty((len(order) + 1, int(each.need.max()) + 1))
-        fill_least(each.weight[order], price[order], count[order], least)
+        order, least = table
         for need in np.unique(each.need):
             if should_stop():
                 return None
-            limit = float(costs[need]) + spare
-            members = np.empty((MOST_GROUPS - total, LONGEST), dtype=np.int64)
+            limit = float(cost[need]) + spare
+            members = np.empty((MAX_GROUPS - total, MAX_GROUP_SIZE), dtype=np.int64)
             size = list_groups(
-                each.weight[order], price[order], count[order], least[:, : need + 1], limit, MOST_NODES, members
+                each.weight[order], price[order], count[order], least[:, : need + 1], limit, MAX_NODES, members
             )
             if size < 0:
                 return None
-            groups = np.zeros((size, len(count)), dtype=np.int64)
-            line, place = np.nonzero(members[:size] >= 0)
-            np.add.at(groups, (line, order[members[line, place]]), 1)
-            found.append(groups)
-            rows += [len(tasks)] * len(groups)
-            tasks.append(each.tasks[each.need == need])
-            total += len(groups)
-    return Choice(np.concatenate(found), np.array(rows, dtype=np.intp), tasks, count)
+            found.append(_count_members(members[:size], order, len(count)))
+            row_of_group += [len(tasks_of_row)] * size
+            tasks_of_row.append(each.tasks[each.need == need])
+            total += size
+    return SetPartitioning(np.concatenate(found), np.array(row_of_group, dtype=np.intp), tasks_of_row, count)
 
 
-def choose_groups(choice: Choice, seed: int, should_stop: Callable[[], bool]) -> tuple[WholeArray | None, bool]:
-    """Choose a group for each task by HiGHS.
-
-    Returns
-    -------
-    ndarray of int64, shape (k, t), or None
-        Agents of each class on each task of the model.
-    bool
-        Whether there is proven to be no such choice.
-    """
-    highs = highspy.Highs()
-    highs.HandleUserInterrupt = True
-    for option, value in (("output_flag", False), ("parallel", "off"), ("random_seed", seed % 2**31)):
-        highs.setOptionValue(option, value)
-
-    def work() -> highspy.HighsModelStatus:
-        highs.passModel(_programme(choice))
-        highs.solve()
-        return highs.getModelStatus()
-
-    status = run_native(work, should_stop, highs.cancelSolve)
-    if status is None or status == highspy.HighsModelStatus.kInfeasible:
-        return None, status is not None
-    if highs.getInfo().primal_solution_status != highspy.SolutionStatus.kSolutionStatusFeasible:
-        return None, False
-    return _table(choice, np.round(np.asarray(highs.getSolution().col_value)).astype(np.int64)), False
+def _least_costs(needs: TaskNeeds, price: FloatArray, count: WholeArray) -> tuple[WholeArray, FloatArray] | None:
+    """Return the classes by falling weight, and the table of `fill_least` for them; None if it is too large."""
+    usable = np.flatnonzero((needs.weight > 0) & (count > 0))
+    order = usable[np.argsort(-needs.weight[usable], kind="stable")]
+    if len(order) * int(needs.need.max()) > MAX_CELLS:
+        return None
+    least = np.empty((len(order) + 1, int(needs.need.max()) + 1))
+    fill_least(needs.weight[order], price[order], count[order], least)
+    return order, least
 
 
-def _programme(choice: Choice) -> highspy.HighsLp:
-    """State that each task takes a group, and no class more agents than it has."""
-    p, rows = len(choice.row), len(choice.tasks)
-    alike = np.array([len(tasks) for tasks in choice.tasks], dtype=float)
-    line, kind = np.nonzero(choice.groups)
-    row = np.concatenate([choice.row, rows + kind])
-    value = np.concatenate([np.ones(p), choice.groups[line, kind].astype(float)])
-    matrix = csc_array((value, (row, np.concatenate([np.arange(p), line]))), shape=(rows + len(choice.count), p))
-    lp = highspy.HighsLp()
-    lp.num_row_, lp.num_col_ = matrix.shape
-    lp.col_cost_, lp.col_lower_, lp.col_upper_ = np.zeros(p), np.zeros(p), alike[choice.row]
-    lp.row_lower_ = np.concatenate([alike, np.full(len(choice.count), -np.inf)])
-    lp.row_upper_ = np.concatenate([alike, choice.count.astype(float)])
-    lp.a_matrix_.format_ = highspy.MatrixFormat.kColwise
-    lp.a_matrix_.start_, lp.a_matrix_.index_, lp.a_matrix_.value_ = matrix.indptr, matrix.indices, matrix.data
-    lp.integrality_ = [highspy.HighsVarType.kInteger] * p
-    return lp
-
-
-def _table(choice: Choice, times: WholeArray) -> WholeArray:
-    table = np.zeros((len(choice.count), sum(len(tasks) for tasks in choice.tasks)), dtype=np.int64)
-    free = [list(tasks) for tasks in choice.tasks]
-    for group in np.repeat(np.arange(len(times)), times).tolist():
-        table[:, free[choice.row[group]].pop()] = choice.groups[group]
-    return table
+def _count_members(members: WholeArray, order: WholeArray, classes: int) -> WholeArray:
+    """Return the agents of each class in each group, shape (p, classes), given the places of members in `order`."""
+    groups = np.zeros((len(members), classes), dtype=np.int64)
+    line, place = np.nonzero(members >= 0)
+    np.add.at(groups, (line, order[members[line, place]]), 1)
+    return groups
 
 
 def compile_loops() -> None:
-    """Compile what this needs, or read it from the cache, so that no run waits for it."""
+    """Compile the loops of this module, or read it from the cache, so that no run waits for it."""
     ones = np.ones(2, dtype=np.int64)
     read_group(fill_table(ones, np.ones(2), ones, 2, False), 2, 1)
     least = np.empty((3, 3))
     fill_least(ones, np.ones(2), ones, least)
-    list_groups(ones, np.ones(2), ones, least[:, :2], 1.0, 1, np.empty((1, LONGEST), dtype=np.int64))
+    list_groups(ones, np.ones(2), ones, least[:, :2], 1.0, 1, np.empty((1, MAX_GROUP_SIZE), dtype=np.int64))

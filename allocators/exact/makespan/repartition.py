@@ -1,8 +1,8 @@
-"""A plan for a given T by splitting the agents of two, three or four tasks anew, in the best way there is; compiled.
+"""Repartition: assign the agents of two, three or four tasks to these tasks anew, in the best way of all; compiled.
 
 With two to four agents per task, single moves and swaps soon find nothing, while a few tasks have so few agents between
-them that all ways of splitting these can be tried. That is done over and over for a task that is short and others drawn
-at random; of several best splits one is drawn, so that the search wanders where nothing gets better.
+them that all their partitions can be tried. One of the tasks has a shortfall, the others are drawn at random; of
+several best partitions one is drawn, so that the search drifts over plans that are equally good.
 """
 
 import numpy as np
@@ -11,11 +11,11 @@ from alloc.allocators.runtime.compiled import compiled
 from alloc.allocators.runtime.random import RandomState, draw
 from alloc.problems.instance import FloatArray, IntArray
 
-MOST_TASKS = 4
-"""Tasks whose agents are split together at the most."""
+MAX_TASKS = 4
+"""Tasks whose agents are assigned anew together, at the most."""
 
-POOL = 12
-"""Agents that are split together at the most; of larger pools some stay where they are."""
+MAX_POOL = 12
+"""Agents assigned anew together, at the most; of larger pools some stay where they are."""
 
 
 @compiled
@@ -28,13 +28,39 @@ def sum_subsets(value: FloatArray, size: int, sums: FloatArray) -> None:
 
 
 @compiled
-def missing(has: float, need: float) -> float:
-    """What a task lacks; rounding errors are none."""
+def shortfall(has: float, need: float) -> float:
+    """How much a task has less than it needs; 0 within rounding errors."""
     return max(0.0, need - has) if has < need * (1 - 1e-12) else 0.0
 
 
 @compiled
-def split(
+def prepare_sums(
+    value: FloatArray, base: FloatArray, need: FloatArray, tasks: int, size: int, sums: FloatArray
+) -> tuple[float, FloatArray]:
+    """Fill `sums` for `best_partition`: what each subset of agents adds to each task, and at the most to any.
+
+    Returns
+    -------
+    float
+        Difference up to which two shortfalls are equal.
+    ndarray, shape (MAX_TASKS,)
+        What the tasks after each one need from the pool.
+    """
+    slack, largest = 0.0, np.zeros(size)
+    for task in range(tasks):
+        slack = max(slack, 1e-9 * need[task])
+        sum_subsets(value[task], size, sums[task])
+        for agent in range(size):
+            largest[agent] = max(largest[agent], value[task, agent])
+    sum_subsets(largest, size, sums[MAX_TASKS])
+    later = np.zeros(MAX_TASKS)
+    for task in range(tasks - 2, -1, -1):
+        later[task] = later[task + 1] + need[task + 1] - base[task + 1]
+    return slack, later
+
+
+@compiled
+def best_partition(
     value: FloatArray,
     base: FloatArray,
     need: FloatArray,
@@ -45,64 +71,41 @@ def split(
     state: RandomState,
     chosen: IntArray,
 ) -> float:
-    """Split agents over two to four tasks such that as little as possible is missing; return that.
+    """Assign agents to two to four tasks at the least total shortfall; return that, or ``inf`` if it exceeds `within`.
 
     Parameters
     ----------
-    value : ndarray, shape (MOST_TASKS, POOL)
-        What each agent adds to each task.
-    base, need : ndarray, shape (MOST_TASKS,)
+    value : ndarray, shape (MAX_TASKS, MAX_POOL)
+        What each of `size` agents adds to each of `tasks` tasks.
+    base, need : ndarray, shape (MAX_TASKS,)
         What each task has already, and needs.
-    tasks : int
-        How many they are.
-    size : int
-        Agents to split.
-    within : float
-        Only splits that miss at most this are looked for.
-    sums : ndarray, shape (MOST_TASKS + 1, 2**POOL)
+    sums : ndarray, shape (MAX_TASKS + 1, 2**MAX_POOL)
         Space to work in.
-    state : ndarray of uint64, shape (1,)
-        Of the random numbers.
-    chosen : ndarray of int, shape (MOST_TASKS,)
-        Gets the agents of each task, as bits; of several best splits a random one. Unchanged if there is none.
-
-    Returns
-    -------
-    float
-        ``inf`` if there is no such split.
+    chosen : ndarray of int, shape (MAX_TASKS,)
+        Gets the agents of each task, as bits; of several best partitions a random one. Unchanged if there is none.
     """
-    all_agents, most, slack = (1 << size) - 1, sums[MOST_TASKS], 0.0
-    largest = np.zeros(size)
-    for task in range(tasks):
-        slack = max(slack, 1e-9 * need[task])
-        sum_subsets(value[task], size, sums[task])
-        for agent in range(size):
-            largest[agent] = max(largest[agent], value[task, agent])
-    sum_subsets(largest, size, most)
-    later = np.zeros(MOST_TASKS)  # what the tasks after each one need from the pool
-    for task in range(tasks - 2, -1, -1):
-        later[task] = later[task + 1] + need[task + 1] - base[task + 1]
+    all_agents = (1 << size) - 1
+    slack, later = prepare_sums(value, base, need, tasks, size, sums)
     best, equals, found = within, 0, False
     for first in range(all_agents + 1):
-        lacks = missing(base[0] + sums[0, first], need[0])
+        short = shortfall(base[0] + sums[0, first], need[0])
         rest = all_agents ^ first
-        if lacks + max(0.0, later[0] - most[rest]) > best + slack:
+        if short + max(0.0, later[0] - sums[MAX_TASKS, rest]) > best + slack:
             continue
         second = rest
         while True:
-            lacks2 = lacks + missing(base[1] + sums[1, second], need[1])
+            short2 = short + shortfall(base[1] + sums[1, second], need[1])
             rest2 = rest ^ second
             if tasks == 2:
-                third, deep = 0, lacks2 <= best + slack
+                third, deep = 0, short2 <= best + slack
             else:
-                third, deep = rest2, lacks2 + max(0.0, later[1] - most[rest2]) <= best + slack
+                third, deep = rest2, short2 + max(0.0, later[1] - sums[MAX_TASKS, rest2]) <= best + slack
             while deep:
-                total, fourth = lacks2, 0
+                total = short2
                 if tasks > 2:
-                    total += missing(base[2] + sums[2, third], need[2])
+                    total += shortfall(base[2] + sums[2, third], need[2])
                 if tasks > 3:
-                    fourth = rest2 ^ third
-                    total += missing(base[3] + sums[3, fourth], need[3])
+                    total += shortfall(base[3] + sums[3, rest2 ^ third], need[3])
                 if total <= best + slack:
                     equals = 1 if not found or total < best - slack else equals + 1
                     if equals == 1 or draw(state, equals) == 0:
@@ -111,7 +114,7 @@ def split(
                         if tasks > 2:
                             chosen[2] = third
                         if tasks > 3:
-                            chosen[3] = fourth
+                            chosen[3] = rest2 ^ third
                 if tasks < 4 or third == 0:
                     break
                 third = (third - 1) & rest2
@@ -122,10 +125,109 @@ def split(
 
 
 @compiled
-def wander(
+def count_agents(work: FloatArray, place: IntArray, has: FloatArray, size: IntArray, members: IntArray) -> None:
+    """Fill `has`, `size` and `members` from the task of each agent: work, number and agents of each task."""
+    for i in range(len(place)):
+        j = place[i]
+        has[j] += work[i, j]
+        members[j, size[j]] = i
+        size[j] += 1
+
+
+@compiled
+def total_shortfall(has: FloatArray, need: FloatArray) -> tuple[float, float]:
+    """Return the sum of shortfalls, and the least part of its need that a task has."""
+    total, least = 0.0, np.inf
+    for j in range(len(need)):
+        total += shortfall(has[j], need[j])
+        least = min(least, has[j] / need[j])
+    return total, least
+
+
+@compiled
+def draw_tasks(has: FloatArray, need: FloatArray, state: RandomState, task: IntArray) -> int:
+    """Draw a task with a shortfall, and others: write them to `task` and return how many they are."""
+    count, t = 0, len(need)
+    for j in range(t):
+        if shortfall(has[j], need[j]) > 0:
+            count += 1
+            if draw(state, count) == 0:
+                task[0] = j
+    tasks = min(t, 2 + (draw(state, 8) > 0) + (draw(state, 4) == 0))
+    q = 1
+    while q < tasks:
+        task[q] = draw(state, t)
+        new = True
+        for r in range(q):
+            new &= task[r] != task[q]
+        if new:
+            q += 1
+    return tasks
+
+
+@compiled
+def draw_pool(
+    task: IntArray, tasks: int, size: IntArray, members: IntArray, state: RandomState, pool: IntArray, at: IntArray
+) -> tuple[int, int]:
+    """Collect the agents of the tasks, those to be assigned anew first.
+
+    Writes the agents to `pool`, and which of the tasks each is on to `at`; returns how many there are in all, and how
+    many are to be assigned anew.
+    """
+    agents = 0
+    for q in range(tasks):
+        j = task[q]
+        for r in range(size[j]):
+            pool[agents], at[agents] = members[j, r], q
+            agents += 1
+    used = min(agents, MAX_POOL)
+    for p in range(used):
+        r = p + draw(state, agents - p)
+        pool[p], pool[r] = pool[r], pool[p]
+        at[p], at[r] = at[r], at[p]
+    return agents, used
+
+
+@compiled
+def reassign(
+    work: FloatArray,
+    task: IntArray,
+    tasks: int,
+    chosen: IntArray,
+    pool: IntArray,
+    at: IntArray,
+    agents: int,
+    used: int,
+    place: IntArray,
+    has: FloatArray,
+    size: IntArray,
+    members: IntArray,
+) -> None:
+    """Move the first `used` agents of the pool to the tasks they are `chosen` for, and update what depends on it."""
+    for q in range(tasks):
+        size[task[q]] = 0
+    for p in range(agents):
+        q = at[p]
+        if p < used:
+            for r in range(tasks):
+                if chosen[r] >> p & 1:
+                    q = r
+        j = task[q]
+        place[pool[p]] = j
+        members[j, size[j]] = pool[p]
+        size[j] += 1
+    for q in range(tasks):
+        j = task[q]
+        has[j] = 0.0
+        for r in range(size[j]):
+            has[j] += work[members[j, r], j]
+
+
+@compiled
+def search_repartitions(
     work: FloatArray, need: FloatArray, place: IntArray, steps: int, state: RandomState
 ) -> tuple[float, float, IntArray]:
-    """Split the agents of a few tasks anew, `steps` times or until every task has what it needs.
+    """Assign the agents of a few tasks anew, `steps` times or until every task has what it needs.
 
     Parameters
     ----------
@@ -141,93 +243,40 @@ def wander(
     Returns
     -------
     float
-        What is missing in the end, summed over tasks.
+        Total shortfall in the end.
     float
-        The largest part of its need that the shortest task had.
+        The largest part of its need that the task with the smallest part has had.
     ndarray of int, shape (n,)
         The places at that time.
     """
     n, t = work.shape
     has, size, members = np.zeros(t), np.zeros(t, dtype=np.int64), np.empty((t, n), dtype=np.int32)
-    for i in range(n):
-        j = place[i]
-        has[j] += work[i, j]
-        members[j, size[j]] = i
-        size[j] += 1
-    sums = np.empty((MOST_TASKS + 1, 1 << POOL))
-    task, chosen = np.empty(MOST_TASKS, dtype=np.int64), np.zeros(MOST_TASKS, dtype=np.int64)
-    value, base, needs = np.empty((MOST_TASKS, POOL)), np.empty(MOST_TASKS), np.empty(MOST_TASKS)
+    count_agents(work, place, has, size, members)
+    sums = np.empty((MAX_TASKS + 1, 1 << MAX_POOL))
+    task, chosen = np.empty(MAX_TASKS, dtype=np.int64), np.zeros(MAX_TASKS, dtype=np.int64)
+    value, base, needs = np.empty((MAX_TASKS, MAX_POOL)), np.empty(MAX_TASKS), np.empty(MAX_TASKS)
     pool, at = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
-    best = np.empty_like(place)
-    for i in range(n):
-        best[i] = place[i]
-    total, least = 0.0, np.inf
-    for j in range(t):
-        total += missing(has[j], need[j])
-        least = min(least, has[j] / need[j])
+    best = place.copy()
+    total, least = total_shortfall(has, need)
     for _ in range(steps):
         if total == 0.0:
             break
-        count = 0
-        for j in range(t):
-            if missing(has[j], need[j]) > 0:
-                count += 1
-                if draw(state, count) == 0:
-                    task[0] = j
-        tasks = min(t, 2 + (draw(state, 8) > 0) + (draw(state, 4) == 0))
+        tasks = draw_tasks(has, need, state, task)
         if tasks < 2:
             break
-        q = 1
-        while q < tasks:
-            task[q] = draw(state, t)
-            new = True
-            for r in range(q):
-                new &= task[r] != task[q]
-            if new:
-                q += 1
-        agents = 0
+        agents, used = draw_pool(task, tasks, size, members, state, pool, at)
         before = 0.0
         for q in range(tasks):
-            j = task[q]
-            base[q], needs[q] = has[j], need[j]
-            before += missing(has[j], need[j])
-            for r in range(size[j]):
-                pool[agents], at[agents] = members[j, r], q
-                agents += 1
-        used = min(agents, POOL)
-        for p in range(used):
-            r = p + draw(state, agents - p)
-            pool[p], pool[r] = pool[r], pool[p]
-            at[p], at[r] = at[r], at[p]
+            base[q], needs[q] = has[task[q]], need[task[q]]
+            before += shortfall(base[q], needs[q])
         for p in range(used):
             for q in range(tasks):
                 value[q, p] = work[pool[p], task[q]]
             base[at[p]] -= value[at[p], p]
-        after = split(value, base, needs, tasks, used, before, sums, state, chosen)
-        if after == np.inf:
+        if best_partition(value, base, needs, tasks, used, before, sums, state, chosen) == np.inf:
             continue
-        for q in range(tasks):
-            size[task[q]] = 0
-        for p in range(agents):
-            q = at[p]
-            if p < used:
-                for r in range(tasks):
-                    if chosen[r] >> p & 1:
-                        q = r
-            j = task[q]
-            place[pool[p]] = j
-            members[j, size[j]] = pool[p]
-            size[j] += 1
-        for q in range(tasks):
-            j = task[q]
-            has[j] = 0.0
-            for r in range(size[j]):
-                has[j] += work[members[j, r], j]
-        total = 0.0
-        lowest = np.inf
-        for j in range(t):
-            total += missing(has[j], need[j])
-            lowest = min(lowest, has[j] / need[j])
+        reassign(work, task, tasks, chosen, pool, at, agents, used, place, has, size, members)
+        total, lowest = total_shortfall(has, need)
         if lowest > least:
             least = lowest
             for i in range(n):

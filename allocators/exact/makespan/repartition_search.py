@@ -1,23 +1,23 @@
-"""Plans by `repartition`: from where the search is, on for one T after the other."""
+"""Plans by `repartition`, from the fastest plan on, for one target makespan after the other."""
 
 from collections.abc import Callable
 
 import numpy as np
 
-from alloc.allocators.exact.makespan.repartition import wander
+from alloc.allocators.exact.makespan.repartition import search_repartitions
 from alloc.allocators.exact.model import Model
 from alloc.problems import Allocation
 from alloc.problems.instance import IDLE, FloatArray, IntArray
 
-MOST_PLACES = 4_000_000
-"""Pairs of agent and task beyond which this is none of its business."""
+MAX_PAIRS = 4_000_000
+"""Agent-task pairs above which there is no such search."""
 
 STEPS = 20
-"""Splits in one go: less than a millisecond as a rule, a tenth of a second at worst."""
+"""Repartitions between two looks at the clock: less than a millisecond as a rule, a tenth of a second at worst."""
 
 
-class Wanderer:
-    """Splits the agents of a few tasks anew, again and again; every agent that can be of use has a task.
+class RepartitionSearch:
+    """Assigns the agents of a few tasks anew, again and again; every agent that can be of use has a task.
 
     Parameters
     ----------
@@ -32,11 +32,11 @@ class Wanderer:
         self._tasks: IntArray = model.tasks
 
     @property
-    def able(self) -> bool:
-        """Whether the model is of a size for this."""
-        return len(self._model.classes.class_of_agent) * len(self._model.tasks) <= MOST_PLACES
+    def is_tractable(self) -> bool:
+        """Whether the model is small enough."""
+        return len(self._model.classes.class_of_agent) * len(self._model.tasks) <= MAX_PAIRS
 
-    def settle(self, allocation: Allocation) -> None:
+    def start(self, allocation: Allocation) -> None:
         """Begin from this plan; tasks that it leaves unserved stay so."""
         model, task = self._model, allocation.task_of_agent
         served = np.isin(model.tasks, task)
@@ -49,7 +49,7 @@ class Wanderer:
         place[idle] = mask.argmax(axis=1)[model.classes.class_of_agent[idle]]
         self._place = place.astype(np.int64)
 
-    def walk(self, time: float, should_stop: Callable[[], bool], *, most_steps: int) -> tuple[bool, Allocation]:
+    def run(self, time: float, should_stop: Callable[[], bool], *, max_steps: int) -> tuple[bool, Allocation]:
         """Look for a plan with makespan `time`.
 
         Returns
@@ -57,19 +57,19 @@ class Wanderer:
         bool
             Whether it was found.
         Allocation
-            That plan, else the one met in which the shortest task lacked the smallest part.
+            That plan, else the one in which the task with the smallest part of its need had the largest part.
         """
-        able, need = self._model.uncapped(time)
-        work = np.ascontiguousarray(able[:, self._tasks][self._model.classes.class_of_agent])
-        need, best, most, steps = need[self._tasks], self._place, -1.0, 0
+        weight, need = self._model.uncapped(time)
+        work = np.ascontiguousarray(weight[:, self._tasks][self._model.classes.class_of_agent])
+        need, best, largest, steps = need[self._tasks], self._place, -1.0, 0
         while True:
-            lacking, part, place = wander(work, need, self._place, STEPS, self._state)
+            shortfall, part, place = search_repartitions(work, need, self._place, STEPS, self._state)
             steps += STEPS
-            if lacking == 0.0:
+            if shortfall == 0.0:
                 return True, self._plan(work, self._place)
-            if part > most:
-                most, best = part, place
-            if steps >= most_steps or should_stop():
+            if part > largest:
+                largest, best = part, place
+            if steps >= max_steps or should_stop():
                 return False, self._plan(work, best)
 
     def _plan(self, work: FloatArray, place: IntArray) -> Allocation:
@@ -78,5 +78,6 @@ class Wanderer:
 
 
 def compile_loops() -> None:
-    """Compile what this needs, or read it from the cache, so that no run waits for it."""
-    wander(np.ones((4, 2)), np.full(2, 2.0), np.array([0, 0, 0, 1]), 1, np.ones(1, dtype=np.uint64))
+    """Compile the loops, or read them from the cache, so that no run waits for it."""
+    place = np.array([0, 0, 0, 1])
+    search_repartitions(np.ones((4, 2)), np.full(2, 2.0), place, 1, np.ones(1, dtype=np.uint64))

@@ -9,14 +9,28 @@ from alloc.allocators.runtime.compiled import compiled
 from alloc.problems.instance import FloatArray, IntArray
 
 TOLERANCE = 1e-12
-"""Relative part of a need that is forgiven, for what sums of floats may be off."""
+"""Relative part of a demand that is forgiven, against rounding errors of sums."""
+
+ROUNDS, MESSAGES, SALES = 0, 1, 2
+"""Entries of `Market.counts`."""
 
 
 class Market(NamedTuple):
-    """The goods, what they cost to get, and who has them; the last three are changed in place.
+    """The agents for sale, their costs, prices and owners; the last three fields are changed in place.
 
-    `origin`, `cost` and `mask` are as in `Reach`, the cost of a flight in place of its distance; `price` and `owner` (a
-    task, or -1) are of shape (n,), and `tally` counts rounds, messages and sales, shape (3,).
+    Attributes
+    ----------
+    ability : ndarray, shape (n,)
+    origin : ndarray of int, shape (n,)
+        Row of each agent in `cost` and `mask`, as in `Reach`.
+    cost : ndarray, shape (origins, m)
+        Cost of each agent on each task besides its price.
+    mask : ndarray of bool, shape (origins, m)
+    price : ndarray, shape (n,)
+    owner : ndarray of int, shape (n,)
+        Task that has bought each agent, or -1.
+    counts : ndarray of int, shape (3,)
+        Rounds, messages and sales so far.
     """
 
     ability: FloatArray
@@ -25,75 +39,83 @@ class Market(NamedTuple):
     mask: NDArray[np.bool_]
     price: FloatArray
     owner: IntArray
-    tally: IntArray
+    counts: IntArray
 
 
 @compiled
-def bid(rounds: int, need: FloatArray, market: Market, increment: float) -> bool:
-    """Hold up to `rounds` rounds; return whether every task got what it needs.
+def run_rounds(rounds: int, demand: FloatArray, market: Market, increment: float) -> bool:
+    """Hold up to `rounds` rounds; return whether the demand of every task is met.
 
-    In a round each task that lacks ability bids for the agent that is cheapest for what it lacks, flight and price
-    together, and as much as makes it as dear as the second cheapest, and an increment. The agent goes with the highest
-    bid. Whom a task can do without it dismisses, and who has no task asks nothing.
+    In a round each task with a shortfall bids for the agent of least cost and price per ability that it lacks: as much
+    as makes it as expensive as the second cheapest, and an increment. The agent goes to the highest bidder. Agents that
+    a task does not need are released, and their price falls to 0.
 
     Parameters
     ----------
-    need : ndarray, shape (m,)
+    demand : ndarray, shape (m,)
         Ability that each task needs.
     increment : float
-        Least rise of a price, > 0.
+        Least increase of a price, > 0.
 
     References
     ----------
     Bertsekas (1992), doi:10.1007/BF00247653; there each bidder wants one object.
     """
-    n, m = len(market.price), len(need)
-    have = np.zeros(m)
+    n, m = len(market.price), len(demand)
+    supply = np.zeros(m)
     for i in range(n):
         if market.owner[i] >= 0:
-            have[market.owner[i]] += market.ability[i]
+            supply[market.owner[i]] += market.ability[i]
     offer, bidder = np.zeros(n), np.full(n, -1)
     for _ in range(rounds):
-        served = True
-        bidder[:] = -1
-        for j in range(m):
-            if have[j] < need[j] * (1 - TOLERANCE):
-                served = False
-                i, amount = choose(j, need[j] - have[j], market, increment)
-                if i >= 0:
-                    market.tally[1] += 1
-                    if bidder[i] < 0 or amount > offer[i]:
-                        offer[i], bidder[i] = amount, j
-        if served:
+        if not collect_bids(demand, supply, offer, bidder, market, increment):
             return True
-        market.tally[0] += 1
+        market.counts[ROUNDS] += 1
         for i in range(n):
             j = bidder[i]
             if j < 0:
                 continue
             if market.owner[i] >= 0:
-                have[market.owner[i]] -= market.ability[i]
-            have[j] += market.ability[i]
+                supply[market.owner[i]] -= market.ability[i]
+            supply[j] += market.ability[i]
             market.owner[i], market.price[i] = j, offer[i]
-            market.tally[1] += m  # all tasks hear the price
-            market.tally[2] += 1
+            market.counts[MESSAGES] += m  # the price is announced to all tasks
+            market.counts[SALES] += 1
         for i in range(n):
             j = market.owner[i]
-            if j >= 0 and have[j] - market.ability[i] >= need[j] * (1 - TOLERANCE):
-                have[j] -= market.ability[i]
+            if j >= 0 and supply[j] - market.ability[i] >= demand[j] * (1 - TOLERANCE):
+                supply[j] -= market.ability[i]
                 market.owner[i], market.price[i] = -1, 0.0
-                market.tally[1] += m
+                market.counts[MESSAGES] += m
     return False
 
 
 @compiled
-def choose(j: int, lack: float, market: Market, increment: float) -> tuple[int, float]:
-    """Return whom task `j` bids for, and how much; -1 where there is nobody."""
+def collect_bids(
+    demand: FloatArray, supply: FloatArray, offer: FloatArray, bidder: IntArray, market: Market, increment: float
+) -> bool:
+    """Write the highest bid for each agent and its bidder (-1: none); return whether any task has a shortfall."""
+    any_short = False
+    bidder[:] = -1
+    for j in range(len(demand)):
+        if supply[j] < demand[j] * (1 - TOLERANCE):
+            any_short = True
+            i, amount = choose_agent(j, demand[j] - supply[j], market, increment)
+            if i >= 0:
+                market.counts[MESSAGES] += 1
+                if bidder[i] < 0 or amount > offer[i]:
+                    offer[i], bidder[i] = amount, j
+    return any_short
+
+
+@compiled
+def choose_agent(j: int, shortfall: float, market: Market, increment: float) -> tuple[int, float]:
+    """Return the agent that task `j` bids for, and the bid; -1 if there is none."""
     best, second, agent = np.inf, np.inf, -1
     for i in range(len(market.price)):
         row = market.origin[i]
         if market.owner[i] != j and market.mask[row, j]:
-            rate = (market.cost[row, j] + market.price[i]) / min(market.ability[i], lack)
+            rate = (market.cost[row, j] + market.price[i]) / min(market.ability[i], shortfall)
             if rate < best:
                 best, second, agent = rate, best, i
             elif rate < second:
@@ -102,5 +124,5 @@ def choose(j: int, lack: float, market: Market, increment: float) -> tuple[int, 
         return -1, 0.0
     amount = market.price[agent] + increment
     if second < np.inf:
-        amount += (second - best) * min(market.ability[agent], lack)
+        amount += (second - best) * min(market.ability[agent], shortfall)
     return agent, amount

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from alloc.allocators.contract.base import Allocator, Proposal
+from alloc.allocators.contract.built_in import BUILT_IN
 from alloc.allocators.contract.search import Search
 from alloc.allocators.heuristic.greedy.exchange import fly_less
-from alloc.allocators.registry import BUILT_IN
 from alloc.problems import IDLE, Allocation, Instance, Objective, makespan_lower_bound
 
 CHECK_EVERY = 256

@@ -3,13 +3,13 @@
 from typing import ClassVar
 
 from alloc.allocators.contract.base import Allocator, Proposal
+from alloc.allocators.contract.built_in import BUILT_IN
 from alloc.allocators.contract.parameters import with_settings
 from alloc.allocators.contract.search import Search
 from alloc.allocators.heuristic.greedy.list_schedule import greedy
 from alloc.allocators.heuristic.local_search.annealing_state import compile_loops
 from alloc.allocators.heuristic.local_search.improve import improve
 from alloc.allocators.heuristic.local_search.parameters import LocalSearchParameters
-from alloc.allocators.registry import BUILT_IN
 from alloc.problems import Allocation, serve_all
 
 

@@ -41,7 +41,7 @@ class Candidates(NamedTuple):
 
 
 def arrays_and_candidates(instance: Instance, count: int) -> tuple[InstanceArrays, Candidates]:
-    """Return the arrays of an instance, distances included where they fit, and `count` candidates per origin and task."""
+    """Return the arrays of an instance, with a table of distances if it fits, and `count` candidates per row."""
     arrays = instance_arrays(instance)
     origins, m = len(arrays.origin_position), instance.m
     count = min(count, m)

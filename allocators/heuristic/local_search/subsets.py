@@ -42,7 +42,7 @@ def best_by_sums(
 ) -> np.uint64:
     """Return the cheapest subset by dynamic programming over integer sums of abilities.
 
-    For each sum up to `largest_sum`, the cheapest subset of the first k agents is known, k = 0, 1 and so on. Indices are
+    For each sum up to `largest_sum`, the cheapest subset of the first k agents is known, for growing k. Indices are
     unsigned, which spares the compiler checks for negative ones.
     """
     cost, sets, sizes, costs = work.sum_cost, work.sum_set, work.ability, work.cost

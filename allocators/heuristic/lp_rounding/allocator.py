@@ -7,6 +7,7 @@ import numpy as np
 
 from alloc.allocators.contract.base import Allocator, Proposal
 from alloc.allocators.contract.budget import Budget
+from alloc.allocators.contract.built_in import BUILT_IN
 from alloc.allocators.contract.parameters import CheckedParameters, bounded, with_settings
 from alloc.allocators.contract.search import Search
 from alloc.allocators.heuristic.greedy.list_schedule import greedy
@@ -14,7 +15,6 @@ from alloc.allocators.heuristic.local_search.annealing_state import AnnealingSta
 from alloc.allocators.heuristic.local_search.improve import improve
 from alloc.allocators.heuristic.local_search.parameters import LocalSearchParameters
 from alloc.allocators.heuristic.lp_rounding.relaxation import Relaxation
-from alloc.allocators.registry import BUILT_IN
 from alloc.problems import Allocation, Instance, Objective, serve_all
 from alloc.problems.bounds import LP_PAIRS_PER_SECOND, LP_SIZE_LIMIT
 

@@ -13,7 +13,7 @@ from alloc.problems import InputError
 class Sample(CheckedParameters):
     size: int = bounded(3, low=1, high=9)
     rate: float = bounded(0.5, low=0, above=True)
-    radius: float | None = bounded(None, low=0)
+    radius: float | None = bounded(None, low=0, infinite=True)
     steps: tuple[float, ...] = bounded((0.1, 0.2), low=0)
     fast: bool = False
     name: str = "a"
@@ -32,14 +32,15 @@ def test_values_become_pythons_own():
     assert found == Sample(2, 1.0, 2.0, (1.0, 2.0), True)
     assert [type(value) for value in (found.size, found.rate, found.radius, found.fast)] == [int, float, float, bool]
     assert with_settings(Sample, found, {"radius": None}).radius is None
+    assert with_settings(Sample, found, {"radius": np.inf}).radius == np.inf
 
 
 @pytest.mark.parametrize(
     ("name", "value"),
     [
         ("size", 0), ("size", 10), ("size", 2.0), ("size", True), ("size", None), ("rate", 0), ("rate", "1"),
-        ("rate", np.inf), ("rate", np.nan), ("radius", -1), ("steps", ()), ("steps", (1, -1)), ("steps", 1),
-        ("fast", 1), ("name", 3),
+        ("rate", np.inf), ("rate", np.nan), ("radius", -1), ("radius", np.nan), ("steps", ()),
+        ("steps", (1, -1)), ("steps", 1), ("fast", 1), ("name", 3),
     ],
 )  # fmt: skip
 def test_wrong_values_are_named(name, value):

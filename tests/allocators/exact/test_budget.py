@@ -97,8 +97,8 @@ def test_signal_ends_a_run_and_leaves_the_process_in_order(method, number):
         assert process.wait(timeout=10) == 0
 
 
-def test_iterations_count_questions_and_repeat(exact):
-    """With a budget of iterations alone, the same seed gives the same answer, after that many questions."""
+def test_iterations_count_models_and_repeat(exact):
+    """With a budget of iterations alone, the same seed gives the same answer, after as many models for the solver."""
     instance = hard(14, 4)
     runs = [solve(instance, exact, time_limit_s=None, iterations=3, seed=5) for _ in range(2)]
     assert runs[0].allocation == runs[1].allocation

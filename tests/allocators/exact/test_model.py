@@ -3,9 +3,10 @@ import pytest
 from oracle import brute_force
 from tiny_instances import tiny_instance
 
-from alloc.allocators.exact.cpsat import whole_costs, whole_numbers
-from alloc.allocators.exact.model import Demand, Model
-from alloc.allocators.exact.solver_model import Question
+from alloc.allocators.exact.cpsat import integer_costs, integer_weights
+from alloc.allocators.exact.demand import Demand
+from alloc.allocators.exact.model import Model
+from alloc.allocators.exact.solver_model import SolverLimits, SolverModel
 from alloc.problems import Allocation, Instance, agent_classes, evaluate, fewest_unserved
 
 SERVED = [
@@ -18,7 +19,7 @@ def model_of(instance: Instance, *, by_place: bool = False) -> Model:
 
 
 def meets(demand: Demand, counts: np.ndarray) -> bool:
-    done = np.bincount(demand.goal, weights=demand.weight * counts, minlength=len(demand.need))
+    done = np.bincount(demand.task_of_pair, weights=demand.weight * counts, minlength=len(demand.need))
     return bool((done >= demand.need).all())
 
 
@@ -42,11 +43,11 @@ def test_rounding_keeps_every_plan(seed):
     best = brute_force(instance)
     model = model_of(instance)
     demand = model.at(best.makespan)
-    weight, need = whole_numbers(demand)
+    weight, need = integer_weights(demand)
     done = np.zeros(len(need), dtype=np.int64)
-    np.add.at(done, demand.goal, weight * model.counts(demand, Allocation(best.plan)))
+    np.add.at(done, demand.task_of_pair, weight * model.counts(demand, Allocation(best.plan)))
     assert (done >= need).all()
-    assert sum(int(w) * int(most) for w, most in zip(weight, demand.most, strict=True)) < 2**62
+    assert sum(int(w) * int(most) for w, most in zip(weight, demand.max_count, strict=True)) < 2**62
 
 
 @pytest.mark.parametrize(
@@ -62,8 +63,8 @@ def test_unit_of_abilities_is_found(ability, unit):
 def test_next_makespan_after_one_that_is_ruled_out():
     """With whole abilities and a workload of 12, nothing lies between 12 / 5 and 12 / 4."""
     model = model_of(Instance(ability=[1, 2, 3], workload=[12]))
-    assert model.after(12 / 5) == pytest.approx(3.0, rel=1e-9)
-    assert model.after(2.7) == pytest.approx(3.0, rel=1e-9)
+    assert model.next_makespan(12 / 5) == pytest.approx(3.0, rel=1e-9)
+    assert model.next_makespan(2.7) == pytest.approx(3.0, rel=1e-9)
 
 
 def test_travel_takes_from_the_weight():
@@ -82,30 +83,30 @@ def test_nothing_to_spare_means_everybody_works():
     """Where demand uses up all ability, all must work and no task may get more."""
     demand = model_of(Instance(ability=[1, 1, 2], workload=[2, 2])).at(1.0)
     assert demand.spare == 0
-    assert demand.enough.tolist() == [2, 2]
-    assert demand.least_used.tolist() == demand.count.tolist()
+    assert demand.max_weight.tolist() == [2, 2]
+    assert demand.min_agents.tolist() == demand.count.tolist()
 
 
 def test_agents_that_reach_nothing_are_not_to_spare():
     """The strongest agent may take no task: it counts neither as ability nor as one who must work."""
     demand = model_of(Instance(ability=[5, 1, 1], workload=[1, 1], allowed_tasks=[[], None, None])).at(1.0)
     assert demand.spare == 0
-    assert demand.least_used.tolist() == [2, 0]
+    assert demand.min_agents.tolist() == [2, 0]
 
 
 def test_too_small_a_time_is_hopeless():
     """Below the lower bound, no solver needs to be asked."""
     model = model_of(Instance(ability=[1, 1, 2], workload=[2, 2]))
-    assert model.at(0.9).hopeless
-    assert not model.at(1.0).hopeless
+    assert model.at(0.9).trivially_infeasible
+    assert not model.at(1.0).trivially_infeasible
 
 
 def test_costs_are_rounded_down():
     """A bound in CP-SAT's integers bounds the true cost, and loses less than 1e-9 of it."""
     demand = model_of(Instance(ability=[1, 2, 3], workload=[3, 3])).at(1.0)
-    pairs, rng = len(demand.kind), np.random.default_rng(0)
+    pairs, rng = len(demand.class_of_pair), np.random.default_rng(0)
     cost, hint = rng.random(pairs), np.ones(pairs, dtype=np.intp)
-    question = Question(demand, cost, hint, seconds=1, threads=1, seed=0, repeatable=False)
-    whole, scale = whole_costs(question)
+    model = SolverModel(demand, cost, hint, SolverLimits(seconds=1, threads=1, seed=0, repeatable=False))
+    whole, scale = integer_costs(model)
     assert whole @ hint / scale <= cost @ hint
     assert whole @ hint / scale == pytest.approx(cost @ hint, rel=1e-9)

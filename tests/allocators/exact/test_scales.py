@@ -6,10 +6,11 @@ from oracle import brute_force, least_energy_within
 from tiny_instances import scaled_instance
 
 from alloc.allocators import Status, solve
-from alloc.allocators.exact.cpsat import whole_costs
+from alloc.allocators.exact.cpsat import integer_costs
+from alloc.allocators.exact.demand import Demand
 from alloc.allocators.exact.milp import scaled_costs
-from alloc.allocators.exact.model import Demand, Model
-from alloc.allocators.exact.solver_model import Question
+from alloc.allocators.exact.model import Model
+from alloc.allocators.exact.solver_model import SolverLimits, SolverModel
 from alloc.problems import (
     Instance,
     agent_classes,
@@ -68,7 +69,7 @@ def test_least_energy_by_hand(method, unit):
 
 @pytest.mark.parametrize(("method", "unit"), [("milp", 2.0**-30), ("cpsat", 2.0**-30), ("milp", 2.0**30)])
 def test_larger_instances_are_proven_in_any_unit(method, unit):
-    """Where walks and prices come before the solver, the least energy is the same number of units too."""
+    """Where both sides of the gap come before the solver, the least energy is the same number of units too."""
     plain = paper_like(24, 12, 80, 3)
     scaled = Instance(
         ability=plain.ability,
@@ -97,11 +98,11 @@ def test_equal_makespans_cost_the_least_energy_of_all(method, small, speed):
     assert result.energy_lower_bound <= least
 
 
-def question(cost: np.ndarray, hint: np.ndarray | None) -> Question:
-    """Ask for the least cost over one class of agents for each pair."""
+def energy_model(cost: np.ndarray, hint: np.ndarray | None) -> SolverModel:
+    """Minimise the cost over one class of agents for each pair."""
     instance = Instance(ability=np.arange(1.0, 1 + len(cost)), workload=[1.0])
     demand: Demand = Model.build(instance, agent_classes(instance, by_place=False), 1).at(1.0)
-    return Question(demand, cost, hint, seconds=1, threads=1, seed=0, repeatable=False)
+    return SolverModel(demand, cost, hint, SolverLimits(seconds=1, threads=1, seed=0, repeatable=False))
 
 
 @pytest.mark.parametrize("unit", [1e-280, 1e-9, 1e-3, 1.0, 1e9, 1e280])
@@ -109,12 +110,12 @@ def question(cost: np.ndarray, hint: np.ndarray | None) -> Question:
 def test_costs_come_to_solvers_at_about_one(unit, dear):
     """Whatever the unit, and however dear what no plan needs, the plan at hand keeps its cost; nothing overflows."""
     cost, hint = np.array([3.0, 1.0, 2.0 * dear]) * unit, np.array([1, 1, 0])
-    scaled, scale = scaled_costs(question(cost, hint))
+    scaled, scale = scaled_costs(energy_model(cost, hint))
     assert np.log2(scale) == round(np.log2(scale))
     assert 2.0**-8 <= scaled @ hint <= 2.0**22
     assert scaled @ hint / scale == cost @ hint
     assert (scaled / scale <= cost).all()
-    whole, fine = whole_costs(question(cost, hint))
+    whole, fine = integer_costs(energy_model(cost, hint))
     assert (whole >= 0).all()
     assert whole @ hint / fine == pytest.approx(cost @ hint, rel=1e-9, abs=0)
 
@@ -122,6 +123,6 @@ def test_costs_come_to_solvers_at_about_one(unit, dear):
 def test_ordinary_costs_are_left_as_they_are():
     """Costs of an ordinary order reach the solver to the bit."""
     cost = np.random.default_rng(0).random(5)
-    scaled, scale = scaled_costs(question(cost, np.ones(5, dtype=np.intp)))
+    scaled, scale = scaled_costs(energy_model(cost, np.ones(5, dtype=np.intp)))
     assert scale == 1.0
     assert (scaled == cost).all()

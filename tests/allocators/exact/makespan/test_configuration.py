@@ -6,7 +6,7 @@ from oracle import brute_force
 from scipy.optimize import linprog
 from tiny_instances import all_can_be_served, seeds_where, tiny_instance
 
-from alloc.allocators.exact.makespan.configuration import Configurations
+from alloc.allocators.exact.makespan.configuration import ConfigurationProgramme
 from alloc.allocators.exact.model import Model
 from alloc.problems import Instance, agent_classes, machine_covering, makespan_lower_bound
 
@@ -21,19 +21,19 @@ def never() -> bool:
 
 @pytest.mark.parametrize("seed", seeds_where(all_can_be_served, 40))
 def test_no_makespan_that_can_be_had_is_ruled_out(seed):
-    """On tiny instances of every sort, no prices speak against the optimum of brute force."""
+    """On tiny instances of every sort, no prices exclude the optimum of brute force."""
     instance = tiny_instance(seed)
     best = brute_force(instance)
     assert not best.unserved
     low = makespan_lower_bound(instance)
-    configurations = Configurations(model_of(instance), low)
+    configurations = ConfigurationProgramme(model_of(instance), low)
     for time in (low, (low + best.makespan) / 2, best.makespan * (1 - 1e-6), best.makespan * (1 + 1e-9)):
-        prices, solved = configurations.best_prices(time, never, converge=True)
-        assert solved
+        prices = configurations.dual_prices(time, never, converge=True)
         assert prices is not None
+        assert prices.converged
         if prices.theta > 1:
             assert time < best.makespan
-            assert configurations.reach_of(prices, time, 2 * best.makespan) < best.makespan * (1 + 1e-9)
+            assert configurations.largest_infeasible(prices, time, 2 * best.makespan) < best.makespan * (1 + 1e-9)
 
 
 def test_theta_is_that_of_all_groups():
@@ -41,7 +41,7 @@ def test_theta_is_that_of_all_groups():
     instance = Instance(ability=[3, 5, 6, 7, 9, 11], workload=[10, 14, 17])
     model = model_of(instance)
     time, columns, rows, values = 1.05, [], [], []
-    need = [need for each in Configurations(model, time).needs(time) for need in each.need]
+    need = [need for each in ConfigurationProgramme(model, time).needs(time) for need in each.need]
     for j, group in product(range(3), product((0, 1), repeat=6)):
         if np.dot(group, instance.ability) >= need[j]:
             columns.append(np.concatenate([np.eye(3)[j], group]))
@@ -54,9 +54,9 @@ def test_theta_is_that_of_all_groups():
         A_eq=np.hstack([a_eq, np.zeros((3, 1))]),
         b_eq=np.ones(3),
     )
-    prices, solved = Configurations(model, time).best_prices(time, never, converge=True)
-    assert solved
+    prices = ConfigurationProgramme(model, time).dual_prices(time, never, converge=True)
     assert prices is not None
+    assert prices.converged
     if answer.fun <= 1:
         assert prices.theta == pytest.approx(answer.fun, rel=1e-6)
     else:
@@ -67,8 +67,8 @@ def test_closes_what_simple_bounds_leave():
     """With 2.5 agents per task, the bound of (40, 16) U[1,100], seed 1, rises by 2.2 %."""
     instance = machine_covering(40, 16, 1, 100, 1)
     low = makespan_lower_bound(instance)
-    configurations = Configurations(model_of(instance), low)
-    prices, _ = configurations.best_prices(low * 1.0215, never)
+    configurations = ConfigurationProgramme(model_of(instance), low)
+    prices = configurations.dual_prices(low * 1.0215, never)
     assert prices is not None
     assert prices.theta > 1
 
@@ -79,16 +79,16 @@ def test_real_abilities_are_rounded_to_the_safe_side(seed):
     instance = machine_covering(30, 10, 1, 100, seed, equal=False, whole=False)
     model = model_of(instance)
     low = makespan_lower_bound(instance)
-    configurations = Configurations(model, low)
+    configurations = ConfigurationProgramme(model, low)
     (needs,) = configurations.needs(low * 1.1)
     assert needs.need.max() > 1000
-    share = needs.weight[model.kind] / needs.need[model.goal]
-    truth = model.classes.ability[model.kind] * low * 1.1 / model.work[model.goal]
+    share = needs.weight[model.class_of_pair] / needs.need[model.task_of_pair]
+    truth = model.classes.ability[model.class_of_pair] * low * 1.1 / model.workload[model.task_of_pair]
     assert (share >= truth).all()
 
 
 def test_stops_when_told():
     """Nothing is known then, and nothing is claimed."""
     instance = machine_covering(40, 16, 1, 100, 1)
-    configurations = Configurations(model_of(instance), makespan_lower_bound(instance))
-    assert configurations.best_prices(1.0, lambda: True) == (None, False)
+    configurations = ConfigurationProgramme(model_of(instance), makespan_lower_bound(instance))
+    assert configurations.dual_prices(1.0, lambda: True) is None

@@ -4,21 +4,22 @@ import numpy as np
 import pytest
 from oracle import brute_force
 
-from alloc.allocators.exact.makespan.configuration import Configurations
+from alloc.allocators.exact.makespan.configuration import ConfigurationProgramme
 from alloc.allocators.exact.makespan.enumeration import (
-    LONGEST,
-    choose_groups,
+    MAX_GROUP_SIZE,
     enumerate_groups,
     fill_least,
     list_groups,
 )
+from alloc.allocators.exact.makespan.set_partitioning import solve_set_partitioning
 from alloc.allocators.exact.model import Model
+from alloc.allocators.exact.solver_model import Verdict
 from alloc.problems import agent_classes, evaluate, machine_covering
 
 
 @pytest.mark.parametrize("seed", range(10))
 def test_groups_are_all_that_there_are(seed):
-    """Those covers at no more than the limit from which nobody can be spared, as found by trying everything."""
+    """Those that meet the need at no more than the limit and can spare nobody, as found by trying everything."""
     rng = np.random.default_rng(seed)
     weight, price = np.sort(rng.choice(20, 5, replace=False) + 1)[::-1].copy(), rng.integers(0, 10, 5).astype(float)
     count, need, limit = rng.integers(0, 4, 5), int(rng.integers(1, 25)), float(rng.integers(5, 30))
@@ -28,7 +29,7 @@ def test_groups_are_all_that_there_are(seed):
         spare = any(g > 0 and done - w >= need for g, w in zip(group, weight, strict=True))
         if done >= need and not spare and np.dot(group, price) <= limit:
             expected.add(group)
-    least, found = np.empty((6, need + 1)), np.empty((5000, LONGEST), dtype=np.int64)
+    least, found = np.empty((6, need + 1)), np.empty((5000, MAX_GROUP_SIZE), dtype=np.int64)
     fill_least(weight, price, count, least)
     size = list_groups(weight, price, count, least, limit, 1_000_000, found)
     groups = [tuple(np.bincount(row[row >= 0], minlength=5).tolist()) for row in found[:size]]
@@ -41,8 +42,8 @@ def test_gives_up_where_there_are_too_many():
     weight, price, count = np.array([3, 2, 1]), np.ones(3), np.full(3, 9)
     least = np.empty((4, 13))
     fill_least(weight, price, count, least)
-    assert list_groups(weight, price, count, least, 99.0, 1000, np.empty((2, LONGEST), dtype=np.int64)) == -1
-    assert list_groups(weight, price, count, least, 99.0, 10, np.empty((99, LONGEST), dtype=np.int64)) == -1
+    assert list_groups(weight, price, count, least, 99.0, 1000, np.empty((2, MAX_GROUP_SIZE), dtype=np.int64)) == -1
+    assert list_groups(weight, price, count, least, 99.0, 10, np.empty((99, MAX_GROUP_SIZE), dtype=np.int64)) == -1
 
 
 @pytest.mark.parametrize("equal", [True, False])
@@ -52,18 +53,16 @@ def test_choice_is_a_plan_or_there_is_none(seed, equal):
     instance = machine_covering(8, 3, 1, 30, seed, equal=equal)
     best = brute_force(instance).makespan
     model = Model.build(instance, agent_classes(instance, by_place=False), 3)
-    configurations = Configurations(model, best * 0.8)
+    configurations = ConfigurationProgramme(model, best * 0.8)
 
     def answer(time):
-        prices, _ = configurations.best_prices(time, lambda: False, converge=True)
+        prices = configurations.dual_prices(time, lambda: False, converge=True)
         if prices.theta > 1:
-            return None, True
-        choice = enumerate_groups(configurations, prices, time, lambda: False)
-        return choose_groups(choice, 0, lambda: False)
+            return Verdict.INFEASIBLE, None
+        programme = enumerate_groups(configurations, prices, time, lambda: False)
+        return solve_set_partitioning(programme, 0, lambda: False)
 
-    counts, impossible = answer(best * (1 + 1e-9))
-    assert not impossible
-    full = np.zeros((model.classes.size, 3), dtype=np.intp)
-    full[:, model.tasks] = counts
-    assert evaluate(instance, model.classes.spread(full)).makespan == pytest.approx(best)
-    assert answer(best * (1 - 1e-6)) == (None, True)
+    verdict, table = answer(best * (1 + 1e-9))
+    assert verdict is Verdict.FEASIBLE
+    assert evaluate(instance, model.plan(table)).makespan == pytest.approx(best)
+    assert answer(best * (1 - 1e-6)) == (Verdict.INFEASIBLE, None)

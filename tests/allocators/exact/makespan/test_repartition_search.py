@@ -3,7 +3,7 @@ import pytest
 from oracle import brute_force
 from tiny_instances import seeds_where, tiny_instance
 
-from alloc.allocators.exact.makespan.repartition_search import Wanderer
+from alloc.allocators.exact.makespan.repartition_search import RepartitionSearch
 from alloc.allocators.exact.model import Model
 from alloc.allocators.heuristic.greedy.list_schedule import greedy
 from alloc.problems import Instance, agent_classes, evaluate, fewest_unserved, machine_covering, serve_all
@@ -20,9 +20,9 @@ def test_optimum_of_tiny_instances(seed):
     best = brute_force(instance)
     start = serve_all(instance, greedy(instance))
     serve = int((instance.workload > 0).sum()) - best.unserved
-    wanderer = Wanderer(Model.build(instance, agent_classes(instance, by_place=False), serve), seed)
-    wanderer.settle(start)
-    _, plan = wanderer.walk(best.makespan * (1 + 1e-9), lambda: False, most_steps=500)
+    search = RepartitionSearch(Model.build(instance, agent_classes(instance, by_place=False), serve), seed)
+    search.start(start)
+    _, plan = search.run(best.makespan * (1 + 1e-9), lambda: False, max_steps=500)
     score = evaluate(instance, plan)
     assert not score.violations
     assert len(score.unserved_tasks) == best.unserved
@@ -34,10 +34,10 @@ def test_found_plans_have_the_makespan_asked_for():
     """Of what it says to have found, the evaluator thinks likewise."""
     instance = machine_covering(40, 10, 1, 100, 0, equal=False)
     model = Model.build(instance, agent_classes(instance, by_place=False), 10)
-    wanderer = Wanderer(model, 0)
-    wanderer.settle(greedy(instance))
+    search = RepartitionSearch(model, 0)
+    search.start(greedy(instance))
     time = float(instance.workload.sum() / instance.ability.sum()) * 1.01
-    found, plan = wanderer.walk(time, lambda: False, most_steps=10_000)
+    found, plan = search.run(time, lambda: False, max_steps=10_000)
     assert found
     assert evaluate(instance, plan).makespan <= time * (1 + 1e-9)
 
@@ -47,7 +47,7 @@ def test_same_seed_same_plan():
     instance = machine_covering(30, 10, 100, 800, 1)
     plans = []
     for _ in range(2):
-        wanderer = Wanderer(Model.build(instance, agent_classes(instance, by_place=False), 10), 3)
-        wanderer.settle(greedy(instance))
-        plans.append(wanderer.walk(1e-9 + 2.0, lambda: False, most_steps=300)[1])
+        search = RepartitionSearch(Model.build(instance, agent_classes(instance, by_place=False), 10), 3)
+        search.start(greedy(instance))
+        plans.append(search.run(1e-9 + 2.0, lambda: False, max_steps=300)[1])
     assert np.array_equal(plans[0].task_of_agent, plans[1].task_of_agent)

@@ -1,19 +1,21 @@
 """The auction in which tasks bid for agents."""
 
 import numpy as np
+import pytest
 from scipy.optimize import linear_sum_assignment
 
 from alloc.allocators import Budget, Search, solve
-from alloc.allocators.heuristic.decentralised.auction import Parameters, Sale
-from alloc.problems import IDLE, Allocation, Instance, Objective, evaluate, paper
+from alloc.allocators.heuristic.decentralised.auction import Auction
+from alloc.allocators.heuristic.decentralised.deadlines import AuctionParameters, DeadlineSeries
+from alloc.problems import IDLE, Allocation, InputError, Instance, Objective, evaluate, paper
 
 
-def sale(instance: Instance, objective: Objective = Objective.MAKESPAN_ENERGY) -> Sale:
-    return Sale(Search(instance, objective, Budget(None)), Parameters())
+def series(instance: Instance, objective: Objective = Objective.MAKESPAN_ENERGY) -> DeadlineSeries:
+    return DeadlineSeries(Search(instance, objective, Budget(None)), AuctionParameters())
 
 
 def test_each_task_one_agent_is_bertsekas() -> None:
-    """Where each task needs one agent of several alike, flights cost at most the increments more than the least."""
+    """Where each task needs one of several equal agents, the distance exceeds the least by at most the increments."""
     for seed in range(20):
         rng = np.random.default_rng(seed)
         m = int(rng.integers(2, 8))
@@ -23,21 +25,21 @@ def test_each_task_one_agent_is_bertsekas() -> None:
             agent_position=rng.random((m, 2)),
             task_position=rng.random((m, 2)),
         )
-        auction = sale(instance)
-        assert auction.hold(1.0)
+        auction = series(instance)
+        assert auction.meet(1.0)
         task = auction.market.owner
         assert sorted(task.tolist()) == list(range(m))
         cost = auction.cost[instance.reach.origin]
         least = cost[linear_sum_assignment(cost)].sum()
-        assert cost[np.arange(m), task].sum() <= least + m * Parameters().increment + 1e-9
+        assert cost[np.arange(m), task].sum() <= least + m * AuctionParameters().increment + 1e-9
 
 
 def test_met_deadlines_are_met() -> None:
-    """Whenever an auction says that all tasks have what they need, they are done by the deadline; no idler is kept."""
+    """When an auction meets all demands, tasks are done by the deadline, and none has an agent that it can spare."""
     for seed in range(1000, 1003):
         instance = paper(1, seed)
-        auction = sale(instance)
-        assert auction.hold(1.05)
+        auction = series(instance)
+        assert auction.meet(1.05)
         allocation = evaluate(instance, Allocation(auction.market.owner.copy()))
         assert allocation.makespan <= 1.05 + 1e-9
         spare = allocation.group_ability - instance.workload / 1.05
@@ -46,27 +48,35 @@ def test_met_deadlines_are_met() -> None:
 
 
 def test_impossible_deadlines_end() -> None:
-    """An auction for a deadline that nobody can meet ends, unserved."""
-    assert not sale(Instance(ability=[1, 1], workload=[4, 4])).hold(1.0)
-    assert not sale(Instance(ability=[1, 1], workload=[4, 4], allowed_tasks=[[0], [0]])).hold(4.0)
+    """An auction for a deadline that cannot be met ends, and says so."""
+    assert not series(Instance(ability=[1, 1], workload=[4, 4])).meet(1.0)
+    assert not series(Instance(ability=[1, 1], workload=[4, 4], allowed_tasks=[[0], [0]])).meet(4.0)
 
 
 def test_scenarios_are_solved() -> None:
     """The paper's first scenario comes to within 2 %, with less energy where that counts, and messages counted."""
     plain = solve(paper(1, 1000), "auction", iterations=20_000, time_limit_s=None)
-    thrifty = solve(paper(1, 1000), "auction", objective="makespan-energy", iterations=20_000, time_limit_s=None)
+    saving = solve(paper(1, 1000), "auction", objective="makespan-energy", iterations=20_000, time_limit_s=None)
     assert plain.makespan <= 1.02
-    assert thrifty.makespan <= 1.02
-    assert thrifty.energy < 0.5 * plain.energy
-    assert thrifty.energy <= 1.7 * thrifty.energy_lower_bound
+    assert saving.makespan <= 1.02
+    assert saving.energy < 0.5 * plain.energy
+    assert saving.energy <= 1.7 * saving.energy_lower_bound
     assert "messages" in plain.notes[0]
 
 
 def test_slack_saves_energy() -> None:
-    """With 5 % more time, agents fly far less."""
+    """With 5 % more time, the energy is far less."""
     instance = paper(1, 1000)
     settings = {"objective": "makespan-energy", "iterations": 20_000, "time_limit_s": None}
     strict = solve(instance, "auction", **settings)
     loose = solve(instance, "auction", makespan_slack=0.05, **settings)
     assert loose.makespan <= 1.05 * 1.02
     assert loose.energy < 0.95 * strict.energy
+
+
+def test_parameters_are_keywords() -> None:
+    """Parameters are set by keyword; wrong ones are named."""
+    assert Auction(deadlines=2).parameters == AuctionParameters(deadlines=2)
+    with pytest.raises(InputError) as caught:
+        Auction(increment=0)
+    assert caught.value.place == "increment"

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from alloc.allocators import Improvement, Result, StopReason, load, solve
-from alloc.problems import Allocation, Instance, evaluate, fewest_unserved
+from alloc.allocators.heuristic.genetic.algorithm import GeneticAlgorithm
+from alloc.allocators.heuristic.genetic.evolution import GeneticParameters
+from alloc.problems import Allocation, InputError, Instance, evaluate, fewest_unserved
 from alloc.problems.generate import paper
 
 
@@ -50,14 +52,14 @@ def test_never_proposes_violations(objective: str) -> None:
 
 
 def test_saves_energy_at_equal_makespan() -> None:
-    """With energy in the objective it keeps T = 1 and flies far less than without."""
+    """With energy in the objective it keeps T = 1 with far less energy than without."""
     instance = paper(1, 3)
     fast = solve(instance, "ga", time_limit_s=None, iterations=300)
-    thrifty = solve(instance, "ga", objective="makespan-energy", time_limit_s=None, iterations=300)
-    assert thrifty.makespan == pytest.approx(1.0)
+    saving = solve(instance, "ga", objective="makespan-energy", time_limit_s=None, iterations=300)
+    assert saving.makespan == pytest.approx(1.0)
     assert fast.energy is not None
-    assert thrifty.energy is not None
-    assert thrifty.energy < 0.5 * fast.energy
+    assert saving.energy is not None
+    assert saving.energy < 0.5 * fast.energy
 
 
 def outcome(result: Result) -> tuple[object, ...]:
@@ -116,7 +118,7 @@ def test_answers_on_the_smallest_budget(iterations: int) -> None:
 
 
 def test_nothing_to_do() -> None:
-    """Without any workload everybody stays idle, at makespan 0."""
+    """Without any workload all agents are idle, at makespan 0."""
     result = solve(Instance(ability=[1, 2], workload=[0, 0, 0]), "ga")
     assert result.allocation == Allocation([-1, -1])
     assert result.makespan == 0
@@ -164,8 +166,8 @@ def test_holds_its_time_limit_on_many_agents() -> None:
     assert result.runtime_s < 0.5 * 1.1 + 0.5
 
 
-def test_nobody_flies_where_nothing_can_be_served():
-    """Where no task that takes time is within reach, everybody is idle, at once and without warnings."""
+def test_all_idle_where_nothing_can_be_served():
+    """Where no task that takes time is within reach, all agents are idle, at once and without warnings."""
     instance = Instance(
         ability=[1, 2], workload=[3, 4], agent_position=[[0, 0], [1, 1]], task_position=[[9, 9], [8, 8]],
         communication_range=[1, 1],
@@ -173,3 +175,15 @@ def test_nobody_flies_where_nothing_can_be_served():
     result = solve(instance, "ga", objective="makespan-energy", time_limit_s=5)
     assert result.allocation == Allocation.idle(instance)
     assert result.runtime_s < 1
+
+
+def test_parameters_are_keywords() -> None:
+    """A larger population takes other steps from the same seed; wrong parameters are named."""
+    large = GeneticAlgorithm(population=200)
+    assert large.parameters == GeneticParameters(population=200)
+    usual, other = (solve(hard(), one, time_limit_s=None, iterations=20) for one in (GeneticAlgorithm(), large))
+    assert outcome(usual) != outcome(other)
+    for name, value in (("population", 1), ("crossover", 1.1), ("populations", 20)):
+        with pytest.raises(InputError) as caught:
+            GeneticAlgorithm(**{name: value})
+        assert caught.value.place == name

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
-from alloc.allocators.heuristic.genetic.operators import Mutation, _draw_homeward, cross_groups, mutate, tournament
-from alloc.allocators.heuristic.genetic.population import Landscape, list_schedules
+from alloc.allocators.heuristic.genetic.encoding import Encoding
+from alloc.allocators.heuristic.genetic.list_schedules import list_schedules
+from alloc.allocators.heuristic.genetic.mutation import MutationParameters, draw_saving_move, mutate
+from alloc.allocators.heuristic.genetic.operators import cross_groups, tournament
 from alloc.problems import Allocation, Instance, evaluate
 
 
@@ -27,21 +29,21 @@ def instance() -> Instance:
     )
 
 
-def some_genes(landscape: Landscape, rows: int, rng: np.random.Generator) -> np.ndarray:
-    """Rows of a legal population, the bench included."""
-    genes = rng.integers(0, landscape.bench + 1, size=(rows, landscape.n)).astype(np.int32)
-    return np.where(landscape.allows(np.arange(landscape.n), genes), genes, landscape.bench).astype(np.int32)
+def some_genes(encoding: Encoding, rows: int, rng: np.random.Generator) -> np.ndarray:
+    """Rows of a valid population, some agents idle."""
+    genes = rng.integers(0, encoding.idle + 1, size=(rows, encoding.n)).astype(np.int32)
+    return np.where(encoding.allows(np.arange(encoding.n), genes), genes, encoding.idle).astype(np.int32)
 
 
-def test_figures_agree_with_the_evaluator(instance: Instance, rng: np.random.Generator) -> None:
-    """Whole-population figures are those that `evaluate` gives row by row."""
-    landscape = Landscape(instance)
-    genes = some_genes(landscape, 50, rng)
-    figures = landscape.figures(genes, aim=1.0)
+def test_objectives_agree_with_the_evaluator(instance: Instance, rng: np.random.Generator) -> None:
+    """The objectives of a population are those that `evaluate` gives row by row."""
+    encoding = Encoding(instance)
+    genes = some_genes(encoding, 50, rng)
+    objectives = encoding.objectives(genes, target_makespan=1.0)
     for row, (unserved, makespan, energy) in enumerate(
-        zip(figures.unserved, figures.makespan, figures.energy, strict=True)
+        zip(objectives.unserved, objectives.makespan, objectives.energy, strict=True)
     ):
-        score = evaluate(instance, landscape.decode(genes[row]))
+        score = evaluate(instance, encoding.decode(genes[row]))
         assert not score.violations
         assert (len(score.unserved_tasks), score.served_makespan, score.energy) == pytest.approx(
             (unserved, makespan, energy)
@@ -49,20 +51,20 @@ def test_figures_agree_with_the_evaluator(instance: Instance, rng: np.random.Gen
 
 
 def test_shortfall_by_hand() -> None:
-    """Groups of 3 and 2 against workloads 6 and 2 at T = 1 lack half of the first task; at T = 2 nothing."""
-    landscape = Landscape(Instance(ability=[3, 2], workload=[6, 2]))
+    """Groups of 3 and 2 for workloads 6 and 2 have half of the first task as shortfall at T = 1, and none at T = 2."""
+    encoding = Encoding(Instance(ability=[3, 2], workload=[6, 2]))
     genes = np.array([[0, 1]], dtype=np.int32)
-    assert landscape.figures(genes, 1.0).shortfall == pytest.approx([0.5])
-    assert landscape.figures(genes, 2.0).shortfall == pytest.approx([0.0])
+    assert encoding.objectives(genes, 1.0).shortfall == pytest.approx([0.5])
+    assert encoding.objectives(genes, 2.0).shortfall == pytest.approx([0.0])
 
 
 def test_codes_invert_each_other(instance: Instance) -> None:
-    """Encoding keeps what is useful, and benches agents that are idle, not allowed, or on tasks without workload."""
-    landscape = Landscape(instance)
+    """Encoding keeps what is useful; agents that are not allowed, or on tasks without workload, become idle."""
+    encoding = Encoding(instance)
     allocation = Allocation([1, 2, -1, 3, 4, 5, 2, 3, 4, 5, 0, 2])
-    back = landscape.decode(landscape.encode(allocation))
+    back = encoding.decode(encoding.encode(allocation))
     assert back == Allocation([-1, 2, -1, 3, 4, 5, 2, 3, 4, 5, 0, 2])
-    assert landscape.encode(Allocation([4] * 12))[0] == landscape.bench  # agent 0 may do 0, 2 and 3 alone
+    assert encoding.encode(Allocation([4] * 12))[0] == encoding.idle  # agent 0 may do 0, 2 and 3 alone
 
 
 def test_children_take_whole_groups(rng: np.random.Generator) -> None:
@@ -82,38 +84,40 @@ def test_no_share_no_change(rng: np.random.Generator) -> None:
     assert (cross_groups(one, other, np.ones(9), rng) == other).all()
 
 
-@pytest.mark.parametrize("economical", [False, True])
+@pytest.mark.parametrize("energy_counts", [False, True])
 @pytest.mark.parametrize("pairs", [0.0, 1.0])
-def test_mutation_respects_reach(instance: Instance, rng: np.random.Generator, economical: bool, pairs: float) -> None:
-    """However often rows mutate, nobody is sent where it cannot go, and nearly every row changes."""
-    landscape = Landscape(instance)
-    genes = some_genes(landscape, 30, rng)
+def test_mutation_respects_reach(
+    instance: Instance, rng: np.random.Generator, energy_counts: bool, pairs: float
+) -> None:
+    """However often rows mutate, no agent is on a task that it cannot reach, and nearly every row changes."""
+    encoding = Encoding(instance)
+    genes = some_genes(encoding, 30, rng)
     before = genes.copy()
     for _ in range(10):
-        mutate(genes, 1.0, landscape, rng, economical=economical, settings=Mutation(pairs=pairs))
-        assert landscape.allows(np.arange(landscape.n), genes).all()
+        mutate(genes, 1.0, encoding, rng, energy_counts=energy_counts, parameters=MutationParameters(pairs=pairs))
+        assert encoding.allows(np.arange(encoding.n), genes).all()
         assert genes.min() >= 0
-        assert genes.max() <= landscape.bench
+        assert genes.max() <= encoding.idle
     assert (genes != before).any(axis=1).mean() > 0.9
 
 
-def test_mutation_moves_ability_to_where_it_lacks(rng: np.random.Generator) -> None:
-    """One exchange without noise makes good a deficit that an exchange can make good: 5 and 3 for 4 and 4."""
-    landscape = Landscape(Instance(ability=[3, 2, 2, 1], workload=[4, 4]))
+def test_mutation_moves_ability_to_shortfalls(rng: np.random.Generator) -> None:
+    """One exchange without noise removes a shortfall that one exchange can remove: 5 and 3 for 4 and 4."""
+    encoding = Encoding(Instance(ability=[3, 2, 2, 1], workload=[4, 4]))
     genes = np.repeat(np.array([[0, 0, 1, 1]], dtype=np.int32), 50, axis=0)
-    settings = Mutation(exchanges=1.0, stray=0.0, temperature=0.0, pairs=0.0)
-    mutate(genes, 1.0, landscape, rng, settings=settings)
-    assert landscape.figures(genes, 1.0).shortfall.max() == 0
+    parameters = MutationParameters(exchanges=1.0, uniform=0.0, temperature=0.0, pairs=0.0)
+    mutate(genes, 1.0, encoding, rng, parameters=parameters)
+    assert encoding.objectives(genes, 1.0).shortfall.max() == 0
 
 
 def test_large_groups_are_sampled(rng: np.random.Generator) -> None:
-    """In groups beyond the cap every member may move: no agent is out of reach of mutation."""
-    landscape = Landscape(Instance(ability=np.ones(40), workload=[20, 20]))
+    """In groups beyond the cap every member may still move."""
+    encoding = Encoding(Instance(ability=np.ones(40), workload=[20, 20]))
     touched = np.zeros(40, dtype=bool)
     for _ in range(30):
         genes = np.repeat(np.repeat([[0, 1]], 20, axis=1).astype(np.int32), 20, axis=0)
         before = genes.copy()
-        mutate(genes, 1.0, landscape, rng, settings=Mutation(group_cap=4, pairs=0.0, stray=1.0))
+        mutate(genes, 1.0, encoding, rng, parameters=MutationParameters(group_cap=4, pairs=0.0, uniform=1.0))
         touched |= (genes != before).any(axis=0)
     assert touched.all()
 
@@ -127,16 +131,16 @@ def test_tournament_prefers_the_first(rng: np.random.Generator) -> None:
 
 def test_list_schedule_without_noise_is_greedy(instance: Instance, rng: np.random.Generator) -> None:
     """A row without noise takes agents in order of ability, each to the lowest W / h: 3, 2, 2, 1 on 5 and 3 by hand."""
-    landscape = Landscape(Instance(ability=[3, 2, 2, 1], workload=[5, 3]))
-    rows = list_schedules(landscape, np.zeros(1), np.zeros(1), rng, lambda: False)
+    encoding = Encoding(Instance(ability=[3, 2, 2, 1], workload=[5, 3]))
+    rows = list_schedules(encoding, np.zeros(1), np.zeros(1), rng, lambda: False)
     assert rows.tolist() == [[0, 1, 0, 1]]
-    noisy = list_schedules(Landscape(instance), np.full(20, 0.5), np.full(20, 1.0), rng, lambda: False)
-    assert Landscape(instance).allows(np.arange(12), noisy).all()
+    noisy = list_schedules(Encoding(instance), np.full(20, 0.5), np.full(20, 1.0), rng, lambda: False)
+    assert Encoding(instance).allows(np.arange(12), noisy).all()
     assert len(np.unique(noisy, axis=0)) > 10
 
 
-def test_homeward_draws_shorten_the_flight() -> None:
-    """Where energy counts, the agent drawn would fly less to the task drawn beside it, and can go there."""
+def test_saving_moves_reduce_the_distance() -> None:
+    """Where energy counts, the agent drawn is nearer to the task drawn beside it than to its own, and can reach it."""
     rng = np.random.default_rng(4)
     instance = Instance(
         ability=np.ones(30),
@@ -145,13 +149,13 @@ def test_homeward_draws_shorten_the_flight() -> None:
         task_position=rng.random((6, 2)),
         communication_range=np.full(30, 0.9),
     )
-    landscape = Landscape(instance)
+    encoding = Encoding(instance)
     task = np.array([rng.choice(np.flatnonzero(row)) for row in instance.reach.mask[instance.reach.origin]])
     genes = np.tile(task.astype(np.int32), (50, 1))
-    giver, to = _draw_homeward(genes, landscape, rng)
-    away, new = landscape.distance(giver, task[giver]), landscape.distance(giver, to)
+    giver, to = draw_saving_move(genes, encoding, rng)
+    away, new = encoding.distance(giver, task[giver]), encoding.distance(giver, to)
     nearest = np.where(instance.reach.mask, instance.reach.distance, np.inf).min(axis=1)[instance.reach.origin]
     could = nearest[giver] < away
     assert could.any()
     assert (new[could] < away[could]).all()
-    assert landscape.allows(giver, to)[could].all()
+    assert encoding.allows(giver, to)[could].all()

@@ -5,13 +5,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from alloc.allocators.exact.makespan.patterns import cheapest_by_core, cheapest_group, fill_table, read_group
+from alloc.allocators.exact.knapsack import cheapest_group, fill_table, read_group
+from alloc.allocators.exact.knapsack_core import cheapest_by_core
 
 classes = st.lists(st.tuples(st.integers(1, 7), st.integers(-2, 9), st.integers(0, 3)), min_size=1, max_size=4)
 
 
 def arrays(kinds):
-    """Weights, prices and copies as the kernels want them."""
+    """Weights, prices and copies as the kernels take them."""
     weight, price, copies = (np.array(column, dtype=np.int64) for column in zip(*kinds, strict=True))
     return weight, price / 4, copies
 
@@ -54,7 +55,7 @@ def test_one_table_answers_for_every_need(exact):
 
 
 def test_weights_beyond_the_need_count_as_the_need():
-    """An agent that alone is more than enough covers any need, and meets no smaller sum."""
+    """An agent that alone is more than enough meets any need, and no smaller sum exactly."""
     weight, price, copies = np.array([50, 2]), np.array([1.0, 0.4]), np.array([1, 9])
     assert cheapest_group(weight, price, copies, 10, -1)[0] == 1.0
     assert cheapest_group(weight, price, copies, 10, 10)[0] == 2.0
@@ -71,7 +72,7 @@ def test_no_group_costs_infinity():
 
 @given(st.integers(0, 2**32), st.integers(0, 3), st.integers(1, 90))
 def test_core_has_the_cheapest_group(seed, spare, classes):
-    """Settling all but the core costs nothing, for prices of either sign."""
+    """Leaving only the core open costs nothing, for prices of either sign."""
     rng = np.random.default_rng(seed)
     weight, copies = rng.integers(1, 11, classes), rng.integers(1, 4, classes)
     price = rng.normal(0, 1, classes)

@@ -3,7 +3,7 @@ import pytest
 from oracle import brute_force
 from tiny_instances import tiny_instance
 
-from alloc.allocators.exact.energy.least_energy import nearest_places, without_idlers
+from alloc.allocators.exact.energy.places import nearest_places, without_idlers
 from alloc.allocators.exact.model import Model
 from alloc.problems import IDLE, Allocation, Instance, agent_classes, evaluate
 

@@ -3,23 +3,23 @@ import pytest
 from oracle import brute_force
 from tiny_instances import all_can_be_served, seeds_where, tiny_instance
 
-from alloc.allocators.exact.energy.narrowing import REPEATABLE_SLICES, Narrowing
+from alloc.allocators.exact.energy.primal_dual import REPEATABLE_SLICES, PrimalDual
 from alloc.allocators.exact.model import Model
 from alloc.problems import Allocation, Instance, agent_classes, evaluate
 from alloc.problems.generate import paper_like
 
 
-def narrowing(instance: Instance, plan: Allocation, makespan: float, seed: int = 0) -> Narrowing:
+def primal_dual(instance: Instance, plan: Allocation, makespan: float, seed: int = 0) -> PrimalDual:
     """Both sides at a plan and a makespan that it holds."""
     model = Model.build(instance, agent_classes(instance, by_place=True), int((instance.workload > 0).sum()))
-    return Narrowing(instance, model, model.at(makespan), plan, seed)
+    return PrimalDual(instance, model, model.at(makespan), plan, seed)
 
 
-def narrowed(sides: Narrowing, instance: Instance, plan: Allocation) -> Allocation:
+def narrowed(sides: PrimalDual, instance: Instance, plan: Allocation) -> Allocation:
     """Work on both sides to the end."""
     for number in range(REPEATABLE_SLICES):
         plan = sides.repeat(number) or plan
-        sides.meet(evaluate(instance, plan).distance)
+        sides.note_cost(evaluate(instance, plan).distance)
     return plan
 
 
@@ -44,7 +44,7 @@ def test_bound_is_below_the_optimum_of_brute_force(seed):
     instance = tiny_instance(seed)
     best = brute_force(instance)
     assert not best.unserved
-    sides = narrowing(instance, Allocation(best.plan), best.makespan)
+    sides = primal_dual(instance, Allocation(best.plan), best.makespan)
     for number in range(5):
         assert sides.repeat(number) is None  # nothing is better than the best
     assert sides.bound * instance.energy_per_distance <= best.energy * (1 + 1e-9)
@@ -54,7 +54,7 @@ def test_bound_is_below_the_optimum_of_brute_force(seed):
 def test_bound_and_plan_meet_or_come_close(slack):
     """On an instance of the paper's kind, with T = 1 or more, both sides come within some percent of each other."""
     instance, plan = at_home(40, 8, 1)
-    sides = narrowing(instance, plan, slack)
+    sides = primal_dual(instance, plan, slack)
     before = evaluate(instance, plan)
     plan = narrowed(sides, instance, plan)
     after = evaluate(instance, plan)
@@ -69,11 +69,11 @@ def test_pairs_of_the_best_plan_are_kept():
     instance, plan = at_home(60, 10, 2)
     model = Model.build(instance, agent_classes(instance, by_place=True), instance.m)
     demand = model.at(1.0)
-    sides = Narrowing(instance, model, demand, plan, 0)
+    sides = PrimalDual(instance, model, demand, plan, 0)
     plan = narrowed(sides, instance, plan)
     used = np.flatnonzero(model.counts(demand, plan))
     assert set(used) <= set(sides.keep.tolist())
-    assert len(sides.keep) < 0.5 * len(demand.kind)
+    assert len(sides.keep) < 0.5 * len(demand.class_of_pair)
 
 
 def test_same_seed_same_plans():
@@ -83,7 +83,7 @@ def test_same_seed_same_plans():
     limit = evaluate(instance, plan).served_makespan
     ends = []
     for _ in range(2):
-        sides, last = narrowing(instance, plan, limit), plan
+        sides, last = primal_dual(instance, plan, limit), plan
         for number in range(3):
             last = sides.repeat(number) or last
         ends.append((last.task_of_agent.tolist(), sides.bound))
@@ -104,7 +104,7 @@ def test_limits_of_reach_are_kept():
         allowed_tasks=lists,
     )
     limit = evaluate(instance, Allocation(plan)).served_makespan
-    sides = narrowing(instance, Allocation(plan), limit)
+    sides = primal_dual(instance, Allocation(plan), limit)
     found = sides.repeat(0)
     assert found is not None
     score = evaluate(instance, found)

@@ -1,4 +1,4 @@
-"""How many processors there are to compute on."""
+"""The processors that this process may use."""
 
 import os
 

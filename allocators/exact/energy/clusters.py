@@ -1,0 +1,94 @@
+"""Clusters of tasks near each other, whose common knapsack strengthens the Lagrangian bound."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.cluster.hierarchy import linkage
+from scipy.sparse import csr_array
+from scipy.spatial.distance import squareform
+
+from alloc.allocators.exact.energy.energy_model import EnergyModel, Mask
+from alloc.allocators.exact.knapsack import WholeArray
+from alloc.problems.instance import FloatArray
+
+
+def cluster_tasks(task_distance: FloatArray) -> Mask:
+    """Return clusters of up to a quarter of the tasks by average linkage, as rows of members, shape (f, t).
+
+    Larger ones raise the bound little for the time that they take.
+    """
+    tasks = len(task_distance)
+    member = np.vstack([np.eye(tasks, dtype=bool), np.zeros((tasks - 1, tasks), dtype=bool)])
+    tree = linkage(squareform(task_distance, checks=False), "average")
+    for row, (one, other, _, _) in enumerate(tree, start=tasks):
+        member[row] = member[int(one)] | member[int(other)]
+    member = member[tasks:]
+    small: Mask = member.sum(axis=1) <= max(4, tasks / 4)
+    return np.asarray(member[small])
+
+
+@dataclass(frozen=True, eq=False)
+class Clusters:
+    """Knapsacks of whole clusters: one entry for each cluster and class of which some agents may work there.
+
+    Attributes
+    ----------
+    model : EnergyModel
+        The entries as pairs, clusters taking the place of tasks; costs are 0.
+    link : csr_array, shape (pairs, entries)
+        Which entries each pair of class and task counts for.
+    """
+
+    model: EnergyModel
+    link: csr_array
+
+    @classmethod
+    def build(cls, model: EnergyModel, member: Mask) -> "Clusters":
+        """Collect the entries of the clusters, rows of `member`, shape (f, t).
+
+        Classes whose agents must all work in one cluster are no entries of it: they lessen its need.
+        """
+        assert model.ability is not None
+        classes = len(model.count)
+        spare = model.max_weight[0] - model.need[0] if model.max_weight[0] >= 0 else -1
+        everywhere = np.bincount(model.class_of_pair, minlength=classes)
+        need = member @ model.need
+        parts, rows, columns, entries = [], [], [], 0
+        for f, inside in enumerate(member[:, model.task_of_pair]):
+            pairs = np.flatnonzero(inside)
+            class_of_pair = model.class_of_pair[pairs]
+            here = np.bincount(class_of_pair, minlength=classes)
+            usable = np.bincount(class_of_pair, model.copies[pairs], classes).astype(np.int64)
+            fixed = (here == everywhere) & (model.min_agents == model.count) & (here > 0)
+            need[f] -= (model.ability * model.count)[fixed].sum()
+            open_class = np.flatnonzero((here > 0) & ~fixed)
+            entry = np.full(classes, -1)
+            entry[open_class] = entries + np.arange(len(open_class))
+            linked = entry[class_of_pair] >= 0
+            rows.append(pairs[linked])
+            columns.append(entry[class_of_pair[linked]])
+            parts.append((open_class, np.full(len(open_class), f), np.minimum(model.count, usable)[open_class]))
+            entries += len(open_class)
+        agent_class, cluster, copies = (np.concatenate(part) for part in zip(*parts, strict=True))
+        row, column = np.concatenate(rows), np.concatenate(columns)
+        link = csr_array((np.ones(len(row)), (row, column)), shape=(len(model.class_of_pair), entries))
+        return cls(_entries(model, agent_class, cluster, copies, need, spare), link)
+
+
+def _entries(
+    model: EnergyModel, agent_class: WholeArray, cluster: WholeArray, copies: WholeArray, need: WholeArray, spare: int
+) -> EnergyModel:
+    assert model.ability is not None
+    max_weight = need + spare if spare >= 0 else np.full(len(need), -1)
+    return EnergyModel(
+        class_of_pair=agent_class,
+        task_of_pair=cluster,
+        weight=model.ability[agent_class],
+        copies=copies,
+        cost=np.zeros(len(agent_class)),
+        need=np.maximum(need, 0),
+        max_weight=np.maximum(max_weight, -1),  # below 0 no plan would do, and without a limit the bound still holds
+        count=model.count,
+        min_agents=model.min_agents,
+        ability=None,
+    )

@@ -1,0 +1,199 @@
+"""Pairwise repartition on energy: assign the agents of two tasks to these tasks anew, in the best way of all; compiled.
+
+A very large neighbourhood. Which of their agents two tasks get each is a knapsack: exact by dynamic programming, in
+microseconds where needs are small whole numbers. So are a task and the idle agents. A plan that no such step improves
+is perturbed: around one task, distances get noise for one descent; the result is kept if it is better, or by the rule
+of annealing.
+
+The exchanges of `heuristic.local_search` are much the same neighbourhood. In the place of this one they were no better:
+on the paper's scenario 1, in 3 s on two threads of a busy machine, three of ten seeds took 1.0, 1.4 and 2.4 % more
+energy, none markedly less; on scenarios 2 to 4 either came out ahead, by 1.1 % at most.
+
+References
+----------
+Ahuja, Ergun, Orlin and Punnen (2002), A survey of very large-scale neighborhood search techniques,
+doi:10.1016/S0166-218X(01)00338-9. Charon and Hudry (1993), The noising method, doi:10.1016/0167-6377(93)90023-A.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from alloc.allocators.exact.knapsack import WholeArray
+from alloc.allocators.runtime.compiled import compiled
+from alloc.problems.instance import FloatArray
+
+Mask = NDArray[np.bool_]
+
+
+@compiled
+def repartition_pair(
+    a: int, b: int, task: WholeArray, weight: WholeArray, distance: FloatArray, need: WholeArray, noise: FloatArray
+) -> bool:
+    """Assign the agents of tasks `a` and `b` to the two at the least cost; return whether that changed anything.
+
+    Task number ``len(need) - 1`` stands for idleness: it needs nothing. Distances are ``inf`` where an agent cannot go.
+    """
+    pool = np.empty(len(task), dtype=np.int64)
+    free, least, most = collect_pair(a, b, task, weight, distance, need, pool)
+    if most < least or free == 0:
+        return False
+    cost, after, old = np.full(most + 1, np.inf), np.empty(most + 1), 0.0
+    cost[0] = 0.0
+    taken = np.zeros((free, most + 1), dtype=np.uint8)
+    for q in range(free):
+        i, row = pool[q], taken[q]
+        w, paid = weight[i], distance[i, a] - distance[i, b] + noise[i, a] - noise[i, b]
+        if task[i] == a:
+            old += paid
+        for s in range(min(w, most + 1)):
+            after[s] = cost[s]
+        for s in range(w, most + 1):
+            candidate = cost[s - w] + paid
+            better = candidate < cost[s]
+            after[s] = candidate if better else cost[s]
+            row[s] = better
+        cost, after = after, cost
+    best = least
+    for s in range(least, most + 1):
+        if cost[s] < cost[best]:
+            best = s
+    if best > most or not cost[best] < old - 1e-12 * (1.0 + abs(old)):
+        return False
+    for q in range(free - 1, -1, -1):
+        i = pool[q]
+        if taken[q, best]:
+            task[i] = a
+            best -= weight[i]
+        else:
+            task[i] = b
+    return True
+
+
+@compiled
+def collect_pair(
+    a: int, b: int, task: WholeArray, weight: WholeArray, distance: FloatArray, need: WholeArray, pool: WholeArray
+) -> tuple[int, int, int]:
+    """Write the agents of the two tasks that can go to either to `pool`.
+
+    Returns
+    -------
+    int
+        How many they are.
+    int, int
+        Least and largest sum of their weights on `a` that leaves `b` what it needs; the largest is below the least if
+        there is none.
+    """
+    free, total, fixed, movable = 0, 0, 0, 0
+    for i in range(len(task)):
+        if task[i] == a or task[i] == b:
+            total += weight[i]
+            if distance[i, b] == np.inf:
+                fixed += weight[i]
+            elif distance[i, a] < np.inf:
+                pool[free] = i
+                movable += weight[i]
+                free += 1
+    least, most = max(0, need[a] - fixed), total - need[b] - fixed
+    if most < least:
+        return free, least, most
+    return free, least, min(most, movable)
+
+
+@compiled
+def descend_pairs(
+    task: WholeArray,
+    weight: WholeArray,
+    distance: FloatArray,
+    need: WholeArray,
+    noise: FloatArray,
+    pairs: WholeArray,
+    stale: Mask,
+    rng: np.random.Generator,
+    rounds: int,
+) -> None:
+    """Repartition pair after pair, from a random one on, until no pair with a `stale` task improves."""
+    for _ in range(rounds):
+        now, again = stale.copy(), False
+        for j in range(len(stale)):
+            stale[j] = False
+        first = int(rng.random() * len(pairs))
+        for z in range(len(pairs)):
+            a, b = pairs[(first + z) % len(pairs)]
+            if (now[a] or now[b] or stale[a] or stale[b]) and repartition_pair(
+                a, b, task, weight, distance, need, noise
+            ):
+                stale[a] = stale[b] = again = True
+        if not again:
+            break
+
+
+@compiled
+def total_distance(task: WholeArray, distance: FloatArray) -> float:
+    """Return the sum of distances of all agents to their tasks."""
+    total = 0.0
+    for i in range(len(task)):
+        total += distance[i, task[i]]
+    return total
+
+
+@compiled
+def overwrite(target: WholeArray, source: WholeArray) -> None:
+    """Copy `source`; a loop compiles faster than an assignment to a slice."""
+    for i in range(len(source)):
+        target[i] = source[i]
+
+
+@compiled
+def perturb(
+    task: WholeArray,
+    best: WholeArray,
+    weight: WholeArray,
+    distance: FloatArray,
+    need: WholeArray,
+    pairs: WholeArray,
+    near: WholeArray,
+    noise: FloatArray,
+    rng: np.random.Generator,
+    rounds: int,
+    strength: float,
+    temperature: float,
+) -> None:
+    """Perturb and descend `rounds` times from `task`; `best` is the best plan met; both are changed in place.
+
+    Parameters
+    ----------
+    near : ndarray of int, shape (tasks, q)
+        The nearest tasks of each task, itself first.
+    noise : ndarray, shape (n, tasks + 1)
+        Zeros; so again at the end.
+    strength, temperature : float
+        Largest noise, and temperature of annealing, both in units of distance.
+    """
+    least, here = total_distance(best, distance), total_distance(task, distance)
+    before, stale = task.copy(), np.zeros(len(need), dtype=np.bool_)
+    for _ in range(rounds):
+        centre, size = int(rng.random() * len(near)), 2 + int(rng.random() * (near.shape[1] - 1))
+        around, amplitude = near[centre, : min(size, near.shape[1])], strength * rng.random()
+        inside = np.zeros(len(need), dtype=np.bool_)
+        for j in around:
+            inside[j] = True
+            for i in range(len(task)):
+                noise[i, j] = amplitude * (rng.random() + rng.random() - 1.0)
+        for a, b in pairs:
+            if inside[a] and (inside[b] or b == len(need) - 1):
+                repartition_pair(a, b, task, weight, distance, need, noise)
+        for j in around:
+            for i in range(len(task)):
+                noise[i, j] = 0.0
+        for j in range(len(stale)):
+            stale[j] = inside[j]
+        descend_pairs(task, weight, distance, need, noise, pairs, stale, rng, 100)
+        now = total_distance(task, distance)
+        if now <= here or rng.random() < np.exp((here - now) / temperature):
+            here = now
+            overwrite(before, task)
+            if now < least * (1 - 1e-12):
+                least = now
+                overwrite(best, task)
+        else:
+            overwrite(task, before)

@@ -1,0 +1,60 @@
+"""Plans of less energy at the same completion times: agents alike change places, and agents not needed stay idle."""
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from alloc.allocators.exact.model import ROUNDING, Model
+from alloc.problems import IDLE, Allocation, Instance, agent_classes
+from alloc.problems.instance import IntArray
+
+MAX_MATCHED = 400
+"""Agents alike that are matched with their tasks at once, some 10 ms; larger classes are cut into parts."""
+
+
+def nearest_places(
+    instance: Instance, allocation: Allocation, should_stop: Callable[[], bool] = lambda: False
+) -> Allocation:
+    """Exchange agents alike but for their place so that their total distance is least: an assignment problem per class.
+
+    By Crouse (2016), doi:10.1109/TAES.2016.140952, in scipy. Where travel takes time, agents at different places are
+    not alike, and the plan stays as it is.
+    """
+    task = allocation.task_of_agent.copy()
+    if instance.has_travel_time:
+        return allocation
+    for members in _alike(instance):
+        if should_stop():
+            break
+        tasks = task[members][task[members] != IDLE]
+        distance = instance.reach.distance[instance.reach.origin[members]][:, tasks]
+        row, column = linear_sum_assignment(distance)
+        task[members] = IDLE
+        task[members[row]] = tasks[column]
+    return Allocation(task)
+
+
+def _alike(instance: Instance) -> list[IntArray]:
+    """Agents of each class, those of large classes in parts."""
+    classes = agent_classes(instance, by_place=False)
+    order = np.argsort(classes.class_of_agent, kind="stable")
+    whole = np.split(order, np.cumsum(classes.count)[:-1])
+    parts = [np.array_split(members, -(-len(members) // MAX_MATCHED)) for members in whole if len(members) > 1]
+    return [part for members in parts for part in members]
+
+
+def without_idlers(model: Model, allocation: Allocation, time: float) -> Allocation:
+    """Leave out agents without whom their task is done by `time` all the same, the farthest first."""
+    table = model.classes.tally(allocation)
+    share = model.shares(time)
+    for column, task in enumerate(model.tasks.tolist()):
+        done = float(share[:, column] @ table[:, task])
+        group = np.flatnonzero(table[:, task])
+        for agent_class in group[np.argsort(-model.classes.distance[group, task])].tolist():
+            one = float(share[agent_class, column])
+            spare = table[agent_class, task] if one == 0 else max(0, int((done - 1 + ROUNDING) / one))
+            leave = min(int(table[agent_class, task]), int(spare))
+            table[agent_class, task] -= leave
+            done -= leave * one
+    return model.classes.spread(table)

@@ -1,0 +1,204 @@
+"""Close the gap on the energy from both sides: plans by pairwise repartition, bounds by Lagrangian relaxation."""
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from alloc.allocators.exact.demand import Demand
+from alloc.allocators.exact.energy.energy_model import MAX_NEED, EnergyModel, round_demand
+from alloc.allocators.exact.energy.lagrangian import LagrangianBound
+from alloc.allocators.exact.energy.pairwise_search import PairwiseSearch, Perturbation
+from alloc.allocators.exact.model import ROUNDING, Model
+from alloc.allocators.parallel.pool import Pool
+from alloc.problems import IDLE, Allocation, Instance
+from alloc.problems.instance import FloatArray, IntArray
+
+MAX_WORK = 100_000_000
+"""Cells of all tables that a round of prices, or a descent over all pairs of tasks, may fill: some 0.1 s."""
+
+MAX_TASKS = 2000
+"""Tasks above which neither side is used, for its memory."""
+
+SLICE_S = 0.02
+"""What each side may take in one go."""
+
+REPEATABLE_SLICES, REPEATABLE_ROUNDS = 60, 10
+"""Slices, and rounds in each, where effort is counted."""
+
+
+def compile_loops() -> None:
+    """Compile all loops, or read them from the cache, so that no run waits for it."""
+    plan = np.array([0, 1])
+    plans = PairwiseSearch(plan, np.ones(2, dtype=int), np.ones((2, 2)), np.ones(2, dtype=int), np.zeros((2, 2)), 0)
+    plans.descend()
+    plans.anneal(1, 0.0)
+    one, two = np.ones(2, dtype=np.int64), np.array([0, 1])
+    LagrangianBound(EnergyModel(two, two, one, one, np.ones(2), one, one, one, one, None), np.zeros((2, 2))).ascend(
+        1, 3.0
+    )
+
+
+class Timer:
+    """Counts how many rounds of some work fit into a slice, by what the last ones took."""
+
+    def __init__(self) -> None:
+        self._rounds = 1
+
+    def run(self, work: Callable[[int], None]) -> None:
+        """Do as many rounds as fit."""
+        begin = time.monotonic()
+        work(self._rounds)
+        took = max(time.monotonic() - begin, 1e-5)
+        self._rounds = int(np.clip(self._rounds * np.clip(SLICE_S / took, 0.25, 2.0), 1, 100_000))
+
+
+class PrimalDual:
+    """Plans and bounds for the least energy by `model.at(limit)`, all tasks that `plan` serves being served.
+
+    Parameters
+    ----------
+    instance : Instance
+    model : Model
+    demand : Demand
+    plan : Allocation
+        A plan that meets the demand.
+    seed : int
+    """
+
+    def __init__(self, instance: Instance, model: Model, demand: Demand, plan: Allocation, seed: int) -> None:
+        self._model, self._demand = model, demand
+        task_distance = pairwise_distance(instance.task_position[model.tasks])
+        self._pairs: IntArray = np.arange(len(demand.class_of_pair))
+        self._dual = None if demand.partial else self._begin_dual(task_distance)
+        self._primal = _begin_primal(instance, model, demand, plan, task_distance, seed)
+        self._reported = self._cost = _distance(instance, plan)
+        self._primal_timer, self._dual_timer = Timer(), Timer()
+        self._descended = self._primal is None
+
+    @property
+    def bound(self) -> float:
+        """Distance that every plan needs, as far as proven."""
+        return 0.0 if self._dual is None else min(self._dual.bound * (1 - ROUNDING), self._cost)
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether there is neither side."""
+        return self._primal is None and self._dual is None
+
+    @property
+    def closed(self) -> bool:
+        """Whether the best plan is proven."""
+        return self._dual is not None and self._dual.bound >= self._cost * (1 - 1e-9)
+
+    @property
+    def converged(self) -> bool:
+        """Whether bounds hardly rise any more."""
+        return self._dual is None or self._dual.converged
+
+    @property
+    def keep(self) -> IntArray:
+        """Which pairs of the demand a better plan may have, sorted."""
+        return self._pairs if self._dual is None else np.sort(self._pairs[self._dual.kept])
+
+    def run(self, progress: float, pool: Pool | None) -> Allocation | None:
+        """Work on both sides for some 20 ms each; return a plan if a better one was found.
+
+        Parameters
+        ----------
+        progress : float
+            How much of the time has passed, from 0 to 1.
+        pool : Pool or None
+            Works on one side while the calling thread works on the other.
+        """
+        if not self._descended:
+            return self._descend()
+        rising = None if pool is None else pool.submit(self._ascend)
+        if self._primal is not None:
+            primal = self._primal
+            self._primal_timer.run(lambda rounds: primal.anneal(rounds, progress))
+        if rising is None:
+            self._ascend()
+        else:
+            rising.result()
+        return self._better()
+
+    def repeat(self, slice_: int) -> Allocation | None:
+        """Work on both sides as `run` does, by count and not by the clock."""
+        if not self._descended:
+            return self._descend()
+        if self._primal is not None:
+            self._primal.anneal(REPEATABLE_ROUNDS, slice_ / REPEATABLE_SLICES)
+        if self._dual is not None:
+            self._dual.ascend(REPEATABLE_ROUNDS, self._cost)
+        return self._better()
+
+    def note_cost(self, cost: float) -> None:
+        """Take note of the cost of a plan found elsewhere."""
+        self._cost = min(self._cost, cost)
+
+    def _descend(self) -> Allocation | None:
+        """Descend before prices change, as their steps depend on the cost of the plan at hand."""
+        assert self._primal is not None
+        self._descended = self._primal.descend()
+        return self._better()
+
+    def _ascend(self) -> None:
+        if self._dual is not None:
+            dual, cost = self._dual, self._cost
+            self._dual_timer.run(lambda rounds: dual.ascend(rounds, cost))
+
+    def _better(self) -> Allocation | None:
+        """Return the best plan if it has not been returned yet."""
+        if self._primal is None or self._primal.cost >= self._reported * (1 - 1e-12):
+            return None
+        self._reported = self._primal.cost
+        tasks = np.append(self._model.tasks, IDLE)
+        return Allocation(tasks[self._primal.best])
+
+    def _begin_dual(self, task_distance: FloatArray) -> LagrangianBound | None:
+        """Start the dual side; None where its tables are too large."""
+        cost = self._model.distance[self._model.pairs_at(self._demand)]
+        rounded, pairs = round_demand(self._demand, cost)
+        cells = np.maximum(rounded.need, rounded.max_weight)[rounded.task_of_pair].sum()
+        if cells > MAX_WORK:
+            return None
+        self._pairs = pairs
+        return LagrangianBound(rounded, task_distance)
+
+
+def pairwise_distance(place: FloatArray) -> FloatArray:
+    """Return how far any two places are apart, large numbers being scaled, shape (t, t)."""
+    known = np.nan_to_num(place)
+    known = known / max(1.0, float(np.abs(known).max(initial=0.0)))
+    return np.asarray(np.sqrt(((known[:, None] - known[None]) ** 2).sum(axis=2)))
+
+
+def _begin_primal(
+    instance: Instance, model: Model, demand: Demand, plan: Allocation, task_distance: FloatArray, seed: int
+) -> PairwiseSearch | None:
+    """Start the search at `plan`; None where travel takes time, or its tables are too large."""
+    if model.travel_time is not None:
+        return None
+    column = np.full(instance.m + 1, len(model.tasks))
+    column[model.tasks] = np.arange(len(model.tasks))
+    task = column[plan.task_of_agent]
+    distance = np.where(model.classes.mask, model.classes.distance, np.inf)[:, model.tasks]
+    if demand.integral and demand.need.max() <= MAX_NEED:
+        weight, need = demand.ability.astype(np.int64), demand.need.astype(np.int64)
+    else:
+        work = model.workload / demand.time * (1 - ROUNDING)
+        scale = MAX_NEED / work.max()
+        weight, need = np.floor(model.classes.ability * scale).astype(np.int64), np.ceil(work * scale).astype(np.int64)
+    served = np.bincount(task, minlength=len(need) + 1)[:-1] > 0
+    need, distance = np.where(served, need, 0), np.where(served, distance, np.inf)
+    partners = min(len(need), Perturbation().partners)
+    if len(need) * partners / 2 * (instance.n + 2 * instance.n / len(need) * need.max()) > MAX_WORK:
+        return None
+    agent_class = model.classes.class_of_agent
+    return PairwiseSearch(task, weight[agent_class], distance[agent_class], need, task_distance, seed)
+
+
+def _distance(instance: Instance, plan: Allocation) -> float:
+    sent = np.flatnonzero(plan.task_of_agent != IDLE)
+    return float(instance.reach.distance_of(sent, plan.task_of_agent[sent]).sum())

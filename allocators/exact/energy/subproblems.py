@@ -1,0 +1,96 @@
+"""The subproblems of the Lagrangian relaxation: the cheapest group of each task at given prices; compiled."""
+
+import numpy as np
+
+from alloc.allocators.exact.energy.energy_model import EnergyModel
+from alloc.allocators.exact.knapsack import WholeArray, fill_table, read_group
+from alloc.allocators.exact.knapsack_core import cheapest_by_core
+from alloc.allocators.runtime.compiled import compiled
+from alloc.problems.instance import FloatArray
+
+
+def solve_subproblems(
+    model: EnergyModel, price: FloatArray, *, compare: bool = True
+) -> tuple[WholeArray, FloatArray, float]:
+    """Find the cheapest group of every task, or cluster, on its own.
+
+    Parameters
+    ----------
+    price : ndarray, shape (p,)
+        What one agent of each pair costs.
+    compare : bool
+        Whether the excess is wanted.
+
+    Returns
+    -------
+    ndarray of int, shape (p,)
+        Agents of each pair in these groups.
+    ndarray, shape (p,) or (0,)
+        Excess: how much dearer the best group with an agent of the pair is, or less than that.
+    float
+        What all groups cost; ``inf`` if a task has none, the arrays then meaning nothing.
+    """
+    group, excess = np.zeros(len(price), dtype=np.int64), np.zeros(len(price) if compare else 0)
+    total = solve_all(model.first, model.weight, model.copies, price, model.need, model.max_weight, group, excess)
+    return group, excess, total
+
+
+@compiled
+def solve_all(
+    first: WholeArray,
+    weight: WholeArray,
+    copies: WholeArray,
+    price: FloatArray,
+    need: WholeArray,
+    max_weight: WholeArray,
+    group: WholeArray,
+    excess: FloatArray,
+) -> float:
+    """Do the work of `solve_subproblems`, filling `group` and `excess`; an empty `excess` is left out."""
+    total, compare = 0.0, len(excess) > 0
+    for j in range(len(need)):
+        a, b = first[j], first[j + 1]
+        cost = solve_one(weight[a:b], price[a:b], copies[a:b], need[j], max_weight[j], group[a:b], excess[a:b], compare)
+        if not np.isfinite(cost):
+            return np.inf
+        total += cost
+    return total
+
+
+@compiled
+def solve_one(
+    weight: WholeArray,
+    price: FloatArray,
+    copies: WholeArray,
+    need: int,
+    max_weight: int,
+    group: WholeArray,
+    excess: FloatArray,
+    compare: bool,
+) -> float:
+    """Write the cheapest group of one task and return its cost, ``inf`` if there is none."""
+    exact, pairs = max_weight >= 0, len(weight)
+    if exact and not compare:
+        paid, cheapest = cheapest_by_core(weight, price, copies, need, max_weight)
+        for p in range(pairs):
+            group[p] = cheapest[p]
+        return paid
+    table = fill_table(weight, price, copies, max(need, max_weight), exact)
+    cost, best = table[0], need
+    for s in range(need, max_weight + 1):
+        if cost[s] < cost[best]:
+            best = s
+    if not np.isfinite(cost[best]):
+        return np.inf
+    cheapest = read_group(table, pairs, best)
+    for p in range(pairs):
+        group[p] = cheapest[p]
+    for p in range(pairs if compare else 0):
+        with_it = np.inf
+        if exact:
+            for s in range(max(need, weight[p]), max_weight + 1):
+                with_it = min(with_it, cost[s - weight[p]])
+        else:
+            with_it = cost[max(0, need - weight[p])]
+        excess[p] = with_it + price[p] - cost[best]
+    return cost[best]

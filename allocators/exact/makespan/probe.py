@@ -1,0 +1,66 @@
+"""A probe: whether there is a plan with makespan T."""
+
+from dataclasses import dataclass
+from enum import Enum
+
+from alloc.allocators.exact.demand import Demand
+from alloc.allocators.exact.makespan.lower_bounds import probe_by_groups
+from alloc.allocators.exact.makespan.quick_plans import find_plan
+from alloc.allocators.exact.makespan.state import MakespanState
+from alloc.allocators.exact.monitor import SolverMonitor
+from alloc.allocators.exact.solver_model import Solver, SolverLimits, SolverModel, Verdict
+
+
+class Purpose(Enum):
+    """What a probe is for."""
+
+    BISECT = "bisect"
+    """To halve the gap; without a verdict, T becomes the lower end of the bisection."""
+
+    BELOW_PLAN = "below the plan"
+    """To see early, by a T just below the fastest plan, whether that is the optimum; no matter if it stays open."""
+
+    LAST = "last"
+    """To use the time left once all other probes have stayed open."""
+
+
+@dataclass(frozen=True)
+class Probe:
+    """A makespan T in hours, the seconds that its probe may take, and what it is for."""
+
+    time: float
+    seconds: float
+    purpose: Purpose = Purpose.BISECT
+
+
+def probe_makespan(state: MakespanState, solver: Solver, probe: Probe) -> Verdict:
+    """Look for a plan with makespan T or a proof that there is none, by ever more expensive means."""
+    demand = state.model.at(probe.time)
+    if demand.trivially_infeasible:
+        state.rule_out(probe.time)
+        return Verdict.INFEASIBLE
+    if state.bounds_tried:
+        if state.descent and find_plan(state, probe.time):
+            return Verdict.FEASIBLE
+        verdict = probe_by_groups(state, probe.time, probe.seconds)
+        if verdict is not Verdict.UNKNOWN:
+            return verdict
+    return _probe_by_solver(state, solver, demand, probe)
+
+
+def _probe_by_solver(state: MakespanState, solver: Solver, demand: Demand, probe: Probe) -> Verdict:
+    search, build_s = state.search, 2 * len(state.model.class_of_pair) / solver.pairs_per_second
+    until_s = min(search.elapsed_s + probe.seconds + build_s, state.until_s)
+    model = SolverModel(
+        demand=demand,
+        cost=None,
+        hint=state.model.counts(demand, state.plan),
+        limits=SolverLimits.of(search, until_s - search.elapsed_s, search.threads),
+    )
+    answer = solver.solve_model(model, SolverMonitor(search, state.model, demand, until_s))
+    search.iteration += 1
+    if answer.counts is not None:
+        return state.verdict_on(state.model.allocation(demand, answer.counts), probe.time)
+    if answer.verdict is Verdict.INFEASIBLE:
+        state.rule_out(probe.time)
+    return answer.verdict

@@ -1,0 +1,88 @@
+"""Plans without the solver: descents, and the repartition search."""
+
+import numpy as np
+
+from alloc.allocators.exact.makespan.descent import descend
+from alloc.allocators.exact.makespan.state import TIGHT, MakespanState
+
+MANY_KICKS, FEW_KICKS = 300, 20
+"""Kicks of a descent: where solvers have failed, and at the start."""
+
+REPEATABLE_TARGETS = 20
+"""Target makespans of a repartition search where effort is counted."""
+
+PATIENCE_S = 0.05
+"""Seconds without a better plan after which the repartition search may end."""
+
+STEPS_PER_TARGET = 1000
+"""Repartitions for one target makespan."""
+
+STEPS_PER_PROBE = 20_000
+"""Repartitions for a makespan that is probed."""
+
+
+def descend_in_steps(state: MakespanState) -> None:
+    """Descend for the lower bound, then for target makespans closer to the fastest plan."""
+    for weight in (1.0, 0.5, 0.25):
+        if state.ended:
+            return
+        target = state.upper + weight * (state.lower - state.upper)
+        _descend(state, max(state.lower, target), 0.03, kicks=FEW_KICKS)  # smaller only by rounding
+
+
+def search_repartitions(state: MakespanState, share: float) -> None:
+    """Search repartitions for target makespans closer to the fastest plan, for this share of the time at the most.
+
+    Parameters
+    ----------
+    share : float
+        The search ends earlier where plans do not get better.
+    """
+    search, repartition = state.search, state.repartition
+    if not repartition.is_tractable or state.partial or state.ended:  # it cannot choose which tasks to serve
+        return
+    repartition.start(state.plan)
+    begin_s = last_s = search.elapsed_s
+    targets, weight = 0, 1.0
+    while not state.ended:
+        upper, now_s, targets = state.upper, search.elapsed_s, targets + 1
+        patience_s = max(state.share_s(share / 10, PATIENCE_S), last_s - begin_s)
+        late = now_s - begin_s > state.share_s(share) or now_s - last_s > patience_s
+        if targets > REPEATABLE_TARGETS if state.repeatable else late:
+            return
+        target = max(state.lower, upper + weight * (state.lower - upper) - TIGHT / 2 * upper)
+        _, plan = repartition.run(target, lambda: state.over, max_steps=STEPS_PER_TARGET)
+        search.submit(plan)
+        if state.upper < upper:
+            last_s = search.elapsed_s
+        else:
+            weight = weight / 2 if weight > 0.1 else float(state.rng.choice([0.0, 0.5, 1.0]))
+
+
+def find_plan(state: MakespanState, time: float) -> bool:
+    """Search repartitions, or descend where there are too many agents; return whether a plan for `time` was found."""
+    if not state.repartition.is_tractable:
+        return _descend(state, time, 0.05, kicks=MANY_KICKS)
+    state.repartition.start(state.plan)
+    until_s = np.inf if state.repeatable else state.search.elapsed_s + state.share_s(0.01)
+    found, plan = state.repartition.run(
+        time, lambda: state.over or state.search.elapsed_s >= until_s, max_steps=STEPS_PER_PROBE
+    )
+    return state.submit(plan, time) and found
+
+
+def _descend(state: MakespanState, time: float, share: float, kicks: int) -> bool:
+    """Descend from the fastest plan; return whether one with makespan `time` was found."""
+    model = state.model
+    table = model.classes.tally(state.plan)[:, model.tasks]
+    served = table.any(axis=0)
+    until_s = np.inf if state.repeatable else state.search.elapsed_s + state.share_s(share)
+    table[:, served], _ = descend(
+        model.shares(time)[:, served],
+        table[:, served],
+        model.classes.count - table.sum(axis=1),
+        state.rng,
+        kicks=kicks,
+        should_stop=lambda: state.over or state.search.elapsed_s >= until_s,
+    )
+    return state.submit(model.plan(table), time)

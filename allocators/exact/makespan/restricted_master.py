@@ -1,0 +1,108 @@
+"""The configuration linear programme restricted to the groups found so far, solved by HiGHS."""
+
+from dataclasses import dataclass
+
+import highspy
+import numpy as np
+
+from alloc.allocators.exact.knapsack import Table, WholeArray, read_group
+from alloc.problems.instance import IntArray
+
+CLOSE = 1e-9
+"""Gap at which the programme counts as solved, and by which theta may exceed 1 although no prices prove that."""
+
+
+@dataclass(frozen=True, eq=False)
+class TaskNeeds:
+    """What tasks that can use the same agents alike need at some T, in whole steps.
+
+    Attributes
+    ----------
+    tasks : ndarray of int, shape (g,)
+    weight : ndarray of int64, shape (k,)
+        What one agent of each class adds.
+    need : ndarray of int64, shape (g,)
+    """
+
+    tasks: IntArray
+    weight: WholeArray
+    need: WholeArray
+
+
+class RestrictedMaster:
+    """Minimise theta over the groups known; tasks of the same need and weights are one row.
+
+    Parameters
+    ----------
+    tasks : list of TaskNeeds
+    count : ndarray of int64, shape (k,)
+        Agents in each class.
+
+    Attributes
+    ----------
+    solved : bool
+        Whether there is a solution yet.
+    theta : float
+        Its value.
+    price : ndarray, shape (k,)
+        Dual prices of the classes, all agents costing 1 together.
+    """
+
+    def __init__(self, tasks: list[TaskNeeds], count: WholeArray) -> None:
+        self._rows: list[tuple[int, int, int]] = []  # index into `tasks`, need, how many tasks
+        for index, needs in enumerate(tasks):
+            values, times = np.unique(needs.need, return_counts=True)
+            self._rows += [(index, int(v), int(c)) for v, c in zip(values, times, strict=True)]
+        self._tasks, self._count = tasks, count
+        self._seen: set[tuple[int, bytes]] = set()
+        self.solved, self.theta = False, np.inf
+        self.price = self._group_price = np.zeros(0)
+        self._highs = highspy.Highs()
+        for option, value in (("output_flag", False), ("threads", 1), ("presolve", "off")):
+            self._highs.setOptionValue(option, value)
+        for _, _, alike in self._rows:
+            self._highs.addRow(float(alike), float(alike), 0, np.zeros(0, dtype=np.int32), np.zeros(0))
+        for _ in count:
+            self._highs.addRow(-highspy.kHighsInf, 0.0, 0, np.zeros(0, dtype=np.int32), np.zeros(0))
+        uses = (len(self._rows) + np.arange(len(count))).astype(np.int32)
+        self._highs.addCol(1.0, 0.0, highspy.kHighsInf, len(uses), uses, -count.astype(float))
+
+    def add_known(self, group: WholeArray) -> None:
+        """Add a group found at another T as a column of the task with the largest need that it meets."""
+        done = [int(needs.weight @ group) for needs in self._tasks]
+        met = [(need, row) for row, (index, need, _) in enumerate(self._rows) if done[index] >= need]
+        if met:
+            self._add(max(met)[1], group)
+
+    def add_groups(self, tables: list[Table], known: list[WholeArray]) -> bool:
+        """Add the cheapest groups of negative reduced cost, to `known` as well; return whether there were any."""
+        new = False
+        for row, (index, need, _) in enumerate(self._rows):
+            group = read_group(tables[index], len(self._count), need)
+            if self.solved and group @ self.price >= self._group_price[row] - CLOSE / 10:
+                continue
+            if self._add(row, group):
+                known.append(group)
+                new = True
+        return new
+
+    def solve(self) -> bool:
+        """Solve; return whether that succeeded."""
+        self._highs.run()
+        if self._highs.getModelStatus() != highspy.HighsModelStatus.kOptimal:
+            return False
+        dual = np.asarray(self._highs.getSolution().row_dual)
+        self._group_price, self.price = dual[: len(self._rows)], np.maximum(0.0, -dual[len(self._rows) :])
+        self.theta, self.solved = self._highs.getInfo().objective_function_value, True
+        return True
+
+    def _add(self, row: int, group: WholeArray) -> bool:
+        key = (row, group.tobytes())
+        if key in self._seen:
+            return False
+        self._seen.add(key)
+        classes = np.flatnonzero(group)
+        index = np.append(row, len(self._rows) + classes).astype(np.int32)
+        value = np.append(1.0, group[classes]).astype(float)
+        self._highs.addCol(0.0, 0.0, highspy.kHighsInf, len(index), index, value)
+        return True

@@ -1,0 +1,146 @@
+"""The state that the phases of the makespan stage pass along."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from alloc.allocators.contract.search import Search
+from alloc.allocators.contract.tolerance import PROVEN
+from alloc.allocators.exact.makespan.configuration import ConfigurationProgramme
+from alloc.allocators.exact.makespan.repartition_search import RepartitionSearch
+from alloc.allocators.exact.model import Model
+from alloc.allocators.exact.monitor import is_over
+from alloc.allocators.exact.solver_model import Verdict, is_repeatable
+from alloc.problems import Allocation, Evaluation, agent_classes
+
+TIGHT = 1e-8
+"""Relative gap at which the stage ends; well above the tolerance of 1e-9 that solvers and scores have."""
+
+UNLIMITED_S = 60.0
+"""Seconds of which phases get their shares where there is no time limit."""
+
+
+@dataclass(eq=False)
+class MakespanState:
+    """Bounds on the least makespan, and what the phases need to improve them; plans go to `search`.
+
+    Attributes
+    ----------
+    search : Search
+    model : Model
+        Classes not told apart by place.
+    until_s : float
+        Seconds since the run began at which the stage must end; ``inf`` without a time limit.
+    descent : bool
+        Whether plans are looked for without the solver.
+    repeatable : bool
+        Whether effort is counted and not timed.
+    rng : numpy.random.Generator
+    repartition : RepartitionSearch
+    lower : float
+        Proven: no plan that serves `model.min_served` tasks has a smaller makespan, in hours.
+    unresolved : float
+        Largest T whose probe ended without a verdict; no bound, but the lower end of the bisection.
+    bounds_tried : bool
+        Whether the linear programmes have been asked for a bound, as the simple bound and the first plans differ.
+    configurations : ConfigurationProgramme or None
+        None before that, and where the programme is too large.
+    """
+
+    search: Search
+    model: Model
+    until_s: float
+    descent: bool
+    repeatable: bool
+    rng: np.random.Generator
+    repartition: RepartitionSearch
+    lower: float
+    unresolved: float = 0.0
+    bounds_tried: bool = False
+    configurations: ConfigurationProgramme | None = None
+
+    @classmethod
+    def begin(cls, search: Search, min_served: int, until_s: float, *, descent: bool) -> "MakespanState":
+        """Start from the simple bound and the best plan of `search`."""
+        model = Model.build(search.instance, agent_classes(search.instance, by_place=False), min_served)
+        return cls(
+            search=search,
+            model=model,
+            until_s=until_s,
+            descent=descent,
+            repeatable=is_repeatable(search),
+            rng=np.random.default_rng(search.seed),
+            repartition=RepartitionSearch(model, search.seed),
+            lower=_simple_bound(search, model),
+        )
+
+    @property
+    def plan(self) -> Allocation:
+        """The fastest plan so far."""
+        assert self.search.fastest is not None
+        return self.search.fastest.allocation
+
+    @property
+    def upper(self) -> float:
+        """Makespan of the fastest plan so far, in hours."""
+        assert self.search.fastest is not None
+        return self.search.fastest.evaluation.served_makespan
+
+    @property
+    def closed(self) -> bool:
+        """Whether the fastest plan is proven, or keeps to the limit that was given."""
+        given = self.search.tolerance.limit
+        return self.upper <= max(self.lower * (1 + TIGHT), given or 0.0)
+
+    @property
+    def over(self) -> bool:
+        """Whether time is up or the run must end."""
+        return is_over(self.search) or self.search.elapsed_s >= self.until_s
+
+    @property
+    def ended(self) -> bool:
+        """Whether nothing is left to do."""
+        return self.closed or self.over
+
+    @property
+    def partial(self) -> bool:
+        """Whether some tasks stay unserved."""
+        return self.model.min_served < len(self.model.tasks)
+
+    def would_prove(self, time: float) -> bool:
+        """Whether a lower bound of `time` would prove the fastest plan to 1e-6."""
+        return self.upper - time <= PROVEN * self.upper
+
+    def rule_out(self, time: float) -> None:
+        """Take note that no plan has a makespan of `time` or less."""
+        self.lower = max(self.lower, self.model.next_makespan(time))
+        if not self.partial:
+            self.search.raise_bound(min(self.lower, self.upper))
+
+    def submit(self, plan: Allocation, time: float) -> bool:
+        """Submit a plan; return whether it serves enough tasks by `time`."""
+        return self._in_time(self.search.submit(plan), time)
+
+    def verdict_on(self, plan: Allocation, time: float) -> Verdict:
+        """Submit a solver's plan for `time`; by rounding, it may be too slow, or no faster than the fastest."""
+        upper, score = self.upper, self.search.submit(plan)
+        faster = self._in_time(score, time) and score.served_makespan < upper
+        return Verdict.FEASIBLE if faster else Verdict.UNKNOWN
+
+    def _in_time(self, score: Evaluation, time: float) -> bool:
+        served = len(self.model.tasks) - len(score.unserved_tasks)
+        return served >= self.model.min_served and score.served_makespan <= time * (1 + TIGHT / 4)
+
+    def share_s(self, share: float, least_s: float = 0.3) -> float:
+        """Return this share of the stage's time in seconds, at least `least_s`; ``inf`` where effort is counted."""
+        if self.repeatable:
+            return float("inf")
+        return max(least_s, share * (self.until_s if np.isfinite(self.until_s) else UNLIMITED_S))
+
+
+def _simple_bound(search: Search, model: Model) -> float:
+    """All abilities against the smallest workloads that are to be served."""
+    if model.min_served == len(model.tasks):
+        return search.lower_bound
+    least = np.sort(model.workload)[: model.min_served].sum()
+    return float(least / (model.classes.ability @ model.classes.count))
