@@ -11,7 +11,7 @@ from multiprocessing import connection, resource_tracker
 
 from alloc.allocators.parallel.engine import POLL_S, Engine, EngineError, R, T, never_stop
 from alloc.allocators.parallel.remote_call import RemoteCall, run_call
-from alloc.allocators.runtime.processors import available_threads
+from alloc.allocators.parallel.processors import available_threads
 
 MAX_ATTEMPTS = 3
 """Attempts at an item; a process that dies at it three times will die again."""
