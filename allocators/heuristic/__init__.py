@@ -1,1 +1,1 @@
-"""Heuristic methods: good answers fast."""
+"""Heuristic methods: good allocations in little time."""

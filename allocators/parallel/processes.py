@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterator, Sequence
 from multiprocessing import connection, resource_tracker
 
 from alloc.allocators.parallel.engine import POLL_S, Engine, EngineError, R, T, never_stop
-from alloc.allocators.parallel.remote_call import RemoteCall, run_call
 from alloc.allocators.parallel.processors import available_threads
+from alloc.allocators.parallel.remote_call import RemoteCall, run_call
 
 MAX_ATTEMPTS = 3
 """Attempts at an item; a process that dies at it three times will die again."""

@@ -1,1 +1,1 @@
-"""What compiled code needs: compilation, random numbers, and ways to stop native solvers."""
+"""Compilation, random numbers in compiled code, stop requests and native solvers."""

@@ -1,17 +1,25 @@
-"""Loops that numba compiles to machine code: at their first call, or read from its cache where that may be written."""
+"""Decorators for functions that numba compiles to machine code, at their first call or from its cache."""
 
 from collections.abc import Callable
-from typing import Any, TypeVar, cast
+from typing import Literal, TypedDict, TypeVar, cast
 
 import numba
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
 
+class _FastMath(TypedDict):
+    """Options of `numba.njit` for code that needs no particular order of floating-point operations."""
+
+    nogil: bool
+    error_model: Literal["numpy"]
+    fastmath: set[str]
+
+
 def compiled(function: Function) -> Function:
     """Compile `function` at its first call, to run without the interpreter's lock.
 
-    The machine code is kept beside the source, else in the user's cache folder; where neither can be written, every
+    The machine code is cached beside the source, else in the user's cache folder; where neither is writable, every
     process compiles anew.
     """
     try:
@@ -21,11 +29,11 @@ def compiled(function: Function) -> Function:
 
 
 def compiled_loosely(function: Function) -> Function:
-    """Compile `function` as `compiled` does, with sums in any order and divisions by 0 unchecked: for networks.
+    """Compile `function` as `compiled` does, with fast math: sums in any order, and unchecked divisions by 0.
 
-    Infinities keep their meaning.
+    For neural networks. Infinities and NaN keep their meaning.
     """
-    options: dict[str, Any] = {
+    options: _FastMath = {
         "nogil": True,
         "error_model": "numpy",
         "fastmath": {"contract", "reassoc", "arcp", "nsz", "afn"},
@@ -37,5 +45,5 @@ def compiled_loosely(function: Function) -> Function:
 
 
 def inlined(function: Function) -> Function:
-    """Put `function` into each compiled loop that calls it, where a call would cost more than its work."""
+    """Inline `function` into each compiled function that calls it, where a call would cost more than its work."""
     return cast(Function, numba.njit(inline="always", nogil=True)(function))

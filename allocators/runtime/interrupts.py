@@ -1,4 +1,4 @@
-"""Stopping a run from outside: signals, the end of the process, and solvers that only a second thread can stop."""
+"""Stop requests: by signals, by the end of the process, and to native solvers, which only another thread can stop."""
 
 import atexit
 import os
@@ -14,26 +14,26 @@ Answer = TypeVar("Answer")
 
 POLL_S = 0.02
 GRACE_S = 0.3
-"""How long a native solver may take to obey before its thread is left behind."""
+"""How long a native solver may take to stop before its thread is abandoned."""
 
 EXIT_GRACE_S = 10.0
-"""How long the end of the process waits for what still runs: native code that then calls back into Python, crashes."""
+"""How long the exit of the process waits for running threads: native code that calls Python after it would crash."""
 
 THREAD_NAME = "alloc-native-solver"
 
 _running: dict[object, tuple[threading.Thread, Callable[[], object]]] = {}
-"""What is going on in any thread, and how to end it."""
+"""Blocks of `ended_with_process` in any thread, with what stops each."""
 
 _ending = threading.Event()
-"""Set once the process ends."""
+"""Set once the exit of the process has begun."""
 
 
 @contextmanager
 def signals_set(stop: threading.Event) -> Iterator[None]:
     """Let SIGINT and SIGTERM set `stop` while the block runs; does nothing outside the main thread.
 
-    A second signal does what it did before, so that a run that hangs can still be ended. A handler that a program
-    which embeds this has set in C stays in place, as it could not be put back.
+    A second signal has its previous effect, so that a run that hangs can still be ended. Handlers that an embedding
+    program has set in C stay in place, as they could not be restored.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -41,12 +41,12 @@ def signals_set(stop: threading.Event) -> Iterator[None]:
     handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     before = {number: handler for number, handler in handlers.items() if handler is not None}
 
-    def ask_to_stop(number: int, frame: FrameType | None) -> None:
+    def request_stop(number: int, frame: FrameType | None) -> None:
         stop.set()
         signal.signal(number, before[signal.Signals(number)])
 
     for number in before:
-        signal.signal(number, ask_to_stop)
+        signal.signal(number, request_stop)
     try:
         yield
     finally:
@@ -55,22 +55,22 @@ def signals_set(stop: threading.Event) -> Iterator[None]:
 
 
 def run_native(work: Callable[[], Answer], should_stop: Callable[[], bool], halt: Callable[[], None]) -> Answer | None:
-    """Run `work` on another thread, and call `halt` once `should_stop` says so.
+    """Run `work` on another thread, and call `halt` once `should_stop` returns true.
 
     Parameters
     ----------
     work : callable
         Calls the solver; its exceptions are raised here.
     should_stop : callable
-        Asked every 20 ms in the calling thread, where signal handlers run. The end of the process counts as well.
+        Called every 20 ms in the calling thread, where signal handlers run. The exit of the process counts as well.
     halt : callable
-        Asks the solver to end; called once at the most.
+        Requests the solver to stop; called at most once.
 
     Returns
     -------
     object or None
-        The answer of `work`; None if it did not obey within 0.3 s of `halt`, its thread then being left behind. The
-        end of the process waits for it, for 10 s at most.
+        The result of `work`; None if it did not stop within 0.3 s of `halt`. Its thread is then abandoned, and the exit
+        of the process waits for it, up to 10 s.
     """
     answers: list[Answer] = []
     errors: list[BaseException] = []
@@ -87,7 +87,7 @@ def run_native(work: Callable[[], Answer], should_stop: Callable[[], bool], halt
         try:
             while thread.is_alive() and not (ended.is_set() or should_stop()):
                 thread.join(POLL_S)
-        finally:  # what a signal handler raises must not leave a solver at work either
+        finally:  # an exception of a signal handler must not leave a solver running either
             if thread.is_alive():
                 halt()
                 thread.join(GRACE_S)
@@ -98,10 +98,10 @@ def run_native(work: Callable[[], Answer], should_stop: Callable[[], bool], halt
 
 @contextmanager
 def ended_with_process(end: Callable[[], object]) -> Iterator[None]:
-    """Have the end of the process call `end`, and wait until the block is left, for 10 s at most.
+    """Let the exit of the process call `end` while the block runs, and wait for the block, up to 10 s.
 
-    A thread that dies with the interpreter while it is in native code may crash the process: so one that gets here
-    only after that end has begun, waits for its death instead, unless it is in such a block already.
+    A thread in native code while the interpreter is finalised may crash the process. Hence a thread that comes here
+    only after the exit has begun sleeps instead, unless it is in such a block already.
     """
     thread, key = threading.current_thread(), object()
     inside = any(thread is other for other, _ in list(_running.values()))
@@ -109,7 +109,7 @@ def ended_with_process(end: Callable[[], object]) -> Iterator[None]:
     try:
         if not _ending.is_set():
             atexit.unregister(_end_all)
-            atexit.register(_end_all)  # comes first of all that is registered by now
+            atexit.register(_end_all)  # handlers run in reverse order: this one first
         elif not inside and thread is not threading.main_thread():
             del _running[key]
             time.sleep(EXIT_GRACE_S)
@@ -119,12 +119,12 @@ def ended_with_process(end: Callable[[], object]) -> Iterator[None]:
 
 
 def left_behind() -> list[threading.Thread]:
-    """Return the threads of solvers that did not obey, and have not ended since."""
+    """Return the abandoned threads of solvers that did not stop in time, and still run."""
     return [thread for thread in threading.enumerate() if thread.name == THREAD_NAME]
 
 
 def _end_all() -> None:
-    """End what runs in any thread, and wait for it, for those left behind too."""
+    """Stop all blocks in any thread, and wait for them and for abandoned threads."""
     _ending.set()
     limit = time.monotonic() + EXIT_GRACE_S
     while _running and time.monotonic() < limit:
@@ -136,7 +136,7 @@ def _end_all() -> None:
 
 
 def _forget() -> None:
-    """In a process just forked, no other thread runs."""
+    """Reset in a forked process, where no other thread runs."""
     _running.clear()
     _ending.clear()
 

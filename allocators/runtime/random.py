@@ -1,4 +1,4 @@
-"""Random whole numbers for compiled loops, from a state that is an array of one number."""
+"""Random integers for compiled code, by xorshift."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,11 +6,12 @@ from numpy.typing import NDArray
 from alloc.allocators.runtime.compiled import compiled
 
 RandomState = NDArray[np.uint64]
+"""State of the generator, shape (1,)."""
 
 
 @compiled
 def draw(state: RandomState, below: int) -> int:
-    """Return a random whole number in [0, below), by xorshift (Marsaglia 2003, doi:10.18637/jss.v008.i14).
+    """Return a random integer in [0, below), by xorshift (Marsaglia 2003, doi:10.18637/jss.v008.i14).
 
     Parameters
     ----------

@@ -7,7 +7,7 @@ from alloc.problems import Instance, Objective
 
 
 def scattered(n: int, m: int, *, speed: float | None = None) -> Instance:
-    """Everybody is of an ability and at a place of its own: as many classes as agents."""
+    """Every agent has an ability and a location of its own: as many classes as agents."""
     rng = np.random.default_rng(0)
     return Instance(
         ability=rng.uniform(1, 9, n),
@@ -43,14 +43,14 @@ def test_choice_follows_size_budget_and_objective(
     assert " for " in reason
 
 
-def test_agents_alike_count_once() -> None:
-    """Ten thousand agents of two kinds are a small model."""
+def test_equal_agents_count_once() -> None:
+    """Ten thousand agents of two classes are a small model."""
     instance = Instance(ability=np.tile([1.0, 2.0], 5000), workload=np.full(40, 100.0))
     assert choose(instance, Objective.MAKESPAN, Budget(1.0))[0] == "cpsat"
 
 
-def test_more_time_turns_the_choice_to_a_proof() -> None:
-    """With a minute, a solver is worth trying where in a second it is not; without a limit, all the more."""
+def test_more_time_favours_a_proof() -> None:
+    """With a minute or without a limit, a solver is picked where with a second it is not."""
     instance = scattered(500, 50)
     picks = [choose(instance, Objective.MAKESPAN_ENERGY, Budget(seconds))[0] for seconds in (1.0, 60.0, None)]
     assert picks == ["local-search", "milp", "milp"]

@@ -1,1 +1,1 @@
-"""Decentralised methods: agents decide on what they and their neighbours know."""
+"""Decentralised methods: agents decide on local communication."""

@@ -1,4 +1,4 @@
-"""Greedy: largest ability first, each to the task that is worst served within its reach."""
+"""The method `greedy`: largest ability first, each agent to the worst-served task within its reach."""
 
 import heapq
 
@@ -8,24 +8,23 @@ from numpy.typing import NDArray
 from alloc.allocators.contract.base import Allocator, Proposal
 from alloc.allocators.contract.built_in import BUILT_IN
 from alloc.allocators.contract.search import Search
-from alloc.allocators.heuristic.greedy.exchange import fly_less
+from alloc.allocators.heuristic.greedy.swaps import reduce_distance
 from alloc.problems import IDLE, Allocation, Instance, Objective, makespan_lower_bound
 
 CHECK_EVERY = 256
-"""Agents between two looks at the clock."""
-
+"""Agents between two checks of the clock."""
 
 MOST_SCANNED = 20_000
-"""Agents up to which looking at all tasks is as quick as loading compiled code."""
+"""Agents up to which scanning all tasks is as fast as loading compiled code."""
 
 SLICE = 4_096
-"""Agents that compiled code places between two looks at the clock."""
+"""Agents that compiled code assigns between two checks of the clock."""
 
 
 class Greedy(Allocator):
     """List scheduling for machine covering: the task with the lowest W / h next, ties to the largest workload.
 
-    With travel times, an agent counts with what it does until the lower bound on the makespan.
+    With travel times, an agent counts with what it does until the lower bound on the makespan. It has no parameters.
 
     References
     ----------
@@ -35,19 +34,19 @@ class Greedy(Allocator):
     method = BUILT_IN["greedy"]
 
     def allocate(self, search: Search) -> Proposal:
-        """Return one allocation; the agents that are left when time is up stay idle."""
+        """Return one allocation; agents that are left when time is up stay idle."""
         return Proposal(greedy(search.instance, search))
 
 
 def greedy(instance: Instance, search: Search | None = None) -> Allocation:
-    """Build the greedy allocation; ends early when `search` says so.
+    """Return the greedy allocation; ends early when `search` should stop.
 
-    Where energy counts, and everyone reaches everything at once, agents of equal ability then exchange tasks.
+    Where energy counts, and every agent reaches every task at once, agents of equal ability then swap tasks.
     """
     if instance.reach.is_complete and not instance.has_travel_time:
         task = _by_heap(instance, search)
         if search is not None and search.objective is Objective.MAKESPAN_ENERGY:
-            task = fly_less(instance, task, search.should_stop)
+            task = reduce_distance(instance, task, search.should_stop)
         return Allocation(task)
     if instance.reach.has_table and instance.n <= MOST_SCANNED:
         return Allocation(_by_scan(instance, search))
@@ -55,8 +54,8 @@ def greedy(instance: Instance, search: Search | None = None) -> Allocation:
 
 
 def _by_tree(instance: Instance, search: Search | None) -> NDArray[np.intp]:
-    """The same as by a scan, in about O(n log m): a tree over the tasks, in compiled code."""
-    from alloc.allocators.heuristic.greedy.task_tree import (
+    """Do as `_by_scan` in about O(n log m), by compiled code."""
+    from alloc.allocators.heuristic.greedy.tree_search import (
         TreeGreedy,  # loads the compiler, which small instances do without
     )
 
@@ -67,17 +66,18 @@ def _by_tree(instance: Instance, search: Search | None) -> NDArray[np.intp]:
     for begin in range(0, instance.n, SLICE):
         if search is not None and search.should_stop():
             break
-        tree.place(order[begin : begin + SLICE])
+        tree.assign(order[begin : begin + SLICE])
     return tree.task
 
 
 def _order(instance: Instance) -> list[int]:
+    """Return the agents, largest ability first."""
     order: list[int] = np.argsort(-instance.ability, kind="stable").tolist()
     return order
 
 
 def _by_heap(instance: Instance, search: Search | None) -> NDArray[np.intp]:
-    """Every task is within everyone's reach: O(n log m)."""
+    """Assign agents that all reach every task, in O(n log m)."""
     work, ability = instance.workload.tolist(), instance.ability.tolist()
     task = np.full(instance.n, IDLE, dtype=np.intp)
     heap = [(0.0, -h, j) for j, h in enumerate(work) if h > 0]
@@ -94,7 +94,7 @@ def _by_heap(instance: Instance, search: Search | None) -> NDArray[np.intp]:
 
 
 def _by_scan(instance: Instance, search: Search | None) -> NDArray[np.intp]:
-    """O(n m), each agent looking at its own tasks only."""
+    """Assign agents in O(n m), each scanning the tasks within its reach."""
     reach, work = instance.reach, instance.workload
     task = np.full(instance.n, IDLE, dtype=np.intp)
     by_size = np.argsort(-work, kind="stable")

@@ -1,1 +1,1 @@
-"""Local search in compiled code: exact re-partition of two groups at a time, annealed."""
+"""Local search in compiled code: annealed exchanges between two groups, each solved exactly."""

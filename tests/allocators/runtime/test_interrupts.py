@@ -1,4 +1,4 @@
-"""Stopping from outside: signals, and solvers on another thread."""
+"""Stop requests: signals, and solvers on another thread."""
 
 import os
 import signal
@@ -23,7 +23,7 @@ def test_signals_set_the_event(number: signal.Signals) -> None:
 
 
 def test_a_second_interrupt_gets_through() -> None:
-    """Whoever insists is obeyed at once."""
+    """A second signal interrupts at once."""
 
     def insist() -> None:
         stop = threading.Event()
@@ -52,7 +52,7 @@ def test_other_threads_leave_signals_alone() -> None:
 
 
 def test_native_work_answers_or_raises() -> None:
-    """Its answer is handed back, its exception raised here."""
+    """Its result is returned, its exception raised here."""
     assert run_native(lambda: 7, lambda: False, lambda: None) == 7
 
     def fail() -> None:
@@ -63,7 +63,7 @@ def test_native_work_answers_or_raises() -> None:
 
 
 def test_native_work_is_halted() -> None:
-    """Once time is up the solver is told so, and what it then answers counts."""
+    """Once time is up the solver is requested to stop, and its result counts."""
     halted = threading.Event()
 
     def work() -> str:
@@ -73,8 +73,8 @@ def test_native_work_is_halted() -> None:
     assert run_native(work, lambda: True, halted.set) == "best so far"
 
 
-def test_native_work_that_does_not_obey_is_left_behind() -> None:
-    """It costs a fraction of a second, not the run."""
+def test_native_work_that_does_not_stop_is_abandoned() -> None:
+    """A solver that does not stop delays the run by a fraction of a second only."""
     release, begin = threading.Event(), time.monotonic()
     assert run_native(lambda: release.wait(10), lambda: True, lambda: None) is None
     assert time.monotonic() - begin < 2
@@ -84,8 +84,8 @@ def test_native_work_that_does_not_obey_is_left_behind() -> None:
     assert not left_behind()
 
 
-def test_native_work_is_halted_by_what_a_handler_raises() -> None:
-    """A KeyboardInterrupt in the calling thread leaves no solver at work."""
+def test_native_work_is_halted_by_an_exception_of_a_handler() -> None:
+    """A KeyboardInterrupt in the calling thread leaves no solver running."""
     halted = threading.Event()
 
     def interrupted() -> bool:
@@ -110,7 +110,7 @@ print("over", flush=True)
 """
 
 
-def test_the_end_of_the_process_waits_for_what_is_left_behind() -> None:
+def test_the_exit_of_the_process_waits_for_abandoned_threads() -> None:
     """A solver that calls back into an interpreter that has ended would crash a program that embeds us."""
     ran = subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, text=True, timeout=30)
     assert (ran.returncode, ran.stdout.split("\n"), ran.stderr) == (0, ["over", "calls back", ""], "")

@@ -19,15 +19,15 @@ def test_by_hand() -> None:
     assert greedy(Instance(ability=[1, 2, 3, 4], workload=[5, 6])) == Allocation([1, 0, 0, 1])
 
 
-def test_tasks_without_workload_get_nobody() -> None:
-    """All go where there is work, and nobody where there is none at all."""
+def test_tasks_without_workload_get_no_agent() -> None:
+    """All agents go where there is work, and none where there is no work at all."""
     assert greedy(Instance(ability=[1, 1], workload=[0, 3])) == Allocation([1, 1])
     assert greedy(Instance(ability=[1, 1], workload=[0, 0])) == Allocation([-1, -1])
 
 
 @given(instances(speeds=False))
-def test_both_ways_agree(instance: Instance) -> None:
-    """Where all is within reach, the heap does what looking at all tasks does."""
+def test_heap_and_scan_agree(instance: Instance) -> None:
+    """Where all tasks are within reach, the heap gives what scanning all tasks gives."""
     free = Instance(ability=instance.ability, workload=instance.workload)
     one_task_less = [*range(instance.m)]
     scanned = Instance(
@@ -39,8 +39,8 @@ def test_both_ways_agree(instance: Instance) -> None:
 
 
 @given(instances())
-def test_legal_and_complete(instance: Instance) -> None:
-    """Nobody breaks a rule, and with the repair of `solve` the fewest tasks are unserved."""
+def test_feasible_and_complete(instance: Instance) -> None:
+    """No constraint is violated, and with the repair of `solve` the fewest tasks are unserved."""
     assert not evaluate(instance, greedy(instance)).violations
     result = solve(instance, "greedy")
     assert result.evaluation is not None
@@ -66,7 +66,7 @@ def test_the_tree_does_what_the_scan_does(instance: Instance, factor: float) -> 
 
 
 def test_a_hundred_thousand_agents_with_short_ranges() -> None:
-    """No table of all pairs, nobody beyond its range, and every task is served."""
+    """There is no table of all pairs, no agent beyond its range, and every task is served."""
     rng = np.random.default_rng(0)
     n, m = 100_000, 2_000
     instance = Instance(

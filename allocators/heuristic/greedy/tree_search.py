@@ -1,0 +1,211 @@
+"""Greedy for a million agents: each finds the worst-served task within its reach in a tree over the tasks.
+
+An agent visits a node only if the bounding box is within its range and the node's worst-served task is served worse
+than the best candidate so far; where that task is within reach, the rest of the node is skipped.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from alloc.allocators.heuristic.greedy.task_tree import (
+    Floats,
+    Indices,
+    Tasks,
+    Tree,
+    build_tree,
+    is_worse,
+    update_all,
+    update_path,
+)
+from alloc.allocators.runtime.compiled import compiled
+from alloc.problems import Instance
+from alloc.problems.distances.reach import TOLERANCE
+
+MARGIN = 1 - 1e-9
+"""Factor on the distance to a box, against rounding errors."""
+
+STACK_SIZE = 64
+"""Nodes that a depth-first search of a binary tree can have pending."""
+
+
+class Agents(NamedTuple):
+    """The agents, and the limits of their origins as in `Reach`.
+
+    Attributes
+    ----------
+    origin : ndarray of int, shape (n,)
+    ability : ndarray, shape (n,)
+    horizon : ndarray, shape (n,)
+        Distance below which an agent arrives in time to be of use.
+    task : ndarray of int, shape (n,)
+        Task of each agent, -1 for none; changed in place.
+    position : ndarray, shape (origins, 3)
+        In `unit`.
+    longest_distance, battery, radius : ndarray, shape (origins,)
+        Limits with tolerance, and the distance beyond which no task is within reach.
+    list_of : ndarray of int, shape (origins,)
+        List of tasks of each origin, -1 for all tasks.
+    list_begin, listed_task : ndarray of int
+        Lists of tasks as a compressed sparse row.
+    unit, energy_per_distance : float
+    """
+
+    origin: Indices
+    ability: Floats
+    horizon: Floats
+    task: Indices
+    position: Floats
+    longest_distance: Floats
+    battery: Floats
+    radius: Floats
+    list_of: Indices
+    list_begin: Indices
+    listed_task: Indices
+    unit: float
+    energy_per_distance: float
+
+
+class TreeGreedy:
+    """The greedy allocation, agent by agent, with ranges, batteries, task lists and travel times.
+
+    Parameters
+    ----------
+    instance : Instance
+        With at least one task that has workload.
+    horizon : float
+        Hour by which an agent must be at its task to be of use there, where travel takes time.
+    """
+
+    def __init__(self, instance: Instance, horizon: float) -> None:
+        reach, work = instance.reach, instance.workload
+        by_size = np.argsort(-work, kind="stable")
+        rank = np.empty(instance.m, dtype=np.intp)
+        rank[by_size] = np.arange(instance.m)
+        position = reach.goal / reach.unit
+        self._tree = build_tree(position, np.sort(by_size[work[by_size] > 0]))
+        self._tasks = Tasks(position, work, rank, np.zeros(instance.m), np.zeros(instance.m))
+        update_all(self._tree, self._tasks)
+        self._agents = Agents(
+            origin=reach.origin,
+            ability=instance.ability,
+            horizon=horizon * instance.speed,
+            task=np.full(instance.n, -1, dtype=np.intp),
+            position=reach.place / reach.unit,
+            longest_distance=reach.communication_range + TOLERANCE,
+            battery=reach.battery + TOLERANCE,
+            radius=reach.radius,
+            list_of=reach.list_of,
+            list_begin=np.concatenate([[0], np.cumsum([len(tasks) for tasks in reach.lists])]).astype(np.intp),
+            listed_task=np.concatenate([np.zeros(0, dtype=np.intp), *reach.lists]),
+            unit=float(reach.unit),
+            energy_per_distance=float(reach.energy_per_distance),
+        )
+
+    @property
+    def task(self) -> Indices:
+        """Task of each agent so far, -1 for none, shape (n,)."""
+        return self._agents.task
+
+    def assign(self, agents: Indices) -> None:
+        """Assign each of `agents`, in this order, to the worst-served task within its reach."""
+        _assign(agents, self._tree, self._tasks, self._agents)
+
+
+@compiled
+def _assign(chosen: Indices, tree: Tree, tasks: Tasks, agents: Agents) -> None:
+    stack = np.empty(STACK_SIZE, dtype=np.intp)
+    for agent in chosen:
+        if agents.list_of[agents.origin[agent]] >= 0:
+            best, distance = _worst_of_list(agent, tasks, agents)
+        else:
+            best, distance = _worst_in_tree(agent, tree, tasks, agents, stack)
+        if best < 0:
+            continue
+        agents.task[agent] = best
+        tasks.group_ability[best] += agents.ability[agent] * (1.0 - distance / agents.horizon[agent])
+        tasks.coverage[best] = tasks.group_ability[best] / tasks.workload[best]
+        update_path(best, tree, tasks)
+
+
+@compiled
+def _worst_of_list(agent: int, tasks: Tasks, agents: Agents) -> tuple[int, float]:
+    """Return the worst-served task within reach on the agent's list, and its distance; -1 if there is none."""
+    origin = agents.origin[agent]
+    number = agents.list_of[origin]
+    best, best_distance = -1, 0.0
+    for entry in range(agents.list_begin[number], agents.list_begin[number + 1]):
+        j = agents.listed_task[entry]
+        if tasks.workload[j] <= 0 or (best >= 0 and not is_worse(j, best, tasks.coverage, tasks.rank)):
+            continue
+        distance = _distance(agents.position[origin], tasks.position[j], agents.unit)
+        if _is_reachable(agent, origin, distance, agents):
+            best, best_distance = j, distance
+    return best, best_distance
+
+
+@compiled
+def _worst_in_tree(agent: int, tree: Tree, tasks: Tasks, agents: Agents, stack: Indices) -> tuple[int, float]:
+    """Return the worst-served task within reach, and its distance; -1 if there is none."""
+    origin = agents.origin[agent]
+    position = agents.position[origin]
+    is_unknown = np.isnan(position[0])
+    limit = min(agents.radius[origin], agents.horizon[agent]) / agents.unit
+    best, best_distance = -1, 0.0
+    size, stack[0] = 1, 0
+    while size > 0:
+        size -= 1
+        node = stack[size]
+        j = tree.worst[node]
+        if best >= 0 and not is_worse(j, best, tasks.coverage, tasks.rank):
+            continue
+        if not is_unknown and _is_beyond(position, tree.low[node], tree.high[node], limit):
+            continue
+        distance = _distance(position, tasks.position[j], agents.unit)
+        if _is_reachable(agent, origin, distance, agents):
+            best, best_distance = j, distance
+        elif 2 * node + 2 < len(tree.begin):
+            left, right = 2 * node + 1, 2 * node + 2
+            if is_worse(tree.worst[left], tree.worst[right], tasks.coverage, tasks.rank):
+                left, right = right, left
+            stack[size], stack[size + 1] = left, right  # the worse-served is visited first
+            size += 2
+        else:
+            for entry in range(tree.begin[node], tree.end[node]):
+                j = tree.order[entry]
+                if best >= 0 and not is_worse(j, best, tasks.coverage, tasks.rank):
+                    continue
+                distance = _distance(position, tasks.position[j], agents.unit)
+                if _is_reachable(agent, origin, distance, agents):
+                    best, best_distance = j, distance
+    return best, best_distance
+
+
+@compiled
+def _is_reachable(agent: int, origin: int, distance: float, agents: Agents) -> bool:
+    """Whether a task at that distance is within range, battery and horizon of an agent."""
+    return bool(
+        distance <= agents.longest_distance[origin]
+        and agents.energy_per_distance * distance <= agents.battery[origin]
+        and distance < agents.horizon[agent]
+    )
+
+
+@compiled
+def _distance(one: Floats, other: Floats, unit: float) -> float:
+    """Return the distance as in `alloc.problems.distances.metric`, to the last bit."""
+    x, y, z = one[0] - other[0], one[1] - other[1], one[2] - other[2]
+    distance = float(np.sqrt(x * x + y * y + z * z))
+    if np.isnan(distance):
+        return 0.0
+    return distance if unit == 1.0 else min(distance * unit, 1.7976931348623157e308)
+
+
+@compiled
+def _is_beyond(position: Floats, low: Floats, high: Floats, limit: float) -> bool:
+    """Whether the box is farther away than `limit`."""
+    total = 0.0
+    for axis in range(3):
+        step = max(0.0, low[axis] - position[axis], position[axis] - high[axis])
+        total += step * step
+    return bool(np.sqrt(total) * MARGIN > limit)
