@@ -25,12 +25,13 @@ class Decomposition:
 
     Attributes
     ----------
+    shortage : Shortage
     rest : Search or None
         The run of the method on the rest; None where no task is left for it.
     """
 
     def __init__(self, whole: Search, shortage: Shortage, request: Request) -> None:
-        self._whole, self._shortage = whole, shortage
+        self._whole, self.shortage = whole, shortage
         self.rest: Search | None = None
         start = request.start
         if start is not None:
@@ -55,7 +56,7 @@ class Decomposition:
         )
 
     def _submit(self, rest: Allocation) -> None:
-        self._whole.submit(self._shortage.merged(rest))
+        self._whole.submit(self.shortage.merged(rest))
 
     def conclude(self) -> None:
         """Submit the best of the rest together with the cheapest allocation of the competing tasks that is as fast."""
@@ -63,14 +64,14 @@ class Decomposition:
             self._whole.submit(self._merged(self.rest.best.allocation, self.rest.makespan_limit))
 
     def _merged(self, rest: Allocation | None, hours: float) -> Allocation:
-        shortage = self._shortage
+        shortage = self.shortage
         if self._whole.objective is Objective.MAKESPAN_ENERGY:
             shortage = shortage.economical(hours, lambda: 0.0 if self._whole.interrupted else self._whole.remaining_s)
         return shortage.merged(rest)
 
     def notes(self) -> list[str]:
         """Return the notes on the rest, and what is proven of the makespan of the tasks that are served."""
-        best, bound = self._whole.best, self._shortage.bound
+        best, bound = self._whole.best, self.shortage.bound
         notes: list[str] = []
         if self.rest is not None:
             bound, notes = max(bound, self.rest.lower_bound), self.rest.notes

@@ -33,8 +33,9 @@ def real(
     """Return a finite number from `low` to `high`, as Python's own; `above`: `low` itself is out."""
     if isinstance(value, Real) and not isinstance(value, bool | np.bool_):
         number = value.item() if isinstance(value, np.generic) else value
+        number = number if isinstance(number, int | float) else float(number)
         if (low < number if above else low <= number) and number <= high and number < math.inf:
-            return number if isinstance(number, int | float) else float(number)
+            return number
     ends = f"{'>' if above else '>='} {low:g}" + (f" and at most {high:g}" if high < math.inf else "")
     raise InputError(f"must be a finite number {unit}{ends}, got {shown(value)}", name)
 
@@ -56,7 +57,7 @@ def text(value: object, name: str) -> str:
 def choice(kind: type[Choice], value: object, name: str) -> Choice:
     """Return the member of an enumeration that `value` is, or is called."""
     try:
-        return kind(value)
+        return kind(value)  # type: ignore[arg-type]
     except ValueError as error:
         raise InputError(f"must be one of {', '.join(kind)}; got {shown(value)}", name) from error
 

@@ -32,7 +32,8 @@ _NO_MOVE = {
 
 def named(path: PathLike, *, output: bool = False) -> str:
     """Return what messages call `path`."""
-    text = os.fspath(of_type(path, (str, os.PathLike), "path"))
+    of_type(path, (str, os.PathLike), "path")
+    text = os.fspath(path)
     if text == STANDARD_STREAM:
         return "standard output" if output else "standard input"
     return one_line(text, 4096) or "''"

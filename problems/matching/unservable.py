@@ -59,9 +59,9 @@ def _origin_of_task(instance: Instance, near: Neighbours, tasks: IntArray) -> In
     wanted[tasks] = True
     copies = np.minimum(np.bincount(instance.reach.origin, minlength=len(degree)), degree)
     origin = np.full(instance.m, IDLE, dtype=np.intp)
-    for row in np.flatnonzero((copies == degree) & (degree > 1)).tolist():  # agents for all that it can take
-        task = near.task[near.first[row] : near.first[row + 1]]
-        origin[task] = row
+    for one in np.flatnonzero((copies == degree) & (degree > 1)).tolist():  # agents for all that it can take
+        task = near.task[near.first[one] : near.first[one + 1]]
+        origin[task] = one
     wanted &= origin == IDLE
     useful = wanted[near.task]
     first = np.concatenate([[0], np.cumsum(useful)])[near.first]

@@ -37,7 +37,8 @@ class Range:
             return self.optional
         if isinstance(value, bool) or not isinstance(value, Integral if self.whole else Real):
             return False
-        return bool((self.low < value if self.above else self.low <= value) and value <= self.high)
+        number: float = value  # type: ignore[assignment]  # a Real compares with floats, but does not say so
+        return bool((self.low < number if self.above else self.low <= number) and number <= self.high)
 
     def __str__(self) -> str:
         kind = "a whole number" if self.whole else "a number"

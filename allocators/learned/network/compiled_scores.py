@@ -124,7 +124,7 @@ def local_score(weights: Weights, x: Floats, hidden1: Floats, hidden2: Floats) -
         if factor > 0:
             for h in range(width):
                 hidden2[h] += factor * second[j, h]
-    total = third[width, 0]
+    total: float = third[width, 0]
     for h in range(width):
         total += positive(hidden2[h]) * third[h, 0]
     return total

@@ -47,7 +47,7 @@ class FineTuningParameters:
     games: int = 64
     pairs: int = 12_000
     rounds: int = 15
-    price: tuple[float, float] = (0.4, 2.4)
+    energy_weight: tuple[float, float] = (0.4, 2.4)
     ppo: PpoParameters = field(
         default_factory=lambda: PpoParameters(learning_rate=1e-4, max_learning_rate=3e-4, update_epochs=2)
     )

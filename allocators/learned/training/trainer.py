@@ -176,7 +176,7 @@ class Trainer:
             network.load_state_dict(weights)
             networks.append(network)
         report = self.history[self.best_generation - 1]
-        metadata = {
+        metadata: dict[str, str | float] = {
             "seed": self.seed,
             "generation": report.generation,
             "decisions": report.decisions,
