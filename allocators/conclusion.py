@@ -10,6 +10,7 @@ from alloc.allocators.contract.tolerance import EXACT, PROVEN, relative_gap
 from alloc.allocators.decomposition import Decomposition
 from alloc.allocators.result import Result
 from alloc.problems import Objective, minimal_unservable_set
+from alloc.problems.instance import IntArray
 
 MOST_NAMES = 10
 """Ids of competing tasks in a note before it is cut."""
@@ -95,6 +96,7 @@ def _is_proven(search: Search, energy_bound: float | None) -> bool:
 def _contention(search: Search, decomposition: Decomposition | None) -> str:
     """Return the note on the tasks that compete for too few agents."""
     instance = search.instance
+    tasks: IntArray | None
     if decomposition is not None and decomposition.shortage.is_proven:
         tasks = decomposition.shortage.unservable
     elif decomposition is None and search.budget.time_limit_s is None:

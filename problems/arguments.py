@@ -32,8 +32,8 @@ def real(
 ) -> float:
     """Return a finite number from `low` to `high`, as Python's own; `above`: `low` itself is out."""
     if isinstance(value, Real) and not isinstance(value, bool | np.bool_):
-        number = value.item() if isinstance(value, np.generic) else value
-        number = number if isinstance(number, int | float) else float(number)
+        plain: Real = value.item() if isinstance(value, np.generic) else value
+        number = plain if isinstance(plain, int | float) else float(plain)
         if (low < number if above else low <= number) and number <= high and number < math.inf:
             return number
     ends = f"{'>' if above else '>='} {low:g}" + (f" and at most {high:g}" if high < math.inf else "")

@@ -15,12 +15,11 @@ import numpy as np
 from alloc.allocators.learned.algorithms.gappo import breed, fitness
 from alloc.allocators.learned.algorithms.learner import TrainingJob
 from alloc.allocators.learned.files.checkpoint import read_checkpoint, write_checkpoint
-from alloc.allocators.learned.files.description import described
 from alloc.allocators.learned.files.policy_file import save_policy
 from alloc.allocators.learned.network.actor_critic import uninitialised
 from alloc.allocators.learned.training.limits import Limits
 from alloc.allocators.learned.training.member import MemberJob, MemberResult, Weights, initial_state, train_member
-from alloc.allocators.learned.training.parameters import TrainingParameters
+from alloc.allocators.learned.training.parameters import TrainingParameters, described
 from alloc.allocators.learned.training.report import Report, best_generation, next_report
 from alloc.allocators.learned.training.validation import validation_boards
 from alloc.allocators.parallel.engine import Engine, never_stop

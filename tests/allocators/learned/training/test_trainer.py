@@ -289,6 +289,23 @@ def test_checkpoints_of_other_runs_are_refused(tmp_path: Path, changes: dict[str
         trainer(**changes).resume(tmp_path / "checkpoint")
 
 
+def test_descriptions_keep_the_names_of_their_format(tmp_path: Path) -> None:
+    """Checkpoints name parameters as all of this format have, and errors name them as the program does."""
+    trainer().save(tmp_path / "checkpoint")
+    stored = torch.load(tmp_path / "checkpoint", weights_only=True)["description"]
+    assert {
+        "learner.clip",
+        "learner.minibatch",
+        "learner.capacity",
+        "curriculum.price",
+        "curriculum.own",
+    } <= stored.keys()
+    assert stored["learner.minibatch"] == "64"
+    assert {"learner.clip_coef", "learner.minibatch_size", "curriculum.energy_weight"}.isdisjoint(stored)
+    with pytest.raises(InputError, match=r"is a run with learner\.clip_coef 0\.2, not 0\.3"):
+        trainer(learner=replace(TINY.learner, clip_coef=0.3)).resume(tmp_path / "checkpoint")
+
+
 def test_files_that_cannot_be_read_are_not_called_damaged(tmp_path, monkeypatch):
     """No memory, no permission and a damaged file are three things: only the last is advised to be removed."""
     path = tmp_path / "run.checkpoint"
