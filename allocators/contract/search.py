@@ -102,7 +102,7 @@ class Search:
         self.lower_bound = makespan_lower_bound(instance)
         if start is not None:
             evaluate(instance, start)  # says what is wrong with a start of another size
-            self.start = serve_all(instance, start)  # agents that can no longer go where they were sent are idle
+            self.start = serve_all(instance, start, lambda: self.remaining_s)  # who cannot go where sent is idle
             self.submit(self.start)
 
     @property
