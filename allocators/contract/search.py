@@ -98,7 +98,8 @@ class Search:
         self.lower_bound = makespan_lower_bound(instance)
         if start is not None:
             evaluate(instance, start)  # raises if the sizes do not fit
-            self.start = serve_all(instance, start)  # agents that cannot do their tasks become idle
+            # agents that cannot do their tasks become idle
+            self.start = serve_all(instance, start, lambda: self.remaining_s)
             self.submit(self.start)
 
     @property

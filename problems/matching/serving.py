@@ -17,6 +17,9 @@ SPENT = -1
 NEARBY = 64
 """Origins next to a task that are looked at first where there are many."""
 
+CHUNK = 4_096
+"""Tasks that are looked at together."""
+
 MANY = 50_000_000
 """Pairs of agent, or of origin, and unserved task that are too many to look at one by one."""
 
@@ -155,16 +158,17 @@ def _serve_nearby(instance: Instance, task_of_agent: IntArray, unserved: list[in
     goals = np.array(unserved)[~np.isnan(reach.goal[unserved, 0])]
     if not len(origins) or not len(goals):
         return task_of_agent, unserved
-    count = min(NEARBY, len(origins))
-    _, near = cKDTree(reach.place[origins]).query(reach.goal[goals], k=count)
-    served = set()
-    for j, row in zip(goals.tolist(), origins[near.reshape(len(goals), count)], strict=True):
-        same = np.full(count, j)
-        able = row[(first[row] < end[row]) & reach.is_within(row, same, reach.distances_between(row, same))]
-        if len(able):
-            task_of_agent[idle[first[able[0]]]] = j
-            first[able[0]] += 1
-            served.add(j)
+    count, tree, served = min(NEARBY, len(origins)), cKDTree(reach.place[origins]), set()
+    for begin in range(0, len(goals), CHUNK):
+        some = goals[begin : begin + CHUNK]
+        near = origins[tree.query(reach.goal[some], k=count)[1].reshape(len(some), count)]
+        within = reach.is_within(near, some[:, None], reach.distances_between(near, some[:, None]))
+        for j, row, good in zip(some.tolist(), near, within, strict=True):
+            able = row[good & (first[row] < end[row])]
+            if len(able):
+                task_of_agent[idle[first[able[0]]]] = j
+                first[able[0]] += 1
+                served.add(j)
     return task_of_agent, [j for j in unserved if j not in served]
 
 

@@ -50,6 +50,6 @@ class LocalSearch(Allocator):
         instance = search.instance
         if not (instance.workload > 0).any():
             return Proposal(Allocation.idle(instance))
-        search.submit(serve_all(instance, greedy(instance, search)))
+        search.submit(serve_all(instance, greedy(instance, search), lambda: search.remaining_s))
         improve(search, parameters=self.parameters)
         return Proposal()

@@ -1,0 +1,106 @@
+"""Far more tasks than agents: as many are served as can be, within the time limit."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from alloc.allocators import solve
+from alloc.problems import IDLE, Instance, evaluate, fewest_unserved, find_shortage
+from alloc.problems.matching.assignment import match
+from alloc.problems.matching.hopcroft_karp import largest_matching
+from alloc.problems.matching.pairs import bound_by_size, sampled_pairs
+
+
+def surplus_of_tasks(reach: float | None, agents: int = 2_000, tasks: int = 20_000) -> Instance:
+    """Return agents and tasks at random places in the unit square."""
+    rng = np.random.default_rng(1)
+    return Instance(
+        ability=rng.integers(1, 10, agents),
+        workload=rng.integers(10, 1000, tasks),
+        agent_position=rng.random((agents, 2)),
+        task_position=rng.random((tasks, 2)),
+        communication_range=None if reach is None else np.full(agents, reach),
+    )
+
+
+@pytest.mark.parametrize("reach", [0.1, 0.5])
+@pytest.mark.parametrize("method", ["greedy", "local-search"])
+def test_the_limit_holds_and_every_agent_serves_a_small_task(reach: float, method: str) -> None:
+    """Each of 2,000 agents serves one of 20,000 tasks, soon after a limit of one second, and not the largest."""
+    solve(surplus_of_tasks(reach, 20, 200), method, time_limit_s=1)  # loads what is compiled
+    instance = surplus_of_tasks(reach)
+    result = solve(instance, method, time_limit_s=1)
+    assert result.runtime_s <= 1.6
+    assert result.evaluation is not None
+    assert len(result.evaluation.unserved_tasks) == 18_000
+    bound = bound_by_size(instance, np.arange(instance.n), np.arange(instance.m))
+    assert result.evaluation.served_makespan <= 10 * bound
+    assert any("only 2000 agents can take any of the 2001 tasks" in note for note in result.notes)
+
+
+def test_without_time_the_note_says_what_is_not_proven() -> None:
+    """No time is no reason to fail: some tasks are served, and a note says that more might be."""
+    instance = surplus_of_tasks(0.02)
+    result = solve(instance, "greedy", time_limit_s=0)
+    assert result.evaluation is not None
+    assert len(result.evaluation.unserved_tasks) < 19_500
+    assert any("before it was proven that no plan serves more tasks" in note for note in result.notes)
+
+
+@given(st.integers(0, 10**6))
+def test_agents_in_excess_here_and_tasks_there(seed: int) -> None:
+    """Where agents are idle in one place and tasks unserved in another, the fewest tasks are unserved without a table."""
+    rng = np.random.default_rng(seed)
+    instance = surplus_of_tasks(0.15, 30, 60)
+    lists = [None if rng.random() < 0.7 else rng.integers(0, 60, 2).tolist() for _ in range(30)]
+    instance = Instance(
+        ability=instance.ability,
+        workload=instance.workload,
+        agent_position=rng.random((30, 2)),
+        task_position=rng.random((60, 2)),
+        communication_range=instance.communication_range,
+        allowed_tasks=lists,
+    )
+    with pytest.MonkeyPatch.context() as patch:
+        expected = fewest_unserved(instance)
+        patch.setattr("alloc.problems.distances.reach.TABLE_LIMIT", -1)
+        patch.setattr("alloc.problems.matching.agent_matching.LONGEST_S", 1e-5)
+        patch.setattr("alloc.problems.matching.agent_matching.SHORTEST_S", 1e-5)  # a sample of a few pairs
+        assert fewest_unserved(instance) == expected
+        shortage = find_shortage(instance)
+        assert shortage is not None
+        assert shortage.is_proven
+        assert len(shortage.tasks) - len(shortage.agents) == expected
+        assert len(evaluate(instance, shortage.merged()).violations) == 0
+
+
+@given(st.integers(0, 10**6))
+def test_hopcroft_and_karp_agree_with_scipy(seed: int) -> None:
+    """The matching is one, begins with any other, and is as large as that of another implementation."""
+    rng = np.random.default_rng(seed)
+    rows, columns = rng.integers(1, 12, 2)
+    row, column = np.nonzero(rng.random((rows, columns)) < rng.random())
+    first = np.searchsorted(row, np.arange(rows + 1))
+    start = np.full(rows, IDLE)
+    some = rng.permutation(len(row))[:1]
+    start[row[some]] = column[some]
+    found, is_largest = largest_matching(first, column, start, lambda: np.inf)
+    served = np.flatnonzero(found != IDLE)
+    assert is_largest
+    assert len(served) == (match(first, column) != IDLE).sum()
+    assert len(set(found[served])) == len(served)
+    assert all(found[i] in column[first[i] : first[i + 1]] for i in served)
+
+
+def test_a_sample_has_pairs_of_every_size() -> None:
+    """Small budgets leave each agent small tasks and large ones; large budgets leave all pairs."""
+    instance = surplus_of_tasks(0.5, 400, 5_000)
+    agents, tasks = np.arange(400), np.arange(5_000)
+    few, is_all = sampled_pairs(instance, agents, tasks, None, 0.02, lambda: np.inf)
+    assert not is_all
+    work = instance.workload[few.task]
+    assert (np.minimum.reduceat(work, few.first[:-1]) < 100).mean() > 0.9
+    assert (np.maximum.reduceat(work, few.first[:-1]) > 500).mean() > 0.9
+    every, _ = sampled_pairs(instance, agents, tasks, None, 100.0, lambda: np.inf)
+    assert len(every.task) > 5 * len(few.task)
