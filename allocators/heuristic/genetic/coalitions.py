@@ -17,8 +17,8 @@ class TwoColumns:
     target: IntArray
 
 
-def members(some: Genes, column: IntArray, cap: int, nobody: int, rng: np.random.Generator) -> IntArray:
-    """Return `nobody`, then up to `cap` members of a group in each row, then -1; shape (k, at most cap + 1)."""
+def members(some: Genes, column: IntArray, cap: int, no_agent: int, rng: np.random.Generator) -> IntArray:
+    """Return `no_agent`, then up to `cap` members of a group in each row, then -1; shape (k, at most cap + 1)."""
     row, agent = np.nonzero(some == column[:, None])
     size = np.bincount(row, minlength=len(some))
     position = np.arange(len(row)) - (np.cumsum(size) - size)[row]
@@ -27,7 +27,7 @@ def members(some: Genes, column: IntArray, cap: int, nobody: int, rng: np.random
         position = (position + rng.integers(most, size=len(some))[row]) % size[row]
         row, agent, position = row[position < cap], agent[position < cap], position[position < cap]
     table = np.full((len(some), min(most, cap) + 1), -1, dtype=np.intp)
-    table[:, 0] = nobody
+    table[:, 0] = no_agent
     table[row, position + 1] = agent
     return table
 

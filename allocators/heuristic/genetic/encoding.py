@@ -56,8 +56,8 @@ class Encoding:
     idle : int
         The column c of idle agents.
     ability : ndarray, shape (n + 1,)
-        Work per hour of the agents, and 0 for `nobody`.
-    nobody : int
+        Work per hour of the agents, and 0 for `no_agent`.
+    no_agent : int
         The number n of an agent that does not exist, which makes a move out of a swap.
     workload : ndarray, shape (c,)
         Workloads of `tasks`, all positive.
@@ -65,7 +65,7 @@ class Encoding:
 
     def __init__(self, instance: Instance) -> None:
         self.instance, self.reach = instance, instance.reach
-        self.n, self.nobody = instance.n, instance.n
+        self.n, self.no_agent = instance.n, instance.n
         self.tasks = np.flatnonzero(instance.workload > 0)
         self.idle = len(self.tasks)
         self.workload = instance.workload[self.tasks]
@@ -111,17 +111,17 @@ class Encoding:
         )
 
     def allows(self, agent: IntArray, column: NDArray[np.integer]) -> BoolArray:
-        """Whether each agent can take the column beside it; `nobody` can take any, and all agents can be idle."""
+        """Whether each agent can take the column at the same index; `no_agent` can take any, and all can be idle."""
         if self.is_complete:
             return np.ones(np.broadcast_shapes(agent.shape, column.shape), dtype=bool)
         reachable = self.reach.mask[self._origin[agent], self._task[column]]
-        allowed: BoolArray = reachable | (agent == self.nobody) | (column == self.idle)
+        allowed: BoolArray = reachable | (agent == self.no_agent) | (column == self.idle)
         return allowed
 
     def distance(self, agent: IntArray, column: NDArray[np.integer]) -> FloatArray:
-        """Distance from each agent's start to the column beside it; 0 for `nobody` and for idle agents."""
+        """Distance from each agent's start to the column at the same index; 0 for `no_agent` and idle agents."""
         distance = self.reach.distance[self._origin[agent], self._task[column]]
-        return np.where((agent == self.nobody) | (column == self.idle), 0.0, distance)
+        return np.where((agent == self.no_agent) | (column == self.idle), 0.0, distance)
 
     def encode(self, allocation: Allocation) -> Genes:
         """Return the genes of an allocation, shape (n,); agents on unreachable or empty tasks become idle."""

@@ -111,8 +111,8 @@ def _exchange(
     some, ability = genes[columns.row], encoding.ability
     pairs = rng.random() < parameters.pairs
     cap = parameters.pair_cap if pairs else parameters.group_cap
-    givers = coalitions(members(some, columns.source, cap, encoding.nobody, rng), pairs)
-    takers = coalitions(members(some, columns.target, cap, encoding.nobody, rng), pairs)
+    givers = coalitions(members(some, columns.source, cap, encoding.no_agent, rng), pairs)
+    takers = coalitions(members(some, columns.target, cap, encoding.no_agent, rng), pairs)
     noise = parameters.temperature * ability.mean() / demand.mean()
     distance_weight = parameters.distance_weight if energy_counts else None
     cost = exchange_cost(givers, takers, group, demand, columns, encoding, rng, noise, distance_weight)
@@ -121,7 +121,7 @@ def _exchange(
     k = np.flatnonzero(flat[np.arange(len(some)), best] < np.inf)
     going, coming = givers[k, best[k] // takers.shape[1]], takers[k, best[k] % takers.shape[1]]
     for agents, column in ((going, columns.target[k]), (coming, columns.source[k])):
-        which, member = np.nonzero(agents < encoding.nobody)
+        which, member = np.nonzero(agents < encoding.no_agent)
         genes[columns.row[k][which], agents[which, member]] = column[which]
     change = ability[going].sum(axis=1) - ability[coming].sum(axis=1)
     group[columns.row[k], columns.source[k]] -= change

@@ -41,14 +41,9 @@ def add_to_pool(
     size, begin, slot = plan.size[group], plan.begin[group], plan.slot
     idle = plan.demand.shape[0] - 1
     origins, ability, hours_per_distance = arrays.origin, arrays.ability, arrays.hours_per_distance
-    table, origin_position, task_position = arrays.distance, arrays.origin_position, arrays.task_position
-    longest, battery, list_begin, listed = (
-        arrays.longest_distance,
-        arrays.battery,
-        arrays.list_begin,
-        arrays.listed_task,
-    )
-    unit, rate = arrays.distance_unit, arrays.energy_per_distance
+    table, starts, goals = arrays.distance, arrays.origin_position, arrays.task_position
+    longest, battery, rate = arrays.longest_distance, arrays.battery, arrays.energy_per_distance
+    list_begin, listed, unit = arrays.list_begin, arrays.listed_task, arrays.distance_unit
     agents, contribution, other_contribution = work.agent, work.ability, work.other_ability
     distances, costs, logistic = work.distance, work.cost, work.logistic
     noise = draw(plan.random, NOISE_SIZE)
@@ -65,13 +60,9 @@ def add_to_pool(
             if other != idle:
                 there = table[row, other]
         else:
-            here = compute_distance(
-                origin_position, task_position, longest, battery, list_begin, listed, unit, rate, row, task
-            )
+            here = compute_distance(starts, goals, longest, battery, list_begin, listed, unit, rate, row, task)
             if other != idle:
-                there = compute_distance(
-                    origin_position, task_position, longest, battery, list_begin, listed, unit, rate, row, other
-                )
+                there = compute_distance(starts, goals, longest, battery, list_begin, listed, unit, rate, row, other)
         if here == np.inf or there == np.inf:
             continue
         w, slow = ability[agent], hours_per_distance[agent]
@@ -106,7 +97,7 @@ def exchange(
     most = POOL_BY_SUMS // 2 if by_sums else POOL_BY_HALVES // 2
     if plan.size[task] + plan.size[other] <= POOL_ENUMERATED:
         most = POOL_ENUMERATED
-    elif not arrays.instant_travel:  # contributions depend on the task: just enough for one says nothing of the other
+    elif not arrays.instant_travel:  # contributions depend on the task, so that meeting in the middle does not apply
         most = POOL_ENUMERATED // 2
     pool: int = np.int64(0)  # type: ignore[assignment]
     for group in (task, other):
@@ -124,16 +115,16 @@ def exchange(
             members += 1
         else:
             other_missing += work.other_ability[index]
-    may_empty = members == plan.size[task] and plan.demand[task] > 0.0
-    other_may_empty = pool - members == plan.size[other] and plan.demand[other] > 0.0
+    all_in_pool = members == plan.size[task] and plan.demand[task] > 0.0
+    other_all_in_pool = pool - members == plan.size[other] and plan.demand[other] > 0.0
     most_needed = missing if other == plan.demand.shape[0] - 1 else max(missing, total - other_missing)
     largest_sum = int(max(0.0, min(total, most_needed + weights.surplus)))
     if by_sums and (pool > POOL_ENUMERATED or pool * largest_sum < 2 << pool):
         subset = best_by_sums(
-            work, weights, pool, largest_sum, total, missing, other_missing, may_empty, other_may_empty
+            work, weights, pool, largest_sum, total, missing, other_missing, all_in_pool, other_all_in_pool
         )
     elif pool > POOL_ENUMERATED:
         subset = best_by_halves(work, weights, pool, missing, other_missing)
     else:
-        subset = best_by_enumeration(work, weights, pool, missing, other_missing, may_empty, other_may_empty)
+        subset = best_by_enumeration(work, weights, pool, missing, other_missing, all_in_pool, other_all_in_pool)
     apply_subset(plan, work, pool, subset, task, other)

@@ -1,8 +1,8 @@
 """The cheapest subset of a pool of agents for one of two tasks, the rest being for the other; compiled.
 
-A subset is a bit mask over the pool. Its cost is that of its agents (`Workspace.cost`) and the penalties of what both
-tasks then lack: `missing` and `other_missing` are what each would lack without any agent of the pool. `may_empty` and
-`other_may_empty` tell whether a task without any agent of the pool is without any agent at all.
+A subset is a bit mask over the pool. Its cost is that of its agents (`Workspace.cost`) and the penalties of both tasks'
+shortfalls. `missing` and `other_missing` are the abilities that each task would lack without any agent of the pool;
+`all_in_pool` and `other_all_in_pool` tell whether all agents of a task are in the pool, so that it may become unserved.
 """
 
 import numpy as np
@@ -37,8 +37,8 @@ def best_by_sums(
     total: float,
     missing: float,
     other_missing: float,
-    may_empty: bool,
-    other_may_empty: bool,
+    all_in_pool: bool,
+    other_all_in_pool: bool,
 ) -> np.uint64:
     """Return the cheapest subset by dynamic programming over integer sums of abilities.
 
@@ -66,8 +66,8 @@ def best_by_sums(
         old, new = new, old
     best, subset = np.inf, np.uint64(0)
     for entry in range(int(top) + 1):
-        value = cost[old + np.uint64(entry)] + penalty(weights, missing - entry, may_empty and entry == 0)
-        value += penalty(weights, other_missing - (total - entry), other_may_empty and entry == total)
+        value = cost[old + np.uint64(entry)] + penalty(weights, missing - entry, all_in_pool and entry == 0)
+        value += penalty(weights, other_missing - (total - entry), other_all_in_pool and entry == total)
         if value < best:
             best, subset = value, sets[old + np.uint64(entry)]
     return subset
@@ -80,8 +80,8 @@ def best_by_enumeration(
     pool: int,
     missing: float,
     other_missing: float,
-    may_empty: bool,
-    other_may_empty: bool,
+    all_in_pool: bool,
+    other_all_in_pool: bool,
 ) -> np.uint64:
     """Return the cheapest of all 2^pool subsets."""
     ability, other, cost = work.subset_ability, work.subset_other_ability, work.subset_cost
@@ -101,9 +101,9 @@ def best_by_enumeration(
         shortfall, other_shortfall = missing - ability[entry], other_missing - other[entry]
         value = cost[entry]
         if shortfall > 0.0:
-            value += penalty(weights, shortfall, may_empty and entry == 0)
+            value += penalty(weights, shortfall, all_in_pool and entry == 0)
         if other_shortfall > 0.0:
-            value += penalty(weights, other_shortfall, other_may_empty and entry == count - 1)
+            value += penalty(weights, other_shortfall, other_all_in_pool and entry == count - 1)
         if value < best:
             best, subset = value, entry
     return np.uint64(subset)

@@ -140,7 +140,7 @@ def test_list_schedule_without_noise_is_greedy(instance: Instance, rng: np.rando
 
 
 def test_saving_moves_reduce_the_distance() -> None:
-    """Where energy counts, the agent drawn is nearer to the task drawn beside it than to its own, and can reach it."""
+    """Where energy counts, the agent drawn is nearer to the task drawn with it than to its own, and can reach it."""
     rng = np.random.default_rng(4)
     instance = Instance(
         ability=np.ones(30),

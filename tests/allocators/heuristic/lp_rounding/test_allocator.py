@@ -17,7 +17,7 @@ def relaxation(instance: Instance, by_place: bool = True) -> tuple[Relaxation, S
 
 
 def test_least_makespan_by_hand() -> None:
-    """Two thirds of the ability go to two thirds of the work; with ranges, whoever can go must do it alone."""
+    """Two thirds of the ability go to two thirds of the work; with task lists, each agent does its own."""
     lp, search = relaxation(Instance(ability=[4, 2], workload=[4, 2]))
     assert lp.least_makespan(search) == pytest.approx(1.0)
     lp, search = relaxation(Instance(ability=[3, 3], workload=[4, 2], allowed_tasks=[[0], [1]]))

@@ -18,7 +18,7 @@ def fractional_plan(rng: np.random.Generator):
 
 @pytest.mark.parametrize("seed", range(100))
 def test_no_task_loses_more_than_one_agent(seed: int) -> None:
-    """Each task keeps what the fractions brought but for the largest of them, and nobody is used twice."""
+    """Each task keeps what the fractions brought but for the largest of them, and no agent is used twice."""
     agent_class, task, amount, share, cost, count = fractional_plan(np.random.default_rng(seed))
     integer = round_fractions(agent_class, task, amount, share, cost, count)
     assert (np.bincount(agent_class, weights=integer) <= count).all()
