@@ -150,7 +150,7 @@ def test_train_writes_policy_checkpoint_and_log(paths: RunFiles) -> None:
 
 
 def test_the_log_and_the_policy_are_put_right(paths: RunFiles) -> None:
-    """A run that was killed after its checkpoint, before the other files, writes them when it is taken up."""
+    """A run that was killed after its checkpoint, before the other files, writes them when it is resumed."""
     run = trainer(1)
     run_training(run, paths, limits=Limits(iterations=2))
     log = paths.log.read_bytes()
