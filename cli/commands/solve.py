@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 EXAMPLES = examples(
     "alloc solve demo.json",
     "alloc solve demo.json --method ga --time-limit 30 --seed 1 --output best.json",
+    "alloc solve demo.json --method ga --set population=200",
     "alloc solve demo.json --objective makespan-energy --plot demo.png",
     "alloc solve demo.json --objective makespan-energy --makespan-slack 0.05",
     "alloc solve demo.json --start best.json --target-gap 0.01",
