@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from alloc.cli import options
-from alloc.cli.options import Objective, examples
+from alloc.cli.options import examples
 from alloc.cli.output.console import note, say, to_json
 from alloc.cli.output.files import check_outputs, check_picture, read_pair, save
+from alloc.problems.vocabulary import Objective
 
 if TYPE_CHECKING:
     from alloc.allocators import Result

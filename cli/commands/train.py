@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING
 import typer
 
 from alloc.cli.commands import train_options as options
-from alloc.cli.commands.train_options import Engine, Reward, Turn
+from alloc.cli.commands.train_options import Engine
 from alloc.cli.options import SeedOption, assignments, examples
 from alloc.cli.output.console import STANDARD, complain, note, say
 from alloc.cli.output.files import check_output, check_outputs, read_instances
 from alloc.problems.text import counted, number
+from alloc.problems.vocabulary import Reward, Turn
 
 if TYPE_CHECKING:
     from alloc.allocators.learned.training.limits import Limits
