@@ -30,9 +30,9 @@ class _Fitness(base.Fitness):  # type: ignore[misc]
 class _Genome(list[float]):
     """All weights of a network in one list, as DEAP's operators expect them, and the index of its member."""
 
-    def __init__(self, weights: Sequence[float], index: int, fitness: float) -> None:
+    def __init__(self, weights: Sequence[float], member: int, fitness: float) -> None:
         super().__init__(weights)
-        self.index = index
+        self.member = member
         self.fitness = _Fitness((fitness,))
 
 
@@ -82,12 +82,12 @@ def breed(
         for index, (member, score) in enumerate(zip(members, scores, strict=True))
     ]
     unchanged = min(parameters.elite, max(1, len(genomes) - 1))  # at least one of several members is a child
-    following = [members[genome.index] for genome in tools.selBest(genomes, unchanged)]
+    following = [members[genome.member] for genome in tools.selBest(genomes, unchanged)]
     rng = random.Random(seed)
     toolbox = _toolbox(parameters, rng)
     while len(following) < len(members):
         first, second = toolbox.select(genomes, 2)
-        following.append(_child(members[first.index], first, second, parameters, toolbox, rng))
+        following.append(_child(members[first.member], first, second, parameters, toolbox, rng))
     return following
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from numbers import Integral, Real
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from alloc.problems import InputError
 
@@ -37,7 +37,8 @@ class Range:
             return self.optional
         if isinstance(value, bool) or not isinstance(value, Integral if self.whole else Real):
             return False
-        return bool((self.low < value if self.above else self.low <= value) and value <= self.high)
+        number = cast("float", value)  # numbers of numpy compare as well
+        return bool((self.low < number if self.above else self.low <= number) and number <= self.high)
 
     def __str__(self) -> str:
         kind = "a whole number" if self.whole else "a number"

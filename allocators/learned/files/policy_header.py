@@ -18,7 +18,8 @@ def read_header(path: Path | str) -> dict[str, str]:
     InputError
         If there is no such file, or it is not one of safetensors.
     """
-    source = os.fspath(of_type(path, (str, os.PathLike), "policy"))
+    of_type(path, (str, os.PathLike), "policy")
+    source = os.fspath(path)
     if not source:
         raise InputError("names no file; give one by `alloc train`", "policy")
     if os.path.isdir(source):

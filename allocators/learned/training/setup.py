@@ -11,8 +11,8 @@ from alloc.allocators.learned.training.parameters import TrainingParameters
 from alloc.allocators.learned.training.trainer import Trainer
 from alloc.allocators.learned.training.validation import games_on
 from alloc.problems import Instance
-from alloc.problems.arguments import whole
-from alloc.problems.game import Board, Rules
+from alloc.problems.arguments import choice, whole
+from alloc.problems.game import Board, Reward, Rules, Turn
 
 
 def new_trainer(
@@ -44,6 +44,6 @@ def new_trainer(
         network=initial[0].size if initial else NetworkSize(),
         learner=learner,
         curriculum=curriculum,
-        rules=Rules(turn, reward),
+        rules=Rules(choice(Turn, turn, "turn"), choice(Reward, reward, "reward")),
     )
     return Trainer(parameters, seed, boards, [network.state_dict() for network in initial])

@@ -17,10 +17,9 @@ from alloc.allocators.learned.algorithms.learner import TrainingJob
 from alloc.allocators.learned.files.checkpoint import read_checkpoint, write_checkpoint
 from alloc.allocators.learned.files.policy_file import save_policy
 from alloc.allocators.learned.network.actor_critic import unfilled
-from alloc.allocators.learned.training.description import described
 from alloc.allocators.learned.training.limits import Limits
 from alloc.allocators.learned.training.member import MemberJob, MemberResult, Weights, initial_state, train_member
-from alloc.allocators.learned.training.parameters import TrainingParameters
+from alloc.allocators.learned.training.parameters import TrainingParameters, described
 from alloc.allocators.learned.training.report import Report, best_generation, next_report
 from alloc.allocators.learned.training.validation import validation_boards
 from alloc.allocators.parallel.engine import Engine, never_stop
@@ -176,7 +175,7 @@ class Trainer:
             network.load_state_dict(weights)
             networks.append(network)
         report = self.history[self.best_generation - 1]
-        metadata = {
+        metadata: dict[str, str | float] = {
             "seed": self.seed,
             "generation": report.generation,
             "decisions": report.decisions,

@@ -143,7 +143,7 @@ def tune(
     default = parameters.learner or method_parameters(parameters.method)
 
     def objective(trial: optuna.Trial) -> float:
-        learner = replace(default, **suggested(trial, default))
+        learner = replace(default, **suggested(trial, default))  # type: ignore[arg-type]
         trainer = Trainer(replace(parameters, learner=learner), seed + trial.number, boards)
         while not trainer.is_over(limits):
             report = trainer.advance(limits)

@@ -77,6 +77,12 @@ def test_workers_are_kept_until_closed() -> None:
     assert gone(first[0], 0.1)
 
 
+def test_workers_import_what_their_items_need() -> None:
+    """Torch, which takes seconds, is not loaded in a worker whose items do not use it."""
+    with ProcessEngine(1) as engine:
+        assert engine.map(eval, ["'torch' in __import__('sys').modules"]) == [False]
+
+
 def test_a_killed_worker_loses_nothing(tmp_path: Path, pair: ProcessEngine) -> None:
     """Items whose process is killed at the first try are done at the second, the others go on undisturbed."""
     items = [(number, str(tmp_path / str(number))) for number in range(4)]

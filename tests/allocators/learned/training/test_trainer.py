@@ -150,7 +150,7 @@ def test_train_writes_policy_checkpoint_and_log(paths: RunFiles) -> None:
 
 
 def test_the_log_and_the_policy_are_put_right(paths: RunFiles) -> None:
-    """A run that was killed after its checkpoint, before the other files, writes them when it is taken up."""
+    """A run that was killed after its checkpoint, before the other files, writes them when it is resumed."""
     run = trainer(1)
     run_training(run, paths, limits=Limits(iterations=2))
     log = paths.log.read_bytes()
@@ -287,6 +287,23 @@ def test_checkpoints_of_other_runs_are_refused(tmp_path: Path, changes: dict[str
     trainer().save(tmp_path / "checkpoint")
     with pytest.raises(InputError, match=message):
         trainer(**changes).resume(tmp_path / "checkpoint")
+
+
+def test_descriptions_keep_the_names_of_their_format(tmp_path: Path) -> None:
+    """Checkpoints name parameters as all of this format have, and errors name them as the program does."""
+    trainer().save(tmp_path / "checkpoint")
+    stored = torch.load(tmp_path / "checkpoint", weights_only=True)["description"]
+    assert {
+        "learner.clip",
+        "learner.minibatch",
+        "learner.capacity",
+        "curriculum.price",
+        "curriculum.own",
+    } <= stored.keys()
+    assert stored["learner.minibatch"] == "64"
+    assert {"learner.clip_coef", "learner.minibatch_size", "curriculum.energy_weight"}.isdisjoint(stored)
+    with pytest.raises(InputError, match=r"is a run with learner\.clip_coef 0\.2, not 0\.3"):
+        trainer(learner=replace(TINY.learner, clip_coef=0.3)).resume(tmp_path / "checkpoint")
 
 
 def test_files_that_cannot_be_read_are_not_called_damaged(tmp_path, monkeypatch):
