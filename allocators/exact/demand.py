@@ -6,8 +6,8 @@ import numpy as np
 
 from alloc.problems.instance import FloatArray, IntArray
 
-COVERED = 1 - 1e-9
-"""Part of a need at which the need counts as met when no plan is sought yet."""
+MET = 1 - 1e-9
+"""Part of a need at which the need counts as met, so that rounding rules out no T."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +74,7 @@ class Demand:
         if self.spare < 0:
             return True
         all_come = np.bincount(self.task_of_pair, weights=self.weight * self.max_count, minlength=len(self.need))
-        return int((all_come >= self.need * COVERED).sum()) < self.min_served
+        return int((all_come >= self.need * MET).sum()) < self.min_served
 
     def only(self, pairs: IntArray) -> "Demand":
         """Return the constraints with some of the pairs, given by index."""

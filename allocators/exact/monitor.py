@@ -7,7 +7,8 @@ from typing import TypeVar
 
 from alloc.allocators.contract.budget import StopReason
 from alloc.allocators.contract.search import Search
-from alloc.allocators.exact.model import Demand, Model
+from alloc.allocators.exact.demand import Demand
+from alloc.allocators.exact.model import Model
 from alloc.allocators.runtime.interrupts import run_native
 from alloc.problems.instance import IntArray
 

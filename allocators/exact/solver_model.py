@@ -5,7 +5,7 @@ from enum import Enum
 from typing import Protocol
 
 from alloc.allocators.contract.search import Search
-from alloc.allocators.exact.model import Demand
+from alloc.allocators.exact.demand import Demand
 from alloc.allocators.exact.monitor import SolverMonitor
 from alloc.problems.instance import FloatArray, IntArray
 

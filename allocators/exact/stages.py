@@ -28,7 +28,7 @@ class ExactAllocator(Allocator):
     Parameters
     ----------
     descent : bool
-        Whether plans are looked for before the solver is asked.
+        Whether plans are looked for before the solver runs.
     """
 
     solver: ClassVar[Solver]

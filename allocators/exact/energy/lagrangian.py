@@ -137,7 +137,7 @@ class LagrangianBound:
             self._shrink(clusters=add or self._clusters is not None)
 
     def _solve(self) -> Relaxed:
-        """Solve the relaxation at the prices of now."""
+        """Solve the relaxation at the current prices."""
         model, clusters, cluster_group = self._model, self._clusters, np.zeros(0, dtype=np.int64)
         price = model.cost + self._price[model.class_of_pair]
         value = -float(np.where(self._price >= 0, model.count, model.min_agents) @ self._price)
@@ -154,6 +154,9 @@ class LagrangianBound:
         used = np.bincount(model.class_of_pair, relaxed.group, len(model.count)).astype(np.int64)
         slope = _subgradient(used, model, self._price)
         cluster_slope = np.zeros(0) if clusters is None else clusters.link.T @ relaxed.group - relaxed.cluster_group
+        if not (slope.any() or cluster_slope.any()):  # the largest value; on a fading direction prices would grow
+            self._step = 0.0
+            return
         direction = slope + deflection * self._direction[0]
         cluster_direction = cluster_slope + deflection * self._direction[1]
         self._direction = (direction, cluster_direction)

@@ -14,7 +14,7 @@ from alloc.problems import agent_classes
 from alloc.problems.evaluation import last_equal
 
 SHARE_WITHOUT_SOLVER = 0.3
-"""Share of the time before which the solver is not asked."""
+"""Share of the time before which the solver does not run."""
 
 TRAVEL_SHARE, MAX_TRAVEL_S = 0.4, 20.0
 """Share of the time, and seconds at the most, of the local search where travel takes time."""

@@ -21,7 +21,7 @@ MAX_TASKS = 2000
 """Tasks above which neither side is used, for its memory."""
 
 SLICE_S = 0.02
-"""What each side may take in one go."""
+"""Time of each side in one call of `PrimalDual.run`."""
 
 REPEATABLE_SLICES, REPEATABLE_ROUNDS = 60, 10
 """Slices, and rounds in each, where effort is counted."""
@@ -40,7 +40,7 @@ def compile_loops() -> None:
 
 
 class Timer:
-    """Counts how many rounds of some work fit into a slice, by what the last ones took."""
+    """Adapts the number of rounds to a slice of time, by how long the last ones took."""
 
     def __init__(self) -> None:
         self._rounds = 1

@@ -74,7 +74,7 @@ class EnergyState:
         return (self.search.elapsed_s - self.begin_s) / stage_s if stage_s > 0 else 1.0
 
     def submit(self, plan: Allocation | None) -> None:
-        """Submit a plan of `primal_dual`, if there is a new one, and tell it of the best plan."""
+        """Submit a plan of `primal_dual`, if there is a new one, and pass it the cost of the best plan."""
         if plan is not None:
             self.search.submit(plan)
         if self.primal_dual is not None:

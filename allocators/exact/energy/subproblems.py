@@ -80,7 +80,8 @@ def solve_one(
     for s in range(need, max_weight + 1):
         if cost[s] < cost[best]:
             best = s
-    if not np.isfinite(cost[best]):
+    least: float = cost[best]
+    if not np.isfinite(least):
         return np.inf
     cheapest = read_group(table, pairs, best)
     for p in range(pairs):
@@ -92,5 +93,5 @@ def solve_one(
                 with_it = min(with_it, cost[s - weight[p]])
         else:
             with_it = cost[max(0, need - weight[p])]
-        excess[p] = with_it + price[p] - cost[best]
-    return cost[best]
+        excess[p] = with_it + price[p] - least
+    return least

@@ -6,10 +6,14 @@ several best partitions one is drawn, so that the search drifts over plans that 
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from alloc.allocators.runtime.compiled import compiled
 from alloc.allocators.runtime.random import RandomState, draw
 from alloc.problems.instance import FloatArray, IntArray
+
+Members = NDArray[np.int32]
+"""Agents of each task, shape (t, n), as many as the task has."""
 
 MAX_TASKS = 4
 """Tasks whose agents are assigned anew together, at the most."""
@@ -82,7 +86,7 @@ def best_partition(
     sums : ndarray, shape (MAX_TASKS + 1, 2**MAX_POOL)
         Space to work in.
     chosen : ndarray of int, shape (MAX_TASKS,)
-        Gets the agents of each task, as bits; of several best partitions a random one. Unchanged if there is none.
+        Gets the agents of each task as bits, of several best partitions at random; unchanged if there is none.
     """
     all_agents = (1 << size) - 1
     slack, later = prepare_sums(value, base, need, tasks, size, sums)
@@ -110,11 +114,7 @@ def best_partition(
                     equals = 1 if not found or total < best - slack else equals + 1
                     if equals == 1 or draw(state, equals) == 0:
                         best, found = total, True
-                        chosen[0], chosen[1] = first, second
-                        if tasks > 2:
-                            chosen[2] = third
-                        if tasks > 3:
-                            chosen[3] = rest2 ^ third
+                        chosen[0], chosen[1], chosen[2], chosen[3] = first, second, third, rest2 ^ third
                 if tasks < 4 or third == 0:
                     break
                 third = (third - 1) & rest2
@@ -125,7 +125,7 @@ def best_partition(
 
 
 @compiled
-def count_agents(work: FloatArray, place: IntArray, has: FloatArray, size: IntArray, members: IntArray) -> None:
+def count_agents(work: FloatArray, place: IntArray, has: FloatArray, size: IntArray, members: Members) -> None:
     """Fill `has`, `size` and `members` from the task of each agent: work, number and agents of each task."""
     for i in range(len(place)):
         j = place[i]
@@ -167,7 +167,7 @@ def draw_tasks(has: FloatArray, need: FloatArray, state: RandomState, task: IntA
 
 @compiled
 def draw_pool(
-    task: IntArray, tasks: int, size: IntArray, members: IntArray, state: RandomState, pool: IntArray, at: IntArray
+    task: IntArray, tasks: int, size: IntArray, members: Members, state: RandomState, pool: IntArray, at: IntArray
 ) -> tuple[int, int]:
     """Collect the agents of the tasks, those to be assigned anew first.
 
@@ -201,7 +201,7 @@ def reassign(
     place: IntArray,
     has: FloatArray,
     size: IntArray,
-    members: IntArray,
+    members: Members,
 ) -> None:
     """Move the first `used` agents of the pool to the tasks they are `chosen` for, and update what depends on it."""
     for q in range(tasks):

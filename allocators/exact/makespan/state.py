@@ -42,7 +42,7 @@ class MakespanState:
     unresolved : float
         Largest T whose probe ended without a verdict; no bound, but the lower end of the bisection.
     bounds_tried : bool
-        Whether the linear programmes have been asked for a bound, as the simple bound and the first plans differ.
+        Whether linear programmes have been used for a bound; after that, a probe tries more before the solver.
     configurations : ConfigurationProgramme or None
         None before that, and where the programme is too large.
     """

@@ -11,9 +11,9 @@ from alloc.allocators.exact.knapsack_core import cheapest_by_core
 classes = st.lists(st.tuples(st.integers(1, 7), st.integers(-2, 9), st.integers(0, 3)), min_size=1, max_size=4)
 
 
-def arrays(kinds):
+def arrays(rows):
     """Weights, prices and copies as the kernels take them."""
-    weight, price, copies = (np.array(column, dtype=np.int64) for column in zip(*kinds, strict=True))
+    weight, price, copies = (np.array(column, dtype=np.int64) for column in zip(*rows, strict=True))
     return weight, price / 4, copies
 
 
@@ -26,9 +26,9 @@ def by_trying(weight, price, copies, need, enough):
 
 
 @given(classes, st.integers(0, 12), st.one_of(st.just(-1), st.integers(0, 6)))
-def test_cheapest_group_is_that_of_brute_force(kinds, need, spare):
+def test_cheapest_group_is_that_of_brute_force(rows, need, spare):
     """Cost and group are right, for prices of either sign, with and without a limit on the sum."""
-    weight, price, copies = arrays(kinds)
+    weight, price, copies = arrays(rows)
     enough = need + spare if spare >= 0 else -1
     cost, group = cheapest_group(weight, price, copies, need, enough)
     assert cost == pytest.approx(by_trying(weight, price, copies, need, enough if enough >= 0 else np.inf))

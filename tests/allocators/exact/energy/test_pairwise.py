@@ -1,0 +1,50 @@
+from itertools import product
+
+import numpy as np
+import pytest
+
+from alloc.allocators.exact.energy.pairwise import repartition_pair, total_distance
+from alloc.allocators.exact.energy.pairwise_search import PairwiseSearch
+
+
+@pytest.mark.parametrize("partner", ["task", "idleness"])
+@pytest.mark.parametrize("seed", range(10))
+def test_repartition_of_a_pair_is_the_best_there_is(seed, partner):
+    """Of all ways to assign seven agents to a task and another, or to idleness, none is cheaper and does both."""
+    rng = np.random.default_rng(seed)
+    weight, task = rng.integers(1, 6, 7), np.append([0, 1], rng.integers(0, 2, 5))
+    task = np.where(task == 1, 1 if partner == "task" else 2, 0)
+    distance = np.hstack([rng.random((7, 2)), np.zeros((7, 1))])
+    distance[1:, :2][rng.random((6, 2)) < 0.2] = np.inf
+    distance[np.arange(7), task] = np.minimum(distance[np.arange(7), task], 1.0)
+    other = int(task.max())
+    need = np.append(np.maximum(0, np.bincount(task, weight, 3)[:2] - 1), 0).astype(np.int64)
+    need[1] = need[1] if other == 1 else 0
+    best = np.inf
+    for goal in product((0, other), repeat=7):
+        if (np.bincount(goal, weight, 3) >= need).all():
+            best = min(best, distance[np.arange(7), list(goal)].sum())
+    before = total_distance(task, distance)
+    changed = repartition_pair(0, other, task, weight, distance, need, np.zeros_like(distance))
+    assert total_distance(task, distance) == pytest.approx(best)
+    assert changed == (best < before - 1e-9)
+    assert (np.bincount(task, weight, 3) >= need).all()
+
+
+def test_search_keeps_needs_and_never_loses_its_best_plan():
+    """Descent and annealing give plans that do every task, at a distance that never grows."""
+    rng = np.random.default_rng(0)
+    weight, task = rng.integers(1, 9, 30), np.arange(30) % 6
+    need = np.bincount(task, weight, 6).astype(np.int64) - 2
+    place = rng.random((6, 2))
+    apart = np.linalg.norm(place[:, None] - place[None], axis=2)
+    search = PairwiseSearch(task, weight, rng.random((30, 6)), need, apart, seed=1)
+    costs = [search.cost]
+    while not search.descend():
+        costs.append(search.cost)
+    for step in range(5):
+        search.anneal(20, step / 5)
+        costs.append(search.cost)
+        assert (np.bincount(search.best, weight, 7)[:6] >= need).all()
+    assert costs == sorted(costs, reverse=True)
+    assert costs[-1] < 0.6 * costs[0]
