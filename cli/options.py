@@ -1,11 +1,12 @@
 """Arguments and options that several commands share."""
 
 from collections.abc import Sequence
-from enum import StrEnum
 from typing import Annotated
 
 import typer
 import typer.core
+
+from alloc.problems.vocabulary import Objective
 
 BUILT_IN_METHODS = (
     "auto",
@@ -27,13 +28,6 @@ BUILT_IN_METHODS = (
 """For completion, which must not load numpy; a test compares them with the registry."""
 
 READABLE = "a .json or .npz file, a folder with agents.csv and tasks.csv, or - for JSON on standard input"
-
-
-class Objective(StrEnum):
-    """As `alloc.problems.Objective`, without numpy; a test compares the two."""
-
-    MAKESPAN = "makespan"
-    MAKESPAN_ENERGY = "makespan-energy"
 
 
 def examples(*lines: str, closing: str = "") -> str:

@@ -106,6 +106,7 @@ ALLOWED = (
     r"ground (station|truth)s?",  # likewise
     r"survey drones?",  # the agents of an example
     r"world[ _-]size",  # side of the square or cube of generated instances, an option
+    r"--lesson",  # former name of an option, still accepted
     r"supply[ _]ratios?",  # total ability over total workload
     r"exception chain",
 )

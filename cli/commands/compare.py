@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from alloc.cli import options
-from alloc.cli.options import Objective, examples
+from alloc.cli.options import examples
 from alloc.cli.output.console import is_terminal, note, say, table, to_json
 from alloc.cli.output.files import check_outputs, save
 from alloc.problems.text import number, percent
+from alloc.problems.vocabulary import Objective
 
 if TYPE_CHECKING:
     from alloc.allocators import Allocator

@@ -8,6 +8,7 @@ import typer
 
 from alloc.cli.options import examples
 from alloc.cli.output.console import STANDARD, say
+from alloc.problems.vocabulary import Distribution, Sites, Starts
 
 if TYPE_CHECKING:
     from alloc.problems import Instance
@@ -35,32 +36,6 @@ class Family(StrEnum):
     PAPER_4 = "paper-4"
     RANDOM = "random"
     COVERING = "covering"
-
-
-class Sites(StrEnum):
-    """As in `alloc.problems.generate`, without numpy; a test compares them."""
-
-    UNIFORM = "uniform"
-    CLUSTERED = "clustered"
-
-
-class Starts(StrEnum):
-    """As in `alloc.problems.generate`, without numpy."""
-
-    TASKS = "tasks"
-    OWN = "own"
-    DEPOTS = "depots"
-    UNKNOWN = "unknown"
-
-
-class Distribution(StrEnum):
-    """As in `alloc.problems.generate`, without numpy."""
-
-    EQUAL = "equal"
-    UNIFORM = "uniform"
-    LOGNORMAL = "lognormal"
-    PARETO = "pareto"
-    DIRICHLET = "dirichlet"
 
 
 def _option(text: str, default: str, *names: str, metavar: str | None = None) -> object:

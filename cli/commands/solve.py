@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from alloc.cli import options
-from alloc.cli.options import Objective, examples
+from alloc.cli.options import examples
 from alloc.cli.output.console import note, say, to_json
 from alloc.cli.output.files import check_outputs, check_picture, read_pair, save
+from alloc.problems.vocabulary import Objective
 
 if TYPE_CHECKING:
     from alloc.allocators import Result
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 EXAMPLES = examples(
     "alloc solve demo.json",
     "alloc solve demo.json --method ga --time-limit 30 --seed 1 --output best.json",
+    "alloc solve demo.json --method ga --set population=200",
     "alloc solve demo.json --objective makespan-energy --plot demo.png",
     "alloc solve demo.json --objective makespan-energy --makespan-slack 0.05",
     "alloc solve demo.json --start best.json --target-gap 0.01",

@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING
 import typer
 
 from alloc.cli.commands import train_options as options
-from alloc.cli.commands.train_options import Engine, Reward, Turn
+from alloc.cli.commands.train_options import Engine
 from alloc.cli.options import SeedOption, assignments, examples
 from alloc.cli.output.console import STANDARD, complain, note, say
 from alloc.cli.output.files import check_output, check_outputs, read_instances
 from alloc.problems.text import counted, number
+from alloc.problems.vocabulary import Reward, Turn
 
 if TYPE_CHECKING:
     from alloc.allocators.learned.training.limits import Limits
@@ -51,7 +52,7 @@ def train_command(
     init: options.InitOption = None,
     population: options.PopulationOption = None,
     generation_steps: options.GenerationStepsOption = 20_000,
-    lesson: options.FormerGenerationStepsOption = None,
+    former_generation_steps: options.FormerGenerationStepsOption = None,
     settings: options.HyperparametersOption = None,
     turn: options.TurnOption = Turn.BIDDING,
     reward: options.RewardOption = Reward.MAKESPAN,
@@ -67,44 +68,52 @@ def train_command(
 ) -> None:
     """Train a learned method, with a checkpoint after each generation."""
     state, lines = _files(output, checkpoint, log, init)
-    from alloc.allocators import TrainingError, train
+    from alloc.allocators import train
     from alloc.allocators.parallel.engines import check_engine, make_engine
 
     check_engine(engine.value, workers, address)
     problems = None if instances is None else read_instances(instances)
     progress = Progress(problems or [])
+    with _failures_told(state, progress), make_engine(engine.value, workers, address, threads) as where, _interrupts():
+        train(
+            method,
+            output,
+            steps=steps,
+            minutes=minutes,
+            iterations=iterations,
+            patience=patience,
+            families=family or ["mixed"],
+            instances=problems,
+            init=init,
+            population=population,
+            decisions=former_generation_steps or generation_steps,
+            parameters=assignments(settings),
+            turn=turn.value,
+            reward=reward.value,
+            seed=seed,
+            resume=resume,
+            checkpoint=state,
+            log=lines,
+            tensorboard=tensorboard,
+            engine=where,
+            on_start=progress.start,
+            on_report=progress.tell,
+        )
+    progress.close(output)
+
+
+@contextmanager
+def _failures_told(state: str, progress: "Progress") -> Iterator[None]:
+    """After an interrupt or a failure of the engine, say what the checkpoint holds; the latter has exit code 1."""
+    from alloc.allocators import TrainingError
+
     try:
-        with make_engine(engine.value, workers, address, threads) as where, _interrupts():
-            train(
-                method,
-                output,
-                steps=steps,
-                minutes=minutes,
-                iterations=iterations,
-                patience=patience,
-                families=family or ["mixed"],
-                instances=problems,
-                init=init,
-                population=population,
-                decisions=lesson or generation_steps,
-                parameters=assignments(settings),
-                turn=turn.value,
-                reward=reward.value,
-                seed=seed,
-                resume=resume,
-                checkpoint=state,
-                log=lines,
-                tensorboard=tensorboard,
-                engine=where,
-                on_start=progress.start,
-                on_report=progress.tell,
-            )
+        yield
     except KeyboardInterrupt:
         note(f"interrupted; {state} holds {counted(progress.generations, 'generation')}")
     except TrainingError as error:
         complain(str(error))
         raise typer.Exit(1) from None
-    progress.close(output)
 
 
 def _files(output: str, checkpoint: str | None, log: str | None, init: str | None) -> tuple[str, str]:

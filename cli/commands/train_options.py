@@ -5,22 +5,10 @@ from typing import Annotated
 
 import typer
 
+from alloc.problems.vocabulary import Reward, Turn
+
 STEPS = 500_000
 """Decisions of agents in a training without any other limit."""
-
-
-class Turn(StrEnum):
-    """As `alloc.problems.game.Turn`, without torch; a test compares the two."""
-
-    BIDDING = "bidding"
-    SIMULTANEOUS = "simultaneous"
-
-
-class Reward(StrEnum):
-    """As `alloc.problems.game.Reward`, without torch."""
-
-    MAKESPAN = "makespan"
-    COVERAGE = "coverage"
 
 
 class Engine(StrEnum):

@@ -10,7 +10,6 @@ from alloc.allocators import RefusedError
 from alloc.allocators.registry import BUILT_IN, ENTRY_POINT_GROUP
 from alloc.cli import options
 from alloc.cli.commands import solve as solve_module
-from alloc.problems import Objective
 
 READERS = [name for name, one in COMMANDS.items() if one.params[0].name in ("instance", "instances", "source")]
 """Commands whose first argument is an instance."""
@@ -301,7 +300,6 @@ def test_exit_codes_of_other_ends(alloc, small, monkeypatch, error, code):
 def test_names_known_without_numpy_are_those_of_the_registry():
     """What completion offers without loading numpy is what there is."""
     assert set(options.BUILT_IN_METHODS) == {"auto", *BUILT_IN}
-    assert [str(one) for one in options.Objective] == [str(one) for one in Objective]
     assert ENTRY_POINT_GROUP == "alloc.allocators"
     assert solve_module.EXAMPLES
 

@@ -154,6 +154,9 @@ class LagrangianBound:
         used = np.bincount(model.class_of_pair, relaxed.group, len(model.count)).astype(np.int64)
         slope = _subgradient(used, model, self._price)
         cluster_slope = np.zeros(0) if clusters is None else clusters.link.T @ relaxed.group - relaxed.cluster_group
+        if not (slope.any() or cluster_slope.any()):  # the largest value; on a fading direction prices would grow
+            self._step = 0.0
+            return
         direction = slope + deflection * self._direction[0]
         cluster_direction = cluster_slope + deflection * self._direction[1]
         self._direction = (direction, cluster_direction)

@@ -2,10 +2,8 @@ from pathlib import Path
 
 import pytest
 
-from alloc.cli.commands import generate
 from alloc.problems import Family, machine_covering, paper, random_instance
 from alloc.problems.formats import read_instance, to_document
-from alloc.problems.generate import Distribution, Sites, Starts
 
 
 def test_paper_scenarios_are_the_generator_s(alloc):
@@ -76,12 +74,3 @@ def test_errors_name_the_option(alloc):
     """A value that the family refuses is told under the name of its option."""
     assert alloc("generate", "random", "--ability-min", "-1").err.startswith("alloc: --ability-min: must be")
     assert alloc("generate", "random", "--range", "5:1").err.startswith("alloc: --range: must not")
-
-
-@pytest.mark.parametrize(
-    ("ours", "theirs"),
-    [(generate.Distribution, Distribution), (generate.Sites, Sites), (generate.Starts, Starts)],
-)
-def test_choices_are_the_family_s(ours, theirs):
-    """What the options offer without numpy is what the generator knows."""
-    assert list(map(str, ours)) == list(map(str, theirs))

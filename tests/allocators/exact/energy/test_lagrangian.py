@@ -39,15 +39,16 @@ def model_of(seed: int, tasks: int, *, limited: bool) -> tuple[EnergyModel, floa
     return model, best, plan
 
 
+@pytest.mark.parametrize("worse", [1.0001, 1.3])
 @pytest.mark.parametrize("limited", [False, True])
 @pytest.mark.parametrize("seed", range(8))
-def test_bound_is_below_the_best_plan_and_its_pairs_are_kept(seed, limited):
-    """Whatever the prices and clusters, no bound exceeds the cost of the best plan, none of whose pairs is dropped."""
+def test_bound_is_below_the_best_plan_and_its_pairs_are_kept(seed, limited, worse):
+    """However long prices move towards the cost of a worse plan, the best one bounds the bound and loses no pair."""
     model, best, plan = model_of(seed, 4, limited=limited)
     distance = np.abs(np.subtract.outer(np.arange(4.0), np.arange(4.0)))
     bound = LagrangianBound(model, distance)
-    bound.ascend(400, best * (1 + 1e-6))
-    assert 0.5 * best < bound.bound <= best * (1 + 1e-5)
+    bound.ascend(2000, best * worse)
+    assert 0.5 * best < bound.bound <= best * (1 + 1e-9)
     used = model.task_of_pair == plan[model.class_of_pair]
     assert bound.kept[used].all()
 
