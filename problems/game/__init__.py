@@ -29,10 +29,8 @@ from alloc.problems.game.reward import (
 from alloc.problems.game.rules import (
     PAPER,
     PLANNING,
-    Reward,
     Rules,
     State,
-    Turn,
     battery_left,
     begin,
     flown,
@@ -46,6 +44,7 @@ from alloc.problems.game.rules import (
     sum_by_place,
     tasks_of,
 )
+from alloc.problems.vocabulary import Reward, Turn
 
 __all__ = [
     "AGENT_FEATURES",

@@ -13,7 +13,8 @@ from torch import Tensor
 
 from alloc.problems.distances.metric import distance_table
 from alloc.problems.game.candidates import near_tasks
-from alloc.problems.instance import IDLE, Instance
+from alloc.problems.instance import Instance
+from alloc.problems.vocabulary import IDLE
 
 MEAN_DISTANCE = 0.66
 """Distances are scaled to this mean, that of two points in the unit cube."""
@@ -234,7 +235,7 @@ def _start(
 def _apart(instance: Instance) -> NDArray[np.float64]:
     m = instance.m
     apart = np.zeros((m + 1, m + 1))
-    apart[:m, :m] = distance_table(instance.task_position, instance.task_position, instance.reach.unit)
+    apart[:m, :m] = distance_table(instance.task_position, instance.task_position)
     return apart
 
 

@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from alloc.problems.instance import IDLE, Instance
+from alloc.problems.instance import Instance
+from alloc.problems.vocabulary import IDLE
 
 SHARED = 4
 """Candidates of each agent that are kept for tasks which few have near, as a share: one in so many."""

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from alloc.problems.distances.metric import distances
 from alloc.problems.game.board import LARGEST, LEAST, MEAN_DISTANCE, Board, scaled, single, working_share
-from alloc.problems.instance import IDLE, Instance
+from alloc.problems.instance import Instance
+from alloc.problems.vocabulary import IDLE
 
 Ints = NDArray[np.int64]
 
@@ -96,7 +97,7 @@ def lay_out_parts(
     start = np.where(slot.any(2), slot.argmax(2), j)
     last = ((0, 0), (0, 0), (0, 1))
     position = instance.task_position[tasks]
-    apart = scaled(distances(position[:, :, None], position[:, None], instance.reach.unit), scale[:, None, None])
+    apart = scaled(distances(position[:, :, None], position[:, None]), scale[:, None, None])
     legal = np.concatenate([legal, np.ones((count, width, 1), dtype=bool)], axis=2)
     board = Board(
         **{

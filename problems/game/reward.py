@@ -6,7 +6,8 @@ import torch
 from torch import Tensor
 
 from alloc.problems.game.board import Board
-from alloc.problems.game.rules import PLANNING, Reward, Rules, State, flown, group_ability, pick
+from alloc.problems.game.rules import PLANNING, Rules, State, flown, group_ability, pick
+from alloc.problems.vocabulary import Reward
 
 LARGEST_EXPONENT = 20.0
 """Exponent of e in (3) from which on the reward falls along its tangent: it overflows for large deficits."""

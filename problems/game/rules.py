@@ -3,29 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from enum import StrEnum
 
 import torch
 from torch import Tensor
 
 from alloc.problems.game.board import Board
+from alloc.problems.vocabulary import Reward, Turn
 
 TOLERANCE = 1e-5
 """Distance that a battery may be overdrawn by: single precision."""
-
-
-class Turn(StrEnum):
-    """Who moves in a step."""
-
-    BIDDING = "bidding"
-    SIMULTANEOUS = "simultaneous"
-
-
-class Reward(StrEnum):
-    """What the agents are rewarded for."""
-
-    MAKESPAN = "makespan"
-    COVERAGE = "coverage"
 
 
 @dataclass(frozen=True)

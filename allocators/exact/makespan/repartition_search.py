@@ -7,7 +7,8 @@ import numpy as np
 from alloc.allocators.exact.makespan.repartition import wander
 from alloc.allocators.exact.model import Model
 from alloc.problems import Allocation
-from alloc.problems.instance import IDLE, FloatArray, IntArray
+from alloc.problems.instance import FloatArray, IntArray
+from alloc.problems.vocabulary import IDLE
 
 MOST_PLACES = 4_000_000
 """Pairs of agent and task beyond which this is none of its business."""

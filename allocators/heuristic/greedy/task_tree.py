@@ -100,7 +100,7 @@ class TreeGreedy:
         by_size = np.argsort(-work, kind="stable")
         rank = np.empty(instance.m, dtype=np.intp)
         rank[by_size] = np.arange(instance.m)
-        tree = build_tree(reach.goal / reach.unit, np.sort(by_size[work[by_size] > 0]))
+        tree = build_tree(reach.goal, np.sort(by_size[work[by_size] > 0]))
         self.task = np.full(instance.n, -1, dtype=np.intp)
         first = np.concatenate([[0], np.cumsum([len(tasks) for tasks in reach.lists])]).astype(np.intp)
         listed = np.concatenate([np.zeros(0, dtype=np.intp), *reach.lists])
@@ -108,11 +108,11 @@ class TreeGreedy:
         ratio = np.zeros(instance.m)
         _fill(tree.begin, tree.end, tree.order, ratio, rank, worst)
         self._tree = (tree.begin, tree.end, tree.low, tree.high, tree.order, tree.leaf, worst)
-        self._tasks = (reach.goal / reach.unit, work, rank, np.zeros(instance.m), ratio)
+        self._tasks = (reach.goal, work, rank, np.zeros(instance.m), ratio)
         self._agents = (reach.origin, instance.ability, horizon * instance.speed, self.task)
         limits = (reach.communication_range + TOLERANCE, reach.battery + TOLERANCE, reach.radius)
-        self._origins = (reach.place / reach.unit, *limits, reach.list_of, first, listed)
-        self._scale = (float(reach.unit), float(reach.energy_per_distance))
+        self._origins = (reach.place, *limits, reach.list_of, first, listed)
+        self._scale = (1.0, float(reach.energy_per_distance))
 
     def place(self, agents: Indices) -> None:
         """Give each of `agents`, in this order, the task that is worst served within its reach."""

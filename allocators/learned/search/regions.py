@@ -6,7 +6,6 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import dijkstra
 
 from alloc.problems import IDLE
-from alloc.problems.distances.metric import unit_of
 from alloc.problems.game.candidates import Layout
 
 Ints = NDArray[np.int64]
@@ -41,7 +40,6 @@ def cover(
     """
     m = len(position)
     position = np.nan_to_num(position)
-    position = position / unit_of(position, position)
     free = np.ones(m, dtype=bool)
     groups = []
     lacking = np.flatnonzero(surplus < 0)

@@ -50,7 +50,7 @@ def test_without_time_the_note_says_what_is_not_proven() -> None:
 
 @given(st.integers(0, 10**6))
 def test_agents_in_excess_here_and_tasks_there(seed: int) -> None:
-    """Where agents are idle in one place and tasks unserved in another, the fewest tasks are unserved without a table."""
+    """Where agents are idle in one place and tasks unserved in another, the fewest are unserved without a table."""
     rng = np.random.default_rng(seed)
     instance = surplus_of_tasks(0.15, 30, 60)
     lists = [None if rng.random() < 0.7 else rng.integers(0, 60, 2).tolist() for _ in range(30)]

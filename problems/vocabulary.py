@@ -1,0 +1,53 @@
+"""The words of the problem that need no numpy: what is optimised, how instances are made, and how the game goes."""
+
+from enum import StrEnum
+
+IDLE = -1
+"""The task index of an agent without a task."""
+
+
+class Objective(StrEnum):
+    """What is optimised, in this order, after the number of unserved tasks."""
+
+    MAKESPAN = "makespan"
+    MAKESPAN_ENERGY = "makespan-energy"
+
+
+class Distribution(StrEnum):
+    """How abilities or workloads spread."""
+
+    EQUAL = "equal"
+    UNIFORM = "uniform"
+    LOGNORMAL = "lognormal"
+    PARETO = "pareto"
+    DIRICHLET = "dirichlet"
+
+
+class Sites(StrEnum):
+    """How places lie in the world."""
+
+    UNIFORM = "uniform"
+    CLUSTERED = "clustered"
+
+
+class Starts(StrEnum):
+    """Where agents begin."""
+
+    TASKS = "tasks"
+    OWN = "own"
+    DEPOTS = "depots"
+    UNKNOWN = "unknown"
+
+
+class Turn(StrEnum):
+    """Who moves in a step of the game."""
+
+    BIDDING = "bidding"
+    SIMULTANEOUS = "simultaneous"
+
+
+class Reward(StrEnum):
+    """What the agents are rewarded for in the game."""
+
+    MAKESPAN = "makespan"
+    COVERAGE = "coverage"
