@@ -1,21 +1,30 @@
-"""What is to be solved, and how good an answer is; knows nothing of allocators."""
+"""What is to be solved, and how good an answer is; knows nothing of allocators.
+
+Names are loaded when they are asked for, so that a program can have the vocabulary without numpy.
+"""
 
 import logging
+from importlib import import_module
+from typing import TYPE_CHECKING
 
-from alloc.problems.allocation import Allocation
-from alloc.problems.bounds import energy_lower_bound, lp_makespan_lower_bound, makespan_lower_bound
-from alloc.problems.classes import AgentClasses, agent_classes, count_classes
-from alloc.problems.distances.reach import Reach
-from alloc.problems.errors import AllocError, InputError, MissingPackageError, RefusedError, TrainingError
-from alloc.problems.evaluation import Evaluation, Objective, Violation, evaluate
-from alloc.problems.formats import read_allocation, read_instance, write_allocation, write_instance
-from alloc.problems.generate import paper, paper_like, random_instance
-from alloc.problems.generate.covering import machine_covering
-from alloc.problems.generate.family import Family
-from alloc.problems.instance import IDLE, Instance
-from alloc.problems.matching.serving import only_allowed, serve_all
-from alloc.problems.matching.shortage import Shortage, find_shortage
-from alloc.problems.matching.unservable import fewest_unserved, minimal_unservable_set
+if TYPE_CHECKING:
+    from alloc.problems.allocation import Allocation
+    from alloc.problems.bounds import energy_lower_bound, lp_makespan_lower_bound, makespan_lower_bound
+    from alloc.problems.classes import AgentClasses, agent_classes, count_classes
+    from alloc.problems.distances.reach import Reach
+    from alloc.problems.errors import AllocError, InputError, MissingPackageError, RefusedError, TrainingError
+    from alloc.problems.evaluation import Evaluation, Violation, evaluate
+    from alloc.problems.formats.allocation_file import read_allocation, write_allocation
+    from alloc.problems.formats.instance_file import read_instance, write_instance
+    from alloc.problems.generate.covering import machine_covering
+    from alloc.problems.generate.family import Family
+    from alloc.problems.generate.paper_scenarios import paper, paper_like
+    from alloc.problems.generate.random_family import random_instance
+    from alloc.problems.instance import Instance
+    from alloc.problems.matching.serving import only_allowed, serve_all
+    from alloc.problems.matching.shortage import Shortage, find_shortage
+    from alloc.problems.matching.unservable import fewest_unserved, minimal_unservable_set
+    from alloc.problems.vocabulary import IDLE, Objective
 
 __all__ = [
     "IDLE",
@@ -54,4 +63,54 @@ __all__ = [
     "write_instance",
 ]
 
+_MODULE_OF = {
+    "IDLE": "vocabulary",
+    "AgentClasses": "classes",
+    "AllocError": "errors",
+    "Allocation": "allocation",
+    "Evaluation": "evaluation",
+    "Family": "generate.family",
+    "InputError": "errors",
+    "Instance": "instance",
+    "MissingPackageError": "errors",
+    "Objective": "vocabulary",
+    "Reach": "distances.reach",
+    "RefusedError": "errors",
+    "Shortage": "matching.shortage",
+    "TrainingError": "errors",
+    "Violation": "evaluation",
+    "agent_classes": "classes",
+    "count_classes": "classes",
+    "energy_lower_bound": "bounds",
+    "evaluate": "evaluation",
+    "fewest_unserved": "matching.unservable",
+    "find_shortage": "matching.shortage",
+    "lp_makespan_lower_bound": "bounds",
+    "machine_covering": "generate.covering",
+    "makespan_lower_bound": "bounds",
+    "minimal_unservable_set": "matching.unservable",
+    "only_allowed": "matching.serving",
+    "paper": "generate.paper_scenarios",
+    "paper_like": "generate.paper_scenarios",
+    "random_instance": "generate.random_family",
+    "read_allocation": "formats.allocation_file",
+    "read_instance": "formats.instance_file",
+    "serve_all": "matching.serving",
+    "write_allocation": "formats.allocation_file",
+    "write_instance": "formats.instance_file",
+}
+"""Where each name is defined; the imports above say the same to type checkers."""
+
 logging.getLogger("alloc").addHandler(logging.NullHandler())  # silent, unless the program that uses us says otherwise
+
+
+def __getattr__(name: str) -> object:
+    if name not in _MODULE_OF:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value: object = getattr(import_module(f"{__name__}.{_MODULE_OF[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

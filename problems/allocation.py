@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 from alloc.problems.arguments import of_type
 from alloc.problems.errors import InputError, nearest
 from alloc.problems.fields import ReadOnly, indices
-from alloc.problems.instance import IDLE, Instance
+from alloc.problems.instance import Instance
+from alloc.problems.vocabulary import IDLE
 
 
 @dataclass(frozen=True, eq=False)

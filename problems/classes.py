@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from alloc.problems.allocation import Allocation
 from alloc.problems.arguments import flag, of_type
 from alloc.problems.distances.origins import group_rows
-from alloc.problems.instance import IDLE, FloatArray, Instance, IntArray
+from alloc.problems.instance import FloatArray, Instance, IntArray
+from alloc.problems.vocabulary import IDLE
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,14 +2,14 @@
 
 import sys
 from dataclasses import dataclass
-from enum import StrEnum
 
 import numpy as np
 
 from alloc.problems.allocation import Allocation, require_fit
 from alloc.problems.distances.reach import TOLERANCE
 from alloc.problems.fields import ReadOnly
-from alloc.problems.instance import IDLE, FloatArray, Instance, IntArray
+from alloc.problems.instance import FloatArray, Instance, IntArray
+from alloc.problems.vocabulary import IDLE, Objective
 
 RELATIVE_TOLERANCE = 1e-9
 """Makespans and energies this close, relatively, are equal."""
@@ -18,13 +18,6 @@ RELATIVE_TOLERANCE = 1e-9
 def last_equal(hours: float) -> float:
     """Return the largest makespan that counts as equal to `hours`, for all who ask whether a plan is in time."""
     return min(hours * (1 + RELATIVE_TOLERANCE), sys.float_info.max)
-
-
-class Objective(StrEnum):
-    """What is optimised, in this order, after the number of unserved tasks."""
-
-    MAKESPAN = "makespan"
-    MAKESPAN_ENERGY = "makespan-energy"
 
 
 @dataclass(frozen=True)

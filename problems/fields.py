@@ -11,12 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from alloc.problems.arguments import listed
 from alloc.problems.errors import InputError
+from alloc.problems.vocabulary import IDLE
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
-
-IDLE = -1
-"""The task index of an agent without a task."""
 
 LARGEST_INDEX = 2**62
 """Beyond, numbers are no indices on any machine."""

@@ -13,9 +13,10 @@ from alloc.problems import fields
 from alloc.problems.arguments import listed, real, shown, text
 from alloc.problems.distances.reach import Reach, build_reach
 from alloc.problems.errors import InputError, nearest
-from alloc.problems.fields import IDLE, FloatArray, IntArray
+from alloc.problems.fields import FloatArray, IntArray
+from alloc.problems.vocabulary import IDLE
 
-__all__ = ["IDLE", "FloatArray", "Instance", "IntArray"]
+__all__ = ["FloatArray", "Instance", "IntArray"]
 
 AGENT_ARRAYS = ("ability", "agent_position", "start_task", "battery", "communication_range", "speed")
 """Fields of an instance with one row per agent; ids and allowed tasks are tuples."""
@@ -184,7 +185,14 @@ class Instance(fields.ReadOnly):
     @cached_property
     def reach(self) -> Reach:
         """Which tasks each agent can take, and how far they are (C(i) and (1) of the paper)."""
-        return build_reach(self)
+        return build_reach(
+            self.start_position,
+            self.task_position,
+            self.communication_range,
+            self.battery,
+            self.energy_per_distance,
+            self.allowed_tasks,
+        )
 
     @cached_property
     def agent_index(self) -> dict[str, int]:

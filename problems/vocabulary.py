@@ -39,15 +39,15 @@ class Starts(StrEnum):
     UNKNOWN = "unknown"
 
 
-class Turn(StrEnum):
-    """Who moves in a step of the game."""
+class TurnRule(StrEnum):
+    """Which agents move in a step of the game."""
 
     BIDDING = "bidding"
     SIMULTANEOUS = "simultaneous"
 
 
 class Reward(StrEnum):
-    """What the agents are rewarded for in the game."""
+    """What the reward of the game measures."""
 
     MAKESPAN = "makespan"
     COVERAGE = "coverage"

@@ -16,7 +16,7 @@ from alloc.cli.options import SeedOption, assignments, examples
 from alloc.cli.output.console import STANDARD, complain, note, say
 from alloc.cli.output.files import check_output, check_outputs, read_instances
 from alloc.problems.text import counted, number
-from alloc.problems.vocabulary import Reward, Turn
+from alloc.problems.vocabulary import Reward, TurnRule
 
 if TYPE_CHECKING:
     from alloc.allocators.learned.training.limits import Limits
@@ -54,7 +54,7 @@ def train_command(
     generation_steps: options.GenerationStepsOption = 20_000,
     former_generation_steps: options.FormerGenerationStepsOption = None,
     settings: options.HyperparametersOption = None,
-    turn: options.TurnOption = Turn.BIDDING,
+    turn: options.TurnOption = TurnRule.BIDDING,
     reward: options.RewardOption = Reward.MAKESPAN,
     seed: SeedOption = 0,
     resume: options.ResumeOption = False,

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from alloc.problems.vocabulary import Reward, Turn
+from alloc.problems.vocabulary import Reward, TurnRule
 
 STEPS = 500_000
 """Decisions of agents in a training without any other limit."""
@@ -71,7 +71,7 @@ HyperparametersOption = Annotated[
         "prints all that the method has, with their defaults.",
     ),
 ]
-TurnOption = Annotated[Turn, typer.Option(help="Who moves: the highest bids, or all agents at once.")]
+TurnOption = Annotated[TurnRule, typer.Option(help="Who moves: the highest bids, or all agents at once.")]
 RewardOption = Annotated[Reward, typer.Option(help="Makespan, or the paper's coverage (3).")]
 ResumeOption = Annotated[bool, typer.Option("--resume", help="Continue from the checkpoint.")]
 CheckpointOption = Annotated[

@@ -5,31 +5,17 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-LARGEST = 1e150
-"""Coordinates beyond are scaled before distances are measured."""
-
 BLOCK = 1 << 16
 """Distances that are worked out together: as many as fit a cache."""
 
 
-def unit_of(place: Floats, goal: Floats) -> float:
-    """Return what all coordinates are divided by: 1, or the farthest where its square is more than a float holds."""
-    farthest = max(float(np.nanmax(np.abs(places), initial=0.0)) for places in (place, goal))
-    return farthest if farthest > LARGEST else 1.0
-
-
-def distances(place: Floats, goal: Floats, unit: float) -> Floats:
+def distances(place: Floats, goal: Floats) -> Floats:
     """Return distances between places that broadcast, 0 where a coordinate is NaN.
 
     Parameters
     ----------
     place, goal : ndarray, shape (..., 3)
-    unit : float
-        As of `unit_of`, for all places of the instance: the last bit depends on it.
     """
-    if unit != 1.0:
-        with np.errstate(over="ignore"):
-            return np.minimum(distances(place / unit, goal / unit, 1.0) * unit, np.finfo(float).max)
     total = np.square(place[..., 0] - goal[..., 0])
     for axis in range(1, place.shape[-1]):
         step = place[..., axis] - goal[..., axis]
@@ -41,12 +27,12 @@ def distances(place: Floats, goal: Floats, unit: float) -> Floats:
     return total
 
 
-def distance_table(place: Floats, goal: Floats, unit: float) -> Floats:
+def distance_table(place: Floats, goal: Floats) -> Floats:
     """Return the distances of all places to all goals, shape (places, goals)."""
     table = np.empty((len(place), len(goal)))
     rows = max(1, BLOCK // len(goal))
     columns = np.ascontiguousarray(goal.T).T[None, :, :]
     for first in range(0, len(place), rows):
         block = slice(first, first + rows)
-        table[block] = distances(place[block, None, :], columns, unit)
+        table[block] = distances(place[block, None, :], columns)
     return table

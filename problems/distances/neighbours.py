@@ -2,13 +2,10 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-
-if TYPE_CHECKING:
-    from alloc.problems.distances.reach import Reach
 
 CHUNK = 1 << 21
 """Pairs of origin and task that are looked at together, about."""
@@ -20,7 +17,41 @@ MARGIN = 1e-9
 """Relative amount by which a radius is widened before the exact rule decides."""
 
 
+Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
+
+
+class ReachRule(Protocol):
+    """What is asked of `Reach`."""
+
+    @property
+    def place(self) -> Floats:
+        """Where each origin is, shape (origins, 3)."""
+
+    @property
+    def goal(self) -> Floats:
+        """Where each task is, shape (m, 3)."""
+
+    @property
+    def list_of(self) -> Indices:
+        """The list that each origin is bound to, -1 for none."""
+
+    @property
+    def lists(self) -> tuple[Indices, ...]:
+        """Distinct lists of tasks."""
+
+    @property
+    def radius(self) -> Floats:
+        """Distance beyond which nothing is within reach, shape (origins,)."""
+
+    def rows(self, origins: Indices) -> tuple[Floats, NDArray[np.bool_]]:
+        """Return rows of distances, and of who can take what."""
+
+    def distances_between(self, origin: Indices, task: Indices) -> Floats:
+        """Return the distance from each origin to the task beside it."""
+
+    def is_within(self, origin: Indices, task: Indices, distance: Floats) -> NDArray[np.bool_]:
+        """Whether each origin can take the task beside it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +87,7 @@ class Neighbours:
 Pairs = tuple[Indices, Indices]
 
 
-def find_neighbours(reach: "Reach") -> Neighbours:
+def find_neighbours(reach: ReachRule) -> Neighbours:
     """Gather the tasks within reach of each origin; time and memory are in proportion to their number, as a rule."""
     origins, m = len(reach.place), len(reach.goal)
     rows, tasks, flown = [], [], []
@@ -78,14 +109,14 @@ def find_neighbours(reach: "Reach") -> Neighbours:
     return Neighbours(first, column, away)
 
 
-def estimated_pairs(reach: "Reach") -> float:
+def estimated_pairs(reach: ReachRule) -> float:
     """Return about how many pairs of origin and task are within reach, by a sample of the origins."""
     origins = len(reach.place)
     sample = np.unique(np.linspace(0, origins - 1, SAMPLE).astype(np.intp))
     return float(reach.rows(sample)[1].sum(axis=1).mean() * origins)
 
 
-def nearest_distance(reach: "Reach", wanted: NDArray[np.bool_]) -> NDArray[np.float64]:
+def nearest_distance(reach: ReachRule, wanted: NDArray[np.bool_]) -> NDArray[np.float64]:
     """Return how far the nearest of the `wanted` tasks within reach is, ``inf`` where there is none; shape (origins,).
 
     Origins bound to a list get the nearest on it, the others the nearest of all, by a tree.
@@ -104,13 +135,13 @@ def nearest_distance(reach: "Reach", wanted: NDArray[np.bool_]) -> NDArray[np.fl
     nearest[free[lost]] = 0.0 if len(tasks) else np.inf
     placed, known = free[~lost], tasks[~unknown]
     if len(placed) and len(known):
-        _, found = cKDTree(reach.goal[known] / reach.unit).query(reach.place[placed] / reach.unit)
+        _, found = cKDTree(reach.goal[known]).query(reach.place[placed])
         distance = reach.distances_between(placed, known[found])
         nearest[placed] = np.where(reach.is_within(placed, known[found], distance), distance, np.inf)
     return nearest
 
 
-def _candidates(reach: "Reach") -> Iterator[Pairs]:
+def _candidates(reach: ReachRule) -> Iterator[Pairs]:
     """Pairs that may be within reach, every origin in one piece."""
     nothing = np.zeros(0, dtype=np.intp)
     yield nothing, nothing
@@ -123,7 +154,7 @@ def _candidates(reach: "Reach") -> Iterator[Pairs]:
     yield from _around(reach, order[np.argsort(radius[order], kind="stable")], radius)
 
 
-def _on_lists(reach: "Reach", origins: Indices) -> Iterator[Pairs]:
+def _on_lists(reach: ReachRule, origins: Indices) -> Iterator[Pairs]:
     lengths = np.array(list(map(len, reach.lists)), dtype=np.intp)[reach.list_of[origins]] if len(origins) else origins
     for part in np.split(origins, _cuts(lengths)):
         if len(part):
@@ -131,25 +162,25 @@ def _on_lists(reach: "Reach", origins: Indices) -> Iterator[Pairs]:
             yield np.repeat(part, list(map(len, lists))), np.concatenate(lists)
 
 
-def _everywhere(reach: "Reach", origins: Indices) -> Iterator[Pairs]:
+def _everywhere(reach: ReachRule, origins: Indices) -> Iterator[Pairs]:
     m = len(reach.goal)
     for part in np.split(origins, _cuts(np.full(len(origins), m))):
         if len(part):
             yield np.repeat(part, m), np.tile(np.arange(m), len(part))
 
 
-def _around(reach: "Reach", origins: Indices, radius: NDArray[np.float64]) -> Iterator[Pairs]:
+def _around(reach: ReachRule, origins: Indices, radius: NDArray[np.float64]) -> Iterator[Pairs]:
     """Tasks in a ball around each origin, by a tree; those without a place are within every reach."""
     from scipy.spatial import cKDTree
 
     known = np.flatnonzero(~np.isnan(reach.goal[:, 0]))
     unknown = np.flatnonzero(np.isnan(reach.goal[:, 0]))
     if len(known) and len(origins):
-        tree = cKDTree(reach.goal[known] / reach.unit)
+        tree = cKDTree(reach.goal[known])
     while len(origins):
-        place = reach.place[origins] / reach.unit
+        place = reach.place[origins]
         sample = np.unique(np.linspace(0, len(origins) - 1, SAMPLE).astype(np.intp))
-        ball = radius[origins] / reach.unit
+        ball = radius[origins]
         most = tree.query_ball_point(place[sample], ball[sample], return_length=True).mean() if len(known) else 0
         size = max(1, int(CHUNK / (1 + most + len(unknown))))
         part, ball = origins[:size], ball[:size]

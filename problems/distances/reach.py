@@ -4,22 +4,17 @@ Agents that start at one place with the same range, battery and list of tasks sh
 instances have as many origins as tasks, whatever the number of agents.
 """
 
-from __future__ import annotations
-
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from alloc.problems.distances.metric import distance_table, distances, unit_of
+from alloc.problems.distances.metric import distance_table, distances
 from alloc.problems.distances.neighbours import Neighbours, estimated_pairs, find_neighbours
 from alloc.problems.distances.origins import group_rows, number_lists
 from alloc.problems.fields import ReadOnly
-
-if TYPE_CHECKING:
-    from alloc.problems.instance import Instance
 
 TOLERANCE = 1e-9
 """Slack on ranges (in distance) and batteries (in energy)."""
@@ -47,8 +42,6 @@ class Reach(ReadOnly):
         Where the origin is; NaN where unknown.
     goal : ndarray, shape (m, 3)
         Where the tasks are; NaN where unknown.
-    unit : float
-        What coordinates are divided by where they are too large to be squared; else 1.
     communication_range, battery : ndarray, shape (origins,)
         Limits on the distance, and on the energy for it.
     energy_per_distance : float
@@ -61,7 +54,6 @@ class Reach(ReadOnly):
     origin: Indices
     place: Floats
     goal: Floats
-    unit: float
     communication_range: Floats
     battery: Floats
     energy_per_distance: float
@@ -84,7 +76,7 @@ class Reach(ReadOnly):
 
         Takes O(origins * m) time and memory: nothing for instances of any size, unless `has_table`.
         """
-        table = distance_table(self.place, self.goal, self.unit)
+        table = distance_table(self.place, self.goal)
         table.setflags(write=False)
         return table
 
@@ -155,12 +147,12 @@ class Reach(ReadOnly):
         """Return these rows of `distance` and `mask`, each of shape (k, m)."""
         if self.has_table:
             return self.distance[origins], self.mask[origins]
-        distance = distance_table(self.place[origins], self.goal, self.unit)
+        distance = distance_table(self.place[origins], self.goal)
         return distance, self._mask_of(origins, distance)
 
     def block(self, origins: Indices, tasks: Indices) -> tuple[Floats, Flags]:
         """Return these rows and columns of `distance` and `mask`, each of shape (k, l), without a table."""
-        distance = distance_table(self.place[origins], self.goal[tasks], self.unit)
+        distance = distance_table(self.place[origins], self.goal[tasks])
         return distance, self.is_within(origins[:, None], tasks, distance)
 
     def agents_of(self, task: int) -> Indices:
@@ -176,7 +168,7 @@ class Reach(ReadOnly):
 
     def distances_between(self, origin: Indices, task: Indices) -> Floats:
         """Distance from each of these origins to the task beside it, without a table."""
-        return distances(self.place[origin], self.goal[task], self.unit)
+        return distances(self.place[origin], self.goal[task])
 
     def is_within(self, origin: Indices, task: Indices, distance: Floats) -> Flags:
         """Whether each of these origins can take the task beside it, which is `distance` away; without a table."""
@@ -223,7 +215,7 @@ class Reach(ReadOnly):
         low, high = known.min(axis=0), known.max(axis=0)
         corner = np.where(self.place > low / 2 + high / 2, low, high)
         with np.errstate(over="ignore", invalid="ignore"):
-            farthest = distances(self.place, corner, self.unit) * (1 + 1e-12)
+            farthest = distances(self.place, corner) * (1 + 1e-12)
             doubtful = np.flatnonzero(~self._is_near(np.arange(len(self.place)), farthest))
             worst = doubtful[np.argsort((self.radius - farthest)[doubtful])]
         rows = max(1, TABLE_LIMIT // (8 * len(self.goal)))
@@ -231,17 +223,31 @@ class Reach(ReadOnly):
         return all(self._is_near(part[:, None], self._far(part)).all() for part in parts)
 
     def _far(self, origins: Indices) -> Floats:
-        return distance_table(self.place[origins], self.goal, self.unit)
+        return distance_table(self.place[origins], self.goal)
 
 
-def build_reach(instance: Instance) -> Reach:
-    """Group the agents of `instance` by origin; takes O(n log n) time and O(n) memory."""
-    number, lists = number_lists(instance.allowed_tasks, instance.n)
-    place, limit, battery = instance.start_position, instance.communication_range, instance.battery
-    first, origin = group_rows([*place.T, limit, battery, number.astype(np.float64)])
-    goal = instance.task_position
+def build_reach(
+    place: Floats,
+    goal: Floats,
+    communication_range: Floats,
+    battery: Floats,
+    energy_per_distance: float,
+    allowed_tasks: Sequence[Indices | None] | None,
+) -> Reach:
+    """Group agents by origin; takes O(n log n) time and O(n) memory.
+
+    Parameters
+    ----------
+    place, goal : ndarray, shapes (n, 3) and (m, 3)
+        Where agents begin, and where tasks are; NaN where unknown.
+    communication_range, battery : ndarray, shape (n,)
+    energy_per_distance : float
+    allowed_tasks : sequence of (ndarray of int, or None), or None
+        As in `Instance`.
+    """
+    number, lists = number_lists(allowed_tasks, len(place))
+    first, origin = group_rows([*place.T, communication_range, battery, number.astype(np.float64)])
     places, list_of = place[first], number[first]
     for array in (origin, places, list_of):
         array.setflags(write=False)
-    unit = unit_of(places, goal)
-    return Reach(origin, places, goal, unit, limit[first], battery[first], instance.energy_per_distance, list_of, lists)
+    return Reach(origin, places, goal, communication_range[first], battery[first], energy_per_distance, list_of, lists)

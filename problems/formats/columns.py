@@ -7,7 +7,8 @@ import numpy as np
 
 from alloc.problems.errors import InputError, nearest
 from alloc.problems.formats.messages import described, quoted
-from alloc.problems.instance import IDLE, FloatArray, Instance, IntArray
+from alloc.problems.instance import FloatArray, Instance, IntArray
+from alloc.problems.vocabulary import IDLE
 
 INSTANCE_FORMAT = "alloc-instance/1"
 

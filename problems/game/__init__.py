@@ -23,10 +23,8 @@ from alloc.problems.game.reward import (
 from alloc.problems.game.rules import (
     PAPER,
     PLANNING,
-    Reward,
     Rules,
     State,
-    TurnRule,
     action_mask,
     apply_moves,
     at_slot,
@@ -40,6 +38,7 @@ from alloc.problems.game.rules import (
     step,
     sum_by_place,
 )
+from alloc.problems.vocabulary import Reward, TurnRule
 
 __all__ = [
     "AGENT_FEATURES",

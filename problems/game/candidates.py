@@ -5,7 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from alloc.problems.instance import IDLE, Instance
+from alloc.problems.instance import Instance
+from alloc.problems.vocabulary import IDLE
 
 SCARCE_SHARE = 4
 """One in so many candidates of each agent is kept for tasks that few agents have near."""

@@ -204,9 +204,7 @@ def _unscaled(
         candidates=_stack(candidates),
         reachable=_stack(reachable),
         distance=_stack(distance),
-        task_distance=_stack(
-            [distance_table(one.task_position, one.task_position, one.reach.unit) for one in instances]
-        ),
+        task_distance=_stack([distance_table(one.task_position, one.task_position) for one in instances]),
         hours=np.array([max(reference, SHORTEST_HOURS) for _, reference in zip(instances, hours, strict=True)]),
         log_tau=np.array([math.log(one.tau) for one in instances]),
     )

@@ -107,7 +107,7 @@ def _unscaled(instance: Instance, hours: float, tasks: Ints, members: Ints) -> U
         candidates=np.broadcast_to(np.arange(j + 1), shape).copy(),
         reachable=reachable,
         distance=distance,
-        task_distance=distances(position[:, :, None], position[:, None], instance.reach.unit),
+        task_distance=distances(position[:, :, None], position[:, None]),
         hours=np.full(count, max(hours, SHORTEST_HOURS)),
         log_tau=np.full(count, math.log(instance.tau)),
     )

@@ -6,7 +6,8 @@ import torch
 from torch import Tensor
 
 from alloc.problems.game.board import Board
-from alloc.problems.game.rules import PLANNING, Reward, Rules, State, at_slot, group_ability, mean_distance
+from alloc.problems.game.rules import PLANNING, Rules, State, at_slot, group_ability, mean_distance
+from alloc.problems.vocabulary import Reward
 
 LARGEST_EXPONENT = 20.0
 """Exponent of e in (3) beyond which the reward follows its tangent: it overflows for large shortfalls."""

@@ -3,29 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
-from enum import StrEnum
 
 import torch
 from torch import Tensor
 
 from alloc.problems.game.board import Board
+from alloc.problems.vocabulary import Reward, TurnRule
 
 TOLERANCE = 1e-5
 """Distance by which a battery may be overdrawn, for rounding in single precision."""
-
-
-class TurnRule(StrEnum):
-    """Which agents move in a step."""
-
-    BIDDING = "bidding"
-    SIMULTANEOUS = "simultaneous"
-
-
-class Reward(StrEnum):
-    """What the reward measures."""
-
-    MAKESPAN = "makespan"
-    COVERAGE = "coverage"
 
 
 @dataclass(frozen=True)

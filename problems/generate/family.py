@@ -1,10 +1,10 @@
 """A general family of random instances, and what its parameters may be."""
 
 from dataclasses import dataclass
-from enum import StrEnum
 
 from alloc.problems.arguments import choice, flag, real, whole
 from alloc.problems.errors import InputError
+from alloc.problems.vocabulary import Distribution, Sites, Starts
 
 LARGEST = 1e12
 """Largest number that a parameter takes."""
@@ -14,32 +14,6 @@ MOST = 10_000_000
 
 Spread = float | tuple[float, float] | None
 """One value for all, the ends of a uniform distribution, or None: no limit."""
-
-
-class Distribution(StrEnum):
-    """How abilities or workloads spread."""
-
-    EQUAL = "equal"
-    UNIFORM = "uniform"
-    LOGNORMAL = "lognormal"
-    PARETO = "pareto"
-    DIRICHLET = "dirichlet"
-
-
-class Sites(StrEnum):
-    """How places lie in the world."""
-
-    UNIFORM = "uniform"
-    CLUSTERED = "clustered"
-
-
-class Starts(StrEnum):
-    """Where agents begin."""
-
-    TASKS = "tasks"
-    OWN = "own"
-    DEPOTS = "depots"
-    UNKNOWN = "unknown"
 
 
 @dataclass(frozen=True, kw_only=True)

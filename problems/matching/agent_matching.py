@@ -4,11 +4,12 @@ from collections import deque
 
 import numpy as np
 
-from alloc.problems.instance import IDLE, Instance, IntArray
+from alloc.problems.instance import Instance, IntArray
 from alloc.problems.matching.assignment import Pairs
 from alloc.problems.matching.clock import Clock, unlimited
 from alloc.problems.matching.hopcroft_karp import largest_matching
 from alloc.problems.matching.pairs import bound_by_size, sampled_pairs
+from alloc.problems.vocabulary import IDLE
 
 SAMPLE_SHARE, LONGEST_S = 0.2, 2.0
 """Share of the time for the sample, and the longest that it takes."""

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from alloc.problems.instance import IDLE, FloatArray, IntArray
+from alloc.problems.instance import FloatArray, IntArray
 from alloc.problems.matching.clock import MATCHED_PER_SECOND, Clock
+from alloc.problems.vocabulary import IDLE
 
 SEARCH = 10_000_000_000
 """Agents times pairs at which looking for the cheapest assignment takes about a second."""

@@ -2,9 +2,10 @@
 
 import numpy as np
 
-from alloc.problems.instance import IDLE, IntArray
+from alloc.problems.instance import IntArray
 from alloc.problems.matching.assignment import Pairs
 from alloc.problems.matching.clock import Clock
+from alloc.problems.vocabulary import IDLE
 
 CHECK_EVERY = 16
 """Rows between two looks at the clock."""

@@ -8,8 +8,9 @@ import numpy as np
 from alloc.problems.allocation import Allocation, require_fit
 from alloc.problems.arguments import of_type
 from alloc.problems.distances.neighbours import estimated_pairs
-from alloc.problems.instance import IDLE, Instance, IntArray
+from alloc.problems.instance import Instance, IntArray
 from alloc.problems.matching.clock import EVALUATED_PER_SECOND, GATHERED_PER_SECOND, Clock, unlimited
+from alloc.problems.vocabulary import IDLE
 
 SPENT = -1
 """Mark of agents that a failed search has met: no later path leads through them."""

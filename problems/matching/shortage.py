@@ -13,12 +13,13 @@ import numpy as np
 
 from alloc.problems.allocation import Allocation
 from alloc.problems.evaluation import last_equal
-from alloc.problems.instance import AGENT_ARRAYS, IDLE, FloatArray, Instance, IntArray
+from alloc.problems.instance import AGENT_ARRAYS, FloatArray, Instance, IntArray
 from alloc.problems.matching.assignment import Matcher, Pairs, bottleneck, by_scipy, cheapest
 from alloc.problems.matching.clock import Clock, unlimited
 from alloc.problems.matching.hopcroft_karp import match_in_time
 from alloc.problems.matching.pairs import all_pairs, bound_by_size, hours_alone, sampled_pairs
 from alloc.problems.matching.unservable import competing_part
+from alloc.problems.vocabulary import IDLE
 
 SAMPLE_SHARE = 0.3
 """Share of the time that is left for the pairs of an assignment, where a sample has to do."""

@@ -5,11 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from alloc.problems.distances.neighbours import Neighbours, estimated_pairs
-from alloc.problems.instance import IDLE, Instance, IntArray
+from alloc.problems.instance import Instance, IntArray
 from alloc.problems.matching.agent_matching import AgentMatching
 from alloc.problems.matching.assignment import match
 from alloc.problems.matching.clock import GATHERED_PER_SECOND, Clock, unlimited
 from alloc.problems.matching.serving import needs_agent, serve_in_turn
+from alloc.problems.vocabulary import IDLE
 
 FEW, SAMPLE = 8, 20
 """Agents near a task that a quick try looks at, and agents for each task from which they are taken."""

@@ -7,7 +7,8 @@ import numpy as np
 from alloc.allocators.exact.makespan.repartition import search_repartitions
 from alloc.allocators.exact.model import Model
 from alloc.problems import Allocation
-from alloc.problems.instance import IDLE, FloatArray, IntArray
+from alloc.problems.instance import FloatArray, IntArray
+from alloc.problems.vocabulary import IDLE
 
 MAX_PAIRS = 4_000_000
 """Agent-task pairs above which there is no such search."""

@@ -82,7 +82,7 @@ class TreeGreedy:
         by_size = np.argsort(-work, kind="stable")
         rank = np.empty(instance.m, dtype=np.intp)
         rank[by_size] = np.arange(instance.m)
-        position = reach.goal / reach.unit
+        position = reach.goal
         self._tree = build_tree(position, np.sort(by_size[work[by_size] > 0]))
         self._tasks = Tasks(position, work, rank, np.zeros(instance.m), np.zeros(instance.m))
         update_all(self._tree, self._tasks)
@@ -91,14 +91,14 @@ class TreeGreedy:
             ability=instance.ability,
             horizon=horizon * instance.speed,
             task=np.full(instance.n, -1, dtype=np.intp),
-            position=reach.place / reach.unit,
+            position=reach.place,
             longest_distance=reach.communication_range + TOLERANCE,
             battery=reach.battery + TOLERANCE,
             radius=reach.radius,
             list_of=reach.list_of,
             list_begin=np.concatenate([[0], np.cumsum([len(tasks) for tasks in reach.lists])]).astype(np.intp),
             listed_task=np.concatenate([np.zeros(0, dtype=np.intp), *reach.lists]),
-            unit=float(reach.unit),
+            unit=1.0,
             energy_per_distance=float(reach.energy_per_distance),
         )
 

@@ -6,7 +6,6 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import dijkstra
 
 from alloc.problems import IDLE
-from alloc.problems.distances.metric import unit_of
 from alloc.problems.game.candidates import Candidates
 
 Ints = NDArray[np.int64]
@@ -44,7 +43,6 @@ def partition(
     """
     m = len(position)
     position = np.nan_to_num(position)
-    position = position / unit_of(position, position)
     free = np.ones(m, dtype=bool)
     regions = []
     short = np.flatnonzero(surplus < 0)

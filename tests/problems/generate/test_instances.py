@@ -205,7 +205,7 @@ def test_families_that_make_no_sense(fields: dict[str, Any], place: str) -> None
         (lambda: paper_like(10, 3, 9, 0), "total"),
         (lambda: paper_like(10, 3, 101, 0), "total"),
         (lambda: paper_like(10, 5, 14, 0), "total"),
-        (lambda: paper_like(0, 5, 14, 0), "total"),
+        (lambda: paper_like(0, 5, 14, 0), "agents"),
     ],
 )
 def test_what_cannot_be_generated(make: Any, place: str) -> None:
