@@ -50,44 +50,44 @@ def encode_tasks(
     if len(weights.member):
         attend_to_members(game, slot, task, shortfall, weights, token)
         attend_to_neighbours(game, weights, token)
-    hidden = np.empty(2 * width, dtype=np.float32)
+    mix_and_normalise(weights, token)
     out = np.empty(width, dtype=np.float32)
     pooled = np.zeros(2 * width, dtype=np.float32)
     pooled[width:] = -np.inf
     for j in range(places):
-        mix_and_normalise(weights, token[j], hidden, out)
         for k in range(width):
             pooled[k] += token[j, k] / F(places)
             pooled[width + k] = max(pooled[width + k], token[j, k])
         linear(token[j], weights.key, out, False)
         for k in range(width):
             key[k, j] = out[k]
+    reserve = np.empty(1, dtype=np.float32)
     linear(pooled, weights.reserve1, out, True)
-    linear(out, weights.reserve2, hidden[:1], False)
-    reserve: float = hidden[0]
-    return reserve
+    linear(out, weights.reserve2, reserve, False)
+    score: float = reserve[0]
+    return score
 
 
 @compiled_loosely
-def mix_and_normalise(weights: Weights, token: Floats, hidden: Floats, out: Floats) -> None:
-    """Apply the residual network and the layer normalisation to `token`, shape (width,), in place.
-
-    `hidden`, shape (2 * width,), and `out`, shape (width,), are room for layers.
-    """
-    width = len(token)
-    linear(token, weights.mix1, hidden, True)
-    linear(hidden, weights.mix2, out, False)
-    mean = F(0)
-    for k in range(width):
-        token[k] += out[k]
-        mean += token[k]
-    mean /= F(width)
-    spread = F(0)
-    for k in range(width):
-        spread += (token[k] - mean) ** 2
-    factor = F(1) / np.sqrt(spread / F(width) + F(1e-5))
-    for k in range(width):
-        token[k] = (token[k] - mean) * factor
+def mix_and_normalise(weights: Weights, token: Floats) -> None:
+    """Apply the residual network and the layer normalisation to each place, shape (m + 1, width), in place."""
+    places, width = token.shape
+    hidden = np.empty(2 * width, dtype=np.float32)
+    out = np.empty(width, dtype=np.float32)
+    for j in range(places):
+        linear(token[j], weights.mix1, hidden, True)
+        linear(hidden, weights.mix2, out, False)
+        mean = F(0)
+        for k in range(width):
+            token[j, k] += out[k]
+            mean += token[j, k]
+        mean /= F(width)
+        spread = F(0)
+        for k in range(width):
+            spread += (token[j, k] - mean) ** 2
+        factor = F(1) / np.sqrt(spread / F(width) + F(1e-5))
+        for k in range(width):
+            token[j, k] = (token[j, k] - mean) * factor
 
 
 @compiled_loosely

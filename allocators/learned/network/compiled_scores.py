@@ -1,4 +1,4 @@
-"""The local part of the scores of `ActorCritic` in compiled loops: an agent's features, and a small network on them.
+"""The local part of the scores of `ActorCritic` in compiled loops: features of pairs, and a small network on them.
 
 The features are those of `problems.game.observation.pair_features` in single precision; tests compare the two.
 """
@@ -16,7 +16,7 @@ from alloc.problems.game.features import IDLE_SURPLUS, LOG_NEED_OFFSET, PAIR_FEA
 
 
 class PairBuffers(NamedTuple):
-    """Room for the features of a pair and for the hidden layers."""
+    """Room for the features of an agent's candidates, shape (c, PAIR_FEATURES), and for the hidden layers."""
 
     features: Floats
     hidden1: Floats
@@ -24,10 +24,10 @@ class PairBuffers(NamedTuple):
 
 
 @compiled_loosely
-def pair_buffers(weights: Weights) -> PairBuffers:
+def pair_buffers(game: GameArrays, weights: Weights) -> PairBuffers:
     """Return room for `score_agent`."""
     return PairBuffers(
-        np.empty(PAIR_FEATURES, dtype=np.float32),
+        np.empty((game.legal.shape[1], PAIR_FEATURES), dtype=np.float32),
         np.empty(weights.local2.shape[0] - 1, dtype=np.float32),
         np.empty(weights.local3.shape[0] - 1, dtype=np.float32),
     )
@@ -52,79 +52,76 @@ def score_agent(
     wanted : ndarray of bool, shape (c,)
     out : ndarray, shape (c,)
     """
-    x = buffers.features
-    eased = fill_own_features(game, shortfall, agent, own, x)
-    per_ability = F(1) / max(game.ability[agent], F(SMALLEST))
+    fill_pair_features(game, shortfall, agent, own, wanted, buffers.features)
+    fill_local_scores(weights, buffers.features, wanted, buffers.hidden1, buffers.hidden2, out)
+
+
+@inlined
+def fill_pair_features(game: GameArrays, shortfall: Floats, agent: int, own: int, wanted: Flags, x: Floats) -> None:
+    """Fill the features of the wanted candidates of an agent that is at `own`, shape (c, PAIR_FEATURES)."""
+    candidates, contributions, distances = game.candidates[agent], game.contribution[agent], game.distance[agent]
+    here, given, energy_weight = candidates[own], contributions[own], F(game.energy_weight)
+    per_given, per_own_need = F(1) / max(given, F(SMALLEST)), F(1) / max(game.need[here], F(SMALLEST))
+    own_shortfall, own_after = shortfall[here], shortfall[here] + given
+    own_increase = positive(own_shortfall) - positive(own_after)
+    ability = game.ability[agent]
+    per_ability = F(1) / max(ability, F(SMALLEST))
     for k in range(len(wanted)):
-        if wanted[k]:
-            fill_candidate_features(game, shortfall, agent, own, k, eased, per_ability, x)
-            out[k] = local_score(weights, x, buffers.hidden1, buffers.hidden2)
+        if not wanted[k]:
+            continue
+        there, brought, distance = candidates[k], contributions[k], distances[k]
+        per_brought, per_need = F(1) / max(brought, F(SMALLEST)), F(1) / max(game.need[there], F(SMALLEST))
+        its_shortfall, after = shortfall[there], shortfall[there] - brought
+        extra = distance - distances[own]
+        gain = positive(its_shortfall) - positive(after) + own_increase
+        x[k, PairFeature.SHORTFALL_PER_CONTRIBUTION] = clip(its_shortfall * per_brought * F(1 / SHORTFALL_DIVISOR))
+        x[k, PairFeature.SHORTFALL_AFTER_PER_CONTRIBUTION] = clip_to_one(after * per_brought)
+        x[k, PairFeature.OWN_SHORTFALL_PER_CONTRIBUTION] = clip(own_shortfall * per_given * F(1 / SHORTFALL_DIVISOR))
+        x[k, PairFeature.OWN_SHORTFALL_AFTER_PER_CONTRIBUTION] = clip_to_one(own_after * per_given)
+        x[k, PairFeature.SHORTFALL_PER_NEED] = clip(its_shortfall * per_need)
+        x[k, PairFeature.SHORTFALL_AFTER_PER_NEED] = clip(after * per_need)
+        x[k, PairFeature.OWN_SHORTFALL_PER_NEED] = clip(own_shortfall * per_own_need)
+        x[k, PairFeature.OWN_SHORTFALL_AFTER_PER_NEED] = clip(own_after * per_own_need)
+        x[k, PairFeature.EXTRA_DISTANCE] = clip(extra)
+        x[k, PairFeature.DISTANCE] = clip(distance)
+        x[k, PairFeature.EXTRA_ENERGY_COST] = clip(energy_weight * extra)
+        x[k, PairFeature.ENERGY_WEIGHT] = clip(energy_weight - F(1))
+        x[k, PairFeature.LOG_NEED] = clip(game.log_need[there] - F(LOG_NEED_OFFSET))
+        x[k, PairFeature.OWN_LOG_NEED] = clip(game.log_need[here] - F(LOG_NEED_OFFSET))
+        x[k, PairFeature.ABILITY] = clip(ability - F(1))
+        x[k, PairFeature.GAIN_PER_CONTRIBUTION] = clip(gain * per_brought)
+        x[k, PairFeature.GAIN] = clip(gain)
+        x[k, PairFeature.IS_IDLE_PLACE] = F(1) if its_shortfall < F(-IDLE_SURPLUS / 2) else F(0)
+        x[k, PairFeature.OWN_SUPPLY_RATIO] = clip(game.supply_ratio[here])
+        x[k, PairFeature.SUPPLY_RATIO] = clip(game.supply_ratio[there])
+        x[k, PairFeature.REACHABLE_SHARE] = clip(game.reachable_share[agent])
+        x[k, PairFeature.CONTRIBUTION_PER_ABILITY] = clip(brought * per_ability - F(1))
 
 
 @inlined
-def fill_own_features(game: GameArrays, shortfall: Floats, agent: int, own: int, x: Floats) -> float:
-    """Fill the features that do not depend on the candidate; return by how much shortfall rises where it leaves."""
-    here, contribution = game.candidates[agent, own], game.contribution[agent, own]
-    own_shortfall, energy_weight = shortfall[here], F(game.energy_weight)
-    own_after = own_shortfall + contribution
-    per_contribution, per_need = F(1) / max(contribution, F(SMALLEST)), F(1) / max(game.need[here], F(SMALLEST))
-    x[PairFeature.OWN_SHORTFALL_PER_CONTRIBUTION] = clip(own_shortfall * per_contribution * F(1 / SHORTFALL_DIVISOR))
-    x[PairFeature.OWN_SHORTFALL_AFTER_PER_CONTRIBUTION] = clip_to_one(own_after * per_contribution)
-    x[PairFeature.OWN_SHORTFALL_PER_NEED] = clip(own_shortfall * per_need)
-    x[PairFeature.OWN_SHORTFALL_AFTER_PER_NEED] = clip(own_after * per_need)
-    x[PairFeature.ENERGY_WEIGHT] = clip(energy_weight - F(1))
-    x[PairFeature.OWN_LOG_NEED] = clip(game.log_need[here] - F(LOG_NEED_OFFSET))
-    x[PairFeature.ABILITY] = clip(game.ability[agent] - F(1))
-    x[PairFeature.OWN_SUPPLY_RATIO] = clip(game.supply_ratio[here])
-    x[PairFeature.REACHABLE_SHARE] = clip(game.reachable_share[agent])
-    return positive(own_shortfall) - positive(own_after)
-
-
-@inlined
-def fill_candidate_features(
-    game: GameArrays, shortfall: Floats, agent: int, own: int, k: int, eased: float, per_ability: float, x: Floats
+def fill_local_scores(
+    weights: Weights, x: Floats, wanted: Flags, hidden1: Floats, hidden2: Floats, out: Floats
 ) -> None:
-    """Fill the features of an agent and its candidate `k`, besides those of `fill_own_features`."""
-    there, contribution, distance = game.candidates[agent, k], game.contribution[agent, k], game.distance[agent, k]
-    its_shortfall = shortfall[there]
-    after = its_shortfall - contribution
-    per_contribution, per_need = F(1) / max(contribution, F(SMALLEST)), F(1) / max(game.need[there], F(SMALLEST))
-    extra = distance - game.distance[agent, own]
-    gain = positive(its_shortfall) - positive(after) + eased
-    x[PairFeature.SHORTFALL_PER_CONTRIBUTION] = clip(its_shortfall * per_contribution * F(1 / SHORTFALL_DIVISOR))
-    x[PairFeature.SHORTFALL_AFTER_PER_CONTRIBUTION] = clip_to_one(after * per_contribution)
-    x[PairFeature.SHORTFALL_PER_NEED] = clip(its_shortfall * per_need)
-    x[PairFeature.SHORTFALL_AFTER_PER_NEED] = clip(after * per_need)
-    x[PairFeature.EXTRA_DISTANCE] = clip(extra)
-    x[PairFeature.DISTANCE] = clip(distance)
-    x[PairFeature.EXTRA_ENERGY_COST] = clip(F(game.energy_weight) * extra)
-    x[PairFeature.LOG_NEED] = clip(game.log_need[there] - F(LOG_NEED_OFFSET))
-    x[PairFeature.GAIN_PER_CONTRIBUTION] = clip(gain * per_contribution)
-    x[PairFeature.GAIN] = clip(gain)
-    x[PairFeature.IS_IDLE_PLACE] = F(1) if its_shortfall < F(-IDLE_SURPLUS / 2) else F(0)
-    x[PairFeature.SUPPLY_RATIO] = clip(game.supply_ratio[there])
-    x[PairFeature.CONTRIBUTION_PER_ABILITY] = clip(contribution * per_ability - F(1))
-
-
-@inlined
-def local_score(weights: Weights, x: Floats, hidden1: Floats, hidden2: Floats) -> float:
-    """Return the local score of a pair by its features (`ActorCritic.pairs`)."""
+    """Fill the local scores of the wanted candidates by their features (`ActorCritic.pairs`), shape (c,)."""
     first, second, third = weights.local1, weights.local2, weights.local3
     width = len(hidden1)
-    for h in range(width):
-        hidden1[h] = first[PAIR_FEATURES, h]
-    for j in range(PAIR_FEATURES):
-        factor = x[j]
+    for k in range(len(wanted)):
+        if not wanted[k]:
+            continue
         for h in range(width):
-            hidden1[h] += factor * first[j, h]
-    for h in range(width):
-        hidden2[h] = second[width, h]
-    for j in range(width):
-        factor = hidden1[j]
-        if factor > 0:
+            hidden1[h] = first[PAIR_FEATURES, h]
+        for j in range(PAIR_FEATURES):
+            factor = x[k, j]
             for h in range(width):
-                hidden2[h] += factor * second[j, h]
-    total: float = third[width, 0]
-    for h in range(width):
-        total += positive(hidden2[h]) * third[h, 0]
-    return total
+                hidden1[h] += factor * first[j, h]
+        for h in range(width):
+            hidden2[h] = second[width, h]
+        for j in range(width):
+            factor = hidden1[j]
+            if factor > 0:
+                for h in range(width):
+                    hidden2[h] += factor * second[j, h]
+        total = third[width, 0]
+        for h in range(width):
+            total += positive(hidden2[h]) * third[h, 0]
+        out[k] = total

@@ -68,7 +68,7 @@ def new_game(game: GameArrays, best: Ints, figures: NDArray[np.float64], random:
 @compiled_loosely
 def reset_game(game: GameArrays, weights: Weights, state: GameState, total: bool) -> None:
     """Score all pairs, and rate the first position; `slot`, `random` and `visited` are filled already."""
-    buffers = pair_buffers(weights)
+    buffers = pair_buffers(game, weights)
     shortfall = update_groups(game, state)
     for agent in range(len(game.legal)):
         score_agent(game, weights, shortfall, agent, state.slot[agent], game.legal[agent], buffers, state.local[agent])
@@ -84,7 +84,7 @@ def play_rounds(
     """Go on with a game for some rounds, unless it ends before."""
     n, c = game.legal.shape
     places, width = len(game.need), weights.key.shape[1]
-    buffers = pair_buffers(weights)
+    buffers = pair_buffers(game, weights)
     token = np.empty((places, width), dtype=np.float32)
     key = np.empty((width, places), dtype=np.float32)
     bids = np.empty((n, c), dtype=np.float32)
@@ -154,10 +154,13 @@ def score_changes(
         if has_moved:
             state.visited[agent, before[agent]] = True
         concerned = has_moved or changed[game.candidates[agent, own]]
+        count = 0
         for k in range(c):
             touched = concerned or changed[game.candidates[agent, k]]
             wanted[k] = touched and game.legal[agent, k] and not state.visited[agent, k]
-        score_agent(game, weights, shortfall, agent, own, wanted, buffers, state.local[agent])
+            count += wanted[k]
+        if count:
+            score_agent(game, weights, shortfall, agent, own, wanted, buffers, state.local[agent])
 
 
 @compiled_loosely

@@ -59,7 +59,7 @@ def test_targets_of_states() -> None:
     torch.nn.init.constant_(learner.targets["critic"].local[-1].bias, 6.0)
     board = probe("right_task").board[torch.arange(1)]  # two bids are open: the other task, and being idle
     state = reset(board)
-    none = State(**{**vars(state), "left": torch.ones_like(state.left)})
+    none = State(**{**vars(state), "visited": torch.ones_like(state.visited)})
     assert learner.td_targets(board, state, torch.ones(1), PLANNING).item() == pytest.approx(1 + 0.5 * 2 / 3 * 6)
     assert learner.td_targets(board, none, torch.ones(1), PLANNING).item() == 1.0
 

@@ -44,7 +44,7 @@ def test_targets_of_states(bid: float, reserve: float, following: float) -> None
     without_heads(learner, bid, reserve)
     board = probe("right_task").board[torch.arange(2)]
     state = reset(board)
-    none = State(**{**vars(state), "left": torch.ones_like(state.left)})
+    none = State(**{**vars(state), "visited": torch.ones_like(state.visited)})
     reward = torch.tensor([1.0, 2.0])
     assert learner.td_targets(board, state, reward, PLANNING).tolist() == [1 + 0.5 * following, 2 + 0.5 * following]
     assert learner.td_targets(board, none, reward, PLANNING).tolist() == [1.0, 2.0]
