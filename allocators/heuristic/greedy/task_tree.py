@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from alloc.allocators.runtime.compiled import compiled
+from alloc.allocators.runtime.compiled import compiled, inlined
 
 LEAF_SIZE = 8
 """Most tasks in a leaf."""
@@ -104,17 +104,18 @@ def is_worse(one: int, other: int, coverage: Floats, rank: Indices) -> bool:
 
 
 @compiled
-def update_node(node: int, tree: Tree, coverage: Floats, rank: Indices) -> None:
+def update_node(
+    node: int, begin: Indices, end: Indices, order: Indices, worst: Indices, coverage: Floats, rank: Indices
+) -> None:
     """Set the worst-served task of `node`, whose children are up to date."""
-    begin, worst = tree.begin, tree.worst
     if 2 * node + 2 < len(begin):
         left, right = worst[2 * node + 1], worst[2 * node + 2]
         worst[node] = left if is_worse(left, right, coverage, rank) else right
         return
-    best = tree.order[begin[node]]
-    for entry in range(begin[node] + 1, tree.end[node]):
-        if is_worse(tree.order[entry], best, coverage, rank):
-            best = tree.order[entry]
+    best = order[begin[node]]
+    for entry in range(begin[node] + 1, end[node]):
+        if is_worse(order[entry], best, coverage, rank):
+            best = order[entry]
     worst[node] = best
 
 
@@ -122,14 +123,15 @@ def update_node(node: int, tree: Tree, coverage: Floats, rank: Indices) -> None:
 def update_all(tree: Tree, tasks: Tasks) -> None:
     """Set the worst-served task of every node."""
     for node in range(len(tree.begin) - 1, -1, -1):
-        update_node(node, tree, tasks.coverage, tasks.rank)
+        update_node(node, tree.begin, tree.end, tree.order, tree.worst, tasks.coverage, tasks.rank)
 
 
-@compiled
+@inlined
 def update_path(task: int, tree: Tree, tasks: Tasks) -> None:
     """Update the nodes that contain `task`, from its leaf to the root."""
+    begin, end, order, worst, coverage, rank = tree.begin, tree.end, tree.order, tree.worst, tasks.coverage, tasks.rank
     node = tree.leaf[task]
-    update_node(node, tree, tasks.coverage, tasks.rank)
+    update_node(node, begin, end, order, worst, coverage, rank)
     while node > 0:
         node = (node - 1) // 2
-        update_node(node, tree, tasks.coverage, tasks.rank)
+        update_node(node, begin, end, order, worst, coverage, rank)

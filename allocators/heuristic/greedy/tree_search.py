@@ -18,7 +18,7 @@ from alloc.allocators.heuristic.greedy.task_tree import (
     update_all,
     update_path,
 )
-from alloc.allocators.runtime.compiled import compiled
+from alloc.allocators.runtime.compiled import compiled, inlined
 from alloc.problems import Instance
 from alloc.problems.distances.reach import TOLERANCE
 
@@ -128,10 +128,12 @@ def _assign(chosen: Indices, tree: Tree, tasks: Tasks, agents: Agents) -> None:
         update_path(best, tree, tasks)
 
 
-@compiled
+@inlined
 def _worst_of_list(agent: int, tasks: Tasks, agents: Agents) -> tuple[int, float]:
     """Return the worst-served task within reach on the agent's list, and its distance; -1 if there is none."""
     origin = agents.origin[agent]
+    longest, battery, horizon = agents.longest_distance[origin], agents.battery[origin], agents.horizon[agent]
+    rate = agents.energy_per_distance
     number = agents.list_of[origin]
     best, best_distance = -1, 0.0
     for entry in range(agents.list_begin[number], agents.list_begin[number + 1]):
@@ -139,56 +141,56 @@ def _worst_of_list(agent: int, tasks: Tasks, agents: Agents) -> tuple[int, float
         if tasks.workload[j] <= 0 or (best >= 0 and not is_worse(j, best, tasks.coverage, tasks.rank)):
             continue
         distance = _distance(agents.position[origin], tasks.position[j], agents.unit)
-        if _is_reachable(agent, origin, distance, agents):
+        if _is_reachable(distance, longest, battery, rate, horizon):
             best, best_distance = j, distance
     return best, best_distance
 
 
-@compiled
+@inlined
 def _worst_in_tree(agent: int, tree: Tree, tasks: Tasks, agents: Agents, stack: Indices) -> tuple[int, float]:
     """Return the worst-served task within reach, and its distance; -1 if there is none."""
+    begin, end, low, high, order, worst = tree.begin, tree.end, tree.low, tree.high, tree.order, tree.worst
+    positions, coverage, rank, unit = tasks.position, tasks.coverage, tasks.rank, agents.unit
     origin = agents.origin[agent]
+    longest, battery, horizon = agents.longest_distance[origin], agents.battery[origin], agents.horizon[agent]
+    rate = agents.energy_per_distance
     position = agents.position[origin]
     is_unknown = np.isnan(position[0])
-    limit = min(agents.radius[origin], agents.horizon[agent]) / agents.unit
+    limit = min(agents.radius[origin], horizon) / unit
     best, best_distance = -1, 0.0
     size, stack[0] = 1, 0
     while size > 0:
         size -= 1
         node = stack[size]
-        j = tree.worst[node]
-        if best >= 0 and not is_worse(j, best, tasks.coverage, tasks.rank):
+        j = worst[node]
+        if best >= 0 and not is_worse(j, best, coverage, rank):
             continue
-        if not is_unknown and _is_beyond(position, tree.low[node], tree.high[node], limit):
+        if not is_unknown and _is_beyond(position, low[node], high[node], limit):
             continue
-        distance = _distance(position, tasks.position[j], agents.unit)
-        if _is_reachable(agent, origin, distance, agents):
+        distance = _distance(position, positions[j], unit)
+        if _is_reachable(distance, longest, battery, rate, horizon):
             best, best_distance = j, distance
-        elif 2 * node + 2 < len(tree.begin):
+        elif 2 * node + 2 < len(begin):
             left, right = 2 * node + 1, 2 * node + 2
-            if is_worse(tree.worst[left], tree.worst[right], tasks.coverage, tasks.rank):
+            if is_worse(worst[left], worst[right], coverage, rank):
                 left, right = right, left
             stack[size], stack[size + 1] = left, right  # the worse-served is visited first
             size += 2
         else:
-            for entry in range(tree.begin[node], tree.end[node]):
-                j = tree.order[entry]
-                if best >= 0 and not is_worse(j, best, tasks.coverage, tasks.rank):
+            for entry in range(begin[node], end[node]):
+                j = order[entry]
+                if best >= 0 and not is_worse(j, best, coverage, rank):
                     continue
-                distance = _distance(position, tasks.position[j], agents.unit)
-                if _is_reachable(agent, origin, distance, agents):
+                distance = _distance(position, positions[j], unit)
+                if _is_reachable(distance, longest, battery, rate, horizon):
                     best, best_distance = j, distance
     return best, best_distance
 
 
 @compiled
-def _is_reachable(agent: int, origin: int, distance: float, agents: Agents) -> bool:
+def _is_reachable(distance: float, longest: float, battery: float, energy_per_distance: float, horizon: float) -> bool:
     """Whether a task at that distance is within range, battery and horizon of an agent."""
-    return bool(
-        distance <= agents.longest_distance[origin]
-        and agents.energy_per_distance * distance <= agents.battery[origin]
-        and distance < agents.horizon[agent]
-    )
+    return bool(distance <= longest and energy_per_distance * distance <= battery and distance < horizon)
 
 
 @compiled
