@@ -12,7 +12,8 @@ from alloc.problems.bounds import makespan_lower_bound
 from alloc.problems.errors import InputError
 from alloc.problems.evaluation import evaluate
 from alloc.problems.game import Board, State, battery_left, current_tasks, make_board
-from alloc.problems.instance import IDLE, Instance
+from alloc.problems.instance import Instance
+from alloc.problems.vocabulary import IDLE
 
 Source = Sequence[Instance] | Callable[[np.random.Generator], Instance]
 """Instances to draw from, or what makes one with a generator; all of the same numbers of agents and tasks."""

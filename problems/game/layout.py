@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from alloc.problems.distances.metric import distance_table
 from alloc.problems.game.board import SMALLEST, Board
 from alloc.problems.game.candidates import candidate_tasks
-from alloc.problems.instance import IDLE, Instance
+from alloc.problems.instance import Instance
+from alloc.problems.vocabulary import IDLE
 
 MEAN_DISTANCE = 0.66
 """Distances are scaled to this mean, that of two points in the unit cube."""

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from alloc.problems.distances.metric import distances
 from alloc.problems.game.board import Board
 from alloc.problems.game.layout import MEAN_DISTANCE, SHORTEST_HOURS, UnscaledGames
-from alloc.problems.instance import IDLE, Instance
+from alloc.problems.instance import Instance
+from alloc.problems.vocabulary import IDLE
 
 Ints = NDArray[np.int64]
 
