@@ -10,7 +10,7 @@ from alloc.allocators.runtime.compiled import compiled_loosely, inlined
 from alloc.problems.game.features import FEATURE_LIMIT
 
 Floats = NDArray[np.float32]
-Ints = NDArray[np.int64]
+Ints = NDArray[np.int32]
 Flags = NDArray[np.bool_]
 
 F = cast(Callable[[float], float], np.float32)  # to mypy, as to the loops, its numbers are floats like others

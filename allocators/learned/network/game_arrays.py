@@ -1,4 +1,4 @@
-"""Boards of torch as arrays of the compiled loops, without a copy."""
+"""Boards of torch as arrays of the compiled loops, without a copy but for the candidates."""
 
 from typing import NamedTuple
 
@@ -35,6 +35,8 @@ class GameArrays(NamedTuple):
 
 def game_arrays(board: Board) -> list[GameArrays]:
     """Return the games of a board in main memory."""
-    columns = [np.ascontiguousarray(getattr(board, name).numpy()) for name in GameArrays._fields[:-1]]
+    fields = {name: getattr(board, name).numpy() for name in GameArrays._fields[:-1]}
+    fields["candidates"] = fields["candidates"].astype(np.int32)  # loops over 64-bit numbers take a fifth longer
+    columns = [np.ascontiguousarray(array) for array in fields.values()]
     weights = board.energy_weight.tolist()
     return [GameArrays._make([*(array[row] for array in columns), weights[row]]) for row in range(len(weights))]

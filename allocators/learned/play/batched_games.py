@@ -101,7 +101,7 @@ def _play_compiled(
     weights, boards = weights_of(network), game_arrays(board)
     count, (_, n, c) = len(games.row), board.shape
     random = np.random.default_rng(seed).integers(1, 2**63, (count, 1), dtype=np.uint64)
-    best = games.start.copy()
+    best = games.start.astype(np.int32)
     figures = np.full((count, 3), np.inf)
     at_once = max(1, SLICE // (n * c + board.places**2 // PLACES))
     for number, row in enumerate(games.row.tolist()):
@@ -114,7 +114,7 @@ def _play_compiled(
             play_rounds(game, weights, state, min(at_once, rounds - done), temperature, total)
             if not state.running[0] or should_stop():
                 break
-    return Best(*(torch.from_numpy(part) for part in (best, *figures.T.copy())))
+    return Best(*(torch.from_numpy(part) for part in (best.astype(np.int64), *figures.T.copy())))
 
 
 def warm_up(network: ActorCritic) -> None:

@@ -110,7 +110,7 @@ def grant_bids(
     idle = len(changed) - 1
     used[:] = False
     changed[:] = False
-    best = np.empty(n, dtype=np.int64)
+    best = np.empty(n, dtype=np.int32)
     for agent in range(n):
         best[agent] = np.argmax(bids[agent])
     granted = 0

@@ -88,7 +88,7 @@ def play_rounds(
     token = np.empty((places, width), dtype=np.float32)
     key = np.empty((width, places), dtype=np.float32)
     bids = np.empty((n, c), dtype=np.float32)
-    task = np.empty(n, dtype=np.int64)
+    task = np.empty(n, dtype=np.int32)
     used = np.empty(n + places, dtype=np.bool_)
     changed = np.empty(places, dtype=np.bool_)
     noisy = temperature > 0
