@@ -105,9 +105,12 @@ def is_worse(one: int, other: int, coverage: Floats, rank: Indices) -> bool:
 
 @compiled
 def update_node(
-    node: int, begin: Indices, end: Indices, order: Indices, worst: Indices, coverage: Floats, rank: Indices
+    node: int, begin: Indices, end: Indices, order: Indices, coverage: Floats, rank: Indices, worst: Indices
 ) -> None:
-    """Set the worst-served task of `node`, whose children are up to date."""
+    """Set the worst-served task of `node`, whose children are up to date.
+
+    With `worst` earlier among the arguments, the search takes twice the time: the compiler then sees less.
+    """
     if 2 * node + 2 < len(begin):
         left, right = worst[2 * node + 1], worst[2 * node + 2]
         worst[node] = left if is_worse(left, right, coverage, rank) else right
@@ -123,7 +126,7 @@ def update_node(
 def update_all(tree: Tree, tasks: Tasks) -> None:
     """Set the worst-served task of every node."""
     for node in range(len(tree.begin) - 1, -1, -1):
-        update_node(node, tree.begin, tree.end, tree.order, tree.worst, tasks.coverage, tasks.rank)
+        update_node(node, tree.begin, tree.end, tree.order, tasks.coverage, tasks.rank, tree.worst)
 
 
 @inlined
@@ -131,7 +134,7 @@ def update_path(task: int, tree: Tree, tasks: Tasks) -> None:
     """Update the nodes that contain `task`, from its leaf to the root."""
     begin, end, order, worst, coverage, rank = tree.begin, tree.end, tree.order, tree.worst, tasks.coverage, tasks.rank
     node = tree.leaf[task]
-    update_node(node, begin, end, order, worst, coverage, rank)
+    update_node(node, begin, end, order, coverage, rank, worst)
     while node > 0:
         node = (node - 1) // 2
-        update_node(node, begin, end, order, worst, coverage, rank)
+        update_node(node, begin, end, order, coverage, rank, worst)
