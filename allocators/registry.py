@@ -3,6 +3,7 @@
 import importlib
 from importlib.metadata import EntryPoint, entry_points
 from inspect import signature
+from typing import cast
 
 from alloc.allocators.contract.base import Allocator
 from alloc.allocators.contract.built_in import BUILT_IN
@@ -95,7 +96,7 @@ def load(name: str, parameters: object = None, **settings: object) -> Allocator:
     if "policy" in given and "policy" in method.options:
         from alloc.allocators.learned.files.policy_header import read_header
 
-        read_header(text(given["policy"], "policy"))  # a wrong file is an error before the seconds that torch takes
+        read_header(cast("str", given["policy"]))  # a wrong file is an error before the seconds that torch takes
     with ended_with_process(lambda: None):  # the import of a large library cannot be interrupted
         kind = _class(name)
         for key in given:

@@ -32,7 +32,7 @@ CONTEXTS: dict[str, Callable[[], AbstractContextManager[object]]] = {
 
 
 @pytest.fixture
-def lessons(monkeypatch: pytest.MonkeyPatch) -> list[FineTuning]:
+def runs(monkeypatch: pytest.MonkeyPatch) -> list[FineTuning]:
     """Have `gappo` learn on after 0.1 s; what learned is in the list."""
     made: list[FineTuning] = []
 
@@ -58,16 +58,16 @@ def test_the_callers_torch_changes_no_answer(method: str, context: str) -> None:
 
 
 @pytest.mark.parametrize("context", CONTEXTS)
-def test_learning_on_works_in_the_callers_torch(context: str, lessons: list[FineTuning]) -> None:
+def test_learning_on_works_in_the_callers_torch(context: str, runs: list[FineTuning]) -> None:
     """Gradients are had, and in full precision, though the caller wants none."""
     with CONTEXTS[context]():
         result = solve(paper_like(24, 6, 100, 0), "gappo", objective="makespan-energy", time_limit_s=1.5)
     assert result.notes == ()
-    assert lessons[0].lessons > 0
+    assert runs[0].jobs > 0
 
 
 def test_a_failure_in_learning_on_costs_no_plan(
-    lessons: list[FineTuning], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+    runs: list[FineTuning], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     """The run goes on to its end with the policy as shipped, a note says what happened, and the log where."""
 
