@@ -14,8 +14,8 @@ from alloc.allocators.learned.algorithms.hyperparameters import DqnParameters
 from alloc.allocators.learned.files.policy_file import load_policy
 from alloc.allocators.learned.network.actor_critic import ActorCritic
 from alloc.allocators.learned.play.batched_games import warm_up as play_once
+from alloc.allocators.learned.play.limits import too_large
 from alloc.allocators.learned.search.fine_tuning import FineTuning
-from alloc.allocators.learned.search.limits import too_large
 from alloc.allocators.learned.search.planner import Planner, PlannerParameters
 from alloc.allocators.runtime.torch_state import plain_torch, torch_threads
 from alloc.problems import Allocation, InputError, Instance, Objective

@@ -24,9 +24,10 @@ from torch import Tensor, nn
 
 from alloc.allocators.learned.algorithms.dqn import gradient_steps, td_target
 from alloc.allocators.learned.algorithms.hyperparameters import DdpgParameters
-from alloc.allocators.learned.algorithms.learner import StateDict, TrainingJob, TrainingStats
+from alloc.allocators.learned.algorithms.learner import TrainingJob, TrainingStats
 from alloc.allocators.learned.algorithms.schedules import exponential, linear, set_learning_rate
 from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize, initialised
+from alloc.allocators.learned.network.state_dict import StateDict
 from alloc.allocators.learned.play.transitions import TransitionMemory, next_state, play, scores_above_reserve
 from alloc.problems.game import Board, Rules, State
 

@@ -17,7 +17,7 @@ import torch
 from deap import base, tools
 
 from alloc.allocators.learned.algorithms.hyperparameters import BreedingParameters
-from alloc.allocators.learned.algorithms.learner import StateDict
+from alloc.allocators.learned.network.state_dict import StateDict
 
 LEARNING_RATE_FACTORS = (0.8, 1.25)
 """Factors by which a mutation changes the learning rate."""

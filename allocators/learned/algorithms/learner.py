@@ -1,15 +1,13 @@
 """The protocol of learners: what trains one policy, and can be stored and restored anywhere."""
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from alloc.allocators.learned.network.actor_critic import ActorCritic
+from alloc.allocators.learned.network.state_dict import StateDict
 from alloc.problems.game import PLANNING, Board, Rules
-
-StateDict = dict[str, Any]
-"""State of a learner by name: tensors, numbers, strings, and lists and dictionaries of these, as torch's own."""
 
 
 class GameSource(Protocol):

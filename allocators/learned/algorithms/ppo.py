@@ -14,10 +14,11 @@ import torch
 from torch import Tensor, nn
 
 from alloc.allocators.learned.algorithms.hyperparameters import PpoParameters
-from alloc.allocators.learned.algorithms.learner import StateDict, TrainingJob, TrainingStats
+from alloc.allocators.learned.algorithms.learner import TrainingJob, TrainingStats
 from alloc.allocators.learned.algorithms.replay import ReplayBuffer
 from alloc.allocators.learned.algorithms.schedules import linear, set_learning_rate
 from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize, initialised
+from alloc.allocators.learned.network.state_dict import StateDict
 from alloc.allocators.learned.play.action_sampling import log_probabilities
 from alloc.allocators.learned.play.trajectories import Trajectories, advantages, collect
 from alloc.problems.game import Board, Rules, State

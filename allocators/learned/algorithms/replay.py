@@ -4,7 +4,7 @@ from dataclasses import fields
 
 import torch
 
-from alloc.allocators.learned.algorithms.learner import StateDict
+from alloc.allocators.learned.network.state_dict import StateDict
 from alloc.allocators.learned.play.stored_games import from_stored, to_stored
 from alloc.allocators.learned.play.trajectories import Trajectories
 from alloc.problems.game import Board, State

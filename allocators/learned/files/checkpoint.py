@@ -8,7 +8,7 @@ from typing import BinaryIO
 
 import torch
 
-from alloc.allocators.learned.algorithms.learner import StateDict
+from alloc.allocators.learned.network.state_dict import StateDict
 from alloc.problems import InputError
 from alloc.problems.formats import write_bytes_atomically
 from alloc.problems.formats.files import reason

@@ -9,7 +9,7 @@ from pathlib import Path
 import torch
 from safetensors.torch import load, save
 
-from alloc.allocators.learned.algorithms.registry import METHODS
+from alloc.allocators.contract.built_in import BUILT_IN
 from alloc.allocators.learned.files.policy_header import read_header
 from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize, uninitialised
 from alloc.problems import InputError
@@ -90,7 +90,7 @@ def load_policy(path: Path | str, method: str | None, device: torch.device | Non
     except (KeyError, TypeError, ValueError) as error:
         raise InputError("does not describe its networks; use a file by `alloc train`", "metadata", source) from error
     theirs = metadata.get("method", "")
-    if method not in (None, theirs) and theirs in METHODS:
+    if method not in (None, theirs) and theirs in BUILT_IN:
         raise InputError(f"holds a policy of {theirs}; use it with the method {theirs}", "", source)
     expected = _metadata(size, count, theirs if method is None else method)
     for key in ("format", "method", "features", "feature_counts"):

@@ -12,8 +12,8 @@ from alloc.allocators.learned.network.actor_critic import ActorCritic
 from alloc.allocators.learned.network.game_arrays import game_arrays
 from alloc.allocators.learned.network.weights import weights_of
 from alloc.allocators.learned.play.compiled_game import new_game, play_rounds, reset_game
+from alloc.allocators.learned.play.limits import PLACES
 from alloc.allocators.learned.play.rollout import Best, play
-from alloc.allocators.learned.search.limits import PLACES
 from alloc.problems import Instance
 from alloc.problems.game import Board, make_board
 

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from alloc.allocators.contract.search import Search
 from alloc.allocators.learned.network.actor_critic import ActorCritic
 from alloc.allocators.learned.play.batched_games import Games, play_games
+from alloc.allocators.learned.play.limits import NEAR
 from alloc.allocators.learned.play.rollout import Best, position
 from alloc.allocators.learned.search.fine_tuning import FineTuning
-from alloc.allocators.learned.search.limits import NEAR
 from alloc.allocators.learned.search.regions import partition, reach_graph
 from alloc.allocators.learned.search.target_makespan import TargetMakespan
 from alloc.allocators.parallel.pool import Pool

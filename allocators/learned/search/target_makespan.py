@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from alloc.allocators.contract.search import Search
-from alloc.allocators.learned.training.curriculum import reference_makespan
+from alloc.allocators.learned.play.reference import reference_makespan
 from alloc.problems import IDLE, Instance, Objective
 from alloc.problems.game.layout import SHORTEST_HOURS, working_share
 

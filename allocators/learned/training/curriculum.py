@@ -9,8 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from alloc.allocators.learned.play.reference import reference_makespan
 from alloc.allocators.learned.training.families import draw_instance
-from alloc.problems import Instance, lp_makespan_lower_bound, makespan_lower_bound
+from alloc.problems import Instance
 from alloc.problems.game import Board, make_board
 
 TRAINING_SEED = 10**9
@@ -104,14 +105,6 @@ class Curriculum:
         """Return the number of games of this size on a board."""
         least = self.games[0] if n * (m + 1) <= self.max_pairs else 1
         return int(np.clip(self.max_pairs // (n * (m + 1)), least, self.games[1]))
-
-
-def reference_makespan(instance: Instance, lp_time_limit_s: float = 1.0) -> float:
-    """Return T_ref, the best lower bound on the makespan that is cheap to compute, in hours."""
-    bound = makespan_lower_bound(instance)
-    if not instance.reach.is_complete:
-        bound = max(bound, lp_makespan_lower_bound(instance, lp_time_limit_s) or 0.0)
-    return bound
 
 
 def with_reference(instances: Sequence[Instance]) -> list[TrainingInstance]:

@@ -6,8 +6,9 @@ from typing import NamedTuple
 
 import torch
 
-from alloc.allocators.learned.algorithms.learner import StateDict, TrainingJob, TrainingStats
+from alloc.allocators.learned.algorithms.learner import TrainingJob, TrainingStats
 from alloc.allocators.learned.algorithms.registry import new_learner
+from alloc.allocators.learned.network.state_dict import StateDict
 from alloc.allocators.learned.training.parameters import TrainingParameters
 from alloc.allocators.learned.training.validation import Validation, validate
 from alloc.allocators.runtime.torch_state import plain_torch, torch_threads

@@ -11,9 +11,9 @@ from deap import tools
 
 from alloc.allocators.learned.algorithms.gappo import _Genome, _with_generator, breed, fitness
 from alloc.allocators.learned.algorithms.hyperparameters import BreedingParameters, PpoParameters
-from alloc.allocators.learned.algorithms.learner import StateDict
 from alloc.allocators.learned.algorithms.ppo import Ppo
 from alloc.allocators.learned.network.actor_critic import NetworkSize
+from alloc.allocators.learned.network.state_dict import StateDict
 
 SMALL = NetworkSize(pair_width=4, task_width=4, heads=1)
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import torch
 
-from alloc.allocators.learned.training.curriculum import Curriculum, reference_makespan, with_reference
+from alloc.allocators.learned.play.reference import reference_makespan
+from alloc.allocators.learned.training.curriculum import Curriculum, with_reference
 from alloc.allocators.learned.training.families import FAMILIES, RECIPES, draw_instance
 from alloc.problems import makespan_lower_bound
 from alloc.problems.game import Board

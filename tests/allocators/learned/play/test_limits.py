@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from alloc.allocators import Budget
-from alloc.allocators.learned.search.limits import LARGEST, MOST_TASKS, NEAR, PAIRS_PER_SECOND, too_large
+from alloc.allocators.learned.play.limits import LARGEST, MOST_TASKS, NEAR, PAIRS_PER_SECOND, too_large
 from alloc.problems import Instance
 
 
