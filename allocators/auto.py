@@ -1,9 +1,9 @@
 """The method that `auto` picks for an instance, and why.
 
-The thresholds were measured on two cores. For the makespan, exact methods are worth trying as long as the solver's
-model can be built at all, at 60,000 pairs a second. For the energy, they prove a gap of about 1 % up to some 1,000
-pairs for each second, and match the local search up to 5,000, with a far better bound. Beyond, the local search finds
-better allocations in the same time.
+The thresholds were measured on two cores. For the makespan, exact methods pay off as long as the solver's model
+can be built at all, at 60,000 pairs a second. For the energy, they prove a gap of about 1 % up to some 1,000 pairs for
+each second, and match the local search up to 5,000, with a far better bound. Beyond, the local search finds better
+allocations in the same time.
 """
 
 from alloc.allocators.contract.budget import Budget

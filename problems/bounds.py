@@ -162,17 +162,17 @@ def lp_makespan_lower_bound(instance: Instance, time_limit_s: float = 10.0) -> f
         share = classes.ability[kind] * scale / work[task]
     if not np.isfinite(share).all():
         return None
-    cover, limit = _rows(task, -share, instance.m), _rows(kind, np.ones(len(kind)), classes.size)
+    need, limit = _rows(task, -share, instance.m), _rows(kind, np.ones(len(kind)), classes.size)
     ratio = csr_matrix(np.where(work > 0, 1.0, 0.0)[:, None])  # the last variable is scale / T, to be maximised
-    constraints = vstack([hstack([cover, ratio]), hstack([limit, csr_matrix((classes.size, 1))])])
+    constraints = vstack([hstack([need, ratio]), hstack([limit, csr_matrix((classes.size, 1))])])
     cost = np.append(np.zeros(len(kind)), -1.0)
     price = _multipliers(cost, constraints, np.append(np.zeros(instance.m), classes.count), time_limit_s)
     if price is None:
         return None
     # scale / T sum_j price_j <= sum_jk price_j share_kj x_kj <= sum_k count_k max_j price_j share_kj
     price = price[: instance.m] * (work > 0)
-    worth = float(classes.count @ _largest(kind, price[task] * share, classes.size))
-    return scale * float(price.sum()) / worth * (1 - ROUNDING) if worth > 0 else None
+    value = float(classes.count @ _largest(kind, price[task] * share, classes.size))
+    return scale * float(price.sum()) / value * (1 - ROUNDING) if value > 0 else None
 
 
 def energy_lower_bound(instance: Instance, makespan: float, time_limit_s: float = 10.0) -> float | None:

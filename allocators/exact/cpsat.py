@@ -2,7 +2,7 @@
 
 import sys
 from collections.abc import Callable, Iterable, Iterator
-from itertools import chain, islice
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,12 +87,8 @@ def formulate(model: SolverModel, stopped: Callable[[], bool] = lambda: False) -
     """
     demand, program = model.demand, cp_model.CpModel()
     x: list[cp_model.IntVar] = []
-    steps = chain(
-        _add_variables(program, x, demand),
-        _add_work(program, x, demand),
-        _add_agents(program, x, demand),
-    )
-    if any(stopped() for _ in steps):
+    parts = (_add_variables(program, x, demand), _add_work(program, x, demand), _add_agents(program, x, demand))
+    if any(stopped() for steps in parts for _ in steps):
         return None
     for variable, agents in zip(x, [] if model.hint is None else model.hint.tolist(), strict=False):
         program.add_hint(variable, agents)

@@ -1,7 +1,6 @@
 """Instances as plain objects, as JSON holds them (alloc-instance/1)."""
 
 from collections.abc import Callable, Sequence
-from itertools import chain
 from typing import Any, TypeVar
 
 import numpy as np
@@ -219,7 +218,7 @@ def _text_lists(rows: list[Row], kind: str, field: str) -> list[list[str] | None
     rule = "a list of task ids, or null"
     column = _column(rows, kind, field, {list, type(None)}, lambda value: isinstance(value, list | tuple | None), rule)
     given = [entry for entry in column if entry is not None]
-    if not set(map(type, chain.from_iterable(given))) <= {str}:
+    if not {type(name) for names in given for name in names} <= {str}:
         for index, entry in enumerate(column):
             for position, name in enumerate(entry or ()):
                 if not isinstance(name, str):
@@ -238,7 +237,7 @@ def _positions(rows: list[Row], kind: str) -> FloatArray | None:
     if not given:
         return None
     entries = [column[index] for index in given]
-    if not set(map(len, entries)) <= {2, 3} or not set(map(type, chain.from_iterable(entries))) <= {float, int}:
+    if not set(map(len, entries)) <= {2, 3} or not {type(x) for entry in entries for x in entry} <= {float, int}:
         for index in given:
             _check_position(column[index], f"{kind}[{index}].position")
     if set(map(len, entries)) != {3}:

@@ -12,7 +12,7 @@ SCARCE_SHARE = 4
 """One in so many candidates of each agent is kept for tasks that few agents have near."""
 
 AMPLE = 3.0
-"""Supply over need from the nearest agents up to which a task is added to their candidates."""
+"""Ability over need from the nearest agents up to which a task is added to their candidates."""
 
 CHUNK = 2_000_000
 """Pairs of agent and task handled at once, to bound the memory."""
@@ -97,15 +97,16 @@ def _add_scarce(instance: Instance, chosen: Ints, own: int) -> None:
     """Put tasks that too little ability has near in the last columns of the agents nearest to them."""
     n, m = instance.n, instance.m
     kept = chosen[:, :own]
-    supply = np.bincount(kept[kept >= 0], np.repeat(instance.ability[:, None], own, axis=1)[kept >= 0], minlength=m)
+    ability = np.repeat(instance.ability[:, None], own, axis=1)[kept >= 0]
+    near_ability = np.bincount(kept[kept >= 0], ability, minlength=m)
     fair = instance.workload / max(instance.workload.sum(), 1e-300) * instance.ability.sum()
     used = np.full(n, own)
-    for task in np.flatnonzero(supply < AMPLE * fair).tolist():
+    for task in np.flatnonzero(near_ability < AMPLE * fair).tolist():
         able = instance.reach.agents_of(task)
         able = able[(used[able] < chosen.shape[1]) & ~(chosen[able, :own] == task).any(axis=1)]
         order = np.argsort(instance.reach.distance_of(able, np.full(len(able), task)), kind="stable")
         able = able[order]
-        enough = np.searchsorted(np.cumsum(instance.ability[able]), AMPLE * fair[task] - supply[task]) + 1
+        enough = np.searchsorted(np.cumsum(instance.ability[able]), AMPLE * fair[task] - near_ability[task]) + 1
         chosen[able[:enough], used[able[:enough]]] = task
         used[able[:enough]] += 1
     spare = np.arange(chosen.shape[1])[None] >= used[:, None]

@@ -97,11 +97,11 @@ def bottleneck(
     bound = float(np.minimum.reduceat(pairs.hours, pairs.first[:-1]).max())  # each takes its fastest
     low, high = bound, min(latest, float(pairs.hours.max()))
     while time_left() > len(pairs.task) / MATCHED_PER_SECOND:
-        in_question = pairs.hours[(pairs.hours >= low) & (pairs.hours <= high)]
-        if not len(in_question):
+        in_range = pairs.hours[(pairs.hours >= low) & (pairs.hours <= high)]
+        if not len(in_range):
             break
-        half = (len(in_question) - 1) // 2
-        middle = float(np.partition(in_question, half)[half])
+        half = (len(in_range) - 1) // 2
+        middle = float(np.partition(in_range, half)[half])
         within = pairs.within(middle)
         found = matcher(within, best)
         if found is None:

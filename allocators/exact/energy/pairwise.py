@@ -11,7 +11,7 @@ energy, none markedly less; on scenarios 2 to 4 either came out ahead, by 1.1 % 
 
 References
 ----------
-Ahuja, Ergun, Orlin and Punnen (2002), A survey of very large-scale neighborhood search techniques,
+Ahuja, Ergun, Orlin and Punnen (2002), on very large-scale neighbourhood search,
 doi:10.1016/S0166-218X(01)00338-9. Charon and Hudry (1993), The noising method, doi:10.1016/0167-6377(93)90023-A.
 """
 

@@ -62,13 +62,13 @@ def run_rounds(rounds: int, demand: FloatArray, market: Market, increment: float
     Bertsekas (1992), doi:10.1007/BF00247653; there each bidder wants one object.
     """
     n, m = len(market.price), len(demand)
-    supply = np.zeros(m)
+    group_ability = np.zeros(m)
     for i in range(n):
         if market.owner[i] >= 0:
-            supply[market.owner[i]] += market.ability[i]
+            group_ability[market.owner[i]] += market.ability[i]
     offer, bidder = np.zeros(n), np.full(n, -1)
     for _ in range(rounds):
-        if not collect_bids(demand, supply, offer, bidder, market, increment):
+        if not collect_bids(demand, group_ability, offer, bidder, market, increment):
             return True
         market.counts[ROUNDS] += 1
         for i in range(n):
@@ -76,15 +76,15 @@ def run_rounds(rounds: int, demand: FloatArray, market: Market, increment: float
             if j < 0:
                 continue
             if market.owner[i] >= 0:
-                supply[market.owner[i]] -= market.ability[i]
-            supply[j] += market.ability[i]
+                group_ability[market.owner[i]] -= market.ability[i]
+            group_ability[j] += market.ability[i]
             market.owner[i], market.price[i] = j, offer[i]
             market.counts[MESSAGES] += m  # the price is announced to all tasks
             market.counts[SALES] += 1
         for i in range(n):
             j = market.owner[i]
-            if j >= 0 and supply[j] - market.ability[i] >= demand[j] * (1 - TOLERANCE):
-                supply[j] -= market.ability[i]
+            if j >= 0 and group_ability[j] - market.ability[i] >= demand[j] * (1 - TOLERANCE):
+                group_ability[j] -= market.ability[i]
                 market.owner[i], market.price[i] = -1, 0.0
                 market.counts[MESSAGES] += m
     return False
@@ -92,15 +92,15 @@ def run_rounds(rounds: int, demand: FloatArray, market: Market, increment: float
 
 @compiled
 def collect_bids(
-    demand: FloatArray, supply: FloatArray, offer: FloatArray, bidder: IntArray, market: Market, increment: float
+    demand: FloatArray, group_ability: FloatArray, offer: FloatArray, bidder: IntArray, market: Market, increment: float
 ) -> bool:
     """Write the highest bid for each agent and its bidder (-1: none); return whether any task has a shortfall."""
     any_short = False
     bidder[:] = -1
     for j in range(len(demand)):
-        if supply[j] < demand[j] * (1 - TOLERANCE):
+        if group_ability[j] < demand[j] * (1 - TOLERANCE):
             any_short = True
-            i, amount = choose_agent(j, demand[j] - supply[j], market, increment)
+            i, amount = choose_agent(j, demand[j] - group_ability[j], market, increment)
             if i >= 0:
                 market.counts[MESSAGES] += 1
                 if bidder[i] < 0 or amount > offer[i]:

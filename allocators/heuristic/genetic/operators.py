@@ -30,7 +30,7 @@ def cross_groups(one: Genes, other: Genes, share: FloatArray, rng: np.random.Gen
 
     References
     ----------
-    Falkenauer (1994), doi:10.1162/evco.1994.2.2.123: groups, not single genes, are worth inheriting. Here tasks are
+    Falkenauer (1994), doi:10.1162/evco.1994.2.2.123: groups should be inherited, not single genes. Here tasks are
     distinguishable, unlike the bins there, so that no group has to be dissolved and filled anew.
     """
     rows, width = len(one), int(max(one.max(), other.max())) + 1

@@ -77,7 +77,7 @@ def anneal(
             agent = draw(plan.random, agents)
             other = plan.group_of_agent[agent]
             task = draw_candidate(plan.random, tasks, candidates.of_origin[candidates.row[arrays.origin[agent]]])
-            surplus = other < tasks and plan.supply[other] > plan.demand[other]
+            surplus = other < tasks and plan.group_ability[other] > plan.demand[other]
             if other < tasks and (task == other or (surplus and draw(plan.random, 4) == 0)):
                 if surplus or plan.size[tasks] > 0:
                     task, other = other, tasks

@@ -95,7 +95,7 @@ class AnnealingState:
         return noise
 
     def recompute(self) -> None:
-        """Compute supplies and distance from scratch, which removes accumulated rounding errors."""
+        """Compute group abilities and distance from scratch, which removes accumulated rounding errors."""
         recompute(self.arrays, self.plan, self.makespan)
 
     @property
@@ -123,7 +123,7 @@ class AnnealingState:
         """Makespan of the current plan in hours, where travel takes no time."""
         work = self.plan.demand[:-1] > 0
         with np.errstate(divide="ignore"):
-            longest = (self.instance.workload[work] / self.plan.supply[:-1][work]).max()
+            longest = (self.instance.workload[work] / self.plan.group_ability[:-1][work]).max()
         return float(longest / self.arrays.ability_unit)
 
     def _set_groups(self, group: Int32Array) -> None:

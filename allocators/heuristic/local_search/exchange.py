@@ -106,7 +106,8 @@ def exchange(
             if agent >= 0 and plan.group_of_agent[agent] == group:
                 first = plan.position[agent]
             pool = add_to_pool(arrays, plan, work, weights, makespan, group, first, task, other, most, pool)
-    missing, other_missing = plan.demand[task] - plan.supply[task], plan.demand[other] - plan.supply[other]
+    missing = plan.demand[task] - plan.group_ability[task]
+    other_missing = plan.demand[other] - plan.group_ability[other]
     total, members = 0.0, 0
     for index in range(pool):
         total += work.ability[index]

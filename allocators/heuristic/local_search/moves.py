@@ -1,4 +1,4 @@
-"""Moves of agents between groups, and what follows from them: supplies, shortfalls, the best plan so far; compiled."""
+"""Moves of agents between groups, and the group abilities, shortfalls and best plan that follow; compiled."""
 
 import numpy as np
 
@@ -10,19 +10,19 @@ from alloc.allocators.runtime.compiled import compiled, inlined
 
 @compiled
 def recompute(arrays: InstanceArrays, plan: Plan, makespan: float) -> None:
-    """Compute supplies, distance and shortfalls of the plan from scratch."""
+    """Compute group abilities, distance and shortfalls of the plan from scratch."""
     idle = plan.demand.shape[0] - 1
-    group_of_agent, supply, origin = plan.group_of_agent, plan.supply, arrays.origin
+    group_of_agent, group_ability, origin = plan.group_of_agent, plan.group_ability, arrays.origin
     ability, hours_per_distance, table = arrays.ability, arrays.hours_per_distance, arrays.distance
     for task in range(idle + 1):
-        supply[task] = 0.0
+        group_ability[task] = 0.0
     total = 0.0
     for agent in range(group_of_agent.shape[0]):
         task = group_of_agent[agent]
         if task != idle:
             row = origin[agent]
             distance = table[row, task] if table.shape[0] > 0 else untabulated_distance(arrays, row, task)
-            supply[task] += effective_ability(ability[agent], hours_per_distance[agent], makespan, distance)
+            group_ability[task] += effective_ability(ability[agent], hours_per_distance[agent], makespan, distance)
             total += distance
     plan.distance[CURRENT] = total
     plan.counter[N_SHORT] = 0
@@ -34,7 +34,7 @@ def recompute(arrays: InstanceArrays, plan: Plan, makespan: float) -> None:
 @inlined
 def update_shortfall(plan: Plan, task: int) -> None:
     """Add a task to the list of those with a shortfall, or remove it."""
-    position, is_short = plan.short_position[task], plan.supply[task] < plan.demand[task]
+    position, is_short = plan.short_position[task], plan.group_ability[task] < plan.demand[task]
     if is_short and position < 0:
         plan.short_position[task] = plan.counter[N_SHORT]
         plan.short_task[plan.counter[N_SHORT]] = task
@@ -49,7 +49,7 @@ def update_shortfall(plan: Plan, task: int) -> None:
 
 @inlined
 def move(plan: Plan, agent: int, target: int) -> None:
-    """Move an agent to another group, without updating supplies."""
+    """Move an agent to another group, without updating group abilities."""
     source = plan.group_of_agent[agent]
     plan.size[source] -= 1
     last = plan.slot[plan.begin[source] + plan.size[source]]
@@ -79,8 +79,8 @@ def apply_subset(plan: Plan, work: Workspace, pool: int, subset: np.uint64, task
             plan.counter[FULL_GROUP] = 1
             continue
         move(plan, agent, target)
-        plan.supply[task] += sign * work.ability[index]
-        plan.supply[other] -= sign * work.other_ability[index]
+        plan.group_ability[task] += sign * work.ability[index]
+        plan.group_ability[other] -= sign * work.other_ability[index]
         plan.distance[CURRENT] += sign * work.distance[index]
     update_shortfall(plan, task)
     if other != idle:

@@ -45,10 +45,10 @@ class Plan(NamedTuple):
         Members of each group.
     position : ndarray of int, shape (n,)
         Index of each agent within its group.
-    demand, supply : ndarray, shape (m + 1,)
+    demand, group_ability : ndarray, shape (m + 1,)
         Ability that each task needs to be done within the target makespan, and that its group has.
     short_task, short_position : ndarray of int, shape (m,)
-        List of the tasks whose supply is below their demand, and the position of each task on it, -1 for none.
+        List of the tasks whose group ability is below their demand, and the position of each task on it, -1 for none.
     best_group, journal : ndarray of int, shape (n,)
         The best assignment so far, and the agents that have moved since it was saved.
     counter : ndarray of int, shape (3,)
@@ -65,7 +65,7 @@ class Plan(NamedTuple):
     size: Int32Array
     position: Int32Array
     demand: FloatArray
-    supply: FloatArray
+    group_ability: FloatArray
     short_task: Int32Array
     short_position: Int32Array
     best_group: Int32Array
@@ -157,7 +157,7 @@ def idle_plan(n: int, m: int, random: NDArray[np.uint64]) -> Plan:
         size=np.zeros(m + 1, dtype=int32),
         position=np.zeros(n, dtype=int32),
         demand=np.zeros(m + 1),
-        supply=np.zeros(m + 1),
+        group_ability=np.zeros(m + 1),
         short_task=np.zeros(m, dtype=int32),
         short_position=np.full(m, -1, dtype=int32),
         best_group=np.full(n, m, dtype=int32),

@@ -15,7 +15,7 @@ from alloc.problems import IDLE, Allocation, Instance, evaluate, serve_all
 @given(allocated())
 @pytest.mark.parametrize("limit", [0, 10_000])
 def test_incremental_updates_are_right(limit, drawn):
-    """After many exchanges, groups, supplies and the distance are what they are when computed from scratch."""
+    """After many exchanges, groups, group abilities and the distance are what they are when computed from scratch."""
     instance, start = drawn
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(candidates, "TABLE_LIMIT", limit)
@@ -28,9 +28,9 @@ def test_incremental_updates_are_right(limit, drawn):
         assert score.violations == ()
         plan = state.plan
         assert state.distance == pytest.approx(score.distance, abs=1e-9)
-        supply, n_short = plan.supply.copy(), state.n_short
+        group_ability, n_short = plan.group_ability.copy(), state.n_short
         state.recompute()
-        assert plan.supply == pytest.approx(supply, abs=1e-9)
+        assert plan.group_ability == pytest.approx(group_ability, abs=1e-9)
         assert state.n_short == n_short
         members = [plan.slot[plan.begin[j] : plan.begin[j] + plan.size[j]] for j in range(instance.m + 1)]
         assert sorted(np.concatenate(members).tolist()) == list(range(instance.n))
