@@ -98,14 +98,10 @@ def _front_from_document(document: dict[str, object], instance: Instance) -> tup
     points = document.get("points")
     if not isinstance(points, list):
         raise InputError(f"must be a list of points, got {described(points)}", "points")
-    found = []
+    name, found = document.get("instance"), []
     for number, point in enumerate(points):
         fields = json_text.require_object(point, f"points[{number}]")
-        inner = {
-            "format": ALLOCATION_FORMAT,
-            "instance": document.get("instance"),
-            "assignment": fields.get("assignment"),
-        }
+        inner = {"format": ALLOCATION_FORMAT, "instance": name, "assignment": fields.get("assignment")}
         try:
             found.append(allocation_from_document(inner, instance)[0])
         except InputError as error:
