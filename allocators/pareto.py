@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -45,7 +44,7 @@ class Front:
     points: tuple[Result, ...]
     complete: bool
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Return the fields of the format `alloc-pareto/1`, ready for JSON.
 
         Returns
@@ -60,7 +59,7 @@ class Front:
         }
 
 
-def _point(result: Result) -> dict[str, Any]:
+def _point(result: Result) -> dict[str, object]:
     names = (
         "method", "status", "stop_reason", "makespan", "lower_bound", "makespan_limit", "energy", "energy_lower_bound",
         "energy_gap", "unserved_tasks", "runtime_s", "assignment",

@@ -4,10 +4,10 @@ Values of other types that mean the same are taken: numpy's numbers, strings for
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Set
+from collections.abc import Iterable, Mapping, Set
 from enum import StrEnum
 from numbers import Integral, Real
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -71,21 +71,21 @@ def of_type(value: object, kind: type[Kind] | tuple[type[Kind], ...], name: str)
     raise InputError(f"must be {expected}, got {shown(value)}", name)
 
 
-def function(value: object, name: str) -> Callable[..., Any] | None:
+def function(value: Kind, name: str) -> Kind:
     """Return what can be called, or None."""
     if value is None or callable(value):
         return value
     raise InputError(f"must be a function, got {shown(value)}", name)
 
 
-def event(value: Any, name: str) -> Any:
+def event(value: Kind, name: str) -> Kind:
     """Return None, or what can be set and asked as a `threading.Event` can."""
     if value is None or all(callable(getattr(value, method, None)) for method in ("is_set", "set")):
         return value
     raise InputError(f"must be a threading.Event, got {shown(value)}", name)
 
 
-def listed(values: Iterable[Any], name: str, what: str) -> list[Any]:
+def listed(values: Iterable[Kind], name: str, what: str) -> list[Kind]:
     """Return the entries of a list, an array or a generator; `what` they should be.
 
     A string is one value, not its letters, and a set has no order.

@@ -4,7 +4,6 @@ from collections.abc import Iterable, Set
 from decimal import Decimal
 from itertools import pairwise
 from numbers import Real
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,7 +24,7 @@ MATRIX = "a matrix of who may do what, not lists of task indices; give those, as
 class ReadOnly:
     """Keeps the arrays of an object read-only through pickling and deep copies, which forget that they are."""
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
+    def __setstate__(self, state: dict[str, object]) -> None:
         for value in state.values():
             for array in value if isinstance(value, tuple) else (value,):
                 if isinstance(array, np.ndarray):
@@ -176,7 +175,7 @@ def allowed(lists: Iterable[Iterable[int] | None] | None, n: int, m: int) -> tup
     return tuple(result)
 
 
-def _unless_missing(entry: Any) -> Any:
+def _unless_missing(entry: Iterable[int] | None) -> Iterable[int] | None:
     """Return None for the NaN that pandas puts where there is no list."""
     return None if isinstance(entry, float) and np.isnan(entry) else entry
 
@@ -191,7 +190,7 @@ def _is_matrix(arrays: list[IntArray], n: int, m: int, *, always: bool) -> bool:
     return always or m > 2 or any(array[0] == array[1] for array in arrays)
 
 
-def _indices(entry: Any, row: int) -> IntArray:
+def _indices(entry: Iterable[int], row: int) -> IntArray:
     """Return one list of tasks; a set has no order, and needs none here."""
     place, message = f"agents[{row}].tasks", "must be a list of task indices, or None for all"
     if not isinstance(entry, np.ndarray | list | tuple):

@@ -4,7 +4,6 @@ from collections.abc import Iterable, Sequence, Set
 from dataclasses import dataclass, replace
 from functools import cached_property
 from numbers import Real
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -109,7 +108,7 @@ class Instance(fields.ReadOnly):
         n, m = len(w), len(h)
         if n == 0 or m == 0:
             raise InputError("an instance needs at least one agent and one task", "tasks" if n else "agents")
-        values: dict[str, Any] = {
+        values: dict[str, object] = {
             "ability": w,
             "workload": h,
             "name": text(name, "name"),

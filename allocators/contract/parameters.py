@@ -94,7 +94,7 @@ def _converted(
         return None
     kind = next(one for one in kinds if one is not types.NoneType)
     if get_origin(kind) is tuple:
-        entries = listed(value, name, "numbers")  # type: ignore[arg-type]
+        entries: list[object] = listed(value, name, "numbers")  # type: ignore[arg-type]
         if not entries:
             raise InputError("must not be empty", name)
         return tuple(_converted(entry, get_args(kind)[0], name, low, high, above, infinite) for entry in entries)

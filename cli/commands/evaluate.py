@@ -108,19 +108,21 @@ def _scored(problem: "Instance", allocation: "Allocation") -> "Result":
 
 def _is_of(result: "Result", claims: dict[str, object]) -> bool:
     """Return whether the fields `claims` of a result file fit `result`: the same agents and the same scores."""
-    found, assignment = result.to_dict(), claims.get("assignment")
+    found = result.to_dict()
+    claimed, assignment = claims.get("assignment"), found["assignment"]
     same = ("makespan", "energy", "distance", "battery_remaining_percent", "reward")
     return (
         claims.get("instance") == found["instance"]
+        and isinstance(claimed, dict)
         and isinstance(assignment, dict)
-        and assignment.keys() == found["assignment"].keys()
+        and claimed.keys() == assignment.keys()
         and all(_is_close(claims.get(name), found[name]) for name in same)
     )
 
 
-def _is_close(one: object, other: float | None) -> bool:
-    number = _number(one)
-    return one is other if number is None or other is None else math.isclose(number, other, rel_tol=1e-9)
+def _is_close(one: object, other: object) -> bool:
+    first, second = _number(one), _number(other)
+    return one is other if first is None or second is None else math.isclose(first, second, rel_tol=1e-9)
 
 
 def _number(value: object) -> float | None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import gymnasium
 import numpy as np
 import torch
@@ -91,15 +89,15 @@ class BiddingEnv(gymnasium.Env[NDArray[np.float32], np.int64]):
         self._steps = 0
 
     def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        self, *, seed: int | None = None, options: dict[str, object] | None = None
+    ) -> tuple[NDArray[np.float32], dict[str, object]]:
         """Begin a game on an instance drawn anew; with a seed, the same games follow."""
         super().reset(seed=seed)
         self._game = draw(self._source, self._sizes, self.energy_weight, self.np_random)
         self._state, self._steps = reset(self._game.board), 0
         return self._observation(), self._info(illegal=False, over=False)
 
-    def step(self, action: np.int64) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+    def step(self, action: np.int64) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, object]]:
         """Move an agent, or stop."""
         board, before, number = self._game.board, self._state, int(action)
         legal = bool(self.action_masks()[number])
@@ -123,7 +121,7 @@ class BiddingEnv(gymnasium.Env[NDArray[np.float32], np.int64]):
         figures: NDArray[np.float32] = torch.cat(regions).numpy()
         return figures
 
-    def _info(self, illegal: bool, over: bool) -> dict[str, Any]:
+    def _info(self, illegal: bool, over: bool) -> dict[str, object]:
         info: Info = {**episode_figures(self._game, self._state), "illegal": illegal}
         if over:
             info.update(plan_figures(self._game, self._state))

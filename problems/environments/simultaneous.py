@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import torch
 from gymnasium import spaces
@@ -15,7 +13,7 @@ from alloc.problems.environments.observation import AGENT_FIGURES, LIMIT, TASK_F
 from alloc.problems.errors import InputError
 from alloc.problems.game import PAPER, Rules, State, TurnRule, action_mask, difference_rewards, reset, step
 
-Observation = dict[str, NDArray[Any]]
+Observation = dict[str, NDArray[np.generic]]
 
 
 class SimultaneousEnv(ParallelEnv[str, Observation, int]):  # type: ignore[misc]
@@ -85,7 +83,7 @@ class SimultaneousEnv(ParallelEnv[str, Observation, int]):  # type: ignore[misc]
         return self._acts[agent]
 
     def reset(
-        self, seed: int | None = None, options: dict[str, Any] | None = None
+        self, seed: int | None = None, options: dict[str, object] | None = None
     ) -> tuple[dict[str, Observation], dict[str, Info]]:
         """Begin a game on an instance drawn anew; with a seed, the same games follow."""
         if seed is not None or self._rng is None:

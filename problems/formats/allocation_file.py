@@ -1,6 +1,6 @@
 """Allocations as files (alloc-allocation/1), and those inside results (alloc-result/1)."""
 
-from typing import Any
+from typing import cast
 
 from alloc.problems.allocation import Allocation
 from alloc.problems.arguments import of_type
@@ -46,7 +46,7 @@ def read_allocation(path: PathLike, instance: Instance) -> tuple[Allocation, str
     return allocation, warning
 
 
-def read_claims(path: PathLike, instance: Instance) -> tuple[Allocation, str | None, dict[str, Any]]:
+def read_claims(path: PathLike, instance: Instance) -> tuple[Allocation, str | None, dict[str, object]]:
     """Read an allocation as `read_allocation` does, and the other fields of the file where it is a result.
 
     Returns
@@ -59,7 +59,7 @@ def read_claims(path: PathLike, instance: Instance) -> tuple[Allocation, str | N
     source = named(path)
     of_type(instance, Instance, "instance")
     try:
-        document = json_text.parse(read_text(path))
+        document = json_text.require_object(json_text.parse(read_text(path)))
         allocation, name = allocation_from_document(document, instance)
     except InputError as error:
         raise told(error, source) from error.__cause__
@@ -94,7 +94,7 @@ def read_allocations(path: PathLike, instance: Instance) -> tuple[list[Allocatio
     return allocations, _other_instance(source, name, instance)
 
 
-def _front_from_document(document: dict[str, Any], instance: Instance) -> tuple[list[Allocation], str | None]:
+def _front_from_document(document: dict[str, object], instance: Instance) -> tuple[list[Allocation], str | None]:
     points = document.get("points")
     if not isinstance(points, list):
         raise InputError(f"must be a list of points, got {described(points)}", "points")
@@ -106,7 +106,7 @@ def _front_from_document(document: dict[str, Any], instance: Instance) -> tuple[
             found.append(allocation_from_document(inner, instance)[0])
         except InputError as error:
             raise InputError(error.message, f"points[{number}].{error.place}") from error
-    return found, name
+    return found, _instance_name(document)
 
 
 def _other_instance(source: str, name: str | None, instance: Instance) -> str | None:
@@ -139,13 +139,13 @@ def write_allocation(allocation: Allocation, instance: Instance, path: PathLike)
         raise told(error, source) from error.__cause__
 
 
-def allocation_to_document(allocation: Allocation, instance: Instance) -> dict[str, Any]:
+def allocation_to_document(allocation: Allocation, instance: Instance) -> dict[str, object]:
     """Return `allocation` as plain objects; every agent appears, idle ones with None."""
     check_names(instance, "instance")
     return {"format": ALLOCATION_FORMAT, "instance": instance.name, "assignment": allocation.to_ids(instance)}
 
 
-def allocation_from_document(document: Any, instance: Instance) -> tuple[Allocation, str | None]:
+def allocation_from_document(document: object, instance: Instance) -> tuple[Allocation, str | None]:
     """Return the allocation in plain objects, and the name of the instance that it was made for, if given.
 
     Raises
@@ -159,9 +159,7 @@ def allocation_from_document(document: Any, instance: Instance) -> tuple[Allocat
         require_known(fields, ALLOCATION_FIELDS, "")
     elif fields.get("status") == "no_solution":
         raise InputError("this result holds no allocation; give one with another status", "status")
-    name = fields.get("instance")
-    if not isinstance(name, str | None):
-        raise InputError(f"must be a string, got {described(name)}", "instance")
+    name = _instance_name(fields)
     if fields.get("assignment") is None:
         raise InputError("is missing; it must give the task of each agent", "assignment")
     assignment = json_text.require_object(fields["assignment"], "assignment")
@@ -169,4 +167,11 @@ def allocation_from_document(document: Any, instance: Instance) -> tuple[Allocat
         for agent, task in assignment.items():
             if not isinstance(task, str | None):
                 raise InputError(f"must be the id of a task, or null, got {described(task)}", f"assignment.{agent}")
-    return Allocation.from_ids(instance, assignment), name
+    return Allocation.from_ids(instance, cast("dict[str, str | None]", assignment)), name
+
+
+def _instance_name(document: dict[str, object]) -> str | None:
+    name = document.get("instance")
+    if not isinstance(name, str | None):
+        raise InputError(f"must be a string, got {described(name)}", "instance")
+    return name

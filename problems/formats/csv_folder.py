@@ -10,18 +10,21 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import compress
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from alloc.problems.errors import InputError
 from alloc.problems.formats import json_text
-from alloc.problems.formats.columns import Columns, require_format, unknown_field
+from alloc.problems.formats.columns import Columns, check_names, require_format, unknown_field
 from alloc.problems.formats.document import (
     HEADER_FIELDS,
+    HeaderValues,
+    Row,
+    agent_rows,
+    header_document,
     header_values,
     require_known,
-    to_document,
+    task_rows,
 )
 from alloc.problems.formats.files import read_text, reason, write_text_atomically
 from alloc.problems.formats.messages import quoted
@@ -125,12 +128,11 @@ def write_folder(instance: Instance, folder: Path) -> None:
     InputError
         If it cannot be written.
     """
-    document = to_document(instance)
-    agents, tasks = document.pop("agents"), document.pop("tasks")
+    check_names(instance)
     texts = {
-        "agents.csv": _table_text(agents, AGENT_COLUMNS),
-        "tasks.csv": _table_text(tasks, TASK_COLUMNS),
-        "instance.json": json_text.lines(document),
+        "agents.csv": _table_text(agent_rows(instance), AGENT_COLUMNS),
+        "tasks.csv": _table_text(task_rows(instance), TASK_COLUMNS),
+        "instance.json": json_text.lines(header_document(instance)),
     }
     if os.path.lexists(folder):
         for name, text in texts.items():
@@ -165,7 +167,7 @@ def split_ids(cell: str) -> list[str] | None:
     return [re.sub(r"\\(.)", r"\1", name, flags=re.DOTALL) for name in names]
 
 
-def _read_header(path: Path, default_name: str) -> dict[str, Any]:
+def _read_header(path: Path, default_name: str) -> HeaderValues:
     if not os.path.lexists(path):
         return header_values({}, default_name)
     try:
@@ -233,16 +235,17 @@ def _is_number(cell: str) -> bool:
         return False
 
 
-def _table_text(rows: list[dict[str, Any]], columns: Sequence[str]) -> str:
+def _table_text(rows: list[Row], columns: Sequence[str]) -> str:
     cells = (_cells([row.get(column) for row in rows]) for column in columns if column not in "xyz")
     by_name = dict(zip((column for column in columns if column not in "xyz"), cells, strict=True))
+    positions = [row["position"] for row in rows]
     for axis, column in enumerate("xyz"):
-        by_name[column] = _cells([None if row["position"] is None else row["position"][axis] for row in rows])
+        by_name[column] = _cells([place[axis] if isinstance(place, list) else None for place in positions])
     table = [by_name[column] for column in columns]
     return "\n".join([",".join(columns), *map(",".join, zip(*table, strict=True)), ""])
 
 
-def _cells(values: list[Any]) -> list[str]:
+def _cells(values: Sequence[object]) -> list[str]:
     """Return values as cells, quoted where they need it."""
     cells = ["" if value is None else _cell(value) for value in values]
     if re.search(r'[",\r\n]', "".join(cells)):
@@ -253,7 +256,7 @@ def _cells(values: list[Any]) -> list[str]:
     return cells
 
 
-def _cell(value: Any) -> str:
+def _cell(value: object) -> str:
     if isinstance(value, list):
         return join_ids(value)
     return value if isinstance(value, str) else repr(value)

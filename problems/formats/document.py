@@ -1,7 +1,7 @@
 """Instances as plain objects, as JSON holds them (alloc-instance/1)."""
 
 from collections.abc import Callable, Sequence
-from typing import Any, TypeVar
+from typing import TypedDict, TypeGuard, TypeVar, cast
 
 import numpy as np
 
@@ -23,14 +23,22 @@ from alloc.problems.formats.json_text import require_object
 from alloc.problems.formats.messages import described
 from alloc.problems.instance import FloatArray, Instance
 
-Row = dict[str, Any]
+Row = dict[str, object]
 Value = TypeVar("Value")
 
 HEADER_FIELDS = ("format", "name", "tau", "energy_per_distance")
 INSTANCE_FIELDS = (*HEADER_FIELDS, "agents", "tasks")
 
 
-def from_document(document: Any, *, default_name: str = DEFAULT_NAME) -> Instance:
+class HeaderValues(TypedDict):
+    """The fields of `Columns` that concern neither a single agent nor a single task."""
+
+    name: str
+    tau: float
+    energy_per_distance: float
+
+
+def from_document(document: object, *, default_name: str = DEFAULT_NAME) -> Instance:
     """Return the instance that a document of plain objects describes.
 
     Parameters
@@ -67,7 +75,7 @@ def from_document(document: Any, *, default_name: str = DEFAULT_NAME) -> Instanc
     ).build()
 
 
-def to_document(instance: Instance) -> dict[str, Any]:
+def to_document(instance: Instance) -> Row:
     """Return `instance` as plain objects, ready for `json.dump`; `from_document` is the inverse.
 
     Raises
@@ -76,6 +84,11 @@ def to_document(instance: Instance) -> dict[str, Any]:
         If an id holds what no file can keep.
     """
     check_names(instance)
+    return {**header_document(instance), "agents": agent_rows(instance), "tasks": task_rows(instance)}
+
+
+def agent_rows(instance: Instance) -> list[Row]:
+    """Return the agents of an instance as plain objects."""
     agents = zip(
         instance.agent_ids,
         plain_numbers(instance.ability),
@@ -87,6 +100,11 @@ def to_document(instance: Instance) -> dict[str, Any]:
         allowed_task_ids(instance),
         strict=True,
     )
+    return [dict(zip(AGENT_FIELDS, row, strict=True)) for row in agents]
+
+
+def task_rows(instance: Instance) -> list[Row]:
+    """Return the tasks of an instance as plain objects."""
     tasks = zip(
         instance.task_ids,
         plain_numbers(instance.workload),
@@ -94,29 +112,30 @@ def to_document(instance: Instance) -> dict[str, Any]:
         plain_numbers(instance.priority),
         strict=True,
     )
-    return {
-        **header_document(instance),
-        "agents": [dict(zip(AGENT_FIELDS, row, strict=True)) for row in agents],
-        "tasks": [dict(zip(TASK_FIELDS, row, strict=True)) for row in tasks],
-    }
+    return [dict(zip(TASK_FIELDS, row, strict=True)) for row in tasks]
 
 
-def header_document(instance: Instance) -> dict[str, Any]:
+def header_document(instance: Instance) -> Row:
     """Return what concerns neither a single agent nor a single task."""
     tau, energy = plain_numbers(np.array([instance.tau, instance.energy_per_distance]))
     return {"format": INSTANCE_FORMAT, "name": instance.name, "tau": tau, "energy_per_distance": energy}
 
 
-def header_values(header: Row, default_name: str) -> dict[str, Any]:
+def header_values(header: Row, default_name: str) -> HeaderValues:
     """Return name, tau and energy_per_distance, or what stands for them where they are absent."""
     name = header.get("name")
     if not isinstance(name, str | None):
         raise InputError(f"must be a string, got {described(name)}", "name")
-    values: dict[str, Any] = {"name": default_name if name is None else name}
-    for field, default in (("tau", DEFAULT_TAU), ("energy_per_distance", DEFAULT_ENERGY_PER_DISTANCE)):
-        value = float(_numbers([header], "", field)[0])
-        values[field] = default if np.isnan(value) else value
-    return values
+    return {
+        "name": default_name if name is None else name,
+        "tau": _number(header, "tau", DEFAULT_TAU),
+        "energy_per_distance": _number(header, "energy_per_distance", DEFAULT_ENERGY_PER_DISTANCE),
+    }
+
+
+def _number(header: Row, field: str, default: float) -> float:
+    value = float(_numbers([header], "", field)[0])
+    return default if np.isnan(value) else value
 
 
 def require_known(row: Row, known: Sequence[str], place: str) -> None:
@@ -162,15 +181,15 @@ def _rows(document: Row, kind: str, known: Sequence[str]) -> list[Row]:
 
 
 def _column(
-    rows: list[Row], kind: str, field: str, types: set[type], fits: Callable[[Any], bool], rule: str
-) -> list[Any]:
+    rows: list[Row], kind: str, field: str, types: set[type], fits: Callable[[object], TypeGuard[Value]], rule: str
+) -> list[Value]:
     """One field of all rows, None where absent; `types` settles at once what `fits` decides one by one."""
     column = [row.get(field) for row in rows]
     if not set(map(type, column)) <= types:
         for index, value in enumerate(column):
             if not fits(value):
                 raise InputError(f"must be {rule}, got {described(value)}", _place(kind, index, field))
-    return column
+    return cast("list[Value]", column)
 
 
 def _place(kind: str, index: int, field: str) -> str:
@@ -204,19 +223,16 @@ def _float(value: float | None) -> float:
 
 
 def _texts(rows: list[Row], kind: str, field: str) -> list[str]:
-    rule = "a non-empty string"
-    return _column(rows, kind, field, {str}, lambda value: isinstance(value, str), rule)
+    return _column(rows, kind, field, {str}, _is_text, "a non-empty string")
 
 
 def _nullable_texts(rows: list[Row], kind: str, field: str) -> list[str | None] | None:
-    rule = "the id of a task, or null"
-    column = _column(rows, kind, field, {str, type(None)}, lambda value: isinstance(value, str | None), rule)
+    column = _column(rows, kind, field, {str, type(None)}, _is_text_or_null, "the id of a task, or null")
     return _unless_all_null(column)
 
 
-def _text_lists(rows: list[Row], kind: str, field: str) -> list[list[str] | None] | None:
-    rule = "a list of task ids, or null"
-    column = _column(rows, kind, field, {list, type(None)}, lambda value: isinstance(value, list | tuple | None), rule)
+def _text_lists(rows: list[Row], kind: str, field: str) -> list[Sequence[str] | None] | None:
+    column = _column(rows, kind, field, {list, type(None)}, _is_list_or_null, "a list of task ids, or null")
     given = [entry for entry in column if entry is not None]
     if not {type(name) for names in given for name in names} <= {str}:
         for index, entry in enumerate(column):
@@ -225,28 +241,26 @@ def _text_lists(rows: list[Row], kind: str, field: str) -> list[list[str] | None
                     raise InputError(
                         f"must be the id of a task, got {described(name)}", f"{kind}[{index}].{field}[{position}]"
                     )
-    return _unless_all_null(column)
+    return _unless_all_null(cast("list[Sequence[str] | None]", column))
 
 
 def _positions(rows: list[Row], kind: str) -> FloatArray | None:
-    rule = "a list of 2 or 3 numbers, or null"
-    column = _column(
-        rows, kind, "position", {list, type(None)}, lambda value: isinstance(value, list | tuple | None), rule
-    )
+    column = _column(rows, kind, "position", {list, type(None)}, _is_list_or_null, "a list of 2 or 3 numbers, or null")
     given = [index for index, entry in enumerate(column) if entry is not None]
     if not given:
         return None
-    entries = [column[index] for index in given]
+    entries = [entry for entry in column if entry is not None]
     if not set(map(len, entries)) <= {2, 3} or not {type(x) for entry in entries for x in entry} <= {float, int}:
-        for index in given:
-            _check_position(column[index], f"{kind}[{index}].position")
-    if set(map(len, entries)) != {3}:
-        entries = [entry if len(entry) == 3 else [*entry, 0.0] for entry in entries]
+        for index, entry in zip(given, entries, strict=True):
+            _check_position(entry, f"{kind}[{index}].position")
+    places = cast("list[Sequence[float]]", entries)
+    if set(map(len, places)) != {3}:
+        places = [place if len(place) == 3 else [*place, 0.0] for place in places]
     positions = np.full((len(rows), 3), np.nan)
     try:
-        positions[given] = entries
+        positions[given] = places
     except OverflowError:
-        positions[given] = [[_float(value) for value in entry] for entry in entries]
+        positions[given] = [[_float(value) for value in place] for place in places]
     if not np.isfinite(positions[given]).all():
         row = given[int(np.argmin(np.isfinite(positions[given]).all(axis=1)))]
         wrong = next(value for value in positions[row].tolist() if not np.isfinite(value))
@@ -254,7 +268,7 @@ def _positions(rows: list[Row], kind: str) -> FloatArray | None:
     return positions
 
 
-def _check_position(entry: Sequence[Any], place: str) -> None:
+def _check_position(entry: Sequence[object], place: str) -> None:
     if len(entry) not in (2, 3):
         raise InputError(f"must have 2 or 3 coordinates, got {len(entry)}", place)
     for axis, value in enumerate(entry):
@@ -262,8 +276,20 @@ def _check_position(entry: Sequence[Any], place: str) -> None:
             raise InputError(f"must be a number, got {described(value)}", f"{place}[{axis}]")
 
 
-def _is_number_or_null(value: Any) -> bool:
+def _is_number_or_null(value: object) -> TypeGuard[float | int | None]:
     return value is None or (isinstance(value, float | int) and not isinstance(value, bool))
+
+
+def _is_text(value: object) -> TypeGuard[str]:
+    return isinstance(value, str)
+
+
+def _is_text_or_null(value: object) -> TypeGuard[str | None]:
+    return isinstance(value, str | None)
+
+
+def _is_list_or_null(value: object) -> TypeGuard[Sequence[object] | None]:
+    return isinstance(value, list | tuple | None)
 
 
 def _unless_all_null(column: list[Value | None]) -> list[Value | None] | None:

@@ -3,7 +3,6 @@
 import json
 from collections.abc import Iterable
 from json import JSONDecodeError
-from typing import Any
 
 from alloc.problems.errors import InputError
 from alloc.problems.formats.messages import described, quoted
@@ -11,13 +10,13 @@ from alloc.problems.formats.messages import described, quoted
 encode = json.JSONEncoder(ensure_ascii=False, allow_nan=False).encode
 
 
-class RepeatedKey(dict[str, Any]):
+class RepeatedKey(dict[str, object]):
     """An object in which a key occurs twice; found when the object's place is known."""
 
     repeated = ""
 
 
-def parse(text: str) -> Any:
+def parse(text: str) -> object:
     """Return the value of a JSON text; numbers are floats, and those out of range infinite.
 
     Raises
@@ -29,16 +28,17 @@ def parse(text: str) -> Any:
         raise InputError("is empty; expected a JSON object")
     try:
         # float takes whole numbers of any length, int does not
-        return json.loads(text, object_pairs_hook=_object, parse_int=float)
+        value: object = json.loads(text, object_pairs_hook=_object, parse_int=float)
     except JSONDecodeError as error:
         end = " (the file ends here; is it cut off?)" if not text[error.pos :].strip() else ""
         message = f"is not JSON: {error.msg[0].lower()}{error.msg[1:]}{end}"
         raise InputError(message, f"line {error.lineno} column {error.colno}") from error
     except RecursionError as error:
         raise InputError("is nested too deeply; the formats need no more than four levels") from error
+    return value
 
 
-def require_object(value: Any, place: str = "") -> dict[str, Any]:
+def require_object(value: object, place: str = "") -> dict[str, object]:
     """Return `value` if it is an object whose keys all differ.
 
     Raises
@@ -53,12 +53,12 @@ def require_object(value: Any, place: str = "") -> dict[str, Any]:
     return value
 
 
-def lines(document: dict[str, Any]) -> str:
+def lines(document: dict[str, object]) -> str:
     """Return a document as JSON text; its lists and objects take one line per entry."""
     return "{\n" + ",\n".join(f"{encode(key)}: {_block(value)}" for key, value in document.items()) + "\n}\n"
 
 
-def _block(value: Any) -> str:
+def _block(value: object) -> str:
     if isinstance(value, list) and value:
         return "[\n" + ",\n".join(_indented(map(encode, value))) + "\n]"
     if isinstance(value, dict) and value:
@@ -70,7 +70,7 @@ def _indented(entries: Iterable[str]) -> Iterable[str]:
     return (f"  {entry}" for entry in entries)
 
 
-def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+def _object(pairs: list[tuple[str, object]]) -> dict[str, object]:
     plain = dict(pairs)
     if len(plain) == len(pairs):
         return plain

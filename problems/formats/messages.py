@@ -1,14 +1,12 @@
 """Values, names and errors in words that fit on one line."""
 
-from typing import Any
-
 from alloc.problems.errors import InputError
 
 LONGEST_NAME = 40
 LONGEST_MESSAGE = 300
 
 
-def described(value: Any) -> str:
+def described(value: object) -> str:
     """Return what a JSON value is, in at most about 50 characters."""
     if value is None:
         return "null"

@@ -4,7 +4,6 @@ import io
 import math
 import zipfile
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from numpy.lib import format as npy
@@ -53,7 +52,7 @@ FIELDS: dict[str, tuple[str, str]] = {
 
 REQUIRED = ("format", "agent_id", "agent_ability", "task_id", "task_workload")
 
-Arrays = Mapping[str, NDArray[Any]]
+Arrays = Mapping[str, NDArray[np.generic]]
 
 
 def from_npz(data: bytes, default_name: str) -> Instance:
@@ -112,8 +111,8 @@ def to_npz(instance: Instance) -> bytes:
     return buffer.getvalue()
 
 
-def _arrays(instance: Instance) -> dict[str, NDArray[Any]]:
-    arrays: dict[str, NDArray[Any]] = {
+def _arrays(instance: Instance) -> dict[str, NDArray[np.generic]]:
+    arrays: dict[str, NDArray[np.generic]] = {
         "format": np.array(INSTANCE_FORMAT),
         "name": np.array(instance.name),
         "tau": np.array(instance.tau),
@@ -141,14 +140,14 @@ def _arrays(instance: Instance) -> dict[str, NDArray[Any]]:
     return arrays
 
 
-def _texts(texts: tuple[str, ...] | list[str]) -> NDArray[Any]:
+def _texts(texts: tuple[str, ...] | list[str]) -> NDArray[np.generic]:
     width = max(map(len, texts), default=1)
     if 4 * width * len(texts) > LARGEST:
         raise InputError(f"ids of up to {width} characters need too much room in .npz; use .json")
     return np.array(texts, dtype=f"U{max(1, width)}")
 
 
-def _load(data: bytes) -> dict[str, NDArray[Any]]:
+def _load(data: bytes) -> dict[str, NDArray[np.generic]]:
     if not data:
         raise InputError("is empty; expected an .npz file")
     try:
@@ -180,7 +179,7 @@ def _field(member: str) -> str:
     return member.removesuffix(".npy")
 
 
-def _read(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> NDArray[Any]:
+def _read(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> NDArray[np.generic]:
     """Read one array, after its header: what the header promises must be what the archive holds."""
     name = _field(member.filename)
     kind, shape = FIELDS[name]
@@ -190,7 +189,7 @@ def _read(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> NDArray[Any]:
             raise InputError("is cut off", f"array {name}")
     try:
         _check_promise(content, name)
-        array: NDArray[Any] = npy.read_array(io.BytesIO(content), allow_pickle=False)
+        array: NDArray[np.generic] = npy.read_array(io.BytesIO(content), allow_pickle=False)
     except (InputError, MemoryError):
         raise
     except Exception as error:  # numpy parses the header as Python text, and passes on what that raises

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from alloc.problems import Instance, read_allocation
+from alloc.problems.formats import read_allocations
 
 from .conftest import the_error
 
@@ -43,3 +44,10 @@ def test_allocations_that_break_a_rule(tmp_path: Path, document: Any, place: str
     error = the_error(tmp_path / "plan.json", lambda path: read_allocation(path, INSTANCE))
     assert place is None or error.place == place, str(error)
     assert words in error.message or document == {}
+
+
+def test_front_without_points_whose_instance_is_no_name(tmp_path: Path) -> None:
+    """The name of the instance of a front is checked even where no allocation is made for it."""
+    (tmp_path / "front.json").write_text('{"format": "alloc-pareto/1", "instance": 4, "points": []}')
+    error = the_error(tmp_path / "front.json", lambda path: read_allocations(path, INSTANCE))
+    assert (error.place, error.message) == ("instance", "must be a string, got 4")
