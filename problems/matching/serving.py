@@ -100,7 +100,17 @@ def needs_agent(instance: Instance) -> IntArray:
 
 
 def only_allowed(instance: Instance, allocation: Allocation) -> Allocation:
-    """Return `allocation` with the agents idle that are sent where they cannot go."""
+    """Return `allocation` with the agents idle that are sent where they cannot go.
+
+    Parameters
+    ----------
+    instance : Instance
+    allocation : Allocation
+
+    Returns
+    -------
+    Allocation
+    """
     task = require_fit(instance, allocation).copy()
     working = np.flatnonzero(task != IDLE)
     task[working[~instance.reach.allows(working, task[working])]] = IDLE
@@ -112,7 +122,18 @@ def serve_all(instance: Instance, allocation: Allocation, time_left: Clock = unl
 
     Agents sent where they cannot go are idle in the answer. A task that is served stays served. Agents change places
     along augmenting paths alone, each with the fewest moves, at whose end an idle agent is preferred, then the nearest.
-    Where `time_left`, in seconds, runs out, the tasks that are left may stay unserved.
+    Where `time_left` runs out, the tasks that are left may stay unserved.
+
+    Parameters
+    ----------
+    instance : Instance
+    allocation : Allocation
+    time_left : callable
+        Returns the seconds that are left; no limit by default.
+
+    Returns
+    -------
+    Allocation
     """
     task = only_allowed(instance, allocation).task_of_agent
     served = np.zeros(instance.m, dtype=bool)

@@ -98,6 +98,16 @@ def find_shortage(instance: Instance, time_left: Clock = unlimited) -> Shortage 
 
     Of the allocations with that makespan, one with little work is taken. Where `time_left` runs out, the makespan may
     be more, some task may be unserved that could be served, and None may be returned although some task cannot.
+
+    Parameters
+    ----------
+    instance : Instance
+    time_left : callable
+        Returns the seconds that are left; no limit by default.
+
+    Returns
+    -------
+    Shortage or None
     """
     part = competing_part(instance, time_left)
     if part is None:

@@ -42,7 +42,16 @@ class CompetingPart:
 
 
 def fewest_unserved(instance: Instance) -> int:
-    """Return how many tasks with workload no allocation can serve, at the least."""
+    """Return how many tasks with workload no allocation can serve, at the least.
+
+    Parameters
+    ----------
+    instance : Instance
+
+    Returns
+    -------
+    int
+    """
     tasks, reach = needs_agent(instance), instance.reach
     if reach.is_complete:
         return max(0, len(tasks) - instance.n)
@@ -207,6 +216,15 @@ def minimal_unservable_set(instance: Instance) -> IntArray | None:
 
     Such a set has one task more than agents that can take any of them; without any one of its tasks, the rest could
     be served (Hall 1935, doi:10.1112/jlms/s1-10.37.26).
+
+    Parameters
+    ----------
+    instance : Instance
+
+    Returns
+    -------
+    ndarray of int or None
+        Task indices.
     """
     tasks, reach = needs_agent(instance), instance.reach
     if reach.is_complete:
