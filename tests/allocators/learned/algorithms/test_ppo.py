@@ -282,11 +282,15 @@ def test_it_learns_a_probe_game(name: str) -> None:
     assert share_learned(Ppo(NetworkSize(16, 16, 2), PpoParameters(learning_rate=3e-3)), name) >= 0.95
 
 
+BEST_AT_ONCE = 0.75
+"""What the best play of `right_task` earns where all choose at once, measured: it is reached by every seed tried."""
+
+
 def test_it_learns_when_all_choose_at_once() -> None:
-    """Rewards rise under the other turn rule as well."""
+    """Rewards rise to nine tenths of the best there is under the other turn rule as well."""
     games, learner = probe("right_task"), Ppo(SMALL, PpoParameters(learning_rate=3e-3))
-    rewards = [learner.train_on(TrainingJob(seed, 150, games, rules=AT_ONCE)).reward for seed in range(16)]
-    assert sum(rewards[-4:]) > sum(rewards[:4])
+    rewards = [learner.train_on(TrainingJob(seed, 150, games, rules=AT_ONCE)).reward for seed in range(28)]
+    assert sum(rewards[-4:]) / 4 > 0.9 * BEST_AT_ONCE > sum(rewards[:4]) / 4
 
 
 def test_begins_are_not_shared() -> None:
