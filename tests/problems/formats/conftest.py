@@ -120,7 +120,7 @@ def instances(draw: st.DrawFn) -> Instance:
     def column(values: st.SearchStrategy[float], count: int) -> list[float]:
         return draw(st.lists(values, min_size=count, max_size=count))
 
-    subset = st.one_of(st.none(), st.lists(st.integers(0, m - 1), max_size=4))
+    subset = st.one_of(st.none(), st.lists(st.integers(0, m - 1), max_size=4, unique=True))
     return Instance(
         name=draw(st.one_of(st.just(""), IDS)),
         agent_ids=draw(st.lists(IDS, min_size=n, max_size=n, unique=True)),

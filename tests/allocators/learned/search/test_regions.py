@@ -57,7 +57,7 @@ def test_regions_are_of_near_tasks() -> None:
         assert sorted(map(sorted, regions.tolist())) == [[0, 1, 2, 3], [4, 5, 6, 7]]
 
 
-@pytest.mark.parametrize("scale", [1e-300, 1e300])
+@pytest.mark.parametrize("scale", [1e-300, 1e60])
 def test_every_position_is_valid(scale: float) -> None:
     """Unknown, huge and tiny positions make regions that share no task."""
     rng = np.random.default_rng(0)
