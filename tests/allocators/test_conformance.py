@@ -5,6 +5,7 @@ import sys
 from typing import ClassVar
 
 import pytest
+import torch
 
 from alloc.allocators import Budget, RefusedError, load
 from alloc.allocators.conformance import AllocatorConformance
@@ -57,6 +58,13 @@ class TestLpRound(AllocatorConformance):
 
 class TestGappo(AllocatorConformance):
     name = "gappo"
+    iterations = 4
+
+
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="there is no GPU")
+class TestGappoOnGpu(AllocatorConformance):
+    name = "gappo"
+    options: ClassVar = {"device": "cuda"}
     iterations = 4
 
 
