@@ -46,10 +46,10 @@ def bounds_after(search: Search, proposal: Proposal) -> float | None:
         raise_makespan_bound(search, end)
     if search.objective is Objective.MAKESPAN or search.best is None or search.best.evaluation.makespan is None:
         return None
-    if search.best.evaluation.energy == 0:
+    if search.best.evaluation.cost == 0:
         return 0.0
     known = proposal.energy_lower_bound
-    if known is not None and known >= search.best.evaluation.energy * (1 - PROVEN):
+    if known is not None and known >= search.best.evaluation.cost * (1 - PROVEN):
         return known
     makespan, seconds = search.makespan_limit, max(0.0, end - time.monotonic())
     found = _unless_interrupted(search, lambda: energy_lower_bound(search.instance, makespan, seconds))

@@ -90,7 +90,7 @@ def _is_proven(search: Search, energy_bound: float | None) -> bool:
         return search.fast_enough
     if search.best is None or energy_bound is None:
         return False
-    return relative_gap(search.best.evaluation.energy, energy_bound) <= PROVEN
+    return relative_gap(search.best.evaluation.cost, energy_bound) <= PROVEN
 
 
 def _contention(search: Search, decomposition: Decomposition | None) -> str:

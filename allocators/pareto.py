@@ -222,11 +222,19 @@ def slowest(instance: Instance) -> float:
     """Return a makespan, in hours, that no allocation exceeds that serves all tasks with any agent each."""
     hours = float(instance.workload.max()) / float(instance.ability.min())
     if instance.has_travel_time:
+        hours += _farthest(instance) / float(instance.speed.min())
+    return min(hours, sys.float_info.max)
+
+
+def _farthest(instance: Instance) -> float:
+    """Return a distance that no flight exceeds."""
+    reach = instance.reach
+    if reach.geometry.is_euclidean:
         places = np.vstack([instance.start_position, instance.task_position])
         places = places[~np.isnan(places).any(axis=1)]
-        farthest = float(np.linalg.norm(np.ptp(places, axis=0))) if len(places) else 0.0
-        hours += farthest / float(instance.speed.min())
-    return min(hours, sys.float_info.max)
+        return float(np.linalg.norm(np.ptp(places, axis=0))) if len(places) else 0.0
+    near = reach.neighbours
+    return 0.0 if near is None else float(near.distance.max(initial=0.0))
 
 
 def _best_within(known: Sequence[tuple[Allocation, Evaluation]], limit: float) -> Allocation | None:
@@ -236,8 +244,8 @@ def _best_within(known: Sequence[tuple[Allocation, Evaluation]], limit: float) -
         return None
     in_time = [(plan, score) for plan, score in serving if score.served_makespan <= limit]
     if in_time:
-        return min(in_time, key=lambda pair: (pair[1].energy, pair[1].served_makespan))[0]
-    return min(serving, key=lambda pair: (pair[1].served_makespan, pair[1].energy))[0]
+        return min(in_time, key=lambda pair: (pair[1].cost, pair[1].served_makespan))[0]
+    return min(serving, key=lambda pair: (pair[1].served_makespan, pair[1].cost))[0]
 
 
 def _undominated(results: Sequence[Result]) -> tuple[Result, ...]:

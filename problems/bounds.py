@@ -178,7 +178,7 @@ def lp_makespan_lower_bound(instance: Instance, time_limit_s: float = 10.0) -> f
 def energy_lower_bound(instance: Instance, makespan: float, time_limit_s: float = 10.0) -> float | None:
     """Return a lower bound on the energy of every allocation with at most this makespan, or None if none is at hand.
 
-    The linear programme buys ability for each task at the energy of the flight; an agent that could do a task alone
+    With a price on moves, on energy and price together. The linear programme buys ability for each task at that cost; an agent that could do a task alone
     within `makespan` counts as just enough for it. None where it would take more than `time_limit_s` or
     `LP_SIZE_LIMIT` pairs, or if `makespan` is too small.
 
@@ -196,12 +196,12 @@ def energy_lower_bound(instance: Instance, makespan: float, time_limit_s: float 
     from scipy.sparse import vstack
 
     kind, task = np.nonzero(classes.mask & (work > 0))
-    if not len(kind) or instance.energy_per_distance == 0:
+    if not len(kind) or instance.reach.energy_per_distance == 0:
         return 0.0
-    distance = classes.distance[kind, task]
-    scale = scale_to_one(typical_distance(distance))
+    distance, flight = classes.distance[kind, task], classes.cost[kind, task]
+    scale = scale_to_one(typical_distance(flight))
     with np.errstate(over="ignore"):
-        cost = np.minimum(distance * scale, DEAREST)
+        cost = np.minimum(flight * scale, DEAREST)
         hours = np.maximum(0.0, last_equal(makespan) - distance / classes.speed[kind])
         share = np.minimum(1.0, classes.ability[kind] * hours / work[task])
     constraints = vstack([_rows(task, -share, instance.m), _rows(kind, np.ones(len(kind)), classes.size)])
@@ -213,7 +213,7 @@ def energy_lower_bound(instance: Instance, makespan: float, time_limit_s: float 
     price = price[: instance.m] * (work > 0)
     saved = float(classes.count @ _largest(kind, price[task] * share - cost, classes.size))
     least = max(0.0, float(price.sum()) * (1 - ROUNDING) - saved)
-    return min(least / scale * instance.energy_per_distance, sys.float_info.max)
+    return min(least / scale * instance.reach.energy_per_distance, sys.float_info.max)
 
 
 def typical_distance(distance: FloatArray) -> float:

@@ -24,8 +24,8 @@ class AgentClasses:
         Agents in each class.
     ability, speed : ndarray, shape (k,)
         Work per hour, and distance per hour (``inf`` where travel takes no time).
-    distance : ndarray, shape (k, m)
-        Distance to each task; that of one member where classes were not told apart by place.
+    distance, cost : ndarray, shape (k, m)
+        Distance to each task, and `Reach.cost`; those of one member where classes were not told apart by place.
     mask : ndarray of bool, shape (k, m)
         Which tasks the class can take.
     """
@@ -35,6 +35,7 @@ class AgentClasses:
     ability: FloatArray
     speed: FloatArray
     distance: FloatArray
+    cost: FloatArray
     mask: NDArray[np.bool_]
 
     @property
@@ -86,13 +87,17 @@ def agent_classes(instance: Instance, *, by_place: bool) -> AgentClasses:
     AgentClasses
     """
     example, class_of_agent = _group(instance, by_place=by_place)
-    distance, mask = instance.reach.rows(instance.reach.origin[example])
+    reach = instance.reach
+    origin = reach.origin[example]
+    distance, mask = reach.rows(origin)
+    cost = distance if reach.cost_is_distance else reach.costs(origin[:, None], np.arange(instance.m), distance)
     return AgentClasses(
         class_of_agent=class_of_agent,
         count=np.bincount(class_of_agent),
         ability=instance.ability[example],
         speed=instance.speed[example],
         distance=distance,
+        cost=cost,
         mask=mask,
     )
 

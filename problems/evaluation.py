@@ -47,8 +47,11 @@ class Evaluation(ReadOnly):
     served_makespan : float
         max T_j over the served tasks, 0 if there is none.
     distance, energy : float
-        Flown directly from the start to the final task, summed over agents, and `distance` times the energy per
-        unit of distance (19); the largest finite float where they would be more.
+        Flown directly from the start to the final task, and back where an agent returns, summed over agents; and the
+        energy for it (19), at each agent's energy per distance. The largest finite float where they would be more.
+    cost, cost_in_distance : float
+        What is minimised second: the energy, and the price of moves where the instance has one; and the same over the
+        energy per unit of cost, see `Reach.costs`.
     battery_remaining_percent : float or None
         Mean over the agents with a battery, idle ones at 100; None if no agent has one.
     reward : float
@@ -68,6 +71,8 @@ class Evaluation(ReadOnly):
     served_makespan: float
     distance: float
     energy: float
+    cost: float
+    cost_in_distance: float
     battery_remaining_percent: float | None
     reward: float
     reward_saturated: bool
@@ -77,7 +82,7 @@ class Evaluation(ReadOnly):
     def key(self, objective: Objective) -> tuple[float, ...]:
         """Return what is compared first, second and third; smaller is better."""
         first = (float(len(self.unserved_tasks)), self.served_makespan)
-        return first if objective is Objective.MAKESPAN else (*first, self.energy)
+        return first if objective is Objective.MAKESPAN else (*first, self.cost)
 
     def is_better_than(self, other: "Evaluation", objective: Objective) -> bool:
         """Whether this scores better than `other`, with values within 1e-9 relative counted as equal."""
@@ -115,7 +120,9 @@ def evaluate(instance: Instance, allocation: Allocation) -> Evaluation:
     sent = np.flatnonzero(task != IDLE)
     allowed = instance.reach.allows(sent, task[sent])
     agent, goal = sent[allowed], task[sent[allowed]]
-    distance = instance.reach.distance_of(agent, goal)
+    reach = instance.reach
+    origin, distance = reach.origin[agent], reach.distance_of(agent, goal)
+    flown = reach.flown(origin, goal, distance)
     group_ability = np.bincount(goal, weights=instance.ability[agent], minlength=instance.m).astype(np.float64)
     time = _completion_times(instance, agent, goal, distance, group_ability)
     unserved = (instance.workload > 0) & (group_ability == 0)
@@ -123,8 +130,13 @@ def evaluate(instance: Instance, allocation: Allocation) -> Evaluation:
     reward, saturated = _reward(coverage, instance.tau)
     served_makespan = float(time[~unserved].max(initial=0.0))
     with np.errstate(over="ignore"):
-        flown = min(distance.sum(), sys.float_info.max)
-        energy = min(flown * instance.energy_per_distance, sys.float_info.max)
+        length = min(reach.trips(origin, goal, distance).sum(), sys.float_info.max)
+        total = min(flown.sum(), sys.float_info.max)
+        energy = min(total * reach.energy_per_distance, sys.float_info.max)
+        cost = energy
+        if reach.move is not None:
+            total = min(reach.costs(origin, goal, distance).sum(), sys.float_info.max)
+            cost = min(total * reach.energy_per_distance, sys.float_info.max)
     for array in (time, group_ability, coverage):
         array.setflags(write=False)
     return Evaluation(
@@ -133,9 +145,11 @@ def evaluate(instance: Instance, allocation: Allocation) -> Evaluation:
         coverage=coverage,
         makespan=None if unserved.any() else served_makespan,
         served_makespan=served_makespan,
-        distance=float(flown),
+        distance=float(length),
         energy=float(energy),
-        battery_remaining_percent=_battery_percent(instance, agent, distance),
+        cost=float(cost),
+        cost_in_distance=float(total),
+        battery_remaining_percent=_battery_percent(instance, agent, flown),
         reward=reward,
         reward_saturated=saturated,
         unserved_tasks=tuple(np.flatnonzero(unserved).tolist()),
@@ -193,30 +207,47 @@ def _reward(coverage: FloatArray, tau: float) -> tuple[float, bool]:
     return -total, False
 
 
-def _battery_percent(instance: Instance, agent: IntArray, distance: FloatArray) -> float | None:
+def _battery_percent(instance: Instance, agent: IntArray, flown: FloatArray) -> float | None:
     has_battery = np.isfinite(instance.battery)
     if not has_battery.any():
         return None
     used = np.zeros(instance.n)
     with np.errstate(over="ignore"):
-        used[agent] = distance * instance.energy_per_distance
+        used[agent] = flown * instance.reach.energy_per_distance
     used, capacity = used[has_battery], instance.battery[has_battery]
     share = np.divide(used, capacity, out=np.zeros_like(used), where=capacity > 0)
     return float(100 * (1 - np.minimum(share, 1)).mean())
 
 
 def _violations(instance: Instance, agents: IntArray, task: IntArray) -> list[Violation]:
-    found = []
-    for agent in agents.tolist():
-        goal = int(task[agent])
-        away = float(instance.reach.distance_of(np.array([agent]), np.array([goal]))[0])
-        allowed = None if instance.allowed_tasks is None else instance.allowed_tasks[agent]
-        if allowed is not None and goal not in allowed:
-            reason = "the agent may not do this task"
-        elif away > instance.communication_range[agent] + TOLERANCE:
-            reason = f"distance {away:g} exceeds the range {instance.communication_range[agent]:g}"
-        else:
-            needed = instance.energy_per_distance * away
-            reason = f"energy {needed:g} exceeds the battery {instance.battery[agent]:g}"
-        found.append(Violation(agent, goal, reason))
-    return found
+    return [
+        Violation(agent, int(task[agent]), reason_of(instance, agent, int(task[agent]))) for agent in agents.tolist()
+    ]
+
+
+def reason_of(instance: Instance, agent: int, task: int) -> str:
+    """Return why an agent cannot take a task that it cannot take."""
+    reach = instance.reach
+    origin, goal = reach.origin[[agent]], np.array([task])
+    away = reach.distances_between(origin, goal)
+    allowed = None if instance.allowed_tasks is None else instance.allowed_tasks[agent]
+    if allowed is not None and task not in allowed:
+        return "the agent may not do this task"
+    lacking = _lacking(instance, agent, task)
+    if lacking:
+        return f"the agent lacks {', '.join(map(repr, lacking))}"
+    bound_to = reach.list_of[origin[0]]
+    if bound_to >= 0 and task not in reach.lists[bound_to]:
+        return "there is no way to it in the table of distances"
+    if away[0] > instance.communication_range[agent] + TOLERANCE:
+        return f"distance {away[0]:g} exceeds the range {instance.communication_range[agent]:g}"
+    needed = reach.energy_per_distance * reach.flown(origin, goal, away)[0]
+    return f"energy {needed:g} exceeds the battery {instance.battery[agent]:g}"
+
+
+def _lacking(instance: Instance, agent: int, task: int) -> list[str]:
+    """Return the skills that a task needs and an agent has not."""
+    if instance.needs is None:
+        return []
+    held = () if instance.skills is None else instance.skills[agent]
+    return [name for name in instance.needs[task] if name not in held]

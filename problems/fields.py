@@ -14,6 +14,7 @@ from alloc.problems.vocabulary import IDLE
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
+BoolArray = NDArray[np.bool_]
 
 LARGEST_INDEX = 2**62
 """Beyond, numbers are no indices on any machine."""
@@ -73,6 +74,35 @@ def limits(values: ArrayLike | None, field_name: str, length: int) -> FloatArray
     array = vector(values, field_name, length)
     array[np.isnan(array)] = np.inf
     return array
+
+
+def rates(values: ArrayLike | None, usual: float, length: int) -> FloatArray:
+    """Return a rate for each agent; the usual one where none is given, which None and NaN stand for."""
+    if values is None:
+        return np.full(length, float(usual))
+    array = vector(values, "agent_energy_per_distance", length)
+    array[np.isnan(array)] = usual
+    return array
+
+
+def flags(values: ArrayLike | None, field_name: str, length: int) -> BoolArray:
+    """Return True or False for each agent; False where None stands."""
+    if values is None:
+        return np.zeros(length, dtype=np.bool_)
+    given = [False if value is None else value for value in np.asarray(values, dtype=object).ravel().tolist()]
+    if len(given) != length or not all(isinstance(value, bool | np.bool_) for value in given):
+        raise InputError(f"must be a list of {length} times True or False", field_name)
+    return np.array(given, dtype=np.bool_)
+
+
+def require_geographic(position: FloatArray, kind: str) -> None:
+    """Raise `InputError` for the first position that is no longitude and latitude in degrees."""
+    lon, lat = position[:, 0], position[:, 1]
+    wrong = (np.abs(lat) > 90) | (lon < -180) | (lon > 360)
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        message = f"must be longitude (-180 to 360) and latitude (-90 to 90) in degrees, got {position[row].tolist()}"
+        raise InputError(message, f"{kind}s[{row}].position")
 
 
 def ids(names: Iterable[str] | None, count: int, prefix: str, kind: str) -> tuple[str, ...]:

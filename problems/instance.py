@@ -4,21 +4,36 @@ from collections.abc import Iterable, Sequence, Set
 from dataclasses import dataclass, replace
 from functools import cached_property
 from numbers import Real
+from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from alloc.problems import fields
-from alloc.problems.arguments import listed, real, shown, text
-from alloc.problems.distances.reach import Reach, build_reach
+from alloc.problems import eligibility, fields
+from alloc.problems.arguments import listed, of_type, real, shown, text
+from alloc.problems.distances.build import build_reach
+from alloc.problems.distances.geodesic import METRES
+from alloc.problems.distances.given import DistanceTable
+from alloc.problems.distances.metric import GEOGRAPHIC, METRICS
+from alloc.problems.distances.reach import Reach
 from alloc.problems.errors import InputError, nearest
-from alloc.problems.fields import FloatArray, IntArray
+from alloc.problems.fields import BoolArray, FloatArray, IntArray
+from alloc.problems.units import Units
 from alloc.problems.vocabulary import IDLE
 
 __all__ = ["FloatArray", "Instance", "IntArray"]
 
-AGENT_ARRAYS = ("ability", "agent_position", "start_task", "battery", "communication_range", "speed")
-"""Fields of an instance with one row per agent; ids and allowed tasks are tuples."""
+AGENT_ARRAYS = (
+    "ability",
+    "agent_position",
+    "start_task",
+    "battery",
+    "communication_range",
+    "speed",
+    "agent_energy_per_distance",
+    "returns",
+)
+"""Fields of an instance with one row per agent; ids, allowed tasks and skills are tuples."""
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
@@ -58,6 +73,21 @@ class Instance(fields.ReadOnly):
         Base of the reward (3), 0 < tau < 1.
     energy_per_distance : float
         Energy per unit of distance, 0 or from 1e-60 to 1e60 (k of (19)).
+    agent_energy_per_distance : array_like, shape (n,), optional
+        That of each agent; `energy_per_distance` where it is None or NaN.
+    returns : array_like of bool, shape (n,), optional
+        Whether the agent's flight back to its start counts for battery, distance and energy.
+    skills : sequence of (iterable of str, or None), optional
+        What each agent can do.
+    needs : sequence of (iterable of str, or None), optional
+        Skills that an agent must have, all of them, to do each task.
+    metric : {"euclidean", "manhattan", "geographic"}
+        Distances as in (1), along the axes, or along the surface of the earth; with the last, positions are longitude and
+        latitude in degrees and, if given, altitude in metres, and distances are in km or in `units.distance`.
+    distances : DistanceTable or iterable of (str, str, float), optional
+        Distances of one's own, by the ids of agents and tasks; see `DistanceTable.of`.
+    units : Units, optional
+        Labels of the units.
 
     Raises
     ------
@@ -84,6 +114,13 @@ class Instance(fields.ReadOnly):
     priority: FloatArray
     tau: float
     energy_per_distance: float
+    agent_energy_per_distance: FloatArray
+    returns: BoolArray
+    skills: tuple[eligibility.Names, ...] | None
+    needs: tuple[eligibility.Names, ...] | None
+    metric: str
+    distances: DistanceTable | None
+    units: Units
 
     def __init__(
         self,
@@ -103,6 +140,13 @@ class Instance(fields.ReadOnly):
         priority: ArrayLike | None = None,
         tau: float = 0.5,
         energy_per_distance: float = 1.0,
+        agent_energy_per_distance: ArrayLike | None = None,
+        returns: ArrayLike | None = None,
+        skills: Sequence[Iterable[str] | None] | None = None,
+        needs: Sequence[Iterable[str] | None] | None = None,
+        metric: str = "euclidean",
+        distances: DistanceTable | Iterable[tuple[str, str, float]] | None = None,
+        units: Units | None = None,
     ) -> None:
         w, h = fields.vector(ability, "ability"), fields.vector(workload, "workload")
         n, m = len(w), len(h)
@@ -124,7 +168,14 @@ class Instance(fields.ReadOnly):
             "priority": np.ones(m) if priority is None else fields.vector(priority, "priority", m),
             "tau": _unit_share(tau),
             "energy_per_distance": float(real(energy_per_distance, "energy_per_distance")),
+            "agent_energy_per_distance": fields.rates(agent_energy_per_distance, energy_per_distance, n),
+            "returns": fields.flags(returns, "returns", n),
+            "skills": eligibility.name_sets(skills, n, "agent", "skills"),
+            "needs": eligibility.name_sets(needs, m, "task", "needs"),
+            "metric": _metric(metric),
+            "units": Units() if units is None else of_type(units, Units, "units"),
         }
+        values["distances"] = _table(distances, values["agent_ids"], values["task_ids"])
         for key, value in values.items():
             if isinstance(value, np.ndarray):
                 value.setflags(write=False)
@@ -153,6 +204,19 @@ class Instance(fields.ReadOnly):
         if self.energy_per_distance and not fields.LEAST <= self.energy_per_distance <= fields.MOST:
             rule = f"0 or from {fields.LEAST:g} to {fields.MOST:g}"
             raise InputError(f"must be {rule}, got {self.energy_per_distance:g}", "energy_per_distance")
+        fields.require(
+            np.isfinite(self.agent_energy_per_distance) & (self.agent_energy_per_distance >= 0),
+            self.agent_energy_per_distance,
+            "energy_per_distance",
+            "a finite number >= 0",
+            agents,
+        )
+        fields.require_magnitude(self.agent_energy_per_distance, "energy_per_distance", agents)
+        if self.metric == GEOGRAPHIC:
+            fields.require_geographic(self.agent_position, "agent")
+            fields.require_geographic(self.task_position, "task")
+            if self.units.distance and self.units.distance not in METRES:
+                raise InputError(f"must be one of {', '.join(METRES)} with geographic positions", "units.distance")
 
     def __repr__(self) -> str:
         return f"Instance(name={self.name!r}, n={self.n}, m={self.m})"
@@ -184,14 +248,17 @@ class Instance(fields.ReadOnly):
     @cached_property
     def reach(self) -> Reach:
         """Which tasks each agent can take, and how far they are (C(i) and (1) of the paper)."""
-        return build_reach(
-            self.start_position,
-            self.task_position,
-            self.communication_range,
-            self.battery,
-            self.energy_per_distance,
-            self.allowed_tasks,
-        )
+        return build_reach(self)
+
+    @cached_property
+    def eligible_tasks(self) -> Sequence[IntArray | None] | None:
+        """Tasks that each agent may do by its list and its skills, None for all."""
+        return eligibility.eligible_tasks(self.allowed_tasks, self.skills, self.needs, self.n)
+
+    @property
+    def distance_unit(self) -> str:
+        """Unit of geographic distances."""
+        return self.units.distance or "km"
 
     @cached_property
     def agent_index(self) -> dict[str, int]:
@@ -223,14 +290,34 @@ class Instance(fields.ReadOnly):
             if name not in self.agent_index:
                 raise InputError(f"no agent {name!r} in instance {self.name!r}{nearest(name, self.agent_ids)}", "gone")
         dropped = set(ids)
-        left = [index for index, name in enumerate(self.agent_ids) if name not in dropped]
-        lists = self.allowed_tasks
+        left = np.array([index for index, name in enumerate(self.agent_ids) if name not in dropped], dtype=np.intp)
+        lists, skills, table = self.allowed_tasks, self.skills, self.distances
         return replace(
             self,
             agent_ids=tuple(self.agent_ids[index] for index in left),
             allowed_tasks=None if lists is None else tuple(lists[index] for index in left),
+            skills=None if skills is None else tuple(skills[index] for index in left),
+            distances=None if table is None else table.restricted(left, np.arange(self.m)),
             **{name: getattr(self, name)[left] for name in AGENT_ARRAYS},
         )
+
+
+def _metric(name: object) -> str:
+    if name in METRICS:
+        return str(name)
+    raise InputError(f"must be one of {', '.join(METRICS)}, got {shown(name)}", "metric")
+
+
+def _table(given: object, agent_ids: object, task_ids: object) -> DistanceTable | None:
+    """Return a table of distances that fits the instance."""
+    agents, tasks = cast("tuple[str, ...]", agent_ids), cast("tuple[str, ...]", task_ids)
+    if given is None:
+        return None
+    if isinstance(given, DistanceTable):
+        if (given.n, given.m) != (len(agents), len(tasks)):
+            raise InputError(f"is for {given.n} agents and {given.m} tasks", "distances")
+        return given
+    return DistanceTable.of(cast("Iterable[tuple[str, str, float]]", given), agents, tasks)
 
 
 def _unit_share(tau: float) -> float:

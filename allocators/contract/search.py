@@ -184,7 +184,7 @@ class Search:
         in_time = [score.served_makespan <= limit for score in (one, other)]
         if not all(in_time):
             return in_time[0] or (not any(in_time) and one.is_better_than(other, self.objective))
-        return other.energy - one.energy > RELATIVE_TOLERANCE * other.energy
+        return other.cost - one.cost > RELATIVE_TOLERANCE * other.cost
 
     def raise_bound(self, hours: float) -> None:
         """Record a proven lower bound on the makespan, in hours."""
@@ -216,7 +216,7 @@ class Search:
             return StopReason.TARGET_GAP
         if self.best is not None and self.fast_enough:
             energy_counts = self.objective is Objective.MAKESPAN_ENERGY
-            if not energy_counts or self.best.evaluation.energy == 0:
+            if not energy_counts or self.best.evaluation.cost == 0:
                 return StopReason.PROVEN
         return None
 
@@ -229,9 +229,9 @@ def _undominated(found: list[Improvement], limit: float) -> list[Improvement]:
     """Keep those within `limit` hours that have less energy than all faster ones, the fastest first."""
     kept: list[Improvement] = []
     fewest = min(len(one.evaluation.unserved_tasks) for one in found)
-    for one in sorted(found, key=lambda one: (one.evaluation.served_makespan, one.evaluation.energy)):
+    for one in sorted(found, key=lambda one: (one.evaluation.served_makespan, one.evaluation.cost)):
         score = one.evaluation
         in_time = score.served_makespan <= last_equal(limit)
-        if in_time and len(score.unserved_tasks) == fewest and (not kept or score.energy < kept[-1].evaluation.energy):
+        if in_time and len(score.unserved_tasks) == fewest and (not kept or score.cost < kept[-1].evaluation.cost):
             kept.append(one)
     return kept

@@ -98,9 +98,9 @@ class Model:
         return cls(classes, tasks, instance.workload[tasks], class_of_pair, task_of_pair, travel_time, unit, min_served)
 
     @cached_property
-    def distance(self) -> FloatArray:
-        """Distance of each pair, shape (p,)."""
-        return self.classes.distance[self.class_of_pair, self.tasks[self.task_of_pair]]
+    def cost(self) -> FloatArray:
+        """Cost of each pair, in units of distance, shape (p,)."""
+        return self.classes.cost[self.class_of_pair, self.tasks[self.task_of_pair]]
 
     def at(self, time: float) -> Demand:
         """Return the constraints at T = `time` hours, > 0."""

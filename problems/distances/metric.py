@@ -1,4 +1,6 @@
-"""Euclidean distances (1), in blocks or pair by pair, with the same last bit either way."""
+"""Distances between places by a metric, in blocks or pair by pair, with the same last bit either way."""
+
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,8 +11,12 @@ BLOCK = 1 << 16
 """Distances that are worked out together: as many as fit a cache."""
 
 
+EUCLIDEAN, MANHATTAN, GEOGRAPHIC = METRICS = ("euclidean", "manhattan", "geographic")
+"""How far two places are apart: (1) of the paper, the sum over the axes, or along the surface of the earth."""
+
+
 def distances(place: Floats, goal: Floats) -> Floats:
-    """Return distances between places that broadcast, 0 where a coordinate is NaN.
+    """Return Euclidean distances (1) between places that broadcast, 0 where a coordinate is NaN.
 
     Parameters
     ----------
@@ -27,12 +33,26 @@ def distances(place: Floats, goal: Floats) -> Floats:
     return total
 
 
-def distance_table(place: Floats, goal: Floats) -> Floats:
-    """Return the distances of all places to all goals, shape (places, goals)."""
+def manhattan_distances(place: Floats, goal: Floats) -> Floats:
+    """Return the sums of the differences along the axes, of places that broadcast, 0 where a coordinate is NaN.
+
+    Parameters
+    ----------
+    place, goal : ndarray, shape (..., 3)
+    """
+    total = np.abs(place[..., 0] - goal[..., 0])
+    for axis in range(1, place.shape[-1]):
+        total += np.abs(place[..., axis] - goal[..., axis])
+    total[np.isnan(total)] = 0.0
+    return total
+
+
+def distance_table(place: Floats, goal: Floats, between: Callable[[Floats, Floats], Floats] = distances) -> Floats:
+    """Return the distances of all places to all goals by `between`, shape (places, goals)."""
     table = np.empty((len(place), len(goal)))
     rows = max(1, BLOCK // len(goal))
     columns = np.ascontiguousarray(goal.T).T[None, :, :]
     for first in range(0, len(place), rows):
         block = slice(first, first + rows)
-        table[block] = distances(place[block, None, :], columns)
+        table[block] = between(place[block, None, :], columns)
     return table

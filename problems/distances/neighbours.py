@@ -7,6 +7,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from alloc.problems.distances.geometry import Geometry, entries
+from alloc.problems.distances.metric import MANHATTAN
+
 CHUNK = 1 << 21
 """Pairs of origin and task that are looked at together, about."""
 
@@ -31,6 +34,10 @@ class ReachRule(Protocol):
     @property
     def goal(self) -> Floats:
         """Where each task is, shape (m, 3)."""
+
+    @property
+    def geometry(self) -> Geometry:
+        """How far origins are from tasks."""
 
     @property
     def list_of(self) -> Indices:
@@ -119,7 +126,8 @@ def estimated_pairs(reach: ReachRule) -> float:
 def nearest_distance(reach: ReachRule, wanted: NDArray[np.bool_]) -> NDArray[np.float64]:
     """Return how far the nearest of the `wanted` tasks within reach is, ``inf`` where there is none; shape (origins,).
 
-    Origins bound to a list get the nearest on it, the others the nearest of all, by a tree.
+    Origins bound to a list get the nearest on it, the others the nearest of all, by a tree. Where distances are not
+    Euclidean, it may be less than that: the length of a straight line.
     """
     from scipy.spatial import cKDTree
 
@@ -135,9 +143,20 @@ def nearest_distance(reach: ReachRule, wanted: NDArray[np.bool_]) -> NDArray[np.
     nearest[free[lost]] = 0.0 if len(tasks) else np.inf
     placed, known = free[~lost], tasks[~unknown]
     if len(placed) and len(known):
-        _, found = cKDTree(reach.goal[known]).query(reach.place[placed])
-        distance = reach.distances_between(placed, known[found])
-        nearest[placed] = np.where(reach.is_within(placed, known[found], distance), distance, np.inf)
+        axes = 1 if reach.geometry.metric == MANHATTAN else 2
+        straight, found = cKDTree(reach.goal[known]).query(reach.place[placed], p=axes)
+        if reach.geometry.is_euclidean:
+            distance = reach.distances_between(placed, known[found])
+            within = reach.is_within(placed, known[found], distance)
+        else:
+            distance = straight * (1 - MARGIN)
+            within = distance <= reach.radius[placed]
+        nearest[placed] = np.where(within, distance, np.inf)
+    if reach.geometry.given is not None:
+        given = reach.geometry.given
+        origin, task, distance = given.origin, given.task, given.there
+        good = wanted[task] & reach.is_within(origin, task, distance)
+        np.minimum.at(nearest, origin[good], distance[good])
     return nearest
 
 
@@ -188,7 +207,14 @@ def _around(reach: ReachRule, origins: Indices, radius: NDArray[np.float64]) -> 
         if len(known):
             found = cKDTree(place[:size]).sparse_distance_matrix(tree, float(ball[-1]), output_type="ndarray")
             pairs.append((part[found["i"]], known[found["j"]]))
-        yield np.concatenate([pair[0] for pair in pairs]), np.concatenate([pair[1] for pair in pairs])
+        given = reach.geometry.given
+        if given is not None:
+            origin, entry = entries(given.first, part, part)
+            pairs.append((origin, given.task[entry]))
+        origin, task = (np.concatenate([pair[side] for pair in pairs]) for side in (0, 1))
+        if given is not None:  # some are near as well
+            origin, task = np.divmod(np.unique(origin * len(reach.goal) + task), len(reach.goal))
+        yield origin, task
         origins = origins[size:]
 
 

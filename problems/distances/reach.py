@@ -4,16 +4,14 @@ Agents that start at one place with the same range, battery and list of tasks sh
 instances have as many origins as tasks, whatever the number of agents.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from alloc.problems.distances.metric import distance_table, distances
+from alloc.problems.distances.geometry import Geometry
 from alloc.problems.distances.neighbours import Neighbours, estimated_pairs, find_neighbours
-from alloc.problems.distances.origins import group_rows, number_lists
 from alloc.problems.fields import ReadOnly
 
 TOLERANCE = 1e-9
@@ -32,33 +30,60 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Reach(ReadOnly):
-    """Reachable tasks and distances per origin.
+    """Reachable tasks, distances and costs per origin.
 
     Attributes
     ----------
     origin : ndarray of int, shape (n,)
         Origin of each agent.
-    place : ndarray, shape (origins, 3)
-        Where the origin is; NaN where unknown.
-    goal : ndarray, shape (m, 3)
-        Where the tasks are; NaN where unknown.
+    geometry : Geometry
+        Where origins and tasks are, and how far apart.
     communication_range, battery : ndarray, shape (origins,)
         Limits on the distance, and on the energy for it.
     energy_per_distance : float
+        Energy per unit of cost.
+    factor : ndarray, shape (origins,), or None
+        Energy per unit of distance of each origin over `energy_per_distance`; None where all are 1.
+    returns : ndarray of bool, shape (origins,), or None
+        Whether the flight back counts; None where no agent returns.
     list_of : ndarray of int, shape (origins,)
         Which of `lists` the origin is bound to; -1 where it may do all tasks.
     lists : tuple of ndarray of int
         Distinct lists of tasks, each sorted.
+    move : Move or None
+        What an agent costs that gets another task than it has.
     """
 
     origin: Indices
-    place: Floats
-    goal: Floats
+    geometry: Geometry
     communication_range: Floats
     battery: Floats
     energy_per_distance: float
+    factor: Floats | None
+    returns: Flags | None
     list_of: Indices
     lists: tuple[Indices, ...]
+    move: "Move | None" = None
+
+    @property
+    def place(self) -> Floats:
+        """Where each origin is, in Cartesian coordinates, shape (origins, 3); NaN where unknown."""
+        return self.geometry.place
+
+    @property
+    def goal(self) -> Floats:
+        """Where each task is, in Cartesian coordinates, shape (m, 3); NaN where unknown."""
+        return self.geometry.goal
+
+    @property
+    def cost_is_distance(self) -> bool:
+        """Whether the cost of a flight is its distance, whoever flies."""
+        return self.factor is None and self.returns is None and self.move is None
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether costs are distances, and these Euclidean (1): compiled code then needs coordinates alone."""
+        return self.cost_is_distance and self.geometry.is_euclidean
 
     @property
     def pairs(self) -> int:
@@ -76,9 +101,19 @@ class Reach(ReadOnly):
 
         Takes O(origins * m) time and memory: nothing for instances of any size, unless `has_table`.
         """
-        table = distance_table(self.place, self.goal)
+        table = self.geometry.table(np.arange(len(self.place)))
         table.setflags(write=False)
         return table
+
+    @cached_property
+    def cost(self) -> Floats:
+        """What the flight from each origin to each task costs: see `costs`; shape (origins, m). As large as `distance`."""
+        if self.cost_is_distance:
+            return self.distance
+        origins, tasks = np.arange(len(self.place))[:, None], np.arange(len(self.goal))
+        cost = self.costs(origins, tasks, self.distance)
+        cost.setflags(write=False)
+        return cost
 
     @cached_property
     def mask(self) -> Flags:
@@ -95,8 +130,9 @@ class Reach(ReadOnly):
         """Distance beyond which nothing is within reach, before any tolerance on it; shape (origins,)."""
         radius = self.communication_range + TOLERANCE
         if self.energy_per_distance > 0:
-            with np.errstate(over="ignore"):
-                radius = np.minimum(radius, (self.battery + TOLERANCE) / self.energy_per_distance)
+            with np.errstate(over="ignore", divide="ignore"):
+                flight = (self.battery + TOLERANCE) / self.energy_per_distance
+                radius = np.minimum(radius, flight if self.factor is None else flight / self.factor)
         return radius
 
     @cached_property
@@ -147,12 +183,12 @@ class Reach(ReadOnly):
         """Return these rows of `distance` and `mask`, each of shape (k, m)."""
         if self.has_table:
             return self.distance[origins], self.mask[origins]
-        distance = distance_table(self.place[origins], self.goal)
+        distance = self.geometry.table(origins)
         return distance, self._mask_of(origins, distance)
 
     def block(self, origins: Indices, tasks: Indices) -> tuple[Floats, Flags]:
         """Return these rows and columns of `distance` and `mask`, each of shape (k, l), without a table."""
-        distance = distance_table(self.place[origins], self.goal[tasks])
+        distance = self.geometry.table(origins, tasks)
         return distance, self.is_within(origins[:, None], tasks, distance)
 
     def agents_of(self, task: int) -> Indices:
@@ -168,20 +204,52 @@ class Reach(ReadOnly):
 
     def distances_between(self, origin: Indices, task: Indices) -> Floats:
         """Distance from each of these origins to the task beside it, without a table."""
-        return distances(self.place[origin], self.goal[task])
+        return self.geometry.between(origin, task)
+
+    def cost_of(self, agent: Indices, task: Indices) -> Floats:
+        """Cost of each agent's flight to the task beside it; both of shape (k,), and so is the answer."""
+        origin = self.origin[agent]
+        return (
+            self.cost[origin, task]
+            if self.has_table
+            else self.costs(origin, task, self.distances_between(origin, task))
+        )
+
+    def costs(self, origin: Indices, task: Indices, distance: Floats) -> Floats:
+        """Cost of the flight from each of these origins to the task, which is `distance` away, in units of distance.
+
+        The energy of the flight, back again where the agent returns, over `energy_per_distance`; and the price of moving
+        to another task.
+        """
+        cost = self.flown(origin, task, distance)
+        return cost if self.move is None else cost + self.move.price[origin] * (self.move.task[origin] != task)
+
+    def trips(self, origin: Indices, task: Indices, distance: Floats) -> Floats:
+        """Length of the flight from each of these origins to the task, `distance` away, back again if it returns."""
+        if self.returns is None:
+            return distance
+        both = self.geometry.there_and_back(origin, task, distance)
+        trips: Floats = np.where(self.returns[origin], both, distance)
+        return trips
+
+    def flown(self, origin: Indices, task: Indices, distance: Floats) -> Floats:
+        """Cost without the price of moving: energy over `energy_per_distance`."""
+        trips = self.trips(origin, task, distance)
+        return trips if self.factor is None else trips * self.factor[origin]
 
     def is_within(self, origin: Indices, task: Indices, distance: Floats) -> Flags:
         """Whether each of these origins can take the task beside it, which is `distance` away; without a table."""
-        within = self._is_near(origin, distance)
+        within = self._is_near(origin, task, distance)
         if self.lists:
             within &= self._is_allowed(self.list_of[origin], task)
         return within
 
-    def _is_near(self, origin: Indices, distance: Floats) -> Flags:
+    def _is_near(self, origin: Indices, task: Indices, distance: Floats) -> Flags:
         near: Flags = distance <= self.communication_range[origin] + TOLERANCE
         if np.isfinite(self.battery).any():
             with np.errstate(over="ignore"):
-                near &= self.energy_per_distance * distance <= self.battery[origin] + TOLERANCE
+                flown = self.flown(origin, task, distance)
+                near &= self.energy_per_distance * flown <= self.battery[origin] + TOLERANCE
         return near
 
     def _is_allowed(self, number: Indices, task: Indices) -> Flags:
@@ -199,7 +267,7 @@ class Reach(ReadOnly):
         return np.concatenate([*keys, [len(self.lists) * m]])
 
     def _mask_of(self, origins: Indices, distance: Floats) -> Flags:
-        mask = self._is_near(origins[:, None], distance)
+        mask = self._is_near(origins[:, None], np.arange(len(self.goal)), distance)
         for row in np.flatnonzero(self.list_of[origins] >= 0).tolist():
             allowed = self.lists[self.list_of[origins[row]]]
             reached = mask[row, allowed]
@@ -209,45 +277,38 @@ class Reach(ReadOnly):
 
     def _is_complete_by_place(self) -> bool:
         """Look at the farthest corner of the tasks' box, then at all tasks of those that it leaves in doubt."""
-        known = self.goal[~np.isnan(self.goal[:, 0])]
-        if not len(known):
+        if not (np.isfinite(self.communication_range).any() or np.isfinite(self.battery).any()):
             return True
-        low, high = known.min(axis=0), known.max(axis=0)
-        corner = np.where(self.place > low / 2 + high / 2, low, high)
-        with np.errstate(over="ignore", invalid="ignore"):
-            farthest = distances(self.place, corner) * (1 + 1e-12)
-            doubtful = np.flatnonzero(~self._is_near(np.arange(len(self.place)), farthest))
-            worst = doubtful[np.argsort((self.radius - farthest)[doubtful])]
+        known = self.goal[~np.isnan(self.goal[:, 0])]
+        if not len(known) and self.geometry.given is None:
+            return True
+        origins = np.arange(len(self.place))
+        if self.geometry.given is None:
+            low, high = known.min(axis=0), known.max(axis=0)
+            corner = np.where(self.place > low / 2 + high / 2, low, high)
+            with np.errstate(over="ignore", invalid="ignore"):
+                farthest = self.geometry.farthest(corner) * (1 + 1e-12)
+                doubtful = np.flatnonzero(~self._is_near(origins, np.zeros_like(origins), farthest))
+                worst = doubtful[np.argsort((self.radius - farthest)[doubtful])]
+        else:
+            worst = origins
+        tasks = np.arange(len(self.goal))
         rows = max(1, TABLE_LIMIT // (8 * len(self.goal)))
         parts = (worst[begin : begin + rows] for begin in range(0, len(worst), rows))
-        return all(self._is_near(part[:, None], self._far(part)).all() for part in parts)
-
-    def _far(self, origins: Indices) -> Floats:
-        return distance_table(self.place[origins], self.goal)
+        return all(self._is_near(part[:, None], tasks, self.geometry.table(part)).all() for part in parts)
 
 
-def build_reach(
-    place: Floats,
-    goal: Floats,
-    communication_range: Floats,
-    battery: Floats,
-    energy_per_distance: float,
-    allowed_tasks: Sequence[Indices | None] | None,
-) -> Reach:
-    """Group agents by origin; takes O(n log n) time and O(n) memory.
+@dataclass(frozen=True, eq=False)
+class Move(ReadOnly):
+    """What an agent costs that gets another task than it has.
 
-    Parameters
+    Attributes
     ----------
-    place, goal : ndarray, shapes (n, 3) and (m, 3)
-        Where agents begin, and where tasks are; NaN where unknown.
-    communication_range, battery : ndarray, shape (n,)
-    energy_per_distance : float
-    allowed_tasks : sequence of (ndarray of int, or None), or None
-        As in `Instance`.
+    task : ndarray of int, shape (origins,)
+        The task that the agents of each origin have, -1 where they are idle.
+    price : ndarray, shape (origins,)
+        In units of cost.
     """
-    number, lists = number_lists(allowed_tasks, len(place))
-    first, origin = group_rows([*place.T, communication_range, battery, number.astype(np.float64)])
-    places, list_of = place[first], number[first]
-    for array in (origin, places, list_of):
-        array.setflags(write=False)
-    return Reach(origin, places, goal, communication_range[first], battery[first], energy_per_distance, list_of, lists)
+
+    task: Indices
+    price: Floats

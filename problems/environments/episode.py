@@ -53,6 +53,10 @@ def draw(source: Source, sizes: tuple[int, int], energy_weight: float, rng: np.r
         If the instance has other sizes than those before.
     """
     instance = source(rng) if callable(source) else source[int(rng.integers(len(source)))]
+    if not instance.reach.is_plain:
+        raise InputError(
+            f"{instance.name!r} must have Euclidean distances and one energy per distance, without returns"
+        )
     if (instance.n, instance.m) != sizes:
         raise InputError(
             f"has {instance.n} agents and {instance.m} tasks, not {sizes[0]} and {sizes[1]}", instance.name

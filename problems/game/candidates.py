@@ -27,12 +27,14 @@ class Candidates(NamedTuple):
     ----------
     place : ndarray of int, shape (n, c)
         Task, or m for idle and where there are fewer tasks in reach than candidates.
-    distance : ndarray, shape (n, c)
+    distance, cost : ndarray, shape (n, c)
+        Distance, and cost of the flight, see `Reach.costs`.
     legal : ndarray of bool, shape (n, c)
     """
 
     place: Ints
     distance: NDArray[np.float64]
+    cost: NDArray[np.float64]
     legal: NDArray[np.bool_]
 
 
@@ -48,8 +50,10 @@ def candidate_tasks(instance: Instance, near: int | None, plan: Ints | None) -> 
     """
     n, m = instance.n, instance.m
     if near is None or near >= m:
-        distance, legal = instance.reach.rows(instance.reach.origin)
-        return _with_idle(np.broadcast_to(np.arange(m), (n, m)), distance, legal, m)
+        reach, tasks = instance.reach, np.arange(m)
+        distance, legal = reach.rows(reach.origin)
+        cost = distance if reach.cost_is_distance else reach.costs(reach.origin[:, None], tasks, distance)
+        return _with_idle(np.broadcast_to(tasks, (n, m)), distance, cost, legal, m)
     chosen = _nearest(instance, near)
     _include(chosen, instance.start_task, np.full(n, -1))
     if plan is not None:
@@ -58,16 +62,22 @@ def candidate_tasks(instance: Instance, near: int | None, plan: Ints | None) -> 
     known = chosen >= 0
     agent, task = np.broadcast_arrays(np.arange(n)[:, None], np.where(known, chosen, 0))
     legal = instance.reach.allows(agent, task) & known
-    distance = np.where(legal, instance.reach.distance_of(agent, task), 0.0)
-    return _with_idle(np.where(known, chosen, m), distance, legal, m)
+    distance = cost = np.where(legal, instance.reach.distance_of(agent, task), 0.0)
+    if not instance.reach.cost_is_distance:
+        cost = np.where(legal, instance.reach.cost_of(agent, task), 0.0)
+    return _with_idle(np.where(known, chosen, m), distance, cost, legal, m)
 
 
-def _with_idle(task: Ints, distance: NDArray[np.float64], legal: NDArray[np.bool_], idle: int) -> Candidates:
+def _with_idle(
+    task: Ints, distance: NDArray[np.float64], cost: NDArray[np.float64], legal: NDArray[np.bool_], idle: int
+) -> Candidates:
     """Append being idle to the candidates, all of shape (n, c - 1)."""
     n = len(task)
+    away = np.column_stack([distance, np.zeros(n)])
     return Candidates(
         np.column_stack([task, np.full(n, idle)]),
-        np.column_stack([distance, np.zeros(n)]),
+        away,
+        away if cost is distance else np.column_stack([cost, np.zeros(n)]),
         np.column_stack([legal, np.ones(n, dtype=bool)]),
     )
 

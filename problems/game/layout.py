@@ -49,8 +49,8 @@ class UnscaledGames:
         Place of each candidate, the last one m for idle.
     reachable : ndarray of bool, shape (B, n, c)
         Whether the candidate is in C(i).
-    distance : ndarray, shape (B, n, c)
-        From the agents' starts; 0 for the place of the idle.
+    distance, cost : ndarray, shape (B, n, c)
+        From the agents' starts, and what the flight costs, see `Reach.costs`; 0 for the place of the idle.
     task_distance : ndarray, shape (B, m, m)
     hours, log_tau : ndarray, shape (B,)
         Reference makespan, and logarithm of the discount factor of (3).
@@ -64,6 +64,7 @@ class UnscaledGames:
     candidates: Ints
     reachable: Flags
     distance: Floats
+    cost: Floats
     task_distance: Floats
     hours: Floats
     log_tau: Floats
@@ -97,12 +98,12 @@ class UnscaledGames:
     @property
     def nearest(self) -> Ints:
         """Slot of the nearest task that each agent can go to, that of being idle without; shape (B, n)."""
-        return self.nearest_by(self.distance[..., :-1])
+        return self.nearest_by(self.cost[..., :-1])
 
-    def nearest_by(self, distance: Floats) -> Ints:
-        """Return `nearest` by other distances to the tasks, shape (B, n, c - 1)."""
+    def nearest_by(self, cost: Floats) -> Ints:
+        """Return `nearest` by other costs of the flights to the tasks, shape (B, n, c - 1)."""
         legal = self.legal[..., :-1]
-        slot: Ints = np.where(legal.any(2), np.where(legal, distance, np.inf).argmin(2), legal.shape[2])
+        slot: Ints = np.where(legal.any(2), np.where(legal, cost, np.inf).argmin(2), legal.shape[2])
         return slot
 
     def slots_at(self, chosen: Flags, otherwise: Ints | int) -> Ints:
@@ -129,7 +130,7 @@ class UnscaledGames:
             "ability": self.relative_ability,
             "need": _with_idle(need),
             "weight": _with_idle(_weights(self.priority, self.workload > 0)),
-            "distance": _scaled(self.distance, scale[:, None, None]),
+            "distance": _scaled(self.cost, scale[:, None, None]),
             "contribution": self.contribution,
             "energy_weight": np.asarray(energy_weight, dtype=np.float64),
             "supply_ratio": self._supply_ratio(need),
@@ -184,9 +185,9 @@ def make_board(
         Where the agents of all games begin instead; `IDLE` for idle.
     """
     games = _unscaled(instances, reference_makespan, near, plan)
-    distance, legal = games.distance[..., :-1], games.legal[..., :-1]
-    scale = np.array([_scale(one[able]) for one, able in zip(distance, legal, strict=True)])
-    nearest = games.nearest_by(distance + TIE_BREAK * rng.random(distance.shape))
+    cost, legal = games.cost[..., :-1], games.legal[..., :-1]
+    scale = np.array([_scale(one[able]) for one, able in zip(cost, legal, strict=True)])
+    nearest = games.nearest_by(cost + TIE_BREAK * rng.random(cost.shape))
     wanted = _stack([one.start_task if plan is None else np.where(plan == IDLE, one.m, plan) for one in instances])
     start = games.slots_at(games.candidates == wanted[..., None], otherwise=nearest)
     return games.board(scale, start, energy_weight)
@@ -195,7 +196,7 @@ def make_board(
 def _unscaled(
     instances: Sequence[Instance], hours: Sequence[float], near: int | None, plan: Ints | None
 ) -> UnscaledGames:
-    candidates, distance, reachable = zip(*(candidate_tasks(one, near, plan) for one in instances), strict=True)
+    candidates, distance, cost, reachable = zip(*(candidate_tasks(one, near, plan) for one in instances), strict=True)
     return UnscaledGames(
         ability=_stack([one.ability for one in instances]),
         speed=_stack([one.speed for one in instances]),
@@ -205,7 +206,8 @@ def _unscaled(
         candidates=_stack(candidates),
         reachable=_stack(reachable),
         distance=_stack(distance),
-        task_distance=_stack([distance_table(one.task_position, one.task_position) for one in instances]),
+        cost=_stack(cost),
+        task_distance=_stack([distance_table(one.reach.goal, one.reach.goal) for one in instances]),
         hours=np.array([max(reference, SHORTEST_HOURS) for _, reference in zip(instances, hours, strict=True)]),
         log_tau=np.array([math.log(one.tau) for one in instances]),
     )
@@ -247,7 +249,7 @@ def _scaled(distance: Floats, scale: Floats) -> NDArray[np.float32]:
 def _endurance(instance: Instance) -> Floats:
     """Distance for which each battery lasts, shape (n,); not a number where an empty one is not used."""
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        return instance.battery / instance.energy_per_distance
+        return instance.battery / instance.reach.energy_per_distance
 
 
 def _scaled_endurance(endurance: Floats, scale: Floats) -> Floats:

@@ -98,7 +98,11 @@ def _unscaled(instance: Instance, hours: float, tasks: Ints, members: Ints) -> U
     distance, reachable = np.zeros(shape), np.zeros(shape, dtype=np.bool_)
     distance[..., :j] = instance.reach.distance_of(agent, task)
     reachable[..., :j] = instance.reach.allows(agent, task) & real[..., None]
-    position = instance.task_position[tasks]
+    position = instance.reach.goal[tasks]
+    cost = distance
+    if not instance.reach.cost_is_distance:
+        cost = np.zeros(shape)
+        cost[..., :j] = instance.reach.cost_of(agent, task)
     return UnscaledGames(
         ability=np.where(real, instance.ability[someone], 0.0),
         speed=instance.speed[someone],
@@ -108,6 +112,7 @@ def _unscaled(instance: Instance, hours: float, tasks: Ints, members: Ints) -> U
         candidates=np.broadcast_to(np.arange(j + 1), shape).copy(),
         reachable=reachable,
         distance=distance,
+        cost=cost,
         task_distance=distances(position[:, :, None], position[:, None]),
         hours=np.full(count, max(hours, SHORTEST_HOURS)),
         log_tau=np.full(count, math.log(instance.tau)),
@@ -117,5 +122,5 @@ def _unscaled(instance: Instance, hours: float, tasks: Ints, members: Ints) -> U
 def _scale(games: UnscaledGames) -> NDArray[np.float64]:
     """Return what distances are multiplied by, so that their mean over legal pairs is `MEAN_DISTANCE`; shape (G,)."""
     legal = games.legal[..., :-1]
-    mean = (games.distance[..., :-1] * legal).sum((1, 2)) / np.maximum(legal.sum((1, 2)), 1)
+    mean = (games.cost[..., :-1] * legal).sum((1, 2)) / np.maximum(legal.sum((1, 2)), 1)
     return np.where(mean > 0, MEAN_DISTANCE / np.where(mean > 0, mean, 1.0), 1.0)

@@ -37,7 +37,7 @@ def least_energy(search: Search, solver: Solver, min_served: int) -> float | Non
     """
     assert search.best is not None
     time = last_equal(search.makespan_limit)
-    if search.best.evaluation.energy == 0:
+    if search.best.evaluation.cost == 0:
         return 0.0
     if is_over(search):
         return None
@@ -47,12 +47,12 @@ def least_energy(search: Search, solver: Solver, min_served: int) -> float | Non
     demand = model.at(time)
     if model.travel_time is not None and len(demand.class_of_pair) > FEW_PAIRS and not is_repeatable(search):
         _search_travelling(search)
-    distance = _least_distance(EnergyState.begin(search, model, demand), solver)
-    return min(max(0.0, distance * search.instance.energy_per_distance), sys.float_info.max)
+    cost = _least_cost(EnergyState.begin(search, model, demand), solver)
+    return min(max(0.0, cost * search.instance.reach.energy_per_distance), sys.float_info.max)
 
 
-def _least_distance(state: EnergyState, solver: Solver) -> float:
-    """Close the gap from both sides, then by the solver; return the distance that is proven to be needed."""
+def _least_cost(state: EnergyState, solver: Solver) -> float:
+    """Close the gap from both sides, then by the solver; return the cost that is proven to be needed, in units of distance."""
     both = state.primal_dual
     if both is None:
         return _solve_rest(state, solver).bound
@@ -88,7 +88,7 @@ def _solve_rest(state: EnergyState, solver: Solver) -> Answer:
         demand = demand.only(both.keep)
     model = SolverModel(
         demand=demand,
-        cost=state.model.distance[state.model.pairs_at(demand)],
+        cost=state.model.cost[state.model.pairs_at(demand)],
         hint=state.model.counts(demand, search.best.allocation),
         limits=SolverLimits.of(
             search, search.remaining_s, search.threads if both is None else max(1, search.threads - 1)

@@ -16,7 +16,7 @@ MAX_MATCHED = 400
 def nearest_places(
     instance: Instance, allocation: Allocation, should_stop: Callable[[], bool] = lambda: False
 ) -> Allocation:
-    """Exchange agents alike but for their place so that their total distance is least: an assignment problem per class.
+    """Exchange agents alike but for their place so that their total cost is least: an assignment problem per class.
 
     By Crouse (2016), doi:10.1109/TAES.2016.140952, in scipy. Where travel takes time, agents at different places are
     not alike, and the plan stays as it is.
@@ -28,8 +28,8 @@ def nearest_places(
         if should_stop():
             break
         tasks = task[members][task[members] != IDLE]
-        distance = instance.reach.distance[instance.reach.origin[members]][:, tasks]
-        row, column = linear_sum_assignment(distance)
+        cost = instance.reach.cost[instance.reach.origin[members]][:, tasks]
+        row, column = linear_sum_assignment(cost)
         task[members] = IDLE
         task[members[row]] = tasks[column]
     return Allocation(task)
@@ -45,13 +45,13 @@ def _alike(instance: Instance) -> list[IntArray]:
 
 
 def without_idlers(model: Model, allocation: Allocation, time: float) -> Allocation:
-    """Leave out agents without whom their task is done by `time` all the same, the farthest first."""
+    """Leave out agents without whom their task is done by `time` all the same, the dearest first."""
     table = model.classes.tally(allocation)
     share = model.shares(time)
     for column, task in enumerate(model.tasks.tolist()):
         done = float(share[:, column] @ table[:, task])
         group = np.flatnonzero(table[:, task])
-        for agent_class in group[np.argsort(-model.classes.distance[group, task])].tolist():
+        for agent_class in group[np.argsort(-model.classes.cost[group, task])].tolist():
             one = float(share[agent_class, column])
             spare = table[agent_class, task] if one == 0 else max(0, int((done - 1 + ROUNDING) / one))
             leave = min(int(table[agent_class, task]), int(spare))

@@ -158,7 +158,7 @@ class PrimalDual:
 
     def _begin_dual(self, task_distance: FloatArray) -> LagrangianBound | None:
         """Start the dual side; None where its tables are too large."""
-        cost = self._model.distance[self._model.pairs_at(self._demand)]
+        cost = self._model.cost[self._model.pairs_at(self._demand)]
         rounded, pairs = round_demand(self._demand, cost)
         cells = np.maximum(rounded.need, rounded.max_weight)[rounded.task_of_pair].sum()
         if cells > MAX_WORK:
@@ -183,7 +183,7 @@ def _begin_primal(
     column = np.full(instance.m + 1, len(model.tasks))
     column[model.tasks] = np.arange(len(model.tasks))
     task = column[plan.task_of_agent]
-    distance = np.where(model.classes.mask, model.classes.distance, np.inf)[:, model.tasks]
+    cost = np.where(model.classes.mask, model.classes.cost, np.inf)[:, model.tasks]
     if demand.integral and demand.need.max() <= MAX_NEED:
         weight, need = demand.ability.astype(np.int64), demand.need.astype(np.int64)
     else:
@@ -191,12 +191,12 @@ def _begin_primal(
         scale = MAX_NEED / work.max()
         weight, need = np.floor(model.classes.ability * scale).astype(np.int64), np.ceil(work * scale).astype(np.int64)
     served = np.bincount(task, minlength=len(need) + 1)[:-1] > 0
-    need, distance = np.where(served, need, 0), np.where(served, distance, np.inf)
+    need, cost = np.where(served, need, 0), np.where(served, cost, np.inf)
     partners = min(len(need), Perturbation().partners)
     if len(need) * partners / 2 * (instance.n + 2 * instance.n / len(need) * need.max()) > MAX_WORK:
         return None
     agent_class = model.classes.class_of_agent
-    return PairwiseSearch(task, weight[agent_class], distance[agent_class], need, task_distance, seed)
+    return PairwiseSearch(task, weight[agent_class], cost[agent_class], need, task_distance, seed)
 
 
 def _distance(instance: Instance, plan: Allocation) -> float:

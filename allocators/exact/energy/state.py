@@ -63,9 +63,9 @@ class EnergyState:
 
     @property
     def cost(self) -> float:
-        """Distance of the best plan."""
+        """Cost of the best plan, in units of distance."""
         assert self.search.best is not None
-        return self.search.best.evaluation.distance
+        return self.search.best.evaluation.cost_in_distance
 
     @property
     def progress(self) -> float:

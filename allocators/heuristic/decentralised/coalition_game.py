@@ -84,7 +84,7 @@ class CoalitionGame:
         ability = np.bincount(graph.component, weights=instance.ability)
         self.target: FloatArray = (ability / instance.workload.sum())[graph.component]
         distance_counts = self.energy_counts or graph.n_components > 1
-        mean = float(instance.reach.distance[:, instance.workload > 0].mean())
+        mean = float(instance.reach.cost[:, instance.workload > 0].mean())
         self.distance_weight = parameters.distance_weight / mean if distance_counts and mean > 0 else 0.0
         self.games = 0
 
@@ -159,7 +159,7 @@ def _game_data(instance: Instance, graph: CommunicationGraph, partners: int, rng
     return GameData(
         ability=instance.ability,
         origin=reach.origin,
-        distance=reach.distance,
+        cost=reach.cost,
         mask=reach.mask,
         workload=instance.workload,
         neighbour_begin=graph.begin,

@@ -65,8 +65,8 @@ class DeadlineSeries:
         instance, reach = search.instance, search.instance.reach
         self.rng = np.random.default_rng(search.seed)
         energy_counts = search.objective is Objective.MAKESPAN_ENERGY
-        mean = float(reach.distance.mean()) or 1.0
-        self.cost: FloatArray = reach.distance / mean if energy_counts else np.zeros(reach.distance.shape)
+        mean = float(reach.cost.mean()) or 1.0
+        self.cost: FloatArray = reach.cost / mean if energy_counts else np.zeros(reach.distance.shape)
         self.market = Market(
             ability=instance.ability,
             origin=reach.origin,

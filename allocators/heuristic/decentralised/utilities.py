@@ -33,8 +33,8 @@ class GameData(NamedTuple):
     ----------
     ability : ndarray, shape (n,)
     origin : ndarray of int, shape (n,)
-        Row of each agent in `distance` and `mask`, which are those of `Reach`.
-    distance : ndarray, shape (origins, m)
+        Row of each agent in `cost` and `mask`, which are those of `Reach`.
+    cost : ndarray, shape (origins, m)
     mask : ndarray of bool, shape (origins, m)
     workload : ndarray, shape (m,)
     neighbour_begin, neighbour, is_complete
@@ -46,7 +46,7 @@ class GameData(NamedTuple):
 
     ability: FloatArray
     origin: IntArray
-    distance: FloatArray
+    cost: FloatArray
     mask: BoolArray
     workload: FloatArray
     neighbour_begin: IntArray
@@ -71,15 +71,15 @@ def best_serving_change(
     """Return the task that agent `i` prefers, the agent that it would swap with (-1: none), and the precedence.
 
     Its utility is the decrease of the tasks' shortfall, whose sum is thereby a potential of the game, minus the
-    weighted increase of the distance.
+    weighted increase of the cost of flights.
     """
     w, row, home = game.ability[i], game.origin[i], int(plan[i])
-    workload, mask, distance = game.workload, game.mask, game.distance
+    workload, mask, cost = game.workload, game.mask, game.cost
     choice, mate, best = STAY, -1, -np.inf
     if home < 0:
         for j in range(len(workload)):
             if workload[j] > 0 and mask[row, j] and coverage[j] < target * (1 - EPS):
-                value = 1.0 - coverage[j] / target - distance_weight * distance[row, j]
+                value = 1.0 - coverage[j] / target - distance_weight * cost[row, j]
                 if value > best or (value == best and workload[j] > workload[choice]):
                     choice, best = j, value
         if choice >= 0:
@@ -90,7 +90,7 @@ def best_serving_change(
         if home >= 0 and workload[j] > 0 and mask[row, j] and coverage[j] < here:
             gain = before + shortfall(coverage[j], target)
             gain -= shortfall(here - w / workload[home], target) + shortfall(coverage[j] + w / workload[j], target)
-            value = gain - distance_weight * (distance[row, j] - distance[row, home])
+            value = gain - distance_weight * (cost[row, j] - cost[row, home])
             if gain > EPS and value > best:
                 choice, best = j, value
     for k in game.partner[game.partner_begin[i] : game.partner_begin[i + 1]]:
@@ -100,10 +100,10 @@ def best_serving_change(
         gain, detour, change = before, 0.0, game.ability[k] - w
         if home >= 0:
             gain -= shortfall(here + change / workload[home], target)
-            detour += distance[other, home] - distance[row, home]
+            detour += cost[other, home] - cost[row, home]
         if task >= 0:
             gain += shortfall(coverage[task], target) - shortfall(coverage[task] - change / workload[task], target)
-            detour += distance[row, task] - distance[other, task]
+            detour += cost[row, task] - cost[other, task]
         value = gain - distance_weight * detour
         if gain > EPS and value > best:
             choice, mate, best = task, k, value
@@ -114,18 +114,18 @@ def best_serving_change(
 def best_saving_change(
     i: int, plan: NDArray[np.int32], coverage: FloatArray, game: GameData, target: float
 ) -> tuple[int, int, float]:
-    """Return the change that saves most distance, as `best_serving_change` does.
+    """Return the change that saves most cost, as `best_serving_change` does.
 
     No task may fall below the coverage `target`, or below its present one where that is lower.
     """
     w, row, home = game.ability[i], game.origin[i], int(plan[i])
-    workload, mask, distance = game.workload, game.mask, game.distance
+    workload, mask, cost = game.workload, game.mask, game.cost
     choice, mate, best = STAY, -1, EPS
     here = coverage[home] if home >= 0 else 0.0
     floor = min(here, target) * (1 - ROUNDING)
     if home >= 0 and here - w / workload[home] >= floor:
         for j in range(-1, len(workload)):
-            saved = distance[row, home] - (distance[row, j] if j >= 0 else 0.0)
+            saved = cost[row, home] - (cost[row, j] if j >= 0 else 0.0)
             if saved > best and (j < 0 or (mask[row, j] and workload[j] > 0)):
                 choice, best = j, saved
     for k in game.partner[game.partner_begin[i] : game.partner_begin[i + 1]]:
@@ -136,11 +136,11 @@ def best_saving_change(
         if home >= 0:
             if here + change / workload[home] < floor:
                 continue
-            saved += distance[row, home] - distance[other, home]
+            saved += cost[row, home] - cost[other, home]
         if task >= 0:
             if coverage[task] - change / workload[task] < min(coverage[task], target) * (1 - ROUNDING):
                 continue
-            saved += distance[other, task] - distance[row, task]
+            saved += cost[other, task] - cost[row, task]
         if saved > best:
             choice, mate, best = task, k, saved
     return choice, mate, best

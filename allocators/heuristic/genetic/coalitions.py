@@ -63,8 +63,8 @@ def exchange_cost(
     scale = noise * rng.random((rows, 1, 1))
     cost += scale * rng.standard_exponential(cost.shape)
     if distance_weight is not None:
-        weight = distance_weight / encoding.mean_distance * rng.random((rows, 1, 1)) ** 2
-        cost += weight * _added_distance(givers, takers, columns, encoding)
+        weight = distance_weight / encoding.mean_cost * rng.random((rows, 1, 1)) ** 2
+        cost += weight * _added_cost(givers, takers, columns, encoding)
     cost[~_is_possible(givers, takers, columns, encoding)] = np.inf
     return cost
 
@@ -81,11 +81,11 @@ def _shortfall(moved: FloatArray, group: FloatArray, demand: FloatArray, columns
     return shortfall
 
 
-def _added_distance(givers: IntArray, takers: IntArray, columns: TwoColumns, encoding: Encoding) -> FloatArray:
+def _added_cost(givers: IntArray, takers: IntArray, columns: TwoColumns, encoding: Encoding) -> FloatArray:
     """Return the distance that each exchange adds."""
     source, target = columns.source[:, None, None], columns.target[:, None, None]
-    going = (encoding.distance(givers, target) - encoding.distance(givers, source)).sum(axis=2)
-    coming = (encoding.distance(takers, source) - encoding.distance(takers, target)).sum(axis=2)
+    going = (encoding.cost(givers, target) - encoding.cost(givers, source)).sum(axis=2)
+    coming = (encoding.cost(takers, source) - encoding.cost(takers, target)).sum(axis=2)
     added: FloatArray = going[:, :, None] + coming[:, None, :]
     return added
 

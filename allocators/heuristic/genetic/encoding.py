@@ -75,9 +75,9 @@ class Encoding:
         self.is_complete = self.reach.is_complete
 
     @cached_property
-    def mean_distance(self) -> float:
-        """Mean distance of tasks from the agents' starts; 1 where all are 0."""
-        return float(self.reach.distance.mean()) or 1.0
+    def mean_cost(self) -> float:
+        """Mean cost of flights from the agents' starts to tasks; 1 where all are 0."""
+        return float(self.reach.cost.mean()) or 1.0
 
     def group_abilities(self, genes: Genes) -> FloatArray:
         """Return W of each column, that of idle agents included, shape (rows, c + 1)."""
@@ -99,8 +99,8 @@ class Encoding:
         with np.errstate(divide="ignore", over="ignore"):
             time = np.where(served, self.workload / group, 0.0)
             shortfall = np.maximum(0.0, 1 - group / self.demand(target_makespan))
-            distance = self.distance(np.arange(self.n), genes).sum(axis=1) if with_energy else np.zeros(len(genes))
-            energy = distance * self.instance.energy_per_distance
+            cost = self.cost(np.arange(self.n), genes).sum(axis=1) if with_energy else np.zeros(len(genes))
+            energy = cost * self.reach.energy_per_distance
         shortfall[shortfall < ROUNDING] = 0.0
         return Objectives(
             unserved=(~served).sum(axis=1).astype(float),
@@ -118,10 +118,10 @@ class Encoding:
         allowed: BoolArray = reachable | (agent == self.no_agent) | (column == self.idle)
         return allowed
 
-    def distance(self, agent: IntArray, column: NDArray[np.integer]) -> FloatArray:
-        """Distance from each agent's start to the column at the same index; 0 for `no_agent` and idle agents."""
-        distance = self.reach.distance[self._origin[agent], self._task[column]]
-        return np.where((agent == self.no_agent) | (column == self.idle), 0.0, distance)
+    def cost(self, agent: IntArray, column: NDArray[np.integer]) -> FloatArray:
+        """Cost of each agent's flight to the column at the same index; 0 for `no_agent` and idle agents."""
+        cost = self.reach.cost[self._origin[agent], self._task[column]]
+        return np.where((agent == self.no_agent) | (column == self.idle), 0.0, cost)
 
     def encode(self, allocation: Allocation) -> Genes:
         """Return the genes of an allocation, shape (n,); agents on unreachable or empty tasks become idle."""

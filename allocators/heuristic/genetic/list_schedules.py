@@ -48,8 +48,8 @@ def list_schedules(
         origin = reach.origin[agents]
         cost = coverage
         if with_distance:
-            distance = reach.distance[origin] if all_tasks else reach.distance[origin][:, encoding.tasks]
-            cost = cost + (distance_weight * mean / encoding.mean_distance)[:, None] * distance
+            flight = reach.cost[origin] if all_tasks else reach.cost[origin][:, encoding.tasks]
+            cost = cost + (distance_weight * mean / encoding.mean_cost)[:, None] * flight
         if not encoding.is_complete:
             reachable = reach.mask[origin] if all_tasks else reach.mask[origin][:, encoding.tasks]
             cost = np.where(reachable, cost, np.inf)

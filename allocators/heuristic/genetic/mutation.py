@@ -148,9 +148,9 @@ def _draw_giver(
 def draw_saving_move(some: Genes, encoding: Encoding, rng: np.random.Generator) -> tuple[IntArray, IntArray]:
     """Draw an agent of each row in proportion to its distance, and a column by the square of what it saves there."""
     agents = np.arange(encoding.n)[None, :]
-    distance = encoding.distance(agents, some.astype(np.intp))
-    giver = roulette(distance, rng)
+    cost = encoding.cost(agents, some.astype(np.intp))
+    giver = roulette(cost, rng)
     columns = np.arange(encoding.idle)[None, :]
-    saved = np.take_along_axis(distance, giver[:, None], axis=1) - encoding.distance(giver[:, None], columns)
+    saved = np.take_along_axis(cost, giver[:, None], axis=1) - encoding.cost(giver[:, None], columns)
     saved = np.maximum(0.0, saved) ** 2 * encoding.allows(giver[:, None], columns)
     return giver, roulette(saved, rng)

@@ -29,9 +29,9 @@ def reduce_distance(instance: Instance, task: Indices, stop: Callable[[], bool])
     Returns
     -------
     ndarray of int, shape (n,)
-        With no larger total distance than `task`.
+        With no larger total cost than `task`.
     """
-    start, goal = instance.start_position, instance.task_position
+    start, goal = instance.reach.place[instance.reach.origin], instance.reach.goal
     movable = (task != IDLE) & ~np.isnan(start[:, 0])
     movable &= ~np.isnan(goal[task, 0])
     agents = np.flatnonzero(movable)
@@ -43,8 +43,8 @@ def reduce_distance(instance: Instance, task: Indices, stop: Callable[[], bool])
     first, second = _match_by_bisection(start[agents], goal[task[agents]], bounds, stop)
     changed = task.copy()
     changed[agents[first]] = task[agents[second]]
-    distance = instance.reach.distance_of
-    if distance(agents, changed[agents]).sum() < distance(agents, task[agents]).sum():
+    cost = instance.reach.cost_of
+    if cost(agents, changed[agents]).sum() < cost(agents, task[agents]).sum():
         return changed
     return task
 

@@ -4,7 +4,7 @@ An agent visits a node only if the bounding box is within its range and the node
 than the best candidate so far; where that task is within reach, the rest of the node is skipped.
 """
 
-from typing import NamedTuple
+from typing import NamedTuple, TypedDict
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from alloc.allocators.heuristic.greedy.task_tree import (
 )
 from alloc.allocators.runtime.compiled import compiled, inlined
 from alloc.problems import Instance
-from alloc.problems.distances.reach import TOLERANCE
+from alloc.problems.distances.reach import TOLERANCE, Reach
 
 MARGIN = 1 - 1e-9
 """Factor on the distance to a box, against rounding errors."""
@@ -48,6 +48,8 @@ class Agents(NamedTuple):
         List of tasks of each origin, -1 for all tasks.
     list_begin, listed_task : ndarray of int
         Lists of tasks as a compressed sparse row.
+    listed_distance : ndarray
+        How far each listed task is, all being within reach; empty where coordinates give that.
     unit, energy_per_distance : float
     """
 
@@ -62,6 +64,7 @@ class Agents(NamedTuple):
     list_of: Indices
     list_begin: Indices
     listed_task: Indices
+    listed_distance: Floats
     unit: float
     energy_per_distance: float
 
@@ -95,9 +98,7 @@ class TreeGreedy:
             longest_distance=reach.communication_range + TOLERANCE,
             battery=reach.battery + TOLERANCE,
             radius=reach.radius,
-            list_of=reach.list_of,
-            list_begin=np.concatenate([[0], np.cumsum([len(tasks) for tasks in reach.lists])]).astype(np.intp),
-            listed_task=np.concatenate([np.zeros(0, dtype=np.intp), *reach.lists]),
+            **_lists(reach),
             unit=1.0,
             energy_per_distance=float(reach.energy_per_distance),
         )
@@ -110,6 +111,34 @@ class TreeGreedy:
     def assign(self, agents: Indices) -> None:
         """Assign each of `agents`, in this order, to the worst-served task within its reach."""
         _assign(agents, self._tree, self._tasks, self._agents)
+
+
+class _Lists(TypedDict):
+    """Fields of `Agents` on lists of tasks."""
+
+    list_of: Indices
+    list_begin: Indices
+    listed_task: Indices
+    listed_distance: Floats
+
+
+def _lists(reach: Reach) -> _Lists:
+    """Return the lists of tasks; where coordinates do not give distances, each origin has that of all within reach."""
+    if reach.is_plain:
+        return _Lists(
+            list_of=reach.list_of,
+            list_begin=np.concatenate([[0], np.cumsum([len(tasks) for tasks in reach.lists])]).astype(np.intp),
+            listed_task=np.concatenate([np.zeros(0, dtype=np.intp), *reach.lists]),
+            listed_distance=np.zeros(0),
+        )
+    near = reach.neighbours
+    assert near is not None, "an instance with too many pairs is refused"
+    return _Lists(
+        list_of=np.arange(len(reach.place)),
+        list_begin=near.first.astype(np.intp),
+        listed_task=near.task.astype(np.intp),
+        listed_distance=near.distance,
+    )
 
 
 @compiled
@@ -139,6 +168,10 @@ def _worst_of_list(agent: int, tasks: Tasks, agents: Agents) -> tuple[int, float
     for entry in range(agents.list_begin[number], agents.list_begin[number + 1]):
         j = agents.listed_task[entry]
         if tasks.workload[j] <= 0 or (best >= 0 and not is_worse(j, best, tasks.coverage, tasks.rank)):
+            continue
+        if agents.listed_distance.shape[0] > 0:
+            if agents.listed_distance[entry] < horizon:
+                best, best_distance = j, agents.listed_distance[entry]
             continue
         distance = _distance(agents.position[origin], tasks.position[j], agents.unit)
         if _is_reachable(distance, longest, battery, rate, horizon):

@@ -18,7 +18,7 @@ ANY_TASK_PERIOD = 8
 """One in so many exchanges is with any task, not with a candidate."""
 
 SMALLEST_GAIN = 1e-10
-"""Relative improvement of the distance from which on a plan is saved as the best."""
+"""Relative improvement of the cost from which on a plan is saved as the best."""
 
 
 @compiled
@@ -55,18 +55,18 @@ def anneal(
 ) -> float:
     """Make `steps` exchanges, the noise multiplied by `cooling` before each; return the last noise.
 
-    Where distance has no weight, only exchanges with short tasks are made, until there is none; otherwise the plan of
-    least distance without a shortfall is saved.
+    Where cost has no weight, only exchanges with short tasks are made, until there is none; otherwise the plan of
+    least cost without a shortfall is saved.
     """
     tasks, agents = plan.demand.shape[0] - 1, plan.group_of_agent.shape[0]
     noise = weights.noise
     for _ in range(steps):
         noise *= cooling
         now = Weights(
-            weights.distance, noise, weights.short_task, weights.shortfall, weights.surplus, weights.integer_ability
+            weights.cost, noise, weights.short_task, weights.shortfall, weights.surplus, weights.integer_ability
         )
         agent = -1
-        if plan.counter[N_SHORT] > 0 and (weights.distance == 0.0 or draw(plan.random, 4) == 0):
+        if plan.counter[N_SHORT] > 0 and (weights.cost == 0.0 or draw(plan.random, 4) == 0):
             task = plan.short_task[draw(plan.random, plan.counter[N_SHORT])]
             if plan.size[tasks] > 0 and draw(plan.random, 2) == 0:
                 other = tasks
@@ -91,8 +91,8 @@ def anneal(
         if plan.counter[FULL_GROUP] > 0:
             break
         if plan.counter[N_SHORT] == 0:
-            if weights.distance == 0.0:
+            if weights.cost == 0.0:
                 break
-            if plan.distance[CURRENT] < plan.distance[BEST] * (1 - SMALLEST_GAIN):
+            if plan.cost[CURRENT] < plan.cost[BEST] * (1 - SMALLEST_GAIN):
                 save_best(plan)
     return noise

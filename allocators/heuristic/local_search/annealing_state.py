@@ -3,7 +3,7 @@
 import numpy as np
 
 from alloc.allocators.heuristic.local_search.annealing import anneal
-from alloc.allocators.heuristic.local_search.candidates import arrays_and_candidates, mean_candidate_distance
+from alloc.allocators.heuristic.local_search.candidates import arrays_and_candidates, mean_candidate_cost
 from alloc.allocators.heuristic.local_search.instance_arrays import Int32Array
 from alloc.allocators.heuristic.local_search.moves import recompute
 from alloc.allocators.heuristic.local_search.plan import (
@@ -35,8 +35,8 @@ class AnnealingState:
 
     Attributes
     ----------
-    candidate_distance : float
-        Mean distance from an origin to its candidates, the unit of noise on distances.
+    candidate_cost : float
+        Mean cost of a flight from an origin to its candidates, the unit of noise on costs.
     mean_ability : float
         In the unit of `arrays`.
     """
@@ -51,7 +51,7 @@ class AnnealingState:
         self._is_served = np.ones(instance.m, dtype=bool)
         self._least_slots = np.full(m + 1, min(n, max(16, 2 * n // m)), dtype=np.int64)
         self.plan = idle_plan(n, m, random)
-        self.candidate_distance = mean_candidate_distance(self.arrays, self.candidates)
+        self.candidate_cost = mean_candidate_cost(self.arrays, self.candidates)
         self.mean_ability = float(self.arrays.ability.mean())
         self._integer_ability = float(self.arrays.ability.max()) if self.arrays.integer_ability else np.inf
 
@@ -78,12 +78,12 @@ class AnnealingState:
         exact[~self._is_served] = 0.0
         demand[:-1] = np.minimum(np.ceil(exact) if arrays.integer_ability else exact, 1e300)
         self.recompute()
-        self.plan.distance[BEST] = np.inf
+        self.plan.cost[BEST] = np.inf
         self.plan.counter[N_MOVES] = self.instance.n + 1  # so that all of the first best plan is written
 
-    def weights(self, distance: float, noise: float, short_task: float, shortfall: float) -> Weights:
+    def weights(self, cost: float, noise: float, short_task: float, shortfall: float) -> Weights:
         """Return the weights of exchanges; see `Weights`."""
-        return Weights(distance, noise, short_task, shortfall, 2.0, self._integer_ability)
+        return Weights(cost, noise, short_task, shortfall, 2.0, self._integer_ability)
 
     def run(self, steps: int, weights: Weights, cooling: float = 1.0) -> float:
         """Make exchanges; return the last noise."""
@@ -95,7 +95,7 @@ class AnnealingState:
         return noise
 
     def recompute(self) -> None:
-        """Compute group abilities and distance from scratch, which removes accumulated rounding errors."""
+        """Compute group abilities and cost from scratch, which removes accumulated rounding errors."""
         recompute(self.arrays, self.plan, self.makespan)
 
     @property
@@ -105,18 +105,18 @@ class AnnealingState:
 
     @property
     def best(self) -> Allocation | None:
-        """The plan of least distance without a shortfall since the target was set, if any."""
-        return _as_allocation(self.plan.best_group, self.instance.m) if self.best_distance < np.inf else None
+        """The plan of least cost without a shortfall since the target was set, if any."""
+        return _as_allocation(self.plan.best_group, self.instance.m) if self.best_cost < np.inf else None
 
     @property
-    def best_distance(self) -> float:
+    def best_cost(self) -> float:
         """Distance of `best`, ``inf`` for none."""
-        return float(self.plan.distance[BEST])
+        return float(self.plan.cost[BEST])
 
     @property
-    def distance(self) -> float:
+    def cost(self) -> float:
         """Distance of the current plan."""
-        return float(self.plan.distance[CURRENT])
+        return float(self.plan.cost[CURRENT])
 
     @property
     def current_makespan(self) -> float:

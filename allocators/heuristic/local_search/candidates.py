@@ -19,7 +19,7 @@ MOST_ROWS = 100_000
 """Origins up to which each has its own candidates; beyond, it has those of its nearest task."""
 
 SAMPLE_SIZE = 1000
-"""Origins over which the mean distance to a candidate is taken."""
+"""Origins over which the mean cost of a flight to a candidate is taken."""
 
 
 class Candidates(NamedTuple):
@@ -42,14 +42,18 @@ class Candidates(NamedTuple):
 
 def arrays_and_candidates(instance: Instance, count: int) -> tuple[InstanceArrays, Candidates]:
     """Return the arrays of an instance, with a table of distances if it fits, and `count` candidates per row."""
-    arrays = instance_arrays(instance)
+    arrays, reach = instance_arrays(instance), instance.reach
     origins, m = len(arrays.origin_position), instance.m
     count = min(count, m)
     of_task = _nearest_by_position(arrays.task_position, arrays.task_position, count)
     if origins * m <= TABLE_LIMIT:
         table = np.empty((origins, m))
-        fill_table(arrays, table)
-        arrays = arrays._replace(distance=table)
+        if reach.is_plain:
+            fill_table(arrays, table)
+        else:
+            table[:] = np.where(reach.mask, reach.distance, np.inf)
+        cost = table if reach.cost_is_distance else np.where(reach.mask, reach.cost, np.inf)
+        arrays = arrays._replace(distance=table, cost=cost)
         row, of_origin = np.arange(origins), _nearest_by_table(table, count)
     elif origins <= MOST_ROWS:
         row, of_origin = np.arange(origins), _nearest_by_position(arrays.origin_position, arrays.task_position, count)
@@ -59,15 +63,20 @@ def arrays_and_candidates(instance: Instance, count: int) -> tuple[InstanceArray
     return arrays, Candidates(row.astype(np.int32), of_origin, of_task)
 
 
-def mean_candidate_distance(arrays: InstanceArrays, candidates: Candidates) -> float:
-    """Return the mean distance from an origin to its candidates, over a sample; 1 if there is none."""
+def mean_candidate_cost(arrays: InstanceArrays, candidates: Candidates) -> float:
+    """Return the mean cost from an origin to its candidates, over a sample; 1 if there is none.
+
+    By straight lines, but where costs are something else, and tabulated.
+    """
     rows = np.arange(0, len(arrays.origin_position), max(1, len(arrays.origin_position) // SAMPLE_SIZE))
     tasks = candidates.of_origin[candidates.row[rows]]
     with np.errstate(over="ignore", invalid="ignore"):
         step = arrays.origin_position[rows][:, None, :] - arrays.task_position[tasks]
-        distance = np.sqrt((step * step).sum(axis=2))[tasks >= 0] * arrays.distance_unit
-    distance = distance[np.isfinite(distance) & (distance > 0)]
-    return float(distance.mean()) if len(distance) else 1.0
+        cost = np.sqrt((step * step).sum(axis=2))[tasks >= 0] * arrays.distance_unit
+    if arrays.cost is not arrays.distance:
+        cost = arrays.cost[rows[:, None], tasks][tasks >= 0]
+    cost = cost[np.isfinite(cost) & (cost > 0)]
+    return float(cost.mean()) if len(cost) else 1.0
 
 
 def _nearest_by_table(table: FloatArray, count: int) -> Int32Array:

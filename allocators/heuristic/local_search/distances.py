@@ -47,6 +47,20 @@ def compute_distance(
     return distance if low < list_begin[origin + 1] and listed_task[low] == task else np.inf
 
 
+@compiled
+def listed_entry(list_begin: NDArray[np.int64], listed_task: Int32Array, origin: int, task: int) -> int:
+    """Return where a task stands in the list of an origin, -1 if it does not."""
+    low, high = list_begin[origin], list_begin[origin + 1]
+    end = high
+    while low < high:
+        middle = (low + high) // 2
+        if listed_task[middle] < task:
+            low = middle + 1
+        else:
+            high = middle
+    return low if low < end and listed_task[low] == task else -1
+
+
 @inlined
 def untabulated_distance(arrays: InstanceArrays, origin: int, task: int) -> float:
     """Return the distance from an origin to a task without the table."""
@@ -62,6 +76,18 @@ def untabulated_distance(arrays: InstanceArrays, origin: int, task: int) -> floa
         origin,
         task,
     )
+
+
+@inlined
+def distance_and_cost(arrays: InstanceArrays, origin: int, task: int) -> tuple[float, float]:
+    """Return the distance from an origin to a task, ``inf`` where it is out of reach, and the cost of the flight."""
+    if arrays.distance.shape[0] > 0:
+        return arrays.distance[origin, task], arrays.cost[origin, task]
+    if arrays.listed_distance.shape[0] > 0:
+        entry = listed_entry(arrays.list_begin, arrays.listed_task, origin, task)
+        return (np.inf, np.inf) if entry < 0 else (arrays.listed_distance[entry], arrays.listed_cost[entry])
+    distance = untabulated_distance(arrays, origin, task)
+    return distance, distance
 
 
 @compiled

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from alloc.allocators.heuristic.local_search.distances import compute_distance, effective_ability
+from alloc.allocators.heuristic.local_search.distances import compute_distance, effective_ability, listed_entry
 from alloc.allocators.heuristic.local_search.instance_arrays import InstanceArrays
 from alloc.allocators.heuristic.local_search.moves import apply_subset
 from alloc.allocators.heuristic.local_search.plan import (
@@ -41,11 +41,12 @@ def add_to_pool(
     size, begin, slot = plan.size[group], plan.begin[group], plan.slot
     idle = plan.demand.shape[0] - 1
     origins, ability, hours_per_distance = arrays.origin, arrays.ability, arrays.hours_per_distance
-    table, starts, goals = arrays.distance, arrays.origin_position, arrays.task_position
+    table, costs_of, starts, goals = arrays.distance, arrays.cost, arrays.origin_position, arrays.task_position
     longest, battery, rate = arrays.longest_distance, arrays.battery, arrays.energy_per_distance
     list_begin, listed, unit = arrays.list_begin, arrays.listed_task, arrays.distance_unit
     agents, contribution, other_contribution = work.agent, work.ability, work.other_ability
-    distances, costs, logistic = work.distance, work.cost, work.logistic
+    listed_distance, listed_cost = arrays.listed_distance, arrays.listed_cost
+    extra, costs, logistic = work.extra_cost, work.cost, work.logistic
     noise = draw(plan.random, NOISE_SIZE)
     full = pool + most
     for step in range(size):
@@ -54,23 +55,34 @@ def add_to_pool(
         position = first + step
         agent = slot[begin + (position if position < size else position - size)]
         row = origins[agent]
-        there = 0.0
+        there, cost_there = 0.0, 0.0
         if table.shape[0] > 0:
-            here = table[row, task]
+            here, cost_here = table[row, task], costs_of[row, task]
             if other != idle:
-                there = table[row, other]
+                there, cost_there = table[row, other], costs_of[row, other]
+        elif listed_distance.shape[0] > 0:
+            entry = listed_entry(list_begin, listed, row, task)
+            if entry < 0:
+                continue
+            here, cost_here = listed_distance[entry], listed_cost[entry]
+            if other != idle:
+                entry = listed_entry(list_begin, listed, row, other)
+                if entry < 0:
+                    continue
+                there, cost_there = listed_distance[entry], listed_cost[entry]
         else:
             here = compute_distance(starts, goals, longest, battery, list_begin, listed, unit, rate, row, task)
             if other != idle:
                 there = compute_distance(starts, goals, longest, battery, list_begin, listed, unit, rate, row, other)
+            cost_here, cost_there = here, there
         if here == np.inf or there == np.inf:
             continue
         w, slow = ability[agent], hours_per_distance[agent]
         agents[pool] = agent
         contribution[pool] = effective_ability(w, slow, makespan, here)
         other_contribution[pool] = 0.0 if other == idle else effective_ability(w, slow, makespan, there)
-        distances[pool] = here - there
-        costs[pool] = weights.distance * (here - there) + weights.noise * logistic[(noise + step) % NOISE_SIZE]
+        extra[pool] = cost_here - cost_there
+        costs[pool] = weights.cost * (cost_here - cost_there) + weights.noise * logistic[(noise + step) % NOISE_SIZE]
         pool += 1
     return pool
 
@@ -86,7 +98,7 @@ def exchange(
     task: int,
     other: int,
 ) -> None:
-    """Reassign the agents of two groups to them at the least cost: weighted distances, noise and shortfall penalties.
+    """Reassign the agents of two groups to them at the least cost: that of flights, weighted, noise and shortfall penalties.
 
     Of large groups only some agents take part, from `agent` on where that is one of them, from a random one on else
     (-1). `other` may be the group of idle agents.

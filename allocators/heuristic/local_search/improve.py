@@ -118,7 +118,7 @@ def reduce_energy(search: Search, state: AnnealingState, parameters: LocalSearch
     """Anneal within the makespan of the best plan; what is left of the budget is one cooling cycle."""
     best = search.best
     assert best is not None
-    if clock.is_over or best.evaluation.energy == 0:
+    if clock.is_over or best.evaluation.cost == 0:
         return
     state.begin(best.allocation, search.makespan_limit)
     clock = Clock(search, clock.until_s, clock.until_iteration)
@@ -143,15 +143,15 @@ class _Reporter:
 
     def __init__(self, search: Search, state: AnnealingState) -> None:
         self.search, self.state = search, state
-        self.submitted_distance, self.next_s = np.inf, 0.0
+        self.submitted_cost, self.next_s = np.inf, 0.0
 
     def __call__(self, *, at_once: bool = False) -> None:
         """Submit the best plan if it is new, and if it is time to or `at_once`."""
-        is_new = self.state.best_distance < self.submitted_distance
+        is_new = self.state.best_cost < self.submitted_cost
         if not is_new or not (at_once or time.monotonic() >= self.next_s):
             return
         begin = time.monotonic()
-        self.submitted_distance = self.state.best_distance
+        self.submitted_cost = self.state.best_cost
         found = self.state.best
         if found is not None:
             self.search.submit(found)

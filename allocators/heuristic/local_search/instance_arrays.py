@@ -33,12 +33,16 @@ class InstanceArrays(NamedTuple):
         Origin of each agent.
     distance : ndarray, shape (origins, m) or (0, 0)
         Distances, ``inf`` where a task is out of reach; empty where there are more than `TABLE_LIMIT`.
+    cost : ndarray, as `distance`
+        Costs, see `Reach.costs`; the same array where they are distances.
     origin_position, task_position : ndarray, shape (origins, 3) and (m, 3)
         Coordinates, in `distance_unit`; NaN where unknown.
     longest_distance, battery : ndarray, shape (origins,)
         Limits on distance and on energy, tolerance included.
     list_begin, listed_task : ndarray of int, shape (origins + 1,) and (total,)
         Tasks that agents of each origin may do, sorted, as a compressed sparse row; an empty row allows all tasks.
+    listed_distance, listed_cost : ndarray, shape (total,) or (0,)
+        Distances and costs of these tasks, which are all within reach, where coordinates do not give them.
     distance_unit, energy_per_distance, ability_unit : float
     integer_ability : bool
         Whether all abilities are integers in `ability_unit`, and travel takes no time.
@@ -50,12 +54,15 @@ class InstanceArrays(NamedTuple):
     hours_per_distance: FloatArray
     origin: Int32Array
     distance: FloatArray
+    cost: FloatArray
     origin_position: FloatArray
     task_position: FloatArray
     longest_distance: FloatArray
     battery: FloatArray
     list_begin: NDArray[np.int64]
     listed_task: Int32Array
+    listed_distance: FloatArray
+    listed_cost: FloatArray
     distance_unit: float
     energy_per_distance: float
     ability_unit: float
@@ -66,7 +73,7 @@ class InstanceArrays(NamedTuple):
 def instance_arrays(instance: Instance) -> InstanceArrays:
     """Return the arrays of `instance`, with an empty table of distances."""
     reach = instance.reach
-    list_begin, listed_task = _task_lists(reach)
+    list_begin, listed_task, listed_distance, listed_cost = _lists(reach)
     unit = None if instance.has_travel_time else _common_unit(instance.ability)
     scale = float(np.mean(instance.ability)) if unit is None else unit
     scaled = instance.ability / scale
@@ -75,17 +82,39 @@ def instance_arrays(instance: Instance) -> InstanceArrays:
         hours_per_distance=1.0 / instance.speed,
         origin=reach.origin.astype(np.int32),
         distance=np.zeros((0, 0)),
+        cost=np.zeros((0, 0)),
         origin_position=np.ascontiguousarray(reach.place),
         task_position=np.ascontiguousarray(reach.goal),
         longest_distance=reach.communication_range + TOLERANCE,
         battery=reach.battery + TOLERANCE,
         list_begin=list_begin,
         listed_task=listed_task,
+        listed_distance=listed_distance,
+        listed_cost=listed_cost,
         distance_unit=1.0,
         energy_per_distance=reach.energy_per_distance,
         ability_unit=scale,
         integer_ability=unit is not None,
         instant_travel=not instance.has_travel_time,
+    )
+
+
+def _lists(reach: Reach) -> tuple[NDArray[np.int64], Int32Array, FloatArray, FloatArray]:
+    """Return the lists of tasks by origin, with distances and costs where coordinates do not give them."""
+    none = np.zeros(0)
+    if reach.is_plain or len(reach.place) * len(reach.goal) <= TABLE_LIMIT:
+        return (*_task_lists(reach), none, none)
+    near = reach.neighbours
+    assert near is not None, "an instance with too many pairs is refused"
+    cost = reach.costs(near.origin, near.task, near.distance)
+    rows = np.diff(near.first)
+    if (rows > 0).all():
+        return near.first.astype(np.int64), near.task, near.distance, cost
+    # a row without a task gets the task m, which does not exist
+    at = near.first[:-1][rows == 0]
+    begin = near.first + np.concatenate([[0], np.cumsum(rows == 0)])
+    return begin, *(
+        np.insert(part, at, value) for part, value in ((near.task, len(reach.goal)), (near.distance, 0), (cost, 0))
     )
 
 

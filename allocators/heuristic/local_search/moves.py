@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from alloc.allocators.heuristic.local_search.distances import effective_ability, untabulated_distance
+from alloc.allocators.heuristic.local_search.distances import distance_and_cost, effective_ability
 from alloc.allocators.heuristic.local_search.instance_arrays import InstanceArrays
 from alloc.allocators.heuristic.local_search.plan import BEST, CURRENT, FULL_GROUP, N_MOVES, N_SHORT, Plan, Workspace
 from alloc.allocators.runtime.compiled import compiled, inlined
@@ -10,10 +10,10 @@ from alloc.allocators.runtime.compiled import compiled, inlined
 
 @compiled
 def recompute(arrays: InstanceArrays, plan: Plan, makespan: float) -> None:
-    """Compute group abilities, distance and shortfalls of the plan from scratch."""
+    """Compute group abilities, cost and shortfalls of the plan from scratch."""
     idle = plan.demand.shape[0] - 1
     group_of_agent, group_ability, origin = plan.group_of_agent, plan.group_ability, arrays.origin
-    ability, hours_per_distance, table = arrays.ability, arrays.hours_per_distance, arrays.distance
+    ability, hours_per_distance = arrays.ability, arrays.hours_per_distance
     for task in range(idle + 1):
         group_ability[task] = 0.0
     total = 0.0
@@ -21,10 +21,10 @@ def recompute(arrays: InstanceArrays, plan: Plan, makespan: float) -> None:
         task = group_of_agent[agent]
         if task != idle:
             row = origin[agent]
-            distance = table[row, task] if table.shape[0] > 0 else untabulated_distance(arrays, row, task)
+            distance, cost = distance_and_cost(arrays, row, task)
             group_ability[task] += effective_ability(ability[agent], hours_per_distance[agent], makespan, distance)
-            total += distance
-    plan.distance[CURRENT] = total
+            total += cost
+    plan.cost[CURRENT] = total
     plan.counter[N_SHORT] = 0
     for task in range(idle):
         plan.short_position[task] = -1
@@ -81,7 +81,7 @@ def apply_subset(plan: Plan, work: Workspace, pool: int, subset: np.uint64, task
         move(plan, agent, target)
         plan.group_ability[task] += sign * work.ability[index]
         plan.group_ability[other] -= sign * work.other_ability[index]
-        plan.distance[CURRENT] += sign * work.distance[index]
+        plan.cost[CURRENT] += sign * work.extra_cost[index]
     update_shortfall(plan, task)
     if other != idle:
         update_shortfall(plan, other)
@@ -98,4 +98,4 @@ def save_best(plan: Plan) -> None:
             agent = plan.journal[entry]
             plan.best_group[agent] = plan.group_of_agent[agent]
     plan.counter[N_MOVES] = 0
-    plan.distance[BEST] = plan.distance[CURRENT]
+    plan.cost[BEST] = plan.cost[CURRENT]

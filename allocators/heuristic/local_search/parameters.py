@@ -54,7 +54,7 @@ class LocalSearchParameters(CheckedParameters):
     many_exchanges: float = bounded(100.0, low=0, above=True)
 
     def weights(self, state: AnnealingState, noise: float, penalty_factor: float) -> Weights:
-        """Return the weights of exchanges that reduce the distance.
+        """Return the weights of exchanges that reduce the cost.
 
         Parameters
         ----------
@@ -64,9 +64,9 @@ class LocalSearchParameters(CheckedParameters):
         penalty_factor : float
             Factor on both penalties.
         """
-        unit = penalty_factor * max(state.candidate_distance, state.distance / state.instance.n)
+        unit = penalty_factor * max(state.candidate_cost, state.cost / state.instance.n)
         shortfall = self.shortfall_penalty * unit / state.mean_ability
-        return state.weights(1.0, noise * state.candidate_distance, self.short_task_penalty * unit, shortfall)
+        return state.weights(1.0, noise * state.candidate_cost, self.short_task_penalty * unit, shortfall)
 
     def noise_reduction(self, exchanges: float) -> float:
         """Return the factor on `initial_noise` where the budget allows so many exchanges per agent."""

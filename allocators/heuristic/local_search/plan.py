@@ -27,7 +27,7 @@ N_SHORT, N_MOVES, FULL_GROUP = 0, 1, 2
 """Entries of `Plan.counter`."""
 
 CURRENT, BEST = 0, 1
-"""Entries of `Plan.distance`."""
+"""Entries of `Plan.cost`."""
 
 
 class Plan(NamedTuple):
@@ -53,8 +53,8 @@ class Plan(NamedTuple):
         The best assignment so far, and the agents that have moved since it was saved.
     counter : ndarray of int, shape (3,)
         Tasks with a shortfall; moves since the best was saved; whether a group has run out of slots.
-    distance : ndarray, shape (2,)
-        Total distance, of this plan and of the best.
+    cost : ndarray, shape (2,)
+        Total cost of flights, of this plan and of the best.
     random : ndarray of uint64, shape (1,)
         State of the random numbers.
     """
@@ -71,7 +71,7 @@ class Plan(NamedTuple):
     best_group: Int32Array
     journal: Int32Array
     counter: NDArray[np.int64]
-    distance: FloatArray
+    cost: FloatArray
     random: NDArray[np.uint64]
 
 
@@ -84,8 +84,8 @@ class Workspace(NamedTuple):
         The pool: agents that are reassigned.
     ability, other_ability : ndarray
         What each contributes to the task, and to the other one.
-    distance, cost : ndarray
-        By how much the task is farther than the other one, as it is, and weighted with noise.
+    extra_cost, cost : ndarray
+        By how much the flight to the task costs more than that to the other one, as it is, and weighted with noise.
     sum_cost, sum_set : ndarray, shape (2 * MOST_SUMS,)
         Least cost for each sum of abilities, and a subset that has it, as bits; two rows of the dynamic programme.
     subset_ability, subset_other_ability, subset_cost, subset_bits : ndarray
@@ -96,7 +96,7 @@ class Workspace(NamedTuple):
     agent: Int32Array
     ability: FloatArray
     other_ability: FloatArray
-    distance: FloatArray
+    extra_cost: FloatArray
     cost: FloatArray
     sum_cost: FloatArray
     sum_set: NDArray[np.uint64]
@@ -112,8 +112,8 @@ class Weights(NamedTuple):
 
     Attributes
     ----------
-    distance, noise : float
-        Of the distance, and of the noise on the cost of each agent.
+    cost, noise : float
+        Of the cost of flights, and of the noise on the cost of each agent.
     short_task, shortfall : float
         Penalty of each task with a shortfall, and of each unit of ability that is missing.
     surplus : float
@@ -122,7 +122,7 @@ class Weights(NamedTuple):
         The largest ability where abilities are integers, else ``inf``.
     """
 
-    distance: float
+    cost: float
     noise: float
     short_task: float
     shortfall: float
@@ -163,7 +163,7 @@ def idle_plan(n: int, m: int, random: NDArray[np.uint64]) -> Plan:
         best_group=np.full(n, m, dtype=int32),
         journal=np.zeros(n, dtype=int32),
         counter=np.zeros(3, dtype=np.int64),
-        distance=np.zeros(2),
+        cost=np.zeros(2),
         random=random,
     )
 
@@ -171,13 +171,13 @@ def idle_plan(n: int, m: int, random: NDArray[np.uint64]) -> Plan:
 def workspace(seed: int) -> Workspace:
     """Return buffers for exchanges, with noise from `seed`."""
     uniform = np.random.default_rng(seed).uniform(1e-9, 1 - 1e-9, NOISE_SIZE)
-    ability, other_ability, distance, cost = (np.empty(2 * POOL_BY_SUMS) for _ in range(4))
+    ability, other_ability, extra_cost, cost = (np.empty(2 * POOL_BY_SUMS) for _ in range(4))
     subset_ability, subset_other_ability, subset_cost = (np.empty(1 << POOL_ENUMERATED) for _ in range(3))
     return Workspace(
         agent=np.empty(2 * POOL_BY_SUMS, dtype=np.int32),
         ability=ability,
         other_ability=other_ability,
-        distance=distance,
+        extra_cost=extra_cost,
         cost=cost,
         sum_cost=np.empty(2 * MOST_SUMS),
         sum_set=np.empty(2 * MOST_SUMS, dtype=np.uint64),

@@ -120,7 +120,7 @@ class LpRound(Allocator):
             return False
         search.submit(rounded)
         state.begin(rounded, max(makespan, search.lower_bound))
-        parameters, local, unit = self.parameters, LocalSearchParameters(), state.candidate_distance
+        parameters, local, unit = self.parameters, LocalSearchParameters(), state.candidate_cost
         shortfall = unit * local.shortfall_penalty / state.mean_ability
         cooling = parameters.repair_final_noise / parameters.repair_noise
         for step in range(parameters.repair_iterations):

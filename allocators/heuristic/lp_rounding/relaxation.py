@@ -39,6 +39,7 @@ class Relaxation:
         self.agent_class, self.row = np.nonzero(self.classes.mask[:, instance.workload > 0])
         self.task = self.working_tasks[self.row]
         self.distance = self.classes.distance[self.agent_class, self.task]
+        self.flight_cost = self.classes.cost[self.agent_class, self.task]
         columns = np.arange(len(self.agent_class))
         ones = np.ones(len(self.agent_class))
         self.used = csr_array((ones, (self.agent_class, columns)), shape=(self.classes.size, len(columns)))
@@ -71,11 +72,11 @@ class Relaxation:
         return makespan
 
     def rounded(self, search: Search, makespan: float) -> Allocation | None:
-        """Return a fractional allocation of least distance within a makespan, rounded; None if there was no answer."""
+        """Return a fractional allocation of least cost within a makespan, rounded; None if there was no answer."""
         share = self.task_share(makespan)
         rng = np.random.default_rng(search.seed)
-        by_distance = self.distance * scale_to_one(typical_distance(self.distance))
-        cost = by_distance if self.by_place else rng.random(len(share))  # without energy, any vertex will do
+        scaled = self.flight_cost * scale_to_one(typical_distance(self.flight_cost))
+        cost = scaled if self.by_place else rng.random(len(share))  # without energy, any vertex will do
         matrix = vstack([-self._coverage(share), self.used])
         limits = np.concatenate([np.full(self._n_tasks, SAFETY - 1), self.classes.count])
         answer = _minimise(search, cost, matrix, limits, self.time_share)

@@ -200,13 +200,13 @@ class Planner:
         size = min(int(rng.integers(low, high + 1)), instance.m)
         bound_by_reach = is_short and not instance.reach.is_complete
         graph = reach_graph(self._near, self.plan, instance.m, rng) if bound_by_reach else None
-        tasks = partition(instance.task_position, surplus, size, rng, self.parameters.random_share * stagnation, graph)
+        tasks = partition(instance.reach.goal, surplus, size, rng, self.parameters.random_share * stagnation, graph)
         region_of = np.full(instance.m + 1, -1)
         region_of[tasks.ravel()] = np.repeat(np.arange(len(tasks)), size)
         chosen = region_of[self.plan]  # idle agents have no region yet: index -1 is the last entry
         idle = np.flatnonzero(self.plan == IDLE)
         if len(idle):
-            place, _, legal = self._near
+            place, legal = self._near.place, self._near.legal
             chance = np.where(
                 legal[idle] & (region_of[place[idle]] >= 0), rng.random((len(idle), place.shape[1])), -1.0
             )

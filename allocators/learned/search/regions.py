@@ -105,7 +105,7 @@ def reach_graph(near: Candidates, plan: Ints, m: int, rng: np.random.Generator) 
     m : int
         Number of tasks.
     """
-    place, _, legal = near
+    place, legal = near.place, near.legal
     here = np.broadcast_to(plan[:, None], place.shape)
     linked = legal & (here != IDLE) & (place != here) & (place < m)
     pairs = np.unique(place[linked] * m + here[linked])

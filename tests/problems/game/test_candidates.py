@@ -33,7 +33,7 @@ def test_near_tasks_by_hand() -> None:
         agent_position=[[0, 0]],
         allowed_tasks=[[1, 2, 3, 4]],
     )
-    goal, distance, legal = candidate_tasks(instance, 2, None)
+    goal, distance, _, legal = candidate_tasks(instance, 2, None)
     assert goal.tolist() == [[2, 3, 5]]
     assert distance.tolist() == [[pytest.approx(0.3), pytest.approx(0.4), 0]]
     assert legal.all()
@@ -42,13 +42,13 @@ def test_near_tasks_by_hand() -> None:
 def test_missing_candidates_are_barred() -> None:
     """Who can take fewer tasks than it has candidates has places left over that nobody can go to."""
     instance = Instance(ability=[1], workload=[1, 1, 1], allowed_tasks=[[1]])
-    goal, _, legal = candidate_tasks(instance, 2, None)
+    goal, _, _, legal = candidate_tasks(instance, 2, None)
     assert goal[legal].tolist() == [1, 3]
 
 
 def test_candidates_differ(spread: Instance) -> None:
     """No agent has a task twice, and idleness comes last."""
-    goal, _, legal = candidate_tasks(spread, 6, None)
+    goal, _, _, legal = candidate_tasks(spread, 6, None)
     for row, allowed in zip(goal, legal, strict=True):
         assert len(set(row[allowed])) == allowed.sum()
     assert (goal[:, -1] == spread.m).all()
@@ -57,7 +57,7 @@ def test_candidates_differ(spread: Instance) -> None:
 def test_candidates_hold_start_and_plan(spread: Instance) -> None:
     """Where an agent begins and where a plan has it are among its candidates."""
     plan = np.random.default_rng(0).integers(-1, spread.m, spread.n)
-    goal, _, _ = candidate_tasks(spread, 3, plan)
+    goal, _, _, _ = candidate_tasks(spread, 3, plan)
     for wanted in (spread.start_task, plan):
         assert all(task in row for task, row in zip(wanted, goal, strict=True) if task >= 0)
 
@@ -72,8 +72,8 @@ def test_enough_candidates_are_all(spread: Instance, near: int | None) -> None:
 
 def test_near_candidates_look_as_in_the_dense_board(spread: Instance) -> None:
     """Candidates have the distance, up to the scale, and the legality that they have among all tasks."""
-    goal, distance, legal = candidate_tasks(spread, 6, None)
-    _, far, able = candidate_tasks(spread, None, None)
+    goal, distance, _, legal = candidate_tasks(spread, 6, None)
+    _, far, _, able = candidate_tasks(spread, None, None)
     rows = np.arange(spread.n)[:, None]
     assert (legal <= able[rows, goal]).all()
     np.testing.assert_array_equal(distance[legal], far[rows, goal][legal])
@@ -84,7 +84,7 @@ def test_scarce_tasks_find_agents() -> None:
     place = np.column_stack([np.linspace(0, 1, 30), np.zeros(30)])
     sites = np.vstack([np.column_stack([np.linspace(0, 1, 11), np.zeros(11)]), [[1.0, 9.0]]])
     instance = Instance(ability=np.ones(30), workload=np.ones(12), task_position=sites, agent_position=place)
-    goal, _, legal = candidate_tasks(instance, 4, None)
+    goal, _, _, legal = candidate_tasks(instance, 4, None)
     able = ((goal == 11) & legal).any(axis=1)
     assert able.sum() == np.ceil(AMPLE * 30 / 12)
     assert able[25:].all()
@@ -95,7 +95,7 @@ def test_every_task_that_can_be_served_is_a_candidate() -> None:
     for seed in range(5):
         family = Family(agents=120, tasks=40, starts="own", sites="clustered", dimensions=2)
         instance = random_instance(family, seed)
-        goal, _, legal = candidate_tasks(instance, 8, None)
+        goal, _, _, legal = candidate_tasks(instance, 8, None)
         assert set(range(40)) <= set(goal[legal].tolist())
 
 

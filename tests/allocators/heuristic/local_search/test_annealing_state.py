@@ -27,7 +27,7 @@ def test_incremental_updates_are_right(limit, drawn):
         score = evaluate(instance, state.allocation)
         assert score.violations == ()
         plan = state.plan
-        assert state.distance == pytest.approx(score.distance, abs=1e-9)
+        assert state.cost == pytest.approx(score.distance, abs=1e-9)
         group_ability, n_short = plan.group_ability.copy(), state.n_short
         state.recompute()
         assert plan.group_ability == pytest.approx(group_ability, abs=1e-9)

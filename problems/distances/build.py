@@ -1,0 +1,118 @@
+"""Reach of an instance: agents that begin alike make one origin."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from alloc.problems.distances.geometry import Geometry, GivenRows, given_rows
+from alloc.problems.distances.given import DistanceTable
+from alloc.problems.distances.metric import Floats
+from alloc.problems.distances.neighbours import Indices
+from alloc.problems.distances.origins import group_rows, number_lists
+from alloc.problems.distances.reach import Move, Reach
+
+if TYPE_CHECKING:
+    from alloc.problems.instance import Instance
+
+Flags = NDArray[np.bool_]
+
+
+def build_reach(instance: "Instance") -> Reach:
+    """Group agents by origin; takes O(n log n) time and O(n) memory.
+
+    Agents of one origin share place, given distances, range, battery, energy per distance, whether they return, and
+    their list of tasks.
+
+    Parameters
+    ----------
+    instance : Instance
+    """
+    place = instance.start_position
+    number, lists = number_lists(instance.eligible_tasks, instance.n)
+    base, factor = _factors(instance.agent_energy_per_distance, instance.energy_per_distance)
+    returns = instance.returns if instance.returns.any() else None
+    columns = [*place.T, instance.communication_range, instance.battery, number.astype(np.float64)]
+    columns += [column.astype(np.float64) for column in (factor, returns) if column is not None]
+    start = np.where(np.isnan(instance.agent_position[:, 0]), instance.start_task, -1)
+    table = instance.distances
+    if table is not None:
+        columns.append(_rows_of(table, start).astype(np.float64))
+    first, origin = group_rows(columns)
+    given = None if table is None else given_rows(table, first, start[first])
+    list_of = number[first]
+    if table is not None and given is not None and table.missing == "unreachable":
+        list_of, lists = _bound_to(given, list_of, lists)
+    reach = Reach(
+        origin=origin,
+        geometry=Geometry(place[first], instance.task_position, instance.metric, instance.distance_unit, given),
+        communication_range=instance.communication_range[first],
+        battery=instance.battery[first],
+        energy_per_distance=base,
+        factor=None if factor is None else factor[first],
+        returns=None if returns is None else returns[first],
+        list_of=list_of,
+        lists=lists,
+    )
+    for array in (origin, reach.geometry.start, list_of):
+        array.setflags(write=False)
+    return reach
+
+
+def with_move_price(reach: Reach, task_of_agent: Indices, price: Floats) -> Reach:
+    """Return a reach by which an agent pays for another task than it has.
+
+    Parameters
+    ----------
+    reach : Reach
+    task_of_agent : ndarray of int, shape (n,)
+        -1 where it is idle.
+    price : ndarray, shape (n,)
+        Of each agent, in units of cost.
+    """
+    first, origin = group_rows([column.astype(np.float64) for column in (reach.origin, task_of_agent, price)])
+    old = reach.origin[first]
+    geometry = reach.geometry
+    given = geometry.given
+    return Reach(
+        origin=origin,
+        geometry=replace(geometry, start=geometry.start[old], given=None if given is None else given.chosen(old)),
+        communication_range=reach.communication_range[old],
+        battery=reach.battery[old],
+        energy_per_distance=reach.energy_per_distance,
+        factor=None if reach.factor is None else reach.factor[old],
+        returns=None if reach.returns is None else reach.returns[old],
+        list_of=reach.list_of[old],
+        lists=reach.lists,
+        move=Move(task_of_agent[first], price[first]),
+    )
+
+
+def _factors(rate: Floats, base: float) -> tuple[float, Floats | None]:
+    """Return energy per unit of cost, and each agent's energy per distance in it; None where all are 1."""
+    if (rate == base).all():
+        return base, None
+    unit = base if base > 0 else float(rate.max())
+    return unit, rate / unit
+
+
+def _rows_of(table: DistanceTable, start: Indices) -> Indices:
+    """Return by which node of a table each agent's distances are given, -1 where by none; one of its own comes first."""
+    nodes = np.zeros(table.n + table.m + 1, dtype=np.bool_)
+    nodes[table.source] = nodes[table.target] = True
+    agents = np.arange(len(start))
+    by_task = np.where(start >= 0, table.n + start, table.n + table.m)
+    return np.where(nodes[agents], agents, np.where(nodes[by_task] | (start >= 0), by_task, -1))
+
+
+def _bound_to(given: GivenRows, list_of: Indices, lists: Sequence[Indices]) -> tuple[Indices, tuple[Indices, ...]]:
+    """Return lists that allow each origin the tasks whose distance is given, and no others."""
+    own: list[Indices | None] = [given.task[begin:end] for begin, end in pairwise(given.first.tolist())]
+    for origin in np.flatnonzero(list_of >= 0).tolist():
+        tasks = own[origin]
+        assert tasks is not None
+        own[origin] = tasks[np.isin(tasks, lists[list_of[origin]], assume_unique=True)]
+    return number_lists(own, len(own))

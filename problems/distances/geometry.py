@@ -1,0 +1,174 @@
+"""How far origins are from tasks: by a metric, and as the user gives it for some pairs."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from alloc.problems.distances.geodesic import METRES, embedded, geodesic_distances
+from alloc.problems.distances.given import DistanceTable
+from alloc.problems.distances.metric import (
+    EUCLIDEAN,
+    GEOGRAPHIC,
+    MANHATTAN,
+    Floats,
+    distance_table,
+    distances,
+    manhattan_distances,
+)
+from alloc.problems.fields import IntArray, ReadOnly
+
+LONGEST_GEODESIC_M = 20_003_932.0
+"""From pole to pole, the farthest that two places on the earth are apart."""
+
+
+@dataclass(frozen=True, eq=False)
+class GivenRows(ReadOnly):
+    """Pairs whose distances are given: those of origin i are ``first[i]:first[i + 1]``, in ascending order of tasks.
+
+    Attributes
+    ----------
+    first : ndarray of int, shape (origins + 1,)
+    task : ndarray of int, shape (pairs,)
+    there, back : ndarray, shape (pairs,)
+        Distances from the origin to the task, and from the task to the origin.
+    m : int
+        Number of tasks.
+    """
+
+    first: IntArray
+    task: IntArray
+    there: Floats
+    back: Floats
+    m: int
+
+    @cached_property
+    def _keys(self) -> IntArray:
+        """Origin times m plus task of each pair, and an end that no key equals."""
+        origin = np.repeat(np.arange(len(self.first) - 1), np.diff(self.first))
+        return np.append(origin * self.m + self.task, (len(self.first) - 1) * self.m)
+
+    @property
+    def origin(self) -> IntArray:
+        """The origin of each pair."""
+        return np.repeat(np.arange(len(self.first) - 1), np.diff(self.first))
+
+    def chosen(self, origins: IntArray) -> "GivenRows":
+        """Return the rows of some origins, in this order."""
+        origin, entry = entries(self.first, np.arange(len(origins)), origins)
+        first = np.searchsorted(origin, np.arange(len(origins) + 1))
+        return GivenRows(first, self.task[entry], self.there[entry], self.back[entry], self.m)
+
+    def replace(self, default: Floats, values: Floats, origin: IntArray, task: IntArray) -> Floats:
+        """Return `default` with the entries of `values` for the pairs that are given; all broadcast to its shape."""
+        wanted = np.broadcast_to(origin * self.m + task, default.shape)
+        found = np.searchsorted(self._keys, wanted)
+        given = self._keys[found] == wanted
+        result = default.copy()
+        result[given] = values[found[given]]
+        return result
+
+
+@dataclass(frozen=True, eq=False)
+class Geometry(ReadOnly):
+    """Distances of all origins and tasks.
+
+    Attributes
+    ----------
+    start, task_position : ndarray, shape (origins, 3) and (m, 3)
+        Coordinates as in the instance; NaN where unknown.
+    metric : str
+        One of `metric.METRICS`.
+    unit : str
+        Of geographic distances.
+    given : GivenRows or None
+    """
+
+    start: Floats
+    task_position: Floats
+    metric: str = EUCLIDEAN
+    unit: str = "km"
+    given: GivenRows | None = None
+
+    @property
+    def is_euclidean(self) -> bool:
+        """Whether distances are those of (1), with no exception."""
+        return self.metric == EUCLIDEAN and self.given is None
+
+    @cached_property
+    def place(self) -> Floats:
+        """Cartesian coordinates of the origins; straight lines are no longer than the metric's distances."""
+        return embedded(self.start, self.unit) if self.metric == GEOGRAPHIC else self.start
+
+    @cached_property
+    def goal(self) -> Floats:
+        """Cartesian coordinates of the tasks, as for `place`."""
+        return embedded(self.task_position, self.unit) if self.metric == GEOGRAPHIC else self.task_position
+
+    def between(self, origin: IntArray, task: IntArray) -> Floats:
+        """Distance from each of these origins to the task beside it; both broadcast."""
+        distance = self._by_metric(self.start[origin], self.task_position[task])
+        return distance if self.given is None else self.given.replace(distance, self.given.there, origin, task)
+
+    def table(self, origins: IntArray, tasks: IntArray | slice = slice(None)) -> Floats:
+        """Distances of all these origins to all these tasks, shape (k, l)."""
+        table = distance_table(self.start[origins], self.task_position[tasks], self._by_metric)
+        if self.given is None:
+            return table
+        return self.given.replace(table, self.given.there, origins[:, None], np.arange(self.given.m)[tasks])
+
+    def there_and_back(self, origin: IntArray, task: IntArray, distance: Floats) -> Floats:
+        """Length of the flight from each of these origins to the task, which is `distance` away, and back."""
+        back = distance if self.given is None else self.given.replace(distance, self.given.back, origin, task)
+        return distance + back
+
+    def farthest(self, corner: Floats) -> Floats:
+        """Return at least how far each origin is from all places in a box, by its farthest corner; shape (origins,)."""
+        if self.metric == MANHATTAN:
+            return manhattan_distances(self.place, corner)
+        if self.metric == GEOGRAPHIC:
+            climb = np.ptp(np.concatenate([self.start[:, 2], self.task_position[:, 2]]))
+            return np.full(len(self.start), (LONGEST_GEODESIC_M + np.nan_to_num(climb)) / METRES[self.unit])
+        return distances(self.place, corner)
+
+    def _by_metric(self, place: Floats, goal: Floats) -> Floats:
+        if self.metric == GEOGRAPHIC:
+            return geodesic_distances(place, goal, self.unit)
+        return manhattan_distances(place, goal) if self.metric == MANHATTAN else distances(place, goal)
+
+
+def given_rows(table: DistanceTable, agents: IntArray, start_task: IntArray) -> GivenRows:
+    """Return what a table says of some agents: a row for each, or, where it has none, that of the task where it starts.
+
+    Parameters
+    ----------
+    table : DistanceTable
+    agents : ndarray of int, shape (origins,)
+        One agent of each origin.
+    start_task : ndarray of int, shape (origins,)
+        Task at which the agent starts, -1 for none.
+    """
+    node, task, there, back = table.to_tasks()
+    begin = np.searchsorted(node, np.arange(table.n + table.m + 1))
+    origins = np.arange(len(agents))
+    placed = start_task >= 0
+    own = entries(begin, origins, agents)
+    by_task = entries(begin, origins[placed], table.n + start_task[placed])
+    origin = np.concatenate([own[0], by_task[0], origins[placed]])
+    goal = np.concatenate([task[own[1]], task[by_task[1]], start_task[placed]])
+    none = np.zeros(int(placed.sum()))  # the way to where one is already
+    out, home = (np.concatenate([way[own[1]], way[by_task[1]], none]) for way in (there, back))
+    key, first = np.unique(origin * table.m + goal, return_index=True)
+    origin, goal = np.divmod(key, table.m)
+    rows = GivenRows(np.searchsorted(origin, np.arange(len(agents) + 1)), goal, out[first], home[first], table.m)
+    for array in (rows.first, rows.task, rows.there, rows.back):
+        array.setflags(write=False)
+    return rows
+
+
+def entries(begin: IntArray, origins: IntArray, nodes: IntArray) -> tuple[IntArray, IntArray]:
+    """Return row and entry for all entries of compressed rows that begin at `begin`: those of `nodes`, as `origins`."""
+    length = begin[nodes + 1] - begin[nodes]
+    total = int(length.sum())
+    shift = np.repeat(begin[nodes] - (np.cumsum(length) - length), length)
+    return np.repeat(origins, length), np.arange(total) + shift

@@ -1,0 +1,149 @@
+"""Distances that the user gives: roads, corridors, no-fly zones."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal, cast
+
+import numpy as np
+
+from alloc.problems.arguments import listed, shown
+from alloc.problems.distances.metric import Floats
+from alloc.problems.errors import InputError, nearest
+from alloc.problems.fields import IntArray, ReadOnly, numbers
+
+Missing = Literal["metric", "unreachable"]
+
+MISSING = ("metric", "unreachable")
+"""What holds for pairs that a table leaves out: the distance by the metric, or that nobody can go there."""
+
+
+@dataclass(frozen=True, eq=False)
+class DistanceTable(ReadOnly):
+    """Distances between agents' starts and tasks, as far as they are given; both directions alike unless both are.
+
+    Attributes
+    ----------
+    n, m : int
+        Agents and tasks of the instance.
+    source, target : ndarray of int, shape (k,)
+        Where each flight begins and ends: agent i as i, task j as n + j. What is given for the task where an agent
+        starts holds for the agent, too.
+    distance : ndarray, shape (k,)
+    missing : {"metric", "unreachable"}
+        What holds for pairs that are left out.
+    """
+
+    n: int
+    m: int
+    source: IntArray
+    target: IntArray
+    distance: Floats
+    missing: Missing
+
+    @classmethod
+    def of(
+        cls,
+        rows: Iterable[tuple[str, str, float]],
+        agent_ids: Sequence[str],
+        task_ids: Sequence[str],
+        missing: str = "metric",
+    ) -> "DistanceTable":
+        """Return the table of some rows.
+
+        Parameters
+        ----------
+        rows : iterable of (str, str, float)
+            Id of an agent or a task, id of another, and the distance from the one to the other, >= 0.
+        agent_ids, task_ids : sequence of str
+        missing : {"metric", "unreachable"}
+
+        Raises
+        ------
+        InputError
+            If an id is unknown or stands for an agent and a task, a pair is given twice, or two agents are paired.
+        """
+        if missing not in MISSING:
+            raise InputError(f"must be {' or '.join(map(repr, MISSING))}, got {shown(missing)}", "distances.missing")
+        entries = [_row(entry, number) for number, entry in enumerate(listed(rows, "distances", "rows"))]
+        nodes = _nodes(agent_ids, task_ids)
+        source = [_node(entry[0], nodes, f"distances.rows[{number}][0]") for number, entry in enumerate(entries)]
+        target = [_node(entry[1], nodes, f"distances.rows[{number}][1]") for number, entry in enumerate(entries)]
+        table = cls(
+            len(agent_ids),
+            len(task_ids),
+            np.array(source, dtype=np.intp),
+            np.array(target, dtype=np.intp),
+            numbers([entry[2] for entry in entries], "distances") if entries else np.zeros(0),
+            cast("Missing", missing),
+        )
+        table.check()
+        for array in (table.source, table.target, table.distance):
+            array.setflags(write=False)
+        return table
+
+    def check(self) -> None:
+        """Raise `InputError` for the first row that breaks a rule."""
+        for wrong, rule in (
+            (~(np.isfinite(self.distance) & (self.distance >= 0)), "must have a distance that is a finite number >= 0"),
+            (
+                (self.source < self.n) & (self.target < self.n),
+                "joins two agents; give an agent and a task, or two tasks",
+            ),
+        ):
+            if wrong.any():
+                raise InputError(rule, f"distances.rows[{int(np.argmax(wrong))}]")
+        key = self.source * (self.n + self.m) + self.target
+        order = np.argsort(key, kind="stable")
+        twice = key[order][1:] == key[order][:-1]
+        if twice.any():
+            row, other = order[int(np.argmax(twice)) + 1], order[int(np.argmax(twice))]
+            raise InputError(f"gives the same pair as rows[{other}]; keep one", f"distances.rows[{row}]")
+
+    def restricted(self, agents: IntArray, tasks: IntArray) -> "DistanceTable":
+        """Return what the table says of some agents and tasks, numbered anew in this order."""
+        number = np.full(self.n + self.m, -1, dtype=np.intp)
+        number[agents] = np.arange(len(agents))
+        number[self.n + tasks] = len(agents) + np.arange(len(tasks))
+        source, target = number[self.source], number[self.target]
+        kept = (source >= 0) & (target >= 0)
+        return DistanceTable(len(agents), len(tasks), source[kept], target[kept], self.distance[kept], self.missing)
+
+    def to_tasks(self) -> tuple[IntArray, IntArray, Floats, Floats]:
+        """Return node, task, distance there and distance back for every pair that is known, in order of node and task."""
+        size = self.n + self.m
+        key, back = self.source * size + self.target, self.target * size + self.source
+        keys = np.concatenate([key, back])
+        values = np.concatenate([self.distance, self.distance])
+        keys, first = np.unique(keys, return_index=True)  # a row itself comes before the reverse of another
+        values = values[first]
+        node, goal = np.divmod(keys, size)
+        reverse = values[np.searchsorted(keys, goal * size + node)] if len(keys) else values
+        chosen = goal >= self.n
+        return node[chosen], goal[chosen] - self.n, values[chosen], reverse[chosen]
+
+
+Row = tuple[str, str, float]
+
+
+def _row(entry: object, number: int) -> Row:
+    if isinstance(entry, Sequence) and not isinstance(entry, str) and len(entry) == 3:
+        source, target, distance = entry
+        if isinstance(source, str) and isinstance(target, str):
+            return source, target, distance
+    raise InputError(f"must be [from, to, distance] with two ids, got {shown(entry)}", f"distances.rows[{number}]")
+
+
+def _nodes(agent_ids: Sequence[str], task_ids: Sequence[str]) -> dict[str, int]:
+    """Return the node of each id, -1 for those of an agent and a task."""
+    nodes = {name: index for index, name in enumerate(agent_ids)}
+    for index, name in enumerate(task_ids):
+        nodes[name] = -1 if name in nodes else len(agent_ids) + index
+    return nodes
+
+
+def _node(name: str, nodes: Mapping[str, int], place: str) -> int:
+    if name not in nodes:
+        raise InputError(f"there is no agent or task {name!r}{nearest(name, tuple(nodes))}", place)
+    if nodes[name] < 0:
+        raise InputError(f"{name!r} is the id of an agent and of a task; give them different ids", place)
+    return nodes[name]
