@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from alloc.problems.allocation import Allocation
     from alloc.problems.bounds import energy_lower_bound, lp_makespan_lower_bound, makespan_lower_bound
     from alloc.problems.classes import AgentClasses, agent_classes, count_classes
+    from alloc.problems.distances.given import DistanceTable
     from alloc.problems.distances.reach import Reach
     from alloc.problems.errors import AllocError, InputError, MissingPackageError, RefusedError, TrainingError
     from alloc.problems.evaluation import Evaluation, Violation, evaluate
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from alloc.problems.matching.serving import only_allowed, serve_all
     from alloc.problems.matching.shortage import Shortage, find_shortage
     from alloc.problems.matching.unservable import fewest_unserved, minimal_unservable_set
+    from alloc.problems.units import Units
     from alloc.problems.vocabulary import IDLE, Objective
 
 __all__ = [
@@ -31,6 +33,7 @@ __all__ = [
     "AgentClasses",
     "AllocError",
     "Allocation",
+    "DistanceTable",
     "Evaluation",
     "Family",
     "InputError",
@@ -41,6 +44,7 @@ __all__ = [
     "RefusedError",
     "Shortage",
     "TrainingError",
+    "Units",
     "Violation",
     "agent_classes",
     "count_classes",
@@ -68,6 +72,7 @@ _MODULE_OF = {
     "AgentClasses": "classes",
     "AllocError": "errors",
     "Allocation": "allocation",
+    "DistanceTable": "distances.given",
     "Evaluation": "evaluation",
     "Family": "generate.family",
     "InputError": "errors",
@@ -78,6 +83,7 @@ _MODULE_OF = {
     "RefusedError": "errors",
     "Shortage": "matching.shortage",
     "TrainingError": "errors",
+    "Units": "units",
     "Violation": "evaluation",
     "agent_classes": "classes",
     "count_classes": "classes",

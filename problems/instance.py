@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from alloc.problems import eligibility, fields
 from alloc.problems.arguments import listed, of_type, real, shown, text
-from alloc.problems.distances.build import build_reach
+from alloc.problems.distances.build import build_reach, restricted_reach
 from alloc.problems.distances.geodesic import METRES
 from alloc.problems.distances.given import DistanceTable
 from alloc.problems.distances.metric import GEOGRAPHIC, METRICS
@@ -270,6 +270,37 @@ class Instance(fields.ReadOnly):
         """Index of each task id."""
         return {name: index for index, name in enumerate(self.task_ids)}
 
+    def restricted(self, agents: IntArray, tasks: IntArray) -> "Instance":
+        """Return the problem of some agents and tasks alone, in this order; agents stay where they begin.
+
+        Parameters
+        ----------
+        agents, tasks : ndarray of int
+            Indices, none twice.
+        """
+        number = np.full(self.m + 1, IDLE, dtype=np.intp)
+        number[tasks] = np.arange(len(tasks))
+        arrays = {name: getattr(self, name)[agents] for name in AGENT_ARRAYS}
+        arrays |= {"agent_position": self.start_position[agents], "start_task": number[self.start_task[agents]]}
+        lists, table = self.allowed_tasks, self.distances
+        part = replace(
+            self,
+            agent_ids=tuple(self.agent_ids[i] for i in agents.tolist()),
+            task_ids=tuple(self.task_ids[j] for j in tasks.tolist()),
+            workload=self.workload[tasks],
+            task_position=self.task_position[tasks],
+            priority=self.priority[tasks],
+            allowed_tasks=None if lists is None else tuple(_renamed(lists[i], number) for i in agents.tolist()),
+            skills=None if self.skills is None else tuple(self.skills[i] for i in agents.tolist()),
+            needs=None if self.needs is None else tuple(self.needs[j] for j in tasks.tolist()),
+            distances=None if table is None else table.restricted(agents, tasks),
+            **arrays,
+        )
+        part.__dict__["reach"] = restricted_reach(
+            self.reach, agents, tasks
+        )  # what a start outside the part gives, stays
+        return part
+
     def without_agents(self, gone: Iterable[str]) -> "Instance":
         """Return the same problem without these agents, as when they drop out.
 
@@ -300,6 +331,10 @@ class Instance(fields.ReadOnly):
             distances=None if table is None else table.restricted(left, np.arange(self.m)),
             **{name: getattr(self, name)[left] for name in AGENT_ARRAYS},
         )
+
+
+def _renamed(tasks: IntArray | None, number: IntArray) -> IntArray | None:
+    return None if tasks is None else number[tasks][number[tasks] != IDLE]
 
 
 def _metric(name: object) -> str:

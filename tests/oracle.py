@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from pyproj import Geod
 
 from alloc.problems import Instance
 
@@ -45,9 +46,10 @@ def least_energy_within(instance: Instance, makespan: float) -> float:
 def _scored_plans(instance: Instance) -> tuple[NDArray[np.int64], NDArray[np.int64], FloatArray, FloatArray]:
     """Return all plans that send nobody astray, with their unserved tasks, makespans and energies."""
     distance, able = reachable(instance)
+    energy_of = flight_energies(instance, distance)
     options = [[-1, *np.flatnonzero(row).tolist()] for row in able]
     plans = np.array(np.meshgrid(*options, indexing="ij"), dtype=np.int64).reshape(instance.n, -1).T
-    scores = [_score(instance, distance, plans[row : row + CHUNK]) for row in range(0, len(plans), CHUNK)]
+    scores = [_score(instance, distance, energy_of, plans[row : row + CHUNK]) for row in range(0, len(plans), CHUNK)]
     unserved, makespan, energy = (np.concatenate(part) for part in zip(*scores, strict=True))
     return plans, unserved, makespan, energy
 
@@ -56,21 +58,59 @@ def reachable(instance: Instance) -> tuple[NDArray[np.float64], NDArray[np.bool_
     """Return distances (1), shape (n, m), and who can take what, agent by agent."""
     distance, able = np.zeros((instance.n, instance.m)), np.ones((instance.n, instance.m), dtype=bool)
     for i in range(instance.n):
-        place = instance.agent_position[i]
-        if np.isnan(place).any() and instance.start_task[i] >= 0:
-            place = instance.task_position[instance.start_task[i]]
         for j in range(instance.m):
-            away = float(np.linalg.norm(place - instance.task_position[j]))
-            distance[i, j] = 0.0 if np.isnan(away) else away
-            able[i, j] = distance[i, j] <= instance.communication_range[i] + 1e-9
-            able[i, j] &= instance.energy_per_distance * distance[i, j] <= instance.battery[i] + 1e-9
+            away, given = _distance(instance, i, j)
+            distance[i, j] = away
+            if instance.distances is not None and instance.distances.missing == "unreachable":
+                able[i, j] = given
             if instance.allowed_tasks is not None and instance.allowed_tasks[i] is not None:
                 able[i, j] &= j in instance.allowed_tasks[i]
+            if instance.needs is not None:
+                able[i, j] &= set(instance.needs[j]) <= set(() if instance.skills is None else instance.skills[i])
+    able &= distance <= instance.communication_range[:, None] + 1e-9
+    able &= flight_energies(instance, distance) <= instance.battery[:, None] + 1e-9
     return distance, able
 
 
+def flight_energies(instance: Instance, distance: FloatArray) -> FloatArray:
+    """Return the energy of each agent's flight to each task, and back where it returns, shape (n, m)."""
+    energy = np.zeros((instance.n, instance.m))
+    for i in range(instance.n):
+        for j in range(instance.m):
+            back = _distance(instance, i, j, back=True)[0] if instance.returns[i] else 0.0
+            energy[i, j] = instance.agent_energy_per_distance[i] * (distance[i, j] + back)
+    return energy
+
+
+def _distance(instance: Instance, i: int, j: int, *, back: bool = False) -> tuple[float, bool]:
+    """Return how far task j is from where agent i starts, or the way back, and whether a table gives that."""
+    starts_at_task = np.isnan(instance.agent_position[i]).any() and instance.start_task[i] >= 0
+    start = int(instance.start_task[i]) if starts_at_task else None
+    place = instance.agent_position[i] if start is None else instance.task_position[start]
+    table = instance.distances
+    if table is not None:
+        rows = dict(zip(zip(table.source.tolist(), table.target.tolist(), strict=True), table.distance, strict=True))
+        for node in [i] + ([] if start is None else [table.n + start]):
+            there, home = (node, table.n + j), (table.n + j, node)
+            for pair in (home, there) if back else (there, home):
+                if pair in rows:
+                    return float(rows[pair]), True
+        if start == j:
+            return 0.0, True
+    goal = instance.task_position[j]
+    if np.isnan(place).any() or np.isnan(goal).any():
+        return 0.0, False
+    if instance.metric == "manhattan":
+        return float(np.abs(place - goal).sum()), False
+    if instance.metric == "geographic":
+        metres = Geod(ellps="WGS84").inv(place[0], place[1], goal[0], goal[1])[2]
+        metres_in = {"m": 1.0, "km": 1e3, "mi": 1609.344, "nmi": 1852.0}[instance.units.distance or "km"]
+        return float(np.hypot(metres, place[2] - goal[2]) / metres_in), False
+    return float(np.linalg.norm(place - goal)), False
+
+
 def _score(
-    instance: Instance, distance: NDArray[np.float64], plans: NDArray[np.int64]
+    instance: Instance, distance: FloatArray, energy_of: FloatArray, plans: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
     """Unserved tasks, makespan of the served ones and energy of each plan, each of shape (len(plans),)."""
     unserved, makespan = np.zeros(len(plans), dtype=np.int64), np.zeros(len(plans))
@@ -80,8 +120,8 @@ def _score(
         unserved += ~served
         time = _finished(instance.workload[j], instance.ability, distance[:, j] / instance.speed, there)
         makespan = np.maximum(makespan, np.where(served, time, 0.0))
-    flown = np.where(plans >= 0, distance[np.arange(instance.n), plans], 0.0).sum(axis=1)
-    return unserved, makespan, flown * instance.energy_per_distance
+    energy = np.where(plans >= 0, energy_of[np.arange(instance.n), plans], 0.0).sum(axis=1)
+    return unserved, makespan, energy
 
 
 def _finished(

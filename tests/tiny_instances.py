@@ -1,11 +1,11 @@
 """Random instances small enough for brute force, over everything that an instance can have."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from itertools import count, islice
 
 import numpy as np
 
-from alloc.problems import Instance, fewest_unserved
+from alloc.problems import DistanceTable, Instance, fewest_unserved
 
 
 def tiny_instance(seed: int) -> Instance:
@@ -35,6 +35,57 @@ def tiny_instance(seed: int) -> Instance:
         speed=np.where(rng.random(n) < 0.7, rng.uniform(0.2, 3, n), np.inf) if coin[8] else None,
         energy_per_distance=float(rng.choice([1.0, 6.0])),
     )
+
+
+FIELDS = ("metric", "distances", "rates", "returns", "skills", "speeds", "limits")
+"""What `varied_instance` can give an instance beyond abilities, workloads and places."""
+
+
+def varied_instance(seed: int, fields: Collection[str] | None = None) -> Instance:
+    """Return instance number `seed`: at most 5 agents and 4 tasks, with some of `FIELDS`, or with those named."""
+    rng = np.random.default_rng([2026, seed])
+    n, m = int(rng.integers(2, 6)), int(rng.integers(2, 5))
+    drawn = {name for name in FIELDS if rng.random() < 0.5}
+    has = drawn if fields is None else set(fields)
+    metric = str(rng.choice(["manhattan", "geographic"])) if "metric" in has else "euclidean"
+    corner, size = (
+        (np.array([179.9, 88.0]), np.array([0.3, 1.0])) if metric == "geographic" else (np.zeros(2), np.ones(2))
+    )
+    start = rng.integers(-1, m, n)
+    agent_position = corner + size * rng.random((n, 2))
+    agent_position[start >= 0] = np.nan
+    whole = rng.random() < 0.5
+    ids = [f"a{i + 1}" for i in range(n)], [f"t{j + 1}" for j in range(m)]
+    unit = 30.0 if metric == "geographic" else 1.0
+    return Instance(
+        name=f"varied-{seed}",
+        ability=rng.integers(1, 5, n) if whole else rng.uniform(0.5, 4, n),
+        workload=rng.integers(1, 12, m) if whole else rng.uniform(0.5, 12, m),
+        agent_position=agent_position,
+        task_position=corner + size * rng.random((m, 2)),
+        start_task=start,
+        battery=rng.uniform(0.5, 6, n) * unit if "limits" in has else None,
+        communication_range=rng.uniform(0.4, 2, n) * unit if "limits" in has else None,
+        speed=np.where(rng.random(n) < 0.7, rng.uniform(0.2, 3, n) * unit, np.inf) if "speeds" in has else None,
+        energy_per_distance=float(rng.choice([0.0, 1.0, 6.0] if "rates" in has else [1.0, 6.0])),
+        agent_energy_per_distance=rng.choice([0.0, 0.5, 2.0, np.nan], n) if "rates" in has else None,
+        returns=rng.random(n) < 0.5 if "returns" in has else None,
+        skills=[rng.permutation(["camera", "pump"])[: rng.integers(0, 3)].tolist() for _ in range(n)]
+        if "skills" in has
+        else None,
+        needs=[["camera", "pump"][: rng.integers(0, 3)] for _ in range(m)] if "skills" in has else None,
+        metric=metric,
+        distances=_table(rng, *ids, unit) if "distances" in has else None,
+        allowed_tasks=[rng.permutation(m)[:2].tolist() if rng.random() < 0.3 else None for _ in range(n)],
+    )
+
+
+def _table(rng: np.random.Generator, agents: list[str], tasks: list[str], unit: float) -> DistanceTable:
+    """Return some distances from agents, from tasks and back, either all that there are or some among others."""
+    pairs = [(one, other) for one in agents + tasks for other in agents + tasks if one != other]
+    pairs = [pair for pair in pairs if not set(pair) <= set(agents) and rng.random() < 0.4]
+    rows = [(*pair, float(rng.uniform(0, 1.5)) * unit) for pair in pairs]
+    return DistanceTable.of(rows, agents, tasks, missing=str(rng.choice(["metric", "unreachable"])))
 
 
 def seeds_where(holds: Callable[[Instance], bool], number: int) -> list[int]:

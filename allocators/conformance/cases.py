@@ -53,6 +53,16 @@ CASES: dict[str, Instance] = {
         _bare("large numbers", ability=(7e8, 3e9, 2e9, 9e8), workload=(8e11, 5e11, 2e11), tau=0.01),
         _bare("small numbers", ability=(7e-9, 3e-8, 2e-8, 9e-9), workload=(8e-12, 5e-12, 2e-12)),
         _case("travel times", speed=(1.0, 2.0, 4.0, 2.0, 8.0)),
+        _case("manhattan", metric="manhattan", communication_range=(4.0, 3.0, 2.0, 4.0, 6.0)),
+        _case(
+            "geographic", metric="geographic", task_position=((0, 89), (180, 89), (-179.9, 88)), energy_per_distance=0.1
+        ),
+        _case("one energy each", agent_energy_per_distance=(0.5, 2, 1, 0, 3), battery=(3,) * 5),
+        _case("returns", returns=(True, False, True, True, False), battery=(6,) * 5),
+        _case("skills", skills=(["lift"], ["lift", "see"], ["see"], [], ["lift"]), needs=(["lift"], [], ["see"])),
+        _case(
+            "own distances", distances=(("a1", "t1", 9), ("a2", "t3", 0.5), ("t2", "a3", 2)), speed=(INF, 1, 2, 4, 8)
+        ),
         _case("some travel times", speed=(INF, 0.5, 3.0, INF, 1.0), communication_range=(4,) * 5),
     )
 }

@@ -91,6 +91,27 @@ def with_move_price(reach: Reach, task_of_agent: Indices, price: Floats) -> Reac
     )
 
 
+def restricted_reach(reach: Reach, agents: Indices, tasks: Indices) -> Reach:
+    """Return the reach of some agents and tasks, numbered anew in this order."""
+    old, origin = np.unique(reach.origin[agents], return_inverse=True)
+    number = np.full(len(reach.goal) + 1, -1, dtype=np.intp)
+    number[tasks] = np.arange(len(tasks))
+    geometry, move = reach.geometry, reach.move
+    given = None if geometry.given is None else geometry.given.chosen(old).renumbered(number, len(tasks))
+    return Reach(
+        origin=origin.astype(np.intp),
+        geometry=replace(geometry, start=geometry.start[old], task_position=geometry.task_position[tasks], given=given),
+        communication_range=reach.communication_range[old],
+        battery=reach.battery[old],
+        energy_per_distance=reach.energy_per_distance,
+        factor=None if reach.factor is None else reach.factor[old],
+        returns=None if reach.returns is None else reach.returns[old],
+        list_of=reach.list_of[old],
+        lists=tuple(np.sort(number[named][number[named] >= 0]) for named in reach.lists),
+        move=None if move is None else Move(number[move.task[old]], move.price[old]),
+    )
+
+
 def _factors(rate: Floats, base: float) -> tuple[float, Floats | None]:
     """Return energy per unit of cost, and each agent's energy per distance in it; None where all are 1."""
     if (rate == base).all():

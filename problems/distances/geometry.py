@@ -59,6 +59,15 @@ class GivenRows(ReadOnly):
         first = np.searchsorted(origin, np.arange(len(origins) + 1))
         return GivenRows(first, self.task[entry], self.there[entry], self.back[entry], self.m)
 
+    def renumbered(self, number: IntArray, m: int) -> "GivenRows":
+        """Return what is given for some tasks alone: task j as ``number[j]``, none where that is -1."""
+        task = number[self.task]
+        kept = np.flatnonzero(task >= 0)
+        origin = self.origin[kept]
+        order = kept[np.lexsort((task[kept], origin))]
+        first = np.searchsorted(origin, np.arange(len(self.first)))
+        return GivenRows(first, task[order], self.there[order], self.back[order], m)
+
     def replace(self, default: Floats, values: Floats, origin: IntArray, task: IntArray) -> Floats:
         """Return `default` with the entries of `values` for the pairs that are given; all broadcast to its shape."""
         wanted = np.broadcast_to(origin * self.m + task, default.shape)

@@ -13,7 +13,7 @@ import numpy as np
 
 from alloc.problems.allocation import Allocation
 from alloc.problems.evaluation import last_equal
-from alloc.problems.instance import AGENT_ARRAYS, FloatArray, Instance, IntArray
+from alloc.problems.instance import FloatArray, Instance, IntArray
 from alloc.problems.matching.assignment import Matcher, Pairs, bottleneck, by_scipy, cheapest
 from alloc.problems.matching.clock import Clock, unlimited
 from alloc.problems.matching.hopcroft_karp import match_in_time
@@ -64,7 +64,7 @@ class Shortage:
     @property
     def rest(self) -> Instance | None:
         """The instance of `rest_agents` and `rest_tasks`; None where no task is left."""
-        return _restricted(self.instance, self.rest_agents, self.rest_tasks) if len(self.rest_tasks) else None
+        return self.instance.restricted(self.rest_agents, self.rest_tasks) if len(self.rest_tasks) else None
 
     def merged(self, rest: Allocation | None = None) -> Allocation:
         """Return the allocation of the whole instance, with `rest` for what is left; idle without one."""
@@ -181,26 +181,3 @@ def _pairs(
 def _hours(instance: Instance, agents: IntArray, tasks: IntArray) -> FloatArray:
     """Return when each of `agents` is done, alone with the task beside it."""
     return hours_alone(instance, agents, tasks, instance.reach.distance_of(agents, tasks))
-
-
-def _restricted(instance: Instance, agents: IntArray, tasks: IntArray) -> Instance:
-    """Return the instance of these agents and tasks alone; agents stay where they begin."""
-    number = np.full(instance.m + 1, IDLE, dtype=np.intp)
-    number[tasks] = np.arange(len(tasks))
-    lists = instance.allowed_tasks
-    arrays = {name: getattr(instance, name)[agents] for name in AGENT_ARRAYS}
-    arrays |= {"agent_position": instance.start_position[agents], "start_task": number[instance.start_task[agents]]}
-    return replace(
-        instance,
-        agent_ids=tuple(instance.agent_ids[i] for i in agents.tolist()),
-        task_ids=tuple(instance.task_ids[j] for j in tasks.tolist()),
-        workload=instance.workload[tasks],
-        task_position=instance.task_position[tasks],
-        priority=instance.priority[tasks],
-        allowed_tasks=None if lists is None else tuple(_renamed(lists[i], number) for i in agents.tolist()),
-        **arrays,
-    )
-
-
-def _renamed(tasks: IntArray | None, number: IntArray) -> IntArray | None:
-    return None if tasks is None else number[tasks][number[tasks] != IDLE]

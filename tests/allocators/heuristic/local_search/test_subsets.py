@@ -11,7 +11,7 @@ from alloc.allocators.heuristic.local_search.subsets import (
     sorted_subsets,
 )
 
-WEIGHTS = Weights(distance=1.0, noise=0.0, short_task=3.0, shortfall=0.7, surplus=2.0, integer_ability=10.0)
+WEIGHTS = Weights(cost=1.0, noise=0.0, short_task=3.0, shortfall=0.7, surplus=2.0, integer_ability=10.0)
 
 
 def pool_of(seed, size, *, integer):
