@@ -82,8 +82,8 @@ class Instance(fields.ReadOnly):
     needs : sequence of (iterable of str, or None), optional
         Skills that an agent must have, all of them, to do each task.
     metric : {"euclidean", "manhattan", "geographic"}
-        Distances as in (1), along the axes, or along the surface of the earth; with the last, positions are longitude and
-        latitude in degrees and, if given, altitude in metres, and distances are in km or in `units.distance`.
+        Distances as in (1), along the axes, or along the surface of the earth; with the last, positions are longitude
+        and latitude in degrees and, if given, altitude in metres, and distances are in km or in `units.distance`.
     distances : DistanceTable or iterable of (str, str, float), optional
         Distances of one's own, by the ids of agents and tasks; see `DistanceTable.of`.
     units : Units, optional

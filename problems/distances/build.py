@@ -121,7 +121,7 @@ def _factors(rate: Floats, base: float) -> tuple[float, Floats | None]:
 
 
 def _rows_of(table: DistanceTable, start: Indices) -> Indices:
-    """Return by which node of a table each agent's distances are given, -1 where by none; one of its own comes first."""
+    """Return the node of a table that gives the distances of each agent, its own before its start task's; -1 for none."""
     nodes = np.zeros(table.n + table.m + 1, dtype=np.bool_)
     nodes[table.source] = nodes[table.target] = True
     agents = np.arange(len(start))

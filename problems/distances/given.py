@@ -109,7 +109,7 @@ class DistanceTable(ReadOnly):
         return DistanceTable(len(agents), len(tasks), source[kept], target[kept], self.distance[kept], self.missing)
 
     def to_tasks(self) -> tuple[IntArray, IntArray, Floats, Floats]:
-        """Return node, task, distance there and distance back for every pair that is known, in order of node and task."""
+        """Return node, task, distance there and distance back for all known pairs, in order of node and task."""
         size = self.n + self.m
         key, back = self.source * size + self.target, self.target * size + self.source
         keys = np.concatenate([key, back])

@@ -107,7 +107,7 @@ class Reach(ReadOnly):
 
     @cached_property
     def cost(self) -> Floats:
-        """What the flight from each origin to each task costs: see `costs`; shape (origins, m). As large as `distance`."""
+        """What the flight from each origin to each task costs, see `costs`; shape (origins, m), as large as `distance`."""
         if self.cost_is_distance:
             return self.distance
         origins, tasks = np.arange(len(self.place))[:, None], np.arange(len(self.goal))
@@ -218,8 +218,8 @@ class Reach(ReadOnly):
     def costs(self, origin: Indices, task: Indices, distance: Floats) -> Floats:
         """Cost of the flight from each of these origins to the task, which is `distance` away, in units of distance.
 
-        The energy of the flight, back again where the agent returns, over `energy_per_distance`; and the price of moving
-        to another task.
+        The energy of the flight, back again where the agent returns, over `energy_per_distance`; and the price of
+        moving to another task.
         """
         cost = self.flown(origin, task, distance)
         return cost if self.move is None else cost + self.move.price[origin] * (self.move.task[origin] != task)

@@ -52,7 +52,7 @@ def least_energy(search: Search, solver: Solver, min_served: int) -> float | Non
 
 
 def _least_cost(state: EnergyState, solver: Solver) -> float:
-    """Close the gap from both sides, then by the solver; return the cost that is proven to be needed, in units of distance."""
+    """Close the gap from both sides, then by the solver; return what is proven to be needed, in units of distance."""
     both = state.primal_dual
     if both is None:
         return _solve_rest(state, solver).bound

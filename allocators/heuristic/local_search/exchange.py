@@ -98,7 +98,7 @@ def exchange(
     task: int,
     other: int,
 ) -> None:
-    """Reassign the agents of two groups to them at the least cost: that of flights, weighted, noise and shortfall penalties.
+    """Reassign the agents of two groups to them at the least cost: of flights, by weight, of noise and of shortfalls.
 
     Of large groups only some agents take part, from `agent` on where that is one of them, from a random one on else
     (-1). `other` may be the group of idle agents.
