@@ -111,10 +111,15 @@ def only_allowed(instance: Instance, allocation: Allocation) -> Allocation:
     -------
     Allocation
     """
+    return Allocation(_allowed(instance, allocation))
+
+
+def _allowed(instance: Instance, allocation: Allocation) -> IntArray:
+    """Return the task of each agent, `IDLE` where it cannot go to that of `allocation`."""
     task = require_fit(instance, allocation).copy()
     working = np.flatnonzero(task != IDLE)
     task[working[~instance.reach.allows(working, task[working])]] = IDLE
-    return Allocation(task)
+    return task
 
 
 def serve_all(instance: Instance, allocation: Allocation, time_left: Clock = unlimited) -> Allocation:
@@ -135,7 +140,7 @@ def serve_all(instance: Instance, allocation: Allocation, time_left: Clock = unl
     -------
     Allocation
     """
-    task = only_allowed(instance, allocation).task_of_agent
+    task = _allowed(instance, allocation)
     served = np.zeros(instance.m, dtype=bool)
     served[task[task != IDLE]] = True
     unserved = [j for j in needs_agent(instance).tolist() if not served[j]]
