@@ -24,7 +24,7 @@ from alloc.allocators.runtime.interrupts import ended_with_process, signals_set
 from alloc.problems import InputError, Instance, Objective, find_shortage, serve_all
 from alloc.problems.arguments import choice, event, flag, function, of_type
 
-REPAIR_S = 0.3
+REPAIR_S = 0.15
 """Time to serve more tasks after a run whose own time is up."""
 
 

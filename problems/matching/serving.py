@@ -18,8 +18,8 @@ SPENT = -1
 NEARBY = 64
 """Origins next to a task that are looked at first where there are many."""
 
-CHUNK = 4_096
-"""Tasks that are looked at together."""
+CHUNK = 256
+"""Tasks that are looked at together, between two looks at the clock."""
 
 MANY = 50_000_000
 """Pairs of agent, or of origin, and unserved task that are too many to look at one by one."""
@@ -29,7 +29,7 @@ class _Matching:
     """One agent kept for each served task, grown by augmenting paths (Berge 1957, doi:10.1073/pnas.43.9.842)."""
 
     def __init__(self, instance: Instance, task_of_agent: IntArray, unserved: int, time_left: Clock) -> None:
-        self.reach, self.m = instance.reach, instance.m
+        self.reach, self.time_left = instance.reach, time_left
         self.task_of_agent = task_of_agent.copy()
         self.keeper = np.full(instance.m, IDLE, dtype=np.intp)
         working = np.flatnonzero(task_of_agent != IDLE)
@@ -40,17 +40,23 @@ class _Matching:
         self.met = np.zeros(instance.n, dtype=np.intp)  # the search that met an agent last
         self.search = 0
         reach = self.reach
+        self._mask_by_task = np.ascontiguousarray(reach.mask.T) if reach.has_table else None
         many = not reach.has_table and unserved * len(reach.place) > MANY and not reach.is_complete
         many = many and (limit := GATHERED_PER_SECOND * time_left()) > 0 and estimated_pairs(reach) <= limit
         near = reach.neighbours if many else None
         self._rows = None if near is None else near.by_task(instance.m)
 
     def serve(self, task: int) -> IntArray | None:
-        """Serve `task` along a path with the fewest moves; None if done, else the tasks that compete for its agents."""
+        """Serve `task` along a path with the fewest moves; None if done, else the tasks that compete for its agents.
+
+        Where time runs out, these are not all.
+        """
         came_from: dict[int, tuple[int, int]] = {}  # task -> (task that wants its keeper, that keeper)
         self.search += 1
         queue, seen = deque([task]), {task}
         while queue:
+            if self.time_left() <= 0:
+                return np.array(sorted(seen), dtype=np.intp)
             wanting = queue.popleft()
             able = self._able(wanting)
             able = able[(self.met[able] != self.search) & (self.met[able] != SPENT)]
@@ -70,6 +76,8 @@ class _Matching:
 
     def _able(self, task: int) -> IntArray:
         """Return the agents that can take `task`; looked up where many tasks will be asked for."""
+        if self._mask_by_task is not None:
+            return np.flatnonzero(self._mask_by_task[task][self.reach.origin])
         if self._rows is None:
             return self.reach.agents_of(task)
         (first, origins), (begin, agents) = self._rows, self.reach.agents_by_origin
@@ -150,10 +158,10 @@ def serve_all(instance: Instance, allocation: Allocation, time_left: Clock = unl
         return Allocation(_serve_by_anyone(instance, task, unserved))
     pairs = len(instance.reach.place) * len(unserved)
     if not instance.reach.has_table and (pairs > MANY or pairs > EVALUATED_PER_SECOND * time_left()):
-        task, unserved = _serve_nearby(instance, task, unserved)
+        task, unserved = _serve_nearby(instance, task, unserved, time_left)
     matching = _start(instance, task, len(unserved), time_left)
     for j in unserved:
-        if time_left() <= 0 and not instance.reach.has_table:
+        if time_left() <= 0:
             break
         matching.serve(j)
     return Allocation(matching.task_of_agent)
@@ -172,7 +180,9 @@ def _serve_by_anyone(instance: Instance, task_of_agent: IntArray, unserved: list
     return task_of_agent
 
 
-def _serve_nearby(instance: Instance, task_of_agent: IntArray, unserved: list[int]) -> tuple[IntArray, list[int]]:
+def _serve_nearby(
+    instance: Instance, task_of_agent: IntArray, unserved: list[int], time_left: Clock
+) -> tuple[IntArray, list[int]]:
     """Serve tasks by idle agents from the `NEARBY` nearest origins that have one; return the tasks that are left."""
     from scipy.spatial import cKDTree
 
@@ -187,6 +197,8 @@ def _serve_nearby(instance: Instance, task_of_agent: IntArray, unserved: list[in
         return task_of_agent, unserved
     count, tree, served = min(NEARBY, len(origins)), cKDTree(reach.place[origins]), set()
     for begin in range(0, len(goals), CHUNK):
+        if time_left() <= 0:
+            break
         some = goals[begin : begin + CHUNK]
         near = origins[tree.query(reach.goal[some], k=count)[1].reshape(len(some), count)]
         within = reach.is_within(near, some[:, None], reach.distances_between(near, some[:, None]))
