@@ -78,9 +78,7 @@ class _Reporter(cp_model.CpSolverSolutionCallback):
         self._monitor.report(_counts(self.response_proto.solution, self._pairs))
 
 
-def formulate(
-    model: SolverModel, stopped: Callable[[], bool] = lambda: False
-) -> tuple[cp_model.CpModel, float] | None:
+def formulate(model: SolverModel, stopped: Callable[[], bool] = lambda: False) -> tuple[cp_model.CpModel, float] | None:
     """Write the model of `exact.model` down in integers; its first variables are x.
 
     Returns

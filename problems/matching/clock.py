@@ -29,3 +29,9 @@ def at_least(seconds: float, time_left: Clock) -> Clock:
     """Return a clock that shows what `time_left` does, but that has so many seconds from now on in any case."""
     end = time.monotonic() + seconds
     return lambda: max(time_left(), end - time.monotonic())
+
+
+def share_of(share: float, time_left: Clock) -> Clock:
+    """Return a clock that runs out when this share of the time that is left now has passed."""
+    seconds = time_left()
+    return time_left if seconds == math.inf else lambda: time_left() - (1 - share) * seconds

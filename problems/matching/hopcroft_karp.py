@@ -15,9 +15,29 @@ UNSEEN = -1
 """The level of a row that no alternating path has reached, or that leads to no free column any more."""
 
 
-def largest_matching(
-    first: IntArray, column: IntArray, start: IntArray | None = None, time_left: Clock = unlimited
-) -> tuple[IntArray, bool]:
+def match(first: IntArray, column: IntArray, time_left: Clock = unlimited) -> tuple[IntArray, bool]:
+    """Do as `largest_matching`, but from whichever side has fewer to match: the others would be tried to no end.
+
+    Parameters
+    ----------
+    first : ndarray of int, shape (rows + 1,)
+    column : ndarray of int, shape (pairs,)
+    time_left : callable
+        Seconds; no limit by default.
+    """
+    rows, columns = len(first) - 1, int(column.max(initial=-1)) + 1
+    matched = np.full(rows, IDLE, dtype=np.intp)
+    if rows <= columns:
+        return largest_matching(first, column, matched, time_left)
+    order = np.argsort(column, kind="stable")
+    begin = np.searchsorted(column[order], np.arange(columns + 1))
+    row = np.repeat(np.arange(rows), np.diff(first))[order]
+    found, is_largest = largest_matching(begin, row, np.full(columns, IDLE, dtype=np.intp), time_left)
+    matched[found[found != IDLE]] = np.flatnonzero(found != IDLE)
+    return matched, is_largest
+
+
+def largest_matching(first: IntArray, column: IntArray, start: IntArray, time_left: Clock) -> tuple[IntArray, bool]:
     """Return a column for each row of compressed pairs, `IDLE` for none, and whether as many rows as can be have one.
 
     Where time runs out, fewer may have one. By phases of shortest augmenting paths (Hopcroft and Karp 1973,
@@ -28,13 +48,11 @@ def largest_matching(
     first : ndarray of int, shape (rows + 1,)
     column : ndarray of int, shape (pairs,)
         The columns of row i are ``column[first[i]:first[i + 1]]``.
-    start : ndarray of int, shape (rows,), optional
+    start : ndarray of int, shape (rows,)
         A matching to begin with, `IDLE` where a row has no column.
     time_left : callable
-        Seconds; no limit by default.
+        Seconds.
     """
-    if start is None:
-        start = np.full(len(first) - 1, IDLE, dtype=np.intp)
     matching = _Matching(first, column, start, time_left)
     while is_larger := matching.find_levels():
         if not matching.augment_all():

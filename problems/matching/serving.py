@@ -2,6 +2,7 @@
 
 from collections import deque
 from collections.abc import Iterator
+from itertools import compress
 
 import numpy as np
 
@@ -18,7 +19,10 @@ SPENT = -1
 NEARBY = 64
 """Origins next to a task that are looked at first where there are many."""
 
-CHUNK = 256
+NEXT = 8
+"""Of these, the origins that will do for most tasks."""
+
+CHUNK = 8_192
 """Tasks that are looked at together, between two looks at the clock."""
 
 MANY = 50_000_000
@@ -190,24 +194,33 @@ def _serve_nearby(
     by_origin = reach.agents_by_origin[1]
     idle = by_origin[task_of_agent[by_origin] == IDLE]
     bounds = np.searchsorted(reach.origin[idle], np.arange(len(reach.place) + 1))
-    first, end = bounds[:-1].copy(), bounds[1:]
+    first, end = bounds[:-1], bounds[1:]
     origins = np.flatnonzero((first < end) & ~np.isnan(reach.place[:, 0]))
     goals = np.array(unserved)[~np.isnan(reach.goal[unserved, 0])]
     if not len(origins) or not len(goals):
         return task_of_agent, unserved
-    count, tree, served = min(NEARBY, len(origins)), cKDTree(reach.place[origins]), set()
+    tree, free, last, served = cKDTree(reach.place[origins]), first.tolist(), end.tolist(), set()
+
+    def nearest(some: IntArray, count: int) -> Iterator[list[int]]:
+        """For each of these tasks, the origins within reach among its `count` nearest, the nearest first."""
+        count = min(count, len(origins))
+        near = origins[tree.query(reach.goal[some], k=count)[1].reshape(len(some), count)]
+        within = reach.is_within(near, some[:, None], reach.distances_between(near, some[:, None]))
+        return (list(compress(*row)) for row in zip(near.tolist(), within.tolist(), strict=True))
+
     for begin in range(0, len(goals), CHUNK):
         if time_left() <= 0:
             break
         some = goals[begin : begin + CHUNK]
-        near = origins[tree.query(reach.goal[some], k=count)[1].reshape(len(some), count)]
-        within = reach.is_within(near, some[:, None], reach.distances_between(near, some[:, None]))
-        for j, row, good in zip(some.tolist(), near, within, strict=True):
-            able = row[good & (first[row] < end[row])]
-            if len(able):
-                task_of_agent[idle[first[able[0]]]] = j
-                first[able[0]] += 1
-                served.add(j)
+        for j, near in zip(some, nearest(some, NEXT), strict=True):
+            able = next((origin for origin in near if free[origin] < last[origin]), IDLE)
+            if able == IDLE:
+                further = next(nearest(np.array([j]), NEARBY))
+                able = next((origin for origin in further if free[origin] < last[origin]), IDLE)
+            if able != IDLE:
+                task_of_agent[idle[free[able]]] = j
+                free[able] += 1
+                served.add(int(j))
     return task_of_agent, [j for j in unserved if j not in served]
 
 

@@ -7,10 +7,13 @@ import numpy as np
 from alloc.problems.distances.neighbours import Neighbours, estimated_pairs
 from alloc.problems.instance import Instance, IntArray
 from alloc.problems.matching.agent_matching import AgentMatching
-from alloc.problems.matching.clock import GATHERED_PER_SECOND, Clock, at_least, unlimited
-from alloc.problems.matching.hopcroft_karp import largest_matching
+from alloc.problems.matching.clock import GATHERED_PER_SECOND, Clock, at_least, share_of, unlimited
+from alloc.problems.matching.hopcroft_karp import match
 from alloc.problems.matching.serving import needs_agent, serve_in_turn
 from alloc.problems.vocabulary import IDLE
+
+PROOF_SHARE = 0.5
+"""Share of the time in which it is found out whether all tasks can be served, where agents may be enough."""
 
 SHORTEST_S = 0.1
 """How long a table of all pairs is looked at where there is no time."""
@@ -91,7 +94,7 @@ def _origin_of_task(
         return None
     begin = np.concatenate([[0], np.cumsum(length)])
     entry = np.repeat(first[row] - begin[:-1], length) + np.arange(begin[-1])
-    found, is_largest = largest_matching(begin, near.task[useful][entry], time_left=time_left)
+    found, is_largest = match(begin, near.task[useful][entry], time_left)
     if not is_largest:
         return None
     origin[found[found != IDLE]] = row[found != IDLE]
@@ -112,6 +115,7 @@ def competing_part(instance: Instance, time_left: Clock = unlimited) -> Competin
         return CompetingPart(everyone, tasks, chosen, tasks[: instance.n + 1])
     if len(tasks) > instance.n and not reach.has_table:
         return _of_scarce_agents(instance, tasks, time_left)
+    time_left = share_of(PROOF_SHARE, time_left)
     if reach.has_table:
         time_left = at_least(SHORTEST_S, time_left)
     if _are_served_simply(instance, tasks, time_left):
@@ -132,9 +136,7 @@ def _of_scarce_agents(instance: Instance, tasks: IntArray, time_left: Clock) -> 
     return CompetingPart(agents, left, matching.task_of_agent[agents], unservable, matching.is_largest)
 
 
-def _of_neighbours(
-    instance: Instance, tasks: IntArray, near: Neighbours, time_left: Clock
-) -> CompetingPart | None:
+def _of_neighbours(instance: Instance, tasks: IntArray, near: Neighbours, time_left: Clock) -> CompetingPart | None:
     """The same from all pairs within reach."""
     origin = _origin_of_task(instance, near, tasks, time_left)
     if origin is None:
@@ -228,7 +230,7 @@ def _by_sample(instance: Instance, tasks: IntArray, time_left: Clock) -> bool:
     agent, task = sample[near].ravel(), np.repeat(tasks, near.size // len(tasks))
     able = reach.allows(agent, task)
     first = np.concatenate([[0], np.cumsum(able.reshape(len(tasks), -1).sum(axis=1))])
-    return bool((largest_matching(first, agent[able], time_left=time_left)[0] != IDLE).all())
+    return bool((match(first, agent[able], time_left)[0] != IDLE).all())
 
 
 def minimal_unservable_set(instance: Instance) -> IntArray | None:
