@@ -28,6 +28,9 @@ from alloc.problems.arguments import choice, event, flag, function, of_type
 REPAIR_S = 0.2
 """Time to serve more tasks after a run whose own time is up."""
 
+MATCHED_PAIRS = 1_000_000
+"""Pairs of origin and task beyond which the libraries for matchings are loaded before the run."""
+
 
 def solve(
     instance: Instance,
@@ -138,19 +141,19 @@ def _prepared(
     allocator = load(method, parameters, **settings) if isinstance(method, str) else method
     begin = time.monotonic()
     refuse(allocator, request.instance, request.objective, request.budget, request.tolerance)
+    is_matched = _is_matched(request.instance)
     spent_s += time.monotonic() - begin
-    _load_libraries(request.instance)
+    load_compiled(request.instance)  # loading is not part of the run
+    for library in ("scipy.spatial", "scipy.sparse.csgraph") if is_matched else ():
+        importlib.import_module(library)
     if request.budget.target_gap is not None:
-        importlib.import_module("scipy.optimize")  # for the bound before the run; loading is not part of it
+        importlib.import_module("scipy.optimize")  # for the bound before the run
     return allocator, notes, spent_s
 
 
-def _load_libraries(instance: Instance) -> None:
-    """Load what instances too large for a table of all pairs take besides the method, before the clock starts."""
-    if not instance.reach.has_table:
-        load_compiled(instance)
-        if not instance.reach.is_complete:
-            importlib.import_module("scipy.spatial")
+def _is_matched(instance: Instance) -> bool:
+    """Whether matchings are likely to be sought, in so many pairs that loading what seeks them is little beside that."""
+    return instance.reach.pairs > MATCHED_PAIRS and (instance.n < instance.m or not instance.reach.is_complete)
 
 
 def _require_none(parameters: object, settings: dict[str, object]) -> None:
