@@ -67,8 +67,10 @@ def methods_command(
 def _prepare() -> None:
     """Load each installed method, which compiles its loops; a plugin that fails gives a note."""
     from alloc.allocators import describe, load, names
+    from alloc.allocators.heuristic.greedy.tree_search import compile_loops
     from alloc.problems import InputError
 
+    compile_loops()  # greedy leaves it to large instances
     for name in names():
         try:
             if not describe(name).missing:

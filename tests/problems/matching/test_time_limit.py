@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import maximum_bipartite_matching
 
 from alloc.allocators import solve
 from alloc.problems import IDLE, Instance, evaluate, fewest_unserved, find_shortage
-from alloc.problems.matching.assignment import match
 from alloc.problems.matching.hopcroft_karp import largest_matching
 from alloc.problems.matching.pairs import bound_by_size, sampled_pairs
 
@@ -88,7 +89,8 @@ def test_hopcroft_and_karp_agree_with_scipy(seed: int) -> None:
     found, is_largest = largest_matching(first, column, start, lambda: np.inf)
     served = np.flatnonzero(found != IDLE)
     assert is_largest
-    assert len(served) == (match(first, column) != IDLE).sum()
+    graph = csr_matrix((np.ones(len(column)), column, first), (rows, columns))
+    assert len(served) == (maximum_bipartite_matching(graph, perm_type="column") != IDLE).sum()
     assert len(set(found[served])) == len(served)
     assert all(found[i] in column[first[i] : first[i + 1]] for i in served)
 
