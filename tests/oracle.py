@@ -18,7 +18,8 @@ CHUNK = 20_000
 class Optimum:
     """Scores of the best plan: fewest tasks unserved, most priority served, least makespan, least energy.
 
-    `lost` is the sum of the priorities of the unserved tasks. `energy` is the least among the plans with that makespan (within 1e-9 relative); `plan` is one of them.
+    `lost` is the sum of the priorities of the unserved tasks. `energy` is the least among the plans with that makespan
+    (within 1e-9 relative); `plan` is one of them.
     """
 
     unserved: int
@@ -36,7 +37,9 @@ def brute_force(instance: Instance) -> Optimum:
     least = makespan[few].min()
     fast = few & (makespan <= least * (1 + 1e-9))
     best = int(np.flatnonzero(fast)[energy[fast].argmin()])
-    return Optimum(int(unserved[best]), float(least), float(energy[best]), tuple(plans[best].tolist()), float(lost[best]))
+    return Optimum(
+        int(unserved[best]), float(least), float(energy[best]), tuple(plans[best].tolist()), float(lost[best])
+    )
 
 
 def least_energy_within(instance: Instance, makespan: float) -> float:
@@ -48,7 +51,7 @@ def least_energy_within(instance: Instance, makespan: float) -> float:
 def _scored_plans(
     instance: Instance,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], FloatArray, FloatArray, FloatArray]:
-    """Return all plans that send nobody astray, with their unserved tasks, the priority of these, makespan and energy."""
+    """Return all plans that send nobody astray: unserved tasks, the priority of these, makespan, and energy of each."""
     distance, able = reachable(instance)
     energy_of = flight_energies(instance, distance)
     options = [[-1, *np.flatnonzero(row).tolist()] for row in able]
@@ -116,7 +119,7 @@ def _distance(instance: Instance, i: int, j: int, *, back: bool = False) -> tupl
 def _score(
     instance: Instance, distance: FloatArray, energy_of: FloatArray, plans: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], FloatArray, FloatArray, FloatArray]:
-    """Unserved tasks, their priority, makespan of the served ones and energy of each plan, each of shape (len(plans),)."""
+    """Unserved tasks, their priority, makespan of the served ones and energy, each of shape (len(plans),)."""
     unserved, lost, makespan = np.zeros(len(plans), dtype=np.int64), np.zeros(len(plans)), np.zeros(len(plans))
     for j in np.flatnonzero(instance.workload > 0).tolist():
         there = plans == j

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from alloc.problems.distances.neighbours import estimated_pairs
 from alloc.problems.fields import BoolArray
 from alloc.problems.instance import Instance, IntArray
 from alloc.problems.matching.clock import GATHERED_PER_SECOND, Clock, share_of, unlimited
@@ -10,18 +11,24 @@ from alloc.problems.matching.pairs import sampled_pairs
 from alloc.problems.matching.precedence import Precedence, of_first, urgent_first
 from alloc.problems.vocabulary import IDLE
 
-SAMPLE_SHARE, LONGEST_S = 0.2, 2.0
-"""Share of the time for a sample of the pairs, where all are too many, and the longest that it takes."""
+SAMPLE_SHARE, LONGEST_S = 0.1, 2.0
+"""Share of the time for a sample of the pairs, where they are many, and the longest that it takes."""
+
+MANY_PAIRS = 1_000_000
+"""Pairs, within reach or not, beyond which a sample of them is tried first."""
 
 MOST_PAIRS = 50_000_000
 """Pairs beyond which they are not gathered, however much time there is."""
 
-BLOCK = 1 << 21
-"""Pairs, within reach or not, that are looked at together."""
-
 
 def most_priority(
-    instance: Instance, agents: IntArray, tasks: IntArray, known: IntArray, time_left: Clock = unlimited
+    instance: Instance,
+    agents: IntArray,
+    tasks: IntArray,
+    known: IntArray,
+    time_left: Clock = unlimited,
+    *,
+    is_sampled: bool = False,
 ) -> tuple[Precedence, IntArray, bool]:
     """Return which matchings of all `agents` with one of `tasks` each serve the most priority, and one of them.
 
@@ -37,6 +44,8 @@ def most_priority(
         Some task for each agent, no task twice.
     time_left : callable
         Returns the seconds that are left; no limit by default.
+    is_sampled : bool
+        Whether `known` is the best that a sample of the pairs gives.
 
     Returns
     -------
@@ -45,49 +54,57 @@ def most_priority(
     is_proven : bool
         Whether no matching serves more priority; False where time ran out.
     """
-    pairs = _all_within_reach(instance, agents, tasks, share_of(0.5, time_left))
-    if pairs is not None:
-        found = _Groups(instance, len(agents), tasks, *pairs, time_left).found()
-        if found is not None:
-            return *found, True
-    return _by_sample(instance, agents, tasks, known, time_left)
+    start = np.full(len(agents), IDLE, dtype=np.intp)
+    if not is_sampled and len(agents) * len(tasks) > MANY_PAIRS:
+        start = sampled_matching(instance, agents, tasks, time_left)
+        if (start != IDLE).all():
+            return of_first(instance, tasks, len(agents)), start, True
+    in_time = share_of(0.8, time_left)
+    pairs = _all_within_reach(instance, agents, tasks, share_of(0.5, in_time))
+    found = None if pairs is None else _Groups(instance, len(agents), tasks, *pairs, in_time).found()
+    return _completed(instance, start, known, time_left) if found is None else (*found, True)
+
+
+def sampled_matching(instance: Instance, agents: IntArray, tasks: IntArray, time_left: Clock) -> IntArray:
+    """Return a matching of the k agents with the k most urgent of the tasks by a sample of the pairs, idle for none.
+
+    Where all agents have one, there is no matching with more priority.
+    """
+    seconds = min(LONGEST_S, SAMPLE_SHARE * time_left())
+    first = urgent_first(instance, tasks)[: len(agents)]
+    pairs, _ = sampled_pairs(instance, agents, first, None, seconds, share_of(0.3, time_left))
+    start = np.full(len(agents), IDLE, dtype=np.intp)
+    return largest_matching(pairs.first, pairs.task, start, share_of(0.4, time_left))[0]
 
 
 def _all_within_reach(
     instance: Instance, agents: IntArray, tasks: IntArray, time_left: Clock
 ) -> tuple[IntArray, IntArray] | None:
     """Return the row of the agent and the task of each pair within reach; None where they are too many."""
-    reach, rows, found, total = instance.reach, [], [], 0
-    size = max(1, BLOCK // len(tasks))
-    if len(agents) * len(tasks) > 10 * GATHERED_PER_SECOND * time_left():
+    reach, most = instance.reach, min(MOST_PAIRS, GATHERED_PER_SECOND * time_left())
+    near = reach.neighbours if reach.has_table or estimated_pairs(reach) <= most else None
+    if near is None:
         return None
-    for begin in range(0, len(agents), size):
-        _, mask = reach.block(reach.origin[agents[begin : begin + size]], tasks)
-        row, column = np.nonzero(mask)
-        rows.append(row + begin)
-        found.append(tasks[column])
-        total += len(row)
-        if time_left() <= 0 or total > MOST_PAIRS:
-            return None
-    return np.concatenate(rows), np.concatenate(found)
+    origin, wanted = reach.origin[agents], np.zeros(instance.m, dtype=np.bool_)
+    wanted[tasks] = True
+    length = near.first[origin + 1] - near.first[origin]
+    if length.sum() > most:
+        return None
+    row, task = np.repeat(np.arange(len(agents)), length), entries(near.first, near.task, origin)
+    return row[wanted[task]], task[wanted[task]].astype(np.intp)
 
 
-def _by_sample(
-    instance: Instance, agents: IntArray, tasks: IntArray, known: IntArray, time_left: Clock
+def _completed(
+    instance: Instance, start: IntArray, known: IntArray, time_left: Clock
 ) -> tuple[Precedence, IntArray, bool]:
-    """Match as many as time allows of the most urgent tasks, by a sample of the pairs; the others keep theirs."""
-    k, seconds = len(agents), min(LONGEST_S, SAMPLE_SHARE * time_left())
-    first = urgent_first(instance, tasks)[:k]
-    pairs, _ = sampled_pairs(instance, agents, first, None, seconds, time_left)
-    start = np.full(k, IDLE, dtype=np.intp)
-    start, _ = largest_matching(pairs.first, pairs.task, start, share_of(0.5, time_left))
-    if (start != IDLE).all():
-        return of_first(instance, tasks, k), start, True
-    row = np.concatenate([pairs.row, np.arange(k)])
-    task = np.concatenate([pairs.task, known])
+    """Give tasks to agents that `start` leaves idle, by what `known` says, so that no task of `start` is lost."""
+    k = len(start)
+    row, task = (
+        np.concatenate([np.arange(k), np.flatnonzero(start != IDLE)]),
+        np.concatenate([known, start[start != IDLE]]),
+    )
     order = np.argsort(row, kind="stable")
-    begin = np.searchsorted(row[order], np.arange(k + 1))
-    chosen, _ = largest_matching(begin, task[order], start, time_left)
+    chosen, _ = largest_matching(np.searchsorted(row[order], np.arange(k + 1)), task[order], start, time_left)
     if (chosen == IDLE).any():
         chosen = known
     group, required = np.full(instance.m, IDLE, dtype=np.intp), np.zeros(instance.m, dtype=np.bool_)

@@ -92,9 +92,7 @@ class Shortage:
         pairs, _ = _pairs(*args, self.task_of_agent, hours, time_left, by_cost=True)
         if pairs is None:
             return self
-        chosen = cheapest(
-            pairs, self.task_of_agent, pairs.cost, time_left, None if order is None else order.required
-        )
+        chosen = cheapest(pairs, self.task_of_agent, pairs.cost, time_left, None if order is None else order.required)
         return replace(self, task_of_agent=chosen, hours=float(_hours(self.instance, self.agents, chosen).max()))
 
 
@@ -180,9 +178,7 @@ def _pairs(
     if seconds <= 0:
         return None, False
     seconds *= SAMPLE_SHARE
-    pairs, complete = sampled_pairs(
-        instance, agents, tasks, known, seconds, time_left, latest=latest, by_cost=by_cost
-    )
+    pairs, complete = sampled_pairs(instance, agents, tasks, known, seconds, time_left, latest=latest, by_cost=by_cost)
     return (pairs, complete) if order is None else (pairs.chosen(order.allows(pairs.row, pairs.task)), False)
 
 

@@ -10,7 +10,7 @@ from alloc.problems.matching.agent_matching import AgentMatching
 from alloc.problems.matching.clock import GATHERED_PER_SECOND, Clock, at_least, share_of, unlimited
 from alloc.problems.matching.hopcroft_karp import match
 from alloc.problems.matching.precedence import Precedence, differs, of_first, urgent_first
-from alloc.problems.matching.priority import entries, most_priority
+from alloc.problems.matching.priority import entries, most_priority, sampled_matching
 from alloc.problems.matching.serving import needs_agent, serve_in_turn
 from alloc.problems.vocabulary import IDLE
 
@@ -120,17 +120,36 @@ def competing_part(instance: Instance, time_left: Clock = unlimited) -> Competin
         order = of_first(instance, tasks, instance.n) if differs(instance, tasks) else None
         return CompetingPart(everyone, tasks, chosen, tasks[: instance.n + 1], precedence=order)
     if len(tasks) > instance.n and not reach.has_table:
-        share = PROOF_SHARE if differs(instance, tasks) else 1.0
-        return _by_priority(instance, _of_scarce_agents(instance, tasks, share_of(share, time_left)), time_left)
+        return _of_urgent_tasks(instance, tasks, time_left)
     part = _of_table_or_neighbours(instance, tasks, time_left)
     return None if part is None else _by_priority(instance, part, time_left)
 
 
-def _by_priority(instance: Instance, part: CompetingPart, time_left: Clock) -> CompetingPart:
+def _of_urgent_tasks(instance: Instance, tasks: IntArray, time_left: Clock) -> CompetingPart:
+    """The same for more tasks than agents: if all agents can serve the most urgent tasks, by a sample of the pairs."""
+    if not differs(instance, tasks):
+        return _of_scarce_agents(instance, tasks, time_left)
+    everyone = np.arange(instance.n)
+    chosen = sampled_matching(instance, everyone, tasks, time_left)
+    if (chosen != IDLE).all():
+        order = of_first(instance, tasks, instance.n)
+        return CompetingPart(everyone, tasks, chosen, tasks[: instance.n + 1], precedence=order)
+    in_time, part, reach = share_of(PROOF_SHARE, time_left), None, instance.reach
+    if estimated_pairs(reach) <= GATHERED_PER_SECOND * in_time() and reach.neighbours is not None:
+        part = _of_neighbours(instance, tasks, reach.neighbours, in_time)
+    return _by_priority(
+        instance, part or _of_scarce_agents(instance, tasks, in_time, chosen), time_left, is_sampled=True
+    )
+
+
+def _by_priority(
+    instance: Instance, part: CompetingPart, time_left: Clock, *, is_sampled: bool = False
+) -> CompetingPart:
     """Return the same with a matching that serves the most priority."""
     if not len(part.agents) or not differs(instance, part.tasks):
         return part
-    found, chosen, is_proven = most_priority(instance, part.agents, part.tasks, part.task_of_agent, time_left)
+    args = (instance, part.agents, part.tasks, part.task_of_agent, time_left)
+    found, chosen, is_proven = most_priority(*args, is_sampled=is_sampled)
     return replace(part, task_of_agent=chosen, precedence=found, is_proven=part.is_proven and is_proven)
 
 
@@ -147,9 +166,11 @@ def _of_table_or_neighbours(instance: Instance, tasks: IntArray, time_left: Cloc
     return None if reach.neighbours is None else _of_neighbours(instance, tasks, reach.neighbours, time_left)
 
 
-def _of_scarce_agents(instance: Instance, tasks: IntArray, time_left: Clock) -> CompetingPart:
+def _of_scarce_agents(
+    instance: Instance, tasks: IntArray, time_left: Clock, start: IntArray | None = None
+) -> CompetingPart:
     """The same for more tasks than agents, without looking at all pairs, as a rule."""
-    matching = AgentMatching(instance, tasks, time_left)
+    matching = AgentMatching(instance, tasks, time_left, start)
     if matching.is_largest:
         agents, left = np.flatnonzero(~matching.replaceable), tasks[~matching.their_tasks[tasks]]
     else:
