@@ -78,6 +78,7 @@ class Decomposition:
         if best is None or bound <= 0:
             return notes
         hours = best.evaluation.served_makespan
+        as_much = "as many tasks" if self.shortage.precedence is None else "as many and as urgent tasks"
         if relative_gap(hours, bound) <= PROVEN:
-            return [*notes, f"no plan that serves as many tasks is done sooner than in these {hours:.6g} h"]
-        return [*notes, f"every plan that serves as many tasks takes {bound:.6g} h or more, this one {hours:.6g} h"]
+            return [*notes, f"no plan that serves {as_much} is done sooner than in these {hours:.6g} h"]
+        return [*notes, f"every plan that serves {as_much} takes {bound:.6g} h or more, this one {hours:.6g} h"]

@@ -100,7 +100,7 @@ def _scattered(name: str, n: int, m: int) -> Instance:
 
 @cache
 def every_evaluation(case: str) -> tuple[Evaluation, ...]:
-    """Return the scores of all allocations of a case that leave as few tasks unserved as can be, the least urgent ones."""
+    """Return the scores of all allocations of a case that leave the fewest and least urgent tasks unserved."""
     instance = CASES[case]
     options = [[IDLE, *np.flatnonzero(row).tolist()] for row in instance.reach.mask[instance.reach.origin]]
     scores = [evaluate(instance, Allocation(choice)) for choice in product(*options)]

@@ -57,8 +57,8 @@ class Search:
     best : Improvement or None
         The best submitted so far.
     fastest : Improvement or None
-        The one with the least makespan among those that leave the fewest and least urgent tasks unserved; differs from `best` only where
-        energy counts.
+        The one with the least makespan among those that leave the fewest and least urgent tasks unserved; differs from
+        `best` only where energy counts.
     tolerance : MakespanTolerance
         How much slower than the fastest the best may be.
     iteration : int

@@ -27,8 +27,7 @@ def most_priority(
     tasks: IntArray,
     known: IntArray,
     time_left: Clock = unlimited,
-    *,
-    is_sampled: bool = False,
+    sampled: IntArray | None = None,
 ) -> tuple[Precedence, IntArray, bool]:
     """Return which matchings of all `agents` with one of `tasks` each serve the most priority, and one of them.
 
@@ -44,8 +43,8 @@ def most_priority(
         Some task for each agent, no task twice.
     time_left : callable
         Returns the seconds that are left; no limit by default.
-    is_sampled : bool
-        Whether `known` is the best that a sample of the pairs gives.
+    sampled : ndarray of int, shape (k,), optional
+        A matching with many of the most urgent tasks, where `sampled_matching` has been called.
 
     Returns
     -------
@@ -54,8 +53,8 @@ def most_priority(
     is_proven : bool
         Whether no matching serves more priority; False where time ran out.
     """
-    start = np.full(len(agents), IDLE, dtype=np.intp)
-    if not is_sampled and len(agents) * len(tasks) > MANY_PAIRS:
+    start = np.full(len(agents), IDLE, dtype=np.intp) if sampled is None else sampled
+    if sampled is None and len(agents) * len(tasks) > MANY_PAIRS:
         start = sampled_matching(instance, agents, tasks, time_left)
         if (start != IDLE).all():
             return of_first(instance, tasks, len(agents)), start, True

@@ -137,19 +137,22 @@ def _of_urgent_tasks(instance: Instance, tasks: IntArray, time_left: Clock) -> C
     in_time, part, reach = share_of(PROOF_SHARE, time_left), None, instance.reach
     if estimated_pairs(reach) <= GATHERED_PER_SECOND * in_time() and reach.neighbours is not None:
         part = _of_neighbours(instance, tasks, reach.neighbours, in_time)
-    return _by_priority(
-        instance, part or _of_scarce_agents(instance, tasks, in_time, chosen), time_left, is_sampled=True
-    )
+    part = part or _of_scarce_agents(instance, tasks, in_time, chosen)
+    return _by_priority(instance, part, time_left, chosen)
 
 
 def _by_priority(
-    instance: Instance, part: CompetingPart, time_left: Clock, *, is_sampled: bool = False
+    instance: Instance, part: CompetingPart, time_left: Clock, sampled: IntArray | None = None
 ) -> CompetingPart:
     """Return the same with a matching that serves the most priority."""
     if not len(part.agents) or not differs(instance, part.tasks):
         return part
+    if instance.reach.has_table:
+        time_left = at_least(SHORTEST_S, time_left)
+    if sampled is not None:
+        sampled = np.where(np.isin(sampled[part.agents], part.tasks), sampled[part.agents], IDLE)
     args = (instance, part.agents, part.tasks, part.task_of_agent, time_left)
-    found, chosen, is_proven = most_priority(*args, is_sampled=is_sampled)
+    found, chosen, is_proven = most_priority(*args, sampled)
     return replace(part, task_of_agent=chosen, precedence=found, is_proven=part.is_proven and is_proven)
 
 
