@@ -13,6 +13,7 @@ from alloc.allocators.contract.tolerance import EXACT, PROVEN, MakespanTolerance
 from alloc.allocators.result_document import read_document, result_fields
 from alloc.allocators.summary import summary
 from alloc.problems import IDLE, Allocation, Evaluation, InputError, Instance, MissingPackageError, Objective
+from alloc.problems.diagnosis.unserved import Unserved, why_unserved
 from alloc.problems.evaluation import RELATIVE_TOLERANCE
 from alloc.problems.formats.allocation_file import RESULT_FORMAT
 from alloc.problems.formats.files import PathLike, named
@@ -75,6 +76,13 @@ class Result:
     def makespan(self) -> float | None:
         """Hours until the last task is done; None while a task is unserved."""
         return None if self.evaluation is None else self.evaluation.makespan
+
+    @property
+    def unserved(self) -> tuple[Unserved, ...]:
+        """Why tasks are unserved: the ten most urgent ones."""
+        if self.allocation is None or self.evaluation is None or not self.evaluation.unserved_tasks:
+            return ()
+        return why_unserved(self.instance, self.allocation)
 
     @property
     def energy(self) -> float | None:
@@ -147,6 +155,7 @@ class Result:
             "battery_remaining_percent": None if score is None else score.battery_remaining_percent,
             "reward": None if score is None else score.reward,
             "unserved_tasks": [] if score is None else [ids.task_ids[j] for j in score.unserved_tasks],
+            **self._reasons(),
             "violations": []
             if score is None
             else [
@@ -159,6 +168,22 @@ class Result:
                 {"time_s": point.time_s, "makespan": point.makespan, "energy": point.energy} for point in self.trace
             ],
         }
+
+    def _reasons(self) -> dict[str, object]:
+        """Return the field on why tasks are unserved; none where all are served."""
+        agents, found = self.instance.agent_ids, self.unserved
+        fields = [
+            {
+                "task": self.instance.task_ids[one.task],
+                "priority": one.priority,
+                "able": one.able,
+                "able_agents": [agents[i] for i in one.able_agents],
+                "nearest_agent": None if one.nearest is None else agents[one.nearest],
+                "reason": one.reason,
+            }
+            for one in found
+        ]
+        return {"unserved_reasons": fields} if fields else {}
 
     @classmethod
     def from_dict(cls, document: Mapping[str, object], instance: Instance) -> "Result":

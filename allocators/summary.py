@@ -23,6 +23,9 @@ STOPS = {
     StopReason.INTERRUPTED: "it was interrupted",
 }
 
+MOST_REASONS = 5
+"""Unserved tasks whose reason is given."""
+
 MOST_NAMES = 8
 """Ids in a list before it is cut."""
 
@@ -114,11 +117,21 @@ def bottleneck_lines(result: "Result") -> list[str]:
         return []
     if result.evaluation.unserved_tasks:
         ids = [result.instance.task_ids[j] for j in result.evaluation.unserved_tasks]
-        return [f"Unserved: {_list(ids)}."]
+        return [f"Unserved: {_list(ids)}.", *_reasons(result)]
     found = explain(result.instance, result.allocation)
     if found is None:
         return ["There is no work to do."]
     return [_last_tasks(result.instance, found), _gain(result.instance, found), _room(result, found)]
+
+
+def _reasons(result: "Result") -> list[str]:
+    """Return why the most urgent of the unserved tasks are, a line each."""
+    weights = result.instance.priority
+    return [
+        f"  {result.instance.task_ids[one.task]}"
+        f"{f' (priority {number(one.priority)})' if weights.max() > weights.min() else ''}: {one.reason}"
+        for one in result.unserved[:MOST_REASONS]
+    ]
 
 
 def _last_tasks(instance: Instance, found: Bottleneck) -> str:

@@ -35,6 +35,7 @@ SCORES = (
     "battery_remaining_percent",
     "reward",
     "unserved_tasks",
+    "unserved_reasons",
     "violations",
     "assignment",
 )
@@ -144,7 +145,7 @@ def _bounded(result: "Result", claims: dict[str, object]) -> "Result":
 
 def _scores(result: "Result") -> dict[str, object]:
     fields = result.to_dict()
-    return {name: fields[name] for name in SCORES}
+    return {name: fields[name] for name in SCORES if name in fields}
 
 
 def _tasks(result: "Result") -> list[TaskScore]:
