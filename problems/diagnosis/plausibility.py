@@ -18,6 +18,9 @@ FAR_OFF, WIDEST = 3.0, 45.0
 MUCH_MORE = 1000.0
 """Times the median ability at which an ability looks as if it were in other units."""
 
+FEW = 0.05
+"""Share of the agents that may reach no task without a finding: in large fleets some are out of the way."""
+
 MOST_NAMES = 3
 """Ids in a finding before it is cut."""
 
@@ -106,6 +109,8 @@ def _unreaching(instance: Instance) -> Iterator[Finding]:
     if not limited.any() or not reach.has_table:
         return
     reaches_none = ~reach.mask.any(axis=1)[reach.origin] & limited
+    if reaches_none.mean() < FEW:
+        return
     eligible = instance.eligible_tasks
     for agent in np.flatnonzero(reaches_none).tolist():
         options = None if eligible is None else eligible[agent]
@@ -116,9 +121,9 @@ def _unreaching(instance: Instance) -> Iterator[Finding]:
         reason = reason_of(instance, agent, nearest)
         field = "battery" if "battery" in reason else "range"
         others = int(reaches_none.sum()) - 1
-        also = f", and so do {counted(others, 'other')}" if others else ""
-        name = instance.agent_ids[agent]
-        yield Finding(field, f"{name} reaches no task{also}; to {instance.task_ids[nearest]}, its nearest, {reason}")
+        who = f"and {counted(others, 'other')} reach" if others else "reaches"
+        text = f"{instance.agent_ids[agent]} {who} no task; to {instance.task_ids[nearest]}, its nearest, {reason}"
+        yield Finding(field, text)
         return
 
 

@@ -117,11 +117,11 @@ def _nearest(instance: Instance, task: int) -> int:
 
 
 def _excess(instance: Instance, origins: IntArray, task: int) -> FloatArray:
-    """Return the share by which the way to the task exceeds the range or the battery of each origin; < 0 if it does not."""
+    """Return the share by which the way to the task exceeds range or battery of each origin; < 0 if it does not."""
     reach, goal = instance.reach, np.full(len(origins), task)
     distance = reach.distances_between(origins, goal)
-    needed = reach.energy_per_distance * reach.flown(origins, goal, distance)
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+        needed = reach.energy_per_distance * reach.flown(origins, goal, distance)
         far = distance / np.maximum(reach.communication_range + TOLERANCE, TOLERANCE)
         costly = needed / np.maximum(reach.battery + TOLERANCE, TOLERANCE)
     excess: FloatArray = np.maximum(far, costly) - 1
