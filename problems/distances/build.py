@@ -80,28 +80,26 @@ def replanned(reach: Reach, task_of_agent: Indices, price: Floats, pinned: Flags
     """
     first, origin = group_rows([part.astype(np.float64) for part in (reach.origin, task_of_agent, price, pinned)])
     old, task, fixed = reach.origin[first], task_of_agent[first], pinned[first]
-    unit = reach.energy_per_distance if energy_counts and reach.energy_per_distance > 0 else 1.0
+    unit = reach.energy_per_distance or 1.0
     rate = np.ones(len(first)) if reach.factor is None else reach.factor[old]
-    factor = np.where(fixed, 0.0, rate * (reach.energy_per_distance / unit if energy_counts else 0.0))
+    factor = np.where(fixed, 0.0, rate * (reach.energy_per_distance / unit))
     own = [reach.lists[number] if number >= 0 else None for number in reach.list_of[old].tolist()]
     for row in np.flatnonzero(fixed).tolist():
         own[row] = task[[row]] if task[row] >= 0 else task[:0]
     list_of, lists = number_lists(own, len(own))
     given = reach.geometry.given
-    battery, longest = reach.battery[old], reach.communication_range[old]
+    start = reach.geometry.start[old]
     return Reach(
         origin=origin,
-        geometry=replace(
-            reach.geometry, start=reach.geometry.start[old], given=None if given is None else given.chosen(old)
-        ),
-        communication_range=np.where(fixed, np.inf, longest),
-        battery=np.where(fixed, np.inf, battery),
+        geometry=replace(reach.geometry, start=start, given=None if given is None else given.chosen(old)),
+        communication_range=np.where(fixed, np.inf, reach.communication_range[old]),
+        battery=np.where(fixed, np.inf, reach.battery[old]),
         energy_per_distance=unit,
         factor=factor,
         returns=None if reach.returns is None else reach.returns[old],
         list_of=list_of,
         lists=lists,
-        move=Move(task, np.where(fixed, 0.0, price[first] / unit)),
+        move=Move(task, np.where(fixed, 0.0, price[first] / unit), float(energy_counts)),
     )
 
 
@@ -122,7 +120,7 @@ def restricted_reach(reach: Reach, agents: Indices, tasks: Indices) -> Reach:
         returns=None if reach.returns is None else reach.returns[old],
         list_of=reach.list_of[old],
         lists=tuple(np.sort(number[named][number[named] >= 0]) for named in reach.lists),
-        move=None if move is None else Move(number[move.task[old]], move.price[old]),
+        move=None if move is None else Move(number[move.task[old]], move.price[old], move.energy_weight),
     )
 
 

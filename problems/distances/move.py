@@ -18,10 +18,13 @@ class Move(ReadOnly):
         The task that the agents of each origin have, -1 where they are idle.
     price : ndarray, shape (origins,)
         In units of cost.
+    energy_weight : float
+        1 where the energy of flights is part of the cost, 0 where the moves alone are.
     """
 
     task: IntArray
     price: FloatArray
+    energy_weight: float
 
     def of(self, origin: IntArray, task: IntArray) -> FloatArray:
         """Return what each of these origins pays for the task beside it; both broadcast."""

@@ -223,7 +223,7 @@ class Reach(ReadOnly):
         moving to another task.
         """
         cost = self.flown(origin, task, distance)
-        return cost if self.move is None else cost + self.move.of(origin, task)
+        return cost if self.move is None else cost * self.move.energy_weight + self.move.of(origin, task)
 
     def trips(self, origin: Indices, task: Indices, distance: Floats) -> Floats:
         """Length of the flight from each of these origins to the task, `distance` away, back again if it returns."""
