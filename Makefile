@@ -3,6 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := PYTHONWARNINGS=ignore $(BIN)/python -m pip --quiet --disable-pip-version-check
+PARALLEL := -n logical --dist worksteal
 CODE := pyproject.toml $(shell find problems allocators cli -name '*.py' -o -name '*.safetensors')
 EXAMPLE := examples/earthquakes/alaska.json
 
@@ -12,8 +13,8 @@ solve: $(VENV)/.installed  ## allocate the agents of a real instance with GAPPO,
 	@mkdir -p out
 	$(BIN)/alloc solve $(EXAMPLE) --method gappo --objective makespan-energy --output out/alaska-result.json --plot out/alaska.png
 
-test: $(VENV)/.tested  ## run the tests
-	$(BIN)/python -m pytest
+test: $(VENV)/.tested  ## run the tests, on all processors
+	$(BIN)/python -m pytest $(PARALLEL)
 
 check: $(VENV)/.checked  ## lint, format, imports and types
 	$(BIN)/ruff check .
