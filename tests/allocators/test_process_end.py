@@ -34,7 +34,7 @@ time.sleep(after_s)
 
 
 def run(method: str, after_s: float, how: str, times: int = 1) -> subprocess.CompletedProcess[str]:
-    """Solve in a thread, in 1.5 s a run, and end the main thread after so many seconds; `gappo` learns from 0.3 s on."""
+    """Solve in a thread, in 1.5 s a run, and end the main thread after so many seconds; `gappo` learns from 0.3 s."""
     command = [sys.executable, "-c", PROGRAM, method, str(after_s), how, str(times)]
     return subprocess.run(command, capture_output=True, text=True, timeout=60)
 
