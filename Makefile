@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := PYTHONWARNINGS=ignore $(BIN)/python -m pip --quiet --disable-pip-version-check
-PARALLEL := -n logical --dist worksteal
+PARALLEL := -n logical --maxprocesses 8 --dist worksteal
 CODE := pyproject.toml $(shell find problems allocators cli -name '*.py' -o -name '*.safetensors')
 EXAMPLE := examples/earthquakes/alaska.json
 
