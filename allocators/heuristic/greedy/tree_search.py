@@ -112,6 +112,11 @@ class TreeGreedy:
         _assign(agents, self._tree, self._tasks, self._agents)
 
 
+def compile_loops() -> None:
+    """Compile the loops, or read them from the cache."""
+    TreeGreedy(Instance(ability=[1.0], workload=[1.0]), 1.0).assign(np.zeros(1, dtype=np.intp))
+
+
 @compiled
 def _assign(chosen: Indices, tree: Tree, tasks: Tasks, agents: Agents) -> None:
     stack = np.empty(STACK_SIZE, dtype=np.intp)
