@@ -152,7 +152,7 @@ def _prepared(
 
 
 def _is_matched(instance: Instance) -> bool:
-    """Whether matchings are likely to be sought, in so many pairs that loading what seeks them is little beside that."""
+    """Whether matchings are likely to be sought, among so many pairs that loading takes little time beside that."""
     return instance.reach.pairs > MATCHED_PAIRS and (instance.n < instance.m or not instance.reach.is_complete)
 
 
