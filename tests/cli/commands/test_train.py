@@ -332,9 +332,9 @@ def test_options_are_those_of_the_library():
         assert name in inspect.getsource(train_options)
 
 
+@pytest.mark.needs("tensorboard")
 def test_a_resumed_run_keeps_its_events(alloc, mine):
     """TensorBoard shows the generations before --resume beside those after it, each once."""
-    pytest.importorskip("tensorboard")
     from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
     run = ("train", "ppo", "--output", "p.safetensors", *QUICK, "--tensorboard", "events")
