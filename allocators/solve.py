@@ -15,6 +15,7 @@ from alloc.allocators.contract.budget import Budget, StopReason
 from alloc.allocators.contract.improvement import Improvement
 from alloc.allocators.contract.search import Search
 from alloc.allocators.decomposition import Decomposition
+from alloc.allocators.heuristic.greedy.list_schedule import load_compiled
 from alloc.allocators.parallel.processors import available_threads
 from alloc.allocators.refusal import refuse
 from alloc.allocators.registry import load
@@ -34,8 +35,11 @@ from alloc.problems import InputError, Instance, Objective, find_shortage, serve
 from alloc.problems.allocation import CarriedOver
 from alloc.problems.arguments import choice, event, flag, function, of_type, real
 
-REPAIR_S = 0.3
+REPAIR_S = 0.2
 """Time to serve more tasks after a run whose own time is up."""
+
+MATCHED_PAIRS = 1_000_000
+"""Pairs of origin and task beyond which the libraries for matchings are loaded before the run."""
 
 
 def solve(
@@ -161,10 +165,19 @@ def _prepared(
     allocator = load(method, parameters, **settings) if isinstance(method, str) else method
     begin = time.monotonic()
     refuse(allocator, request.instance, request.objective, request.budget, request.tolerance)
+    is_matched = _is_matched(request.instance)
     spent_s += time.monotonic() - begin
+    load_compiled(request.instance)  # loading is not part of the run
+    for library in ("scipy.spatial", "scipy.sparse.csgraph") if is_matched else ():
+        importlib.import_module(library)
     if request.budget.target_gap is not None:
-        importlib.import_module("scipy.optimize")  # for the bound before the run; loading is not part of it
+        importlib.import_module("scipy.optimize")  # for the bound before the run
     return allocator, notes, spent_s
+
+
+def _is_matched(instance: Instance) -> bool:
+    """Whether matchings are likely to be sought, among so many pairs that loading takes little time beside that."""
+    return instance.reach.pairs > MATCHED_PAIRS and (instance.n < instance.m or not instance.reach.is_complete)
 
 
 def _require_none(parameters: object, settings: dict[str, object]) -> None:
