@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 
 from alloc.problems.fields import BoolArray
 from alloc.problems.instance import FloatArray, IntArray
-from alloc.problems.matching.clock import MATCHED_PER_SECOND, Clock
+from alloc.problems.matching.clock import GATHERED_PER_SECOND, MATCHED_PER_SECOND, Clock
 from alloc.problems.matching.hopcroft_karp import largest_matching
 from alloc.problems.vocabulary import IDLE
 
-SEARCH = 10_000_000_000
-"""Agents times pairs at which looking for the cheapest assignment takes about a second."""
+SEARCH = 500_000_000
+"""Agents times pairs at which looking for the cheapest assignment takes a second as a rule, ten at the most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +153,7 @@ def cheapest(
     k = len(known)
     work = min(1.0, 0.1 * time_left()) * SEARCH
     most = int(work // max(1, k * k))
-    if most < 1 or not len(cost):
+    if most < 1 or not len(cost) or len(cost) > GATHERED_PER_SECOND * time_left():
         return known
     held = pairs.task == known[pairs.row]
     if len(cost) > most * k:

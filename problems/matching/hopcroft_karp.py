@@ -115,7 +115,8 @@ class _Matching:
 
     def _augment(self, root: int) -> None:
         """Give `root` a column along a path on which levels rise by one, if there is one left in this phase."""
-        path, options, taken, steps = [root], [iter(self._columns(root))], [], 0
+        path, options, steps = [root], [iter(self._columns(root))], 0
+        taken: list[int] = []
         while path:
             column = next(options[-1], None)
             if column is None:

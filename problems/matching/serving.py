@@ -22,8 +22,8 @@ NEARBY = 64
 NEXT = 8
 """Of these, the origins that will do for most tasks."""
 
-CHUNK = 8_192
-"""Tasks that are looked at together, between two looks at the clock."""
+CHUNK = 16_384
+"""Tasks that are looked at together, between two looks at the clock: a tenth of a second, for which there is time."""
 
 MANY = 50_000_000
 """Pairs of agent, or of origin, and unserved task that are too many to look at one by one."""
@@ -215,7 +215,7 @@ def _serve_nearby(
         return (list(compress(*row)) for row in zip(near.tolist(), within.tolist(), strict=True))
 
     for begin in range(0, len(goals), CHUNK):
-        if time_left() <= 0:
+        if begin and time_left() <= 0:
             break
         some = goals[begin : begin + CHUNK]
         for j, near in zip(some, nearest(some, NEXT), strict=True):
