@@ -142,11 +142,7 @@ def _lists(reach: Reach) -> _Lists:
 
 
 def compile_loops() -> None:
-<<<<<<< HEAD
-    """Compile the loops, or load them from the cache, by a run on the smallest instance."""
-=======
     """Compile the loops, or read them from the cache."""
->>>>>>> core
     TreeGreedy(Instance(ability=[1.0], workload=[1.0]), 1.0).assign(np.zeros(1, dtype=np.intp))
 
 
