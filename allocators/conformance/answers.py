@@ -47,7 +47,7 @@ class AnswerChecks(Runner):
     @every_case
     @every_objective
     def test_answer_is_sound(self, subject: Allocator, case: str, objective: Objective) -> None:
-        """Scores are those of the allocation, agents can do their tasks, and the fewest, least urgent ones are unserved."""
+        """Scores are those of the allocation, agents can do their tasks, and the fewest, least urgent are unserved."""
         instance = CASES[case]
         result = self.answer(subject, case, objective)
         assert result.allocation is not None, "no allocation, though any would do"

@@ -5,12 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from alloc.problems.distances.metric import GEOGRAPHIC
 from alloc.problems.evaluation import reason_of
 from alloc.problems.fields import BoolArray
 from alloc.problems.instance import FloatArray, Instance
 from alloc.problems.text import counted, number
-from alloc.problems.vocabulary import IDLE
+from alloc.problems.vocabulary import GEOGRAPHIC, IDLE
 
 FAR_OFF, WIDEST = 3.0, 45.0
 """Places look like degrees where they are this many times farther from the origin than wide, and at most so wide."""
