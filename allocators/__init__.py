@@ -17,6 +17,8 @@ from alloc.allocators.experiments.compare import Row, compare
 from alloc.allocators.explain import Bottleneck, explain
 from alloc.allocators.pareto import Front, pareto
 from alloc.allocators.registry import TARGETS, describe, load, method_parameters, names
+from alloc.allocators.replanning.moves import Moves
+from alloc.allocators.replanning.reasons import reasons_of_moves
 from alloc.allocators.result import Result, read_result
 from alloc.allocators.solve import solve
 from alloc.problems import AllocError, InputError, MissingPackageError, RefusedError, TrainingError
@@ -59,6 +61,7 @@ __all__ = [
     "Method",
     "Milp",
     "MissingPackageError",
+    "Moves",
     "Ppo",
     "Proposal",
     "RefusedError",
@@ -78,6 +81,7 @@ __all__ = [
     "pareto",
     "plot",
     "read_result",
+    "reasons_of_moves",
     "solve",
     "train",
 ]
