@@ -1,6 +1,7 @@
 """What is to be solved: agents with abilities, tasks with workloads, and who can reach what."""
 
-from collections.abc import Iterable, Sequence, Set
+import logging
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from functools import cached_property
 from numbers import Real
@@ -18,6 +19,7 @@ from alloc.problems.distances.metric import GEOGRAPHIC, METRICS
 from alloc.problems.distances.reach import Reach
 from alloc.problems.errors import InputError, nearest
 from alloc.problems.fields import BoolArray, FloatArray, IntArray
+from alloc.problems.tables.reading import read_tables
 from alloc.problems.units import Units
 from alloc.problems.vocabulary import IDLE
 
@@ -181,6 +183,59 @@ class Instance(fields.ReadOnly):
                 value.setflags(write=False)
             object.__setattr__(self, key, value)
         self._check()
+
+    @classmethod
+    def from_tables(
+        cls,
+        agents: object,
+        tasks: object,
+        distances: object | None = None,
+        *,
+        columns: Mapping[str, str] | None = None,
+        units: Units | None = None,
+        decimal: str | None = None,
+        missing: str | None = None,
+        name: str = "instance",
+        report: Callable[[str], object] | None = None,
+    ) -> "Instance":
+        """Return the instance that tables as people keep them describe, by the names of their columns.
+
+        Parameters
+        ----------
+        agents, tasks : DataFrame, dict of columns, list of dicts, or what `read_grid` gives
+        distances : the same, optional
+            With columns from, to and distance, or as a matrix.
+        columns : dict of str to str, optional
+            The column of a field where it cannot be guessed, or a number for all rows, such as ``{"ability": "1"}``;
+            ``agents.id`` and ``tasks.id`` where both tables have it.
+        units : Units, optional
+            Those that the headers do not give.
+        decimal : {"point", "comma"}, optional
+            The decimal mark, where the numbers do not show it.
+        missing : {"metric", "unreachable"}, optional
+            What holds for pairs without a distance.
+        name : str
+        report : function, optional
+            Called with a line for each column, on what it was taken for, and for each row that was left out; they are
+            logged where it is None.
+
+        Returns
+        -------
+        Instance
+
+        Raises
+        ------
+        InputError
+            If a table can be read in two ways or in none, in one line with the place and the mend.
+        """
+        reading = read_tables(agents, tasks, distances, columns=columns, units=units, decimal=decimal, missing=missing)
+        tell = logging.getLogger("alloc").info if report is None else report
+        for line in reading.lines:
+            tell(line)
+        try:
+            return cls(name=name, **reading.arguments)
+        except InputError as error:
+            raise reading.located(error) from error
 
     def _check(self) -> None:
         agents, tasks = ("agent", self.agent_ids), ("task", self.task_ids)
