@@ -10,7 +10,20 @@ from typing import NoReturn
 
 import typer
 
-from alloc.cli.commands import compare, convert, evaluate, generate, import_, methods, pareto, plot, solve, train, tune, validate
+from alloc.cli.commands import (
+    compare,
+    convert,
+    evaluate,
+    generate,
+    import_,
+    methods,
+    pareto,
+    plot,
+    solve,
+    train,
+    tune,
+    validate,
+)
 from alloc.cli.options import Parameter, examples, option_of
 from alloc.cli.output.console import complain, flush, write_out
 

@@ -1,6 +1,7 @@
 """``alloc import``."""
 
 import re
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,7 +12,6 @@ from alloc.cli.options import examples
 from alloc.cli.output.console import STANDARD, say
 from alloc.cli.output.files import check_outputs
 from alloc.problems.text import counted, one_line
-from alloc.problems.vocabulary import Decimal, Missing
 
 if TYPE_CHECKING:
     from alloc.problems import Units
@@ -25,6 +25,21 @@ EXAMPLES = examples(
 
 TABLE = "text with any separator, .xlsx, or .xlsx:SHEET"
 
+
+class Decimal(StrEnum):
+    """The decimal mark."""
+
+    POINT = "point"
+    COMMA = "comma"
+
+
+class Missing(StrEnum):
+    """What holds for pairs without a distance."""
+
+    METRIC = "metric"
+    UNREACHABLE = "unreachable"
+
+
 MapOption = Annotated[
     list[str] | None,
     typer.Option(
@@ -35,7 +50,7 @@ MapOption = Annotated[
 ]
 UnitsOption = Annotated[
     str | None,
-    typer.Option(metavar="QUANTITY=UNIT,...", help="Units that the headers do not give, of time, distance, energy, work."),
+    typer.Option(metavar="QUANTITY=UNIT,...", help="Units of time, distance, energy and work that no header gives."),
 ]
 
 

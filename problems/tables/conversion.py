@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields
 
 from alloc.problems.distances.geodesic import METRES
 from alloc.problems.errors import InputError
-from alloc.problems.tables.measures import Measure, kind_of, proportion
+from alloc.problems.tables.language.measures import Measure, kind_of, proportion
 from alloc.problems.units import Units
 
 DIMENSIONS = {

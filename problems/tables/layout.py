@@ -4,11 +4,11 @@ from dataclasses import dataclass, field
 
 from alloc.problems.arguments import shown
 from alloc.problems.errors import InputError
-from alloc.problems.tables.digits import split_number
 from alloc.problems.tables.grid import Cell, Grid, as_text, is_real
-from alloc.problems.tables.headers import Header, Kind, header_of, plain
-from alloc.problems.tables.measures import measure_of
-from alloc.problems.tables.synonyms import TOTALS
+from alloc.problems.tables.language.digits import split_number
+from alloc.problems.tables.language.headers import Header, Kind, header_of, plain
+from alloc.problems.tables.language.measures import measure_of
+from alloc.problems.tables.language.synonyms import TOTALS
 
 SEARCHED = 20
 """Rows among which the header is looked for."""
@@ -111,7 +111,9 @@ def _header_row(grid: Grid, rows: list[int], kind: Kind, mapped: frozenset[str])
         scores[row] = (known, sum(bool(text) for text in texts))
     if rows[0] not in scores and not any(known for known, _ in scores.values()):
         raise InputError(
-            "has no names of columns; write them into the first row, such as id, x, y", grid.places[rows[0]], grid.source
+            "has no names of columns; write them into the first row, such as id, x, y",
+            grid.places[rows[0]],
+            grid.source,
         )
     best = max(scores, key=lambda row: (*scores[row], -row))
     return best if scores[best][0] else rows[0]
@@ -140,7 +142,9 @@ def _are_units(cells: list[Cell]) -> bool:
 def _with_unit(header: Header, unit: Cell) -> Header:
     if unit is None:
         return header
-    return Header(f"{header.text} [{as_text(unit).strip('[]()')}]", header.ranks, measure_of(as_text(unit).strip("[]()")))
+    return Header(
+        f"{header.text} [{as_text(unit).strip('[]()')}]", header.ranks, measure_of(as_text(unit).strip("[]()"))
+    )
 
 
 def _body(grid: Grid, body: list[int], header: list[str], notes: list[str]) -> list[int]:

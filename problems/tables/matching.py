@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 
 from alloc.problems.errors import InputError, nearest
 from alloc.problems.tables.grid import Cell
-from alloc.problems.tables.headers import SYNONYMS, Kind, plain
+from alloc.problems.tables.language.headers import Kind, plain
+from alloc.problems.tables.language.synonyms import UNCLEAR_PLACES
 from alloc.problems.tables.layout import Table
-from alloc.problems.tables.synonyms import UNCLEAR_PLACES
 from alloc.problems.tables.values import coordinates
 
 WORDS = {
@@ -179,11 +179,15 @@ def _choose_place(match: Match, wanted: Mapping[str, str]) -> None:
                 match.columns.pop(name, None)
         given = named
     if len(given) > 1:
-        what = " and ".join(repr(match.table.headers[match.columns[n]].text) for f in given for n in f if n in match.columns)
+        what = " and ".join(
+            repr(match.table.headers[match.columns[n]].text) for f in given for n in f if n in match.columns
+        )
         raise match.table.error(f"columns {what} give places in two ways; say which, as by --map {given[0][0]}=...")
     for family in given:
         for name in family:
             if name not in match.columns and name not in match.constants:
                 other = next(one for one in family if one in match.columns)
                 text = match.table.headers[match.columns[other]].text
-                raise match.table.error(f"there is a column {text!r} but none for {name}; add it, or --map {name}=COLUMN")
+                raise match.table.error(
+                    f"there is a column {text!r} but none for {name}; add it, or --map {name}=COLUMN"
+                )

@@ -6,11 +6,11 @@ import numpy as np
 
 from alloc.problems.arguments import shown
 from alloc.problems.fields import FloatArray
-from alloc.problems.tables.digits import Mark, decimal_mark, is_absent, mark_of, number_of, split_number
 from alloc.problems.tables.grid import Cell, is_real
+from alloc.problems.tables.language.digits import Mark, decimal_mark, is_absent, mark_of, number_of, split_number
+from alloc.problems.tables.language.measures import Measure, measure_of, rate_of
+from alloc.problems.tables.language.synonyms import LEVELS
 from alloc.problems.tables.layout import Table
-from alloc.problems.tables.measures import Measure, measure_of, rate_of
-from alloc.problems.tables.synonyms import LEVELS
 from alloc.problems.tables.values import angle
 
 ANGLES = ("lat", "lon")

@@ -7,14 +7,14 @@ import numpy as np
 
 from alloc.problems.errors import InputError
 from alloc.problems.tables.conversion import Found
-from alloc.problems.tables.digits import Mark
 from alloc.problems.tables.grid import Cell, Grid, as_name
+from alloc.problems.tables.language.digits import Mark
 from alloc.problems.tables.layout import Table, table_of
 from alloc.problems.tables.matching import Match, match_columns
 from alloc.problems.tables.numeric import Numbers
 
 FIELDS = ("from", "to", "distance")
-NO_WAY = frozenset("inf infinity \u221e".split())
+NO_WAY = ("inf", "infinity", "\u221e")
 
 
 @dataclass
@@ -43,7 +43,9 @@ class Pairs:
     notes: list[str]
 
 
-def pairs_of(grid: Grid, agents: Sequence[str], tasks: Sequence[str], wanted: dict[str, str], decimal: Mark | None) -> Pairs:
+def pairs_of(
+    grid: Grid, agents: Sequence[str], tasks: Sequence[str], wanted: dict[str, str], decimal: Mark | None
+) -> Pairs:
     """Return the distances in a table with the columns from, to and distance, or a matrix between ids.
 
     Raises
@@ -120,6 +122,8 @@ def _leave_out(pairs: Pairs, agents: set[str]) -> None:
         if source != target and not (source in agents and target in agents)
     ]
     if len(kept) < len(pairs.rows):
-        pairs.notes.append(f"{len(pairs.rows) - len(kept)} distances between agents, or from an id to itself, are left out")
+        pairs.notes.append(
+            f"{len(pairs.rows) - len(kept)} distances between agents, or from an id to itself, are left out"
+        )
         pairs.rows = [pairs.rows[number] for number in kept]
         pairs.places = [pairs.places[number] for number in kept]

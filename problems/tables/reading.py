@@ -1,75 +1,63 @@
 """Tables of agents, tasks and distances to the arguments of an instance."""
 
+import logging
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TypedDict
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TypedDict, TypeVar
 
 from alloc.problems.distances.given import DistanceTable
-from alloc.problems.distances.metric import EUCLIDEAN, GEOGRAPHIC
-from alloc.problems.errors import InputError, nearest
-from alloc.problems.fields import FloatArray, IntArray
-from alloc.problems.tables.conversion import Conversion, Found, conversion
-from alloc.problems.tables.digits import Mark
-from alloc.problems.tables.grid import Grid, as_name, grid_of
-from alloc.problems.tables.headers import Kind
+from alloc.problems.errors import InputError
+from alloc.problems.tables.arguments import Arguments, arguments_of, ids_of
+from alloc.problems.tables.conversion import Conversion, conversion
+from alloc.problems.tables.grid import Grid, grid_of
+from alloc.problems.tables.language.digits import Mark
+from alloc.problems.tables.language.headers import Kind
 from alloc.problems.tables.layout import table_of
 from alloc.problems.tables.matching import column_named, match_columns
 from alloc.problems.tables.pairs import Pairs, pairs_of
 from alloc.problems.tables.records import Records, records_of
-from alloc.problems.tables.values import names_in, separator_of
 from alloc.problems.tables.wanted import Wanted, is_number
 from alloc.problems.units import Units
-from alloc.problems.vocabulary import IDLE
+from alloc.problems.vocabulary import EUCLIDEAN, GEOGRAPHIC
 
 DECIMALS: Mapping[str, Mark] = {"point": ".", "comma": ","}
+Built = TypeVar("Built")
 ROW = re.compile(r"^(agents|tasks|distances\.rows)\[(\d+)\]")
 
 
-class Arguments(TypedDict, total=False):
-    """What an instance is made of; see `Instance`."""
+class TableOptions(TypedDict, total=False):
+    """What `read_tables` takes besides tables."""
 
-    ability: FloatArray
-    workload: FloatArray
-    agent_ids: Sequence[str] | None
-    task_ids: Sequence[str] | None
-    agent_position: FloatArray | None
-    task_position: FloatArray | None
-    start_task: IntArray | None
-    battery: FloatArray | None
-    communication_range: FloatArray | None
-    speed: FloatArray | None
-    allowed_tasks: list[list[int] | None] | None
-    priority: FloatArray | None
-    agent_energy_per_distance: FloatArray | None
-    returns: NDArray[np.bool_] | None
-    skills: list[list[str]] | None
-    needs: list[list[str]] | None
-    metric: str
-    distances: DistanceTable | None
-    units: Units
+    columns: Mapping[str, str] | None
+    units: Units | None
+    decimal: str | None
+    missing: str | None
+    name: str
+    report: Callable[[str], object] | None
 
 
 @dataclass(frozen=True)
 class Reading:
-    """What tables say, and how they were understood.
+    """What tables say.
 
     Attributes
     ----------
     arguments : dict
         Those of an instance.
-    lines : list of str
-        What each column was taken for, and what was left out.
     places : dict of str to (str, list of str)
         The source of each table, and what messages call its rows.
     """
 
     arguments: Arguments
-    lines: list[str]
     places: Mapping[str, tuple[str, list[str]]]
+
+    def built(self, build: Callable[..., Built]) -> Built:
+        """Return the instance; its errors name the place in the tables."""
+        try:
+            return build(**self.arguments)
+        except InputError as error:
+            raise self.located(error) from error
 
     def located(self, error: InputError) -> InputError:
         """Return an error of the instance with its place in the tables."""
@@ -78,6 +66,16 @@ class Reading:
             return error
         source, rows = self.places[match[1]]
         return InputError(error.message, rows[int(match[2])], source)
+
+    def table(self, pairs: Pairs, common: Conversion, missing: str) -> DistanceTable:
+        """Return the distances between pairs, in the common unit."""
+        factor = common.factors.get((pairs.source, "distance"), 1.0)
+        rows = [(source, target, distance * factor) for source, target, distance in pairs.rows]
+        ids = self.arguments["agent_ids"], self.arguments["task_ids"]
+        try:
+            return DistanceTable.of(rows, *ids, missing)
+        except InputError as error:
+            raise self.located(error) from error
 
 
 def read_tables(
@@ -89,13 +87,35 @@ def read_tables(
     units: Units | None = None,
     decimal: str | None = None,
     missing: str | None = None,
+    name: str = "instance",
+    report: Callable[[str], object] | None = None,
 ) -> Reading:
-    """Return what tables of agents, tasks and distances say; see `Instance.from_tables`.
+    """Return what tables as people keep them say, by the names of their columns.
+
+    Parameters
+    ----------
+    agents, tasks : DataFrame, dict of columns, list of dicts, or Grid
+    distances : the same, optional
+        With columns from, to and distance, or as a matrix.
+    columns : dict of str to str, optional
+        The column of a field where it cannot be guessed, or a number for all rows, such as ``{"ability": "1"}``;
+        ``agents.id`` and ``tasks.id`` where both tables have it.
+    units : Units, optional
+        Those that the headers do not give.
+    decimal : {"point", "comma"}, optional
+        The decimal mark, where the numbers do not show it.
+    missing : {"metric", "unreachable"}, optional
+        What holds for pairs without a distance; the first where all have places, unless a pair is marked as closed.
+    name : str
+        Of the instance.
+    report : function, optional
+        Called with a line for each column, on what it was taken for, and for each row that was left out; they are
+        logged where it is None.
 
     Raises
     ------
     InputError
-        If they can be read in two ways, or in none.
+        If a table can be read in two ways or in none, in one line with the place and the mend.
     """
     if decimal is not None and decimal not in DECIMALS:
         raise InputError(f"must be point or comma, got {decimal!r}", "decimal")
@@ -103,30 +123,28 @@ def read_tables(
     wanted = Wanted(columns or {})
     first = _records(grid_of(agents, "agents"), "agents", wanted, mark)
     second = _records(grid_of(tasks, "tasks"), "tasks", wanted, mark)
-    agent_ids, task_ids = _ids(first, "a"), _ids(second, "t")
     pairs = None
     if distances is not None:
         grid = grid_of(distances, "distances")
-        pairs = pairs_of(grid, agent_ids, task_ids, wanted.of("distances", grid), mark)
+        pairs = pairs_of(grid, ids_of(first, "a"), ids_of(second, "t"), wanted.of("distances", grid), mark)
     wanted.require_all_used()
     geographic = _geographic(first, second)
     found = [*first.found, *second.found, *(pairs.found if pairs else [])]
     common = conversion(found, units or Units(), geographic=geographic)
-    arguments = _arguments(first, second, common)
-    arguments["metric"] = GEOGRAPHIC if geographic else EUCLIDEAN
+    arguments = arguments_of(first, second, common)
+    arguments |= {"name": name, "metric": GEOGRAPHIC if geographic else EUCLIDEAN}
     lines = [*_lines(first, common), *_lines(second, common)]
     places = {"agents": (first.table.source, first.table.places), "tasks": (second.table.source, second.table.places)}
+    reading = Reading(arguments, places)
     if pairs is not None:
-        factor = common.factors.get((pairs.source, "distance"), 1.0)
-        rows = [(source, target, distance * factor) for source, target, distance in pairs.rows]
         rest = missing or _missing(pairs, first, second)
         places["distances.rows"] = (pairs.source, pairs.places)
-        try:
-            arguments["distances"] = DistanceTable.of(rows, agent_ids, task_ids, rest)
-        except InputError as error:
-            raise Reading({}, [], places).located(error) from error
+        arguments["distances"] = reading.table(pairs, common, rest)
         lines += _pair_lines(pairs, common, rest)
-    return Reading(arguments, [*lines, *_unmet(arguments)], places)
+    tell = logging.getLogger("alloc").info if report is None else report
+    for line in [*lines, *_unmet(arguments)]:
+        tell(line)
+    return reading
 
 
 def _records(grid: Grid, kind: Kind, wanted: Wanted, mark: Mark | None) -> Records:
@@ -135,11 +153,6 @@ def _records(grid: Grid, kind: Kind, wanted: Wanted, mark: Mark | None) -> Recor
     for field in [field for field, text in named.items() if column_named(table, text) is None and not is_number(text)]:
         match_columns(table, kind, {field: named[field]})  # raises the error that names the columns
     return records_of(match_columns(table, kind, named), mark)
-
-
-def _ids(records: Records, letter: str) -> list[str]:
-    count = len(records.table.rows)
-    return records.ids if records.ids is not None else [f"{letter}{number}" for number in range(1, count + 1)]
 
 
 def _geographic(first: Records, second: Records) -> bool:
@@ -152,100 +165,6 @@ def _geographic(first: Records, second: Records) -> bool:
             source=second.table.source,
         )
     return bool(kinds and kinds.pop())
-
-
-def _arguments(first: Records, second: Records, common: Conversion) -> Arguments:
-    task_ids = _ids(second, "t")
-    skills_at = separator_of([*_cells(first, "skills"), *_cells(second, "needs")])
-    skills, needs = first.lists("skills", skills_at), second.lists("needs", skills_at)
-    spellings: dict[str, str] = {}
-    returns = first.flags("returns")
-    priority = second.numbers.get("priority")
-    return {
-        "ability": _scaled(first, "ability", common),
-        "workload": _scaled(second, "workload", common),
-        "agent_ids": first.ids,
-        "task_ids": second.ids,
-        "agent_position": _positions(first, common),
-        "task_position": _positions(second, common),
-        "start_task": _starts(first, task_ids),
-        "battery": _limit(first, "battery", common),
-        "communication_range": _limit(first, "range", common),
-        "speed": _limit(first, "speed", common),
-        "allowed_tasks": _allowed(first, task_ids),
-        "priority": None if priority is None else np.where(np.isnan(priority), 1.0, priority),
-        "agent_energy_per_distance": (
-            _scaled(first, "energy_per_distance", common) if "energy_per_distance" in first.numbers else None
-        ),
-        "returns": None if returns is None else np.array(returns),
-        "skills": None if skills is None else [_alike(names, spellings) for names in skills],
-        "needs": None if needs is None else [_alike(names, spellings) for names in needs],
-        "units": common.units,
-    }
-
-
-def _cells(records: Records, name: str) -> list[object]:
-    return records.match.cells(name) if name in records.match.columns else []
-
-
-def _scaled(records: Records, name: str, common: Conversion) -> FloatArray:
-    return records.numbers[name] * common.factors.get((records.table.source, name), 1.0)
-
-
-def _limit(records: Records, name: str, common: Conversion) -> FloatArray | None:
-    """Return a field in which an empty cell means that there is no limit."""
-    if name not in records.numbers:
-        return None
-    values = _scaled(records, name, common)
-    return np.where(np.isnan(values), np.inf, values)
-
-
-def _positions(records: Records, common: Conversion) -> FloatArray | None:
-    place = records.positions()
-    if place is None or records.geographic:
-        return place
-    return place * [common.factors.get((records.table.source, axis), 1.0) for axis in "xyz"]
-
-
-def _alike(names: list[str], spellings: dict[str, str]) -> list[str]:
-    """Return skills in the letters in which they were first written."""
-    return [spellings.setdefault(name.casefold(), name) for name in names]
-
-
-def _starts(records: Records, task_ids: list[str]) -> IntArray | None:
-    if "start_task" not in records.match.columns:
-        return None
-    index = {name: number for number, name in enumerate(task_ids)}
-    names = [as_name(cell) for cell in records.match.cells("start_task")]
-    for row, name in enumerate(names):
-        if name and name not in index:
-            raise _unknown_task(records, name, task_ids, row, "start_task")
-    return np.array([index.get(name, IDLE) for name in names], dtype=np.intp)
-
-
-def _allowed(records: Records, task_ids: list[str]) -> list[list[int] | None] | None:
-    """Return the tasks of each agent; an id may itself hold what separates the others."""
-    if "tasks" not in records.match.columns:
-        return None
-    index = {name: number for number, name in enumerate(task_ids)}
-    cells = records.match.cells("tasks")
-    separator = separator_of(cells)
-    allowed: list[list[int] | None] = []
-    for row, cell in enumerate(cells):
-        names = [as_name(cell)] if as_name(cell) in index else [as_name(name) for name in names_in(cell, separator)]
-        if cell is None or [name.casefold() for name in names] in (["all"], ["alle"], ["*"], ["any"]):
-            allowed.append(None)
-            continue
-        for name in names:
-            if name not in index:
-                raise _unknown_task(records, name, task_ids, row, "tasks")
-        allowed.append(sorted({index[name] for name in names}))
-    return allowed
-
-
-def _unknown_task(records: Records, name: str, task_ids: list[str], row: int, field: str) -> InputError:
-    message = f"there is no task {name!r}{nearest(name, task_ids)}"
-    return records.table.error(message, row, records.match.columns[field])
 
 
 def _missing(pairs: Pairs, first: Records, second: Records) -> str:

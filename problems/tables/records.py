@@ -8,19 +8,34 @@ from alloc.problems.arguments import shown
 from alloc.problems.errors import InputError
 from alloc.problems.fields import FloatArray
 from alloc.problems.tables.conversion import DIMENSIONS, Found
-from alloc.problems.tables.digits import Mark
 from alloc.problems.tables.grid import as_name
-from alloc.problems.tables.headers import Kind
+from alloc.problems.tables.language.digits import Mark
+from alloc.problems.tables.language.measures import proportion
 from alloc.problems.tables.layout import Table
 from alloc.problems.tables.matching import Match
-from alloc.problems.tables.measures import proportion
 from alloc.problems.tables.numeric import Numbers, require_numbers
 from alloc.problems.tables.values import coordinates, flag, names_in
 
-NUMERIC = ("ability", "workload", "battery", "range", "speed", "energy_per_distance", "priority", "x", "y", "z", "lat", "lon")
+NUMERIC = (
+    "ability",
+    "workload",
+    "battery",
+    "range",
+    "speed",
+    "energy_per_distance",
+    "priority",
+    "x",
+    "y",
+    "z",
+    "lat",
+    "lon",
+)
 PLACE = ("x", "y", "z", "lat", "lon")
 REQUIRED = {"agents": "ability", "tasks": "workload"}
-EXAMPLES = {"agents": "ability=Capacity, or ability=1 for all alike", "tasks": "workload=Demand, or workload=1 for all alike"}
+EXAMPLES = {
+    "agents": "ability=Capacity, or ability=1 for all alike",
+    "tasks": "workload=Demand, or workload=1 for all alike",
+}
 
 
 @dataclass
@@ -100,7 +115,9 @@ def records_of(match: Match, decimal: Mark | None) -> Records:
     table, required = match.table, REQUIRED[match.kind]
     if required not in match.columns and required not in match.constants:
         names = ", ".join(repr(header.text) for header in table.headers if header.text)
-        raise table.error(f"no column is known as the {required}; the columns are {names}: --map {EXAMPLES[match.kind]}")
+        raise table.error(
+            f"no column is known as the {required}; the columns are {names}: --map {EXAMPLES[match.kind]}"
+        )
     columns = {name: column for name, column in match.columns.items() if name in NUMERIC}
     reader, numbers, found = Numbers(table, columns, decimal), dict[str, FloatArray](), list[Found]()
     for name, column in columns.items():
@@ -182,4 +199,6 @@ def _free(name: str, taken: dict[str, int]) -> str:
 def _refuse_unnamed_sum(table: Table, ids: list[str], required: FloatArray) -> None:
     """Refuse a last row without id whose number is the sum of those above: nobody can tell whether it is a total."""
     if len(ids) > 2 and not ids[-1] and all(ids[:-1]) and np.isclose(required[-1], required[:-1].sum(), rtol=1e-9):
-        raise table.error("has no id and looks like the sum of the rows above; call it 'Total', or give it an id", len(ids) - 1)
+        raise table.error(
+            "has no id and looks like the sum of the rows above; call it 'Total', or give it an id", len(ids) - 1
+        )

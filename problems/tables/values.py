@@ -5,8 +5,8 @@ from collections.abc import Iterable, Sequence
 
 from alloc.problems.arguments import shown
 from alloc.problems.tables.grid import Cell, as_text, is_real
+from alloc.problems.tables.language.synonyms import NO, YES
 from alloc.problems.tables.layout import Table
-from alloc.problems.tables.synonyms import NO, YES
 
 ANGLE = re.compile(
     r"([NSEW])?\s*([+-]?\d+(?:[.,]\d+)?)\s*(?:°|deg\b)?\s*(?:(\d+(?:[.,]\d+)?)\s*['′’]\s*)?"

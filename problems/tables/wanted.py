@@ -5,7 +5,7 @@ from typing import cast
 
 from alloc.problems.errors import InputError, nearest
 from alloc.problems.tables.grid import Grid, as_name
-from alloc.problems.tables.headers import SYNONYMS, Kind
+from alloc.problems.tables.language.headers import SYNONYMS, Kind
 
 FIELDS = frozenset(name for synonyms in SYNONYMS.values() for name in synonyms)
 

@@ -49,7 +49,9 @@ def grid_of_text(data: bytes, source: str) -> Grid:
             places.append(f"line {first + line}")
             line = reader.line_num + 1
     except csv.Error as error:
-        raise InputError(f"has a cell that cannot be read: {error}; are its quotes in pairs?", f"line {line}") from error
+        raise InputError(
+            f"has a cell that cannot be read: {error}; are its quotes in pairs?", f"line {line}"
+        ) from error
     return Grid(source, rows, places, decimal_point=separator == ",", notes=tuple(notes))
 
 

@@ -31,7 +31,9 @@ def grid_of_workbook(data: bytes, source: str, sheet: str | None) -> Grid:
     try:
         book = openpyxl.load_workbook(io.BytesIO(data), data_only=True)
     except (InvalidFileException, zipfile.BadZipFile, KeyError, ValueError) as error:
-        raise InputError("is no workbook that can be read (protected by a password?); save it anew, or as .csv") from error
+        raise InputError(
+            "is no workbook that can be read (protected by a password?); save it anew, or as .csv"
+        ) from error
     names = [one.title for one in book.worksheets]
     if not names:
         raise InputError("has no sheet with cells")
@@ -42,7 +44,9 @@ def grid_of_workbook(data: bytes, source: str, sheet: str | None) -> Grid:
 
 
 def _grid(sheet: "Worksheet", source: str, notes: list[str]) -> Grid:
-    rows: list[list[Cell]] = [[clean(value) for value in row] for row in sheet.iter_rows(min_col=1, min_row=1, values_only=True)]
+    rows: list[list[Cell]] = [
+        [clean(value) for value in row] for row in sheet.iter_rows(min_col=1, min_row=1, values_only=True)
+    ]
     merged: set[tuple[int, int]] = set()
     for block in sheet.merged_cells.ranges:
         top, left = block.min_row - 1, block.min_col - 1

@@ -7,15 +7,17 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Literal
 
-from alloc.problems.tables.measures import Measure, measure_of
-from alloc.problems.tables.synonyms import AGENTS, DISTANCES, KINDS, TASKS, Synonyms
+from alloc.problems.tables.language.measures import Measure, measure_of
+from alloc.problems.tables.language.synonyms import AGENTS, DISTANCES, KINDS, TASKS, Synonyms
 
 Kind = Literal["agents", "tasks", "distances"]
 
 SYNONYMS: Mapping[Kind, Synonyms] = {"agents": AGENTS, "tasks": TASKS, "distances": DISTANCES}
 
 BRACKETS = re.compile(r"^(.*?)\s*[\[(<]\s*([^\])>]*?)\s*[\])>]\s*(.*)$", re.DOTALL)
-TAIL = re.compile(r"^(.*?)(?:[\s_,;:/-]+in\s+|\s*[,;:/]\s*|[\s_-]+)([^\s_,;:]+(?:\s+per\s+\w+)?)$", re.IGNORECASE | re.DOTALL)
+TAIL = re.compile(
+    r"^(.*?)(?:[\s_,;:/-]+in\s+|\s*[,;:/]\s*|[\s_-]+)([^\s_,;:]+(?:\s+per\s+\w+)?)$", re.IGNORECASE | re.DOTALL
+)
 FILLERS = re.compile(
     r"^(?:max|maximum|maximal\w*|nominal|net|rated|est|estimated|required|the|our|mean|avg|average)\s+"
     r"|\s+(?:max|maximum|nominal|net|rated|est|estimated|w|h|v)$"

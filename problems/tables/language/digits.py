@@ -4,21 +4,23 @@ import re
 from collections.abc import Iterable
 from typing import Literal
 
+from alloc.problems.tables.language.synonyms import words
+
 Mark = Literal[",", "."]
 
 NUMBER = re.compile(r"^([+-]?(?:\d[\d.,]*|[.,]\d+)(?:e[+-]?\d+)?)(?![\d.,])\s*(.*)$", re.IGNORECASE | re.DOTALL)
 GROUPED = re.compile(r"^([+-]?\d{1,3}(?:[ \u00a0\u2009\u202f'\u2019]\d{3})+)(?![ \u00a0\u2009\u202f'\u2019]?\d)")
 MINUS = str.maketrans({"\u2212": "-", "\u2013": "-"})
-ABSENT = frozenset(
-    "- -- \u2013 \u2014 ? . n/a na n.a. nan none null nil tbd k.a. keine unlimited unbegrenzt illimit\u00e9 ilimitado "
-    "inf infinity \u221e".split()
+ABSENT = words(
+    "-, --, \u2013, \u2014, ?, ., n/a, na, n.a., n. a., nan, none, null, nil, tbd, k.a., k. a., keine, "
+    "unlimited, no limit, unbegrenzt, illimit\u00e9, ilimitado, inf, infinity, \u221e"
 )
 """Texts that stand for no number, or for no limit."""
 
 
 def is_absent(text: str) -> bool:
     """Whether a text stands for no number, or for no limit."""
-    return text.casefold() in ABSENT or text.casefold() in ("no limit", "k. a.", "n. a.")
+    return text.casefold() in ABSENT
 
 
 def split_number(text: str) -> tuple[str, str] | None:

@@ -19,13 +19,13 @@ SCALES: dict[str, dict[str, float]] = {
 
 ALIASES = {
     "meter": "m", "meters": "m", "metre": "m", "metres": "m", "metros": "m", "kms": "km", "kilometer": "km",
-    "kilometers": "km", "kilometre": "km", "kilometres": "km", "mile": "mi", "miles": "mi", "nm": "nmi", "feet": "ft",
-    "sec": "s", "second": "s", "seconds": "s", "sek": "s", "mins": "min", "minute": "min", "minutes": "min",
-    "hr": "h", "hrs": "h", "hour": "h", "hours": "h", "std": "h", "day": "d", "days": "d", "tag": "d",
-    "kmh": "km/h", "kph": "km/h", "kmph": "km/h", "mps": "m/s", "mph": "mi/h", "kn": "nmi/h", "kt": "nmi/h",
-    "kts": "nmi/h", "knots": "nmi/h", "whkm": "Wh/km", "joule": "J", "kilo": "kg", "kgs": "kg", "tons": "t", "tonnes": "t",
-    "lbs": "lb", "sqm": "m2", "qm": "m2", "liter": "l", "litre": "l", "liters": "l", "litres": "l", "deg": "°",
-    "degrees": "°", "percent": "%", "pct": "%", "prozent": "%",
+    "kilometers": "km", "kilometre": "km", "kilometres": "km", "mile": "mi", "miles": "mi", "nm": "nmi",
+    "feet": "ft", "sec": "s", "second": "s", "seconds": "s", "sek": "s", "mins": "min", "minute": "min",
+    "minutes": "min", "hr": "h", "hrs": "h", "hour": "h", "hours": "h", "std": "h", "day": "d", "days": "d",
+    "tag": "d", "kmh": "km/h", "kph": "km/h", "kmph": "km/h", "mps": "m/s", "mph": "mi/h", "kn": "nmi/h",
+    "kt": "nmi/h", "kts": "nmi/h", "knots": "nmi/h", "whkm": "Wh/km", "joule": "J", "kilo": "kg", "kgs": "kg",
+    "tons": "t", "tonnes": "t", "lbs": "lb", "sqm": "m2", "qm": "m2", "liter": "l", "litre": "l", "liters": "l",
+    "litres": "l", "deg": "°", "degrees": "°", "percent": "%", "pct": "%", "prozent": "%",
 }  # fmt: skip
 
 KINDS = {label.casefold(): (kind, label) for kind, scale in SCALES.items() for label in scale}
