@@ -98,8 +98,8 @@ class Records:
         if wrong.any():
             row = int(np.argmax(wrong))
             raise self.table.error(
-                f"latitude {place[row, 1]:g} and longitude {place[row, 0]:g} are no place on earth; are they the wrong way "
-                "round, or x and y?",
+                f"latitude {place[row, 1]:g} and longitude {place[row, 0]:g} are no place on earth; are they swapped, "
+                "or x and y?",
                 row,
             )
 
@@ -115,9 +115,8 @@ def records_of(match: Match, decimal: Mark | None) -> Records:
     table, required = match.table, REQUIRED[match.kind]
     if required not in match.columns and required not in match.constants:
         names = ", ".join(repr(header.text) for header in table.headers if header.text)
-        raise table.error(
-            f"no column is known as the {required}; the columns are {names}: --map {EXAMPLES[match.kind]}"
-        )
+        names += f"; say which by --map {EXAMPLES[match.kind]}"
+        raise table.error(f"no column is known as the {required}; the columns are {names}")
     columns = {name: column for name, column in match.columns.items() if name in NUMERIC}
     reader, numbers, found = Numbers(table, columns, decimal), dict[str, FloatArray](), list[Found]()
     for name, column in columns.items():
