@@ -1,4 +1,4 @@
-"""Spreadsheets as people write them, with what must come of each: the right numbers, or one line that says what to mend."""
+"""Spreadsheets as people write them, with what must come of each: an instance, or one line that says what to mend."""
 
 import io
 from dataclasses import dataclass, field
@@ -92,6 +92,12 @@ SEPARATORS_AND_ENCODINGS = [
     Case("line ends of an old Mac", "id,ability\rd1,4\rd2,2\r", fields={"ability": [4, 2]}),
     Case("quoted cells with commas", '"id","ability"\n"Smith, J.","4"\n', fields={"agent_ids": ("Smith, J.",)}),
     Case("line break in a cell", 'id,ability\n"d\n1",4\n', fields={"agent_ids": ("d 1",)}),
+    Case("text that Excel must not take for a number", 'id,ability\n="007",4\n', fields={"agent_ids": ("007",)}),
+    Case(
+        "a page of HTML",
+        "<html><table><tr><td>id</td></tr></table></html>",
+        error="agents.csv: is HTML, XML or JSON, not a table; save it as .csv or .xlsx",
+    ),
     Case(
         "open quote",
         'id,ability\n"d1,4\nd2,3\n',
@@ -116,6 +122,12 @@ NUMBERS = [
         "one point that may be either, between semicolons",
         "id;ability\nd1;1.234\nd2;7\n",
         error="agents.csv: line 2, column 'ability': '1.234' may be 1.234 or 1234;"
+        " say which by --decimal point or --decimal comma",
+    ),
+    Case(
+        "whole numbers and one that may be thousands",
+        tasks="Job,Area\nRoof,120\nYard,1.000\n",
+        error="tasks.csv: line 3, column 'Area': '1.000' may be 1.000 or 1000;"
         " say which by --decimal point or --decimal comma",
     ),
     Case("one point between commas", "id,ability\nd1,1.234\n", fields={"ability": [1.234]}),
@@ -240,6 +252,33 @@ HEADERS = [
         fields={"ability": [4], "speed": [30]},
     ),
     Case("row of units", "id;speed;ability\n;km/h;kg\nd1;30;4\n", fields={"units.work": "kg", "speed": [30]}),
+    Case(
+        "row of units with dashes",
+        "Drone;Speed;Payload\n-;[m/s];[kg]\nA;5;6\n",
+        fields={"units.work": "kg", "agent_ids": ("A",), "speed": [5 * 3600], "units.distance": "m"},
+    ),
+    Case(
+        "all that a German operator knows",
+        "lfd.;Drohnen-ID;Traglast (kg);Max. Geschwindigkeit (m/s);Akkukapazität (Wh);Verbrauch (Wh/km)\n"
+        "1;D-01;2,5;15;500;20\n2;D-02;5;12;800;35\n",
+        "Aufgabe;Last (kg);Priorität;Breitengrad;Längengrad\nA;12,5;1;48,13;11,57\nB;7;2;48,2;11,6\nGesamt;19,5;;;\n",
+        fields={
+            "agent_ids": ("D-01", "D-02"),
+            "ability": [2.5, 5],
+            "speed": [54, 43.2],
+            "battery": [500, 800],
+            "agent_energy_per_distance": [20, 35],
+            "task_ids": ("A", "B"),
+            "task_position": [[11.57, 48.13, 0], [11.6, 48.2, 0]],
+        },
+        lines=("agents.csv: lfd.: ignored",),
+    ),
+    Case(
+        "two speeds",
+        "id,ability,Max speed,Cruise speed\na,1,30,20\n",
+        error="agents.csv: columns 'Max speed' and 'Cruise speed' may each be the speed;"
+        " say which, as by --map speed='Max speed'",
+    ),
     Case(
         "no header",
         "d1,4\nd2,2\n",
@@ -425,6 +464,11 @@ PLACES = [
         fields={"agent_position": [[8.456, 47.123, 0]]},
     ),
     Case(
+        "where agents begin",
+        "id,ability,Home lat,Home lon\na,1,50.5,4.5\n",
+        fields={"agent_position": [[4.5, 50.5, 0]], "metric": "geographic"},
+    ),
+    Case(
         "GPS in one column",
         'id,ability,GPS\na,1,"47.1, 8.5"\nb,1,47.2 8.6\n',
         fields={"agent_position": [[8.5, 47.1, 0], [8.6, 47.2, 0]], "metric": "geographic"},
@@ -460,7 +504,8 @@ PLACES = [
     Case(
         "swapped degrees",
         "id,ability,lat,lon\na,1,147.1,8.5\n",
-        error="agents.csv: line 2: latitude 147.1 and longitude 8.5 are no place on earth; are they swapped, or x and y?",
+        error="agents.csv: line 2: latitude 147.1 and longitude 8.5 are no place on earth;"
+        " are they swapped, or x and y?",
     ),
     Case(
         "latitude alone",

@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 
 from alloc.problems.arguments import shown
 from alloc.problems.errors import InputError
-from alloc.problems.tables.grid import Cell, Grid, as_text, is_real
-from alloc.problems.tables.language.digits import split_number
+from alloc.problems.tables.grid import Cell, Grid, as_name, as_text, is_real
+from alloc.problems.tables.language.digits import is_absent, split_number
 from alloc.problems.tables.language.headers import Header, Kind, header_of, plain
 from alloc.problems.tables.language.measures import measure_of
 from alloc.problems.tables.language.synonyms import TOTALS
@@ -121,12 +121,12 @@ def _header_row(grid: Grid, rows: list[int], kind: Kind, mapped: frozenset[str])
 
 def _names(grid: Grid, row: int) -> list[str]:
     """Return the names of columns in a row; where it has none, those of the row above that belong to no number."""
-    texts = [as_text(cell) for cell in grid.rows[row]]
+    texts = [as_name(cell) for cell in grid.rows[row]]
     above = grid.rows[row - 1] if row else []
     if sum(cell is not None for cell in above) < 2 or any(_is_number(cell) for cell in above):
         return texts
     texts += [""] * (len(above) - len(texts))
-    return [text or (as_text(above[column]) if column < len(above) else "") for column, text in enumerate(texts)]
+    return [text or (as_name(above[column]) if column < len(above) else "") for column, text in enumerate(texts)]
 
 
 def _is_number(cell: Cell) -> bool:
@@ -135,12 +135,14 @@ def _is_number(cell: Cell) -> bool:
 
 def _are_units(cells: list[Cell]) -> bool:
     """Whether a row holds nothing but units, in square brackets or not."""
-    texts = [cell for cell in cells if cell is not None]
-    return all(isinstance(cell, str) and measure_of(cell.strip("[]()")) is not None for cell in texts)
+    texts = [cell for cell in cells if isinstance(cell, str) and not is_absent(cell)]
+    if not texts or any(cell is not None and not isinstance(cell, str) for cell in cells):
+        return False
+    return all(measure_of(text.strip("[]()")) is not None for text in texts)
 
 
 def _with_unit(header: Header, unit: Cell) -> Header:
-    if unit is None:
+    if not isinstance(unit, str) or is_absent(unit):
         return header
     return Header(
         f"{header.text} [{as_text(unit).strip('[]()')}]", header.ranks, measure_of(as_text(unit).strip("[]()"))
@@ -149,7 +151,7 @@ def _with_unit(header: Header, unit: Cell) -> Header:
 
 def _body(grid: Grid, body: list[int], header: list[str], notes: list[str]) -> list[int]:
     """Return the rows without repeated headers, and without totals and footnotes at the end; `notes` says which."""
-    repeated = [row for row in body if [as_text(cell) for cell in grid.rows[row]] == header]
+    repeated = [row for row in body if [as_name(cell) for cell in grid.rows[row]] == header]
     notes += [f"{grid.places[row]} repeats the names of the columns and is left out" for row in repeated]
     body = [row for row in body if row not in set(repeated)]
     dropped: list[str] = []

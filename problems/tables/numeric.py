@@ -76,7 +76,10 @@ class Numbers:
             return "," if "," in unclear[0] else "."  # thousands of degrees there are none
         if len(self._shown) == 1:
             return next(iter(self._shown))
-        if self._table.decimal_point and not any("," in one for one in unclear):
+        is_mixed = any(
+            mark_of(one) == "" for one in digits
+        )  # whole numbers among those with three decimals: thousands?
+        if self._table.decimal_point and not is_mixed and not any("," in one for one in unclear):
             return "."
         row = next(row for row, cells in enumerate(self._table.rows) if str(cells[column]).startswith(unclear[0]))
         as_decimal, as_group = unclear[0].replace(",", "."), unclear[0].replace(",", "").replace(".", "")

@@ -20,6 +20,9 @@ MARKS = (
     (codecs.BOM_UTF16_BE, "utf-16-be"),
 )
 DECLARED = re.compile(r"^\"?sep=(.)\"?\r?\n", re.IGNORECASE)
+FORMULA_TEXT = re.compile(r'^="([^"]*)"$')
+"""How spreadsheets are kept from taking a text for a number."""
+
 SAMPLE = 200
 """Rows by which the separator is chosen."""
 
@@ -33,6 +36,8 @@ def grid_of_text(data: bytes, source: str) -> Grid:
         If it is no text, or its quotes do not fit.
     """
     text, encoding = decoded(data)
+    if text.lstrip().startswith(("<", "{")):
+        raise InputError("is HTML, XML or JSON, not a table; save it as .csv or .xlsx")
     notes = [] if encoding.startswith("utf") else [f"is no UTF-8 and was read as {encoding}"]
     declared = DECLARED.match(text)
     first = 0
@@ -45,7 +50,7 @@ def grid_of_text(data: bytes, source: str) -> Grid:
     line = 1
     try:
         for row in reader:
-            rows.append([clean(cell) for cell in row])
+            rows.append([clean(FORMULA_TEXT.sub(r"\1", cell)) for cell in row])
             places.append(f"line {first + line}")
             line = reader.line_num + 1
     except csv.Error as error:

@@ -71,4 +71,4 @@ def number_of(digits: str, mark: Mark) -> float:
 def decimal_mark(numbers: Iterable[str]) -> set[Mark]:
     """Return the decimal marks that some numbers show beyond doubt."""
     found = {mark_of(digits) for digits in numbers}
-    return {mark for mark in (",", ".") if mark in found}  # type: ignore[misc]
+    return {mark for mark in (",", ".") if mark in found}

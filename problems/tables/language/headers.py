@@ -19,9 +19,11 @@ TAIL = re.compile(
     r"^(.*?)(?:[\s_,;:/-]+in\s+|\s*[,;:/]\s*|[\s_-]+)([^\s_,;:]+(?:\s+per\s+\w+)?)$", re.IGNORECASE | re.DOTALL
 )
 FILLERS = re.compile(
-    r"^(?:max|maximum|maximal\w*|nominal|net|rated|est|estimated|required|the|our|mean|avg|average)\s+"
+    r"^(?:max|maximum|maximal\w*|nominal|net|rated|est|estimated|required|the|our|mean|avg|average|home|base|start|depot"
+    r"|launch|current|initial|agent|drone|robot|vehicle|task|job|site|target|customer)\s+"
     r"|\s+(?:max|maximum|nominal|net|rated|est|estimated|w|h|v)$"
 )
+"""Words that change nothing of what a column is."""
 
 
 @dataclass(frozen=True)
@@ -73,10 +75,13 @@ def names(kind: Kind) -> dict[str, dict[str, int]]:
 def ranks_of(text: str, kind: Kind) -> dict[str, int]:
     """Return the fields that a name may be; the names of fields themselves come first, other wordings last."""
     name, known = plain(text), names(kind)
-    for candidate in (name, name.replace(" ", ""), re.sub(FILLERS, "", name)):
+    for candidate in (name, name.replace(" ", "")):
         if candidate in known:
             return known[candidate]
-    return {}
+    without = re.sub(FILLERS, "", name)
+    if without in known:
+        return {field: max(rank, 1) for field, rank in known[without].items()}
+    return {"id": 2} if name.endswith(" id") and kind != "distances" else {}
 
 
 def header_of(text: str, kind: Kind) -> Header:

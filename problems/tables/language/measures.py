@@ -70,10 +70,8 @@ def measure_of(text: str) -> Measure | None:
         match = re.match(r"^(10+)\s*(?=\D)", bottom)
         if match:
             factor, bottom = 1 / float(match[1]), bottom[match.end() :]
-    parts = [_label(part) for part in ([top, bottom] if slash else [top])]
-    if None in parts:
-        return None
-    return Measure(*[part for part in parts if part], factor=factor)
+    over, under = _label(top), _label(bottom) if slash else ""
+    return None if over is None or under is None else Measure(over, under, factor)
 
 
 def _label(text: str) -> str | None:

@@ -61,7 +61,7 @@ AGENTS: Synonyms = {
     ),
     "speed": (
         "speed",
-        "velocity, v, cruise speed, flight speed, travel speed, geschwindigkeit, tempo, vitesse, velocidad",
+        "velocity, v, cruise speed, flight speed, travel speed, top speed, vmax, geschwindigkeit, geschw, tempo, vitesse, velocidad",
     ),
     "energy_per_distance": (
         "energy per distance",
@@ -120,7 +120,7 @@ DISTANCES: Synonyms = {
 
 KINDS = {
     "agents": "agent, drone, uav, robot, vehicle, truck, van, crew, worker, machine, employee, team, unit, fahrzeug, "
-    "drohne",
+    "drohne, drohnen",
     "tasks": "task, job, order, mission, target, site, customer, stop, auftrag, aufgabe",
 }
 """What agents and tasks are called; `drone_id` and `Drone No.` are ids of agents."""
@@ -132,7 +132,7 @@ UNCLEAR_PLACES = words(
 """Columns that may hold latitude and longitude, x and y, or a name."""
 
 TOTALS = words(
-    "total, totals, grand total, sum, sum total, overall, all, summe, gesamt, gesamtsumme, insgesamt, somme, "
+    "total, totals, grand total, sum, sum total, overall, summe, gesamt, gesamtsumme, insgesamt, somme, "
     "total general, total generale, suma, average, mean, mittelwert, durchschnitt, mittel, moyenne, promedio, media, "
     "count, anzahl, nombre total, \u2211, \u03c3, \u00f8"
 )

@@ -67,3 +67,68 @@ def test_there_are_spreadsheets_enough() -> None:
     """Sixty spreadsheets at the least, and none twice."""
     names = [case.name for case in [*TEXTS, *WORKBOOKS]]
     assert len(set(names)) == len(names) >= 60
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "latin-1", "cp1252"])
+def test_all_spellings_of_a_table_are_the_same(encoding: str, tmp_path: Path) -> None:
+    """Whatever the separator, the encoding, the decimal mark and the line ends, the same fleet comes out."""
+    for separator in (";", "\t", ",", "|"):
+        for mark in (",", "."):
+            for end in ("\n", "\r\n", "\r"):
+                number = f'"1{mark}5"' if separator == mark else f"1{mark}5"
+                rows = [("Größe", "Nutzlast (kg)"), ("Jürgen", number), ("Zoë", "22")]
+                text = end.join(separator.join(row) for row in rows) + end
+                path = tmp_path / "agents.csv"
+                path.write_bytes(text.encode(encoding))
+                instance = Instance.from_tables(
+                    read_grid(path), {"id": ["t1"], "load": [1]}, columns={"agents.id": "Größe"}
+                )
+                assert instance.agent_ids == ("Jürgen", "Zoë"), (separator, mark, end)
+                assert instance.ability.tolist() == [1.5, 22]
+
+
+FRAME = {"Drone": ["d1", "d2"], "Payload": [4, 2.5], "Range": [None, 12], "skills": [["a", "b"], None]}
+ROWS = [{"Site": 1, "Load": "3,5", "needs": "B"}, {"Site": 2, "Load": 4}]
+
+
+@pytest.mark.needs("pandas")
+def test_data_frames_dicts_and_lists_of_dicts_are_tables() -> None:
+    """The same columns in either form give the same instance; an index with a name is a column."""
+    import pandas as pd
+
+    frame = pd.DataFrame(FRAME)
+    for agents in (FRAME, frame, frame.set_index("Drone"), frame.to_dict("records")):
+        instance = Instance.from_tables(agents, pd.DataFrame(ROWS))
+        assert instance.agent_ids == ("d1", "d2")
+        assert instance.ability.tolist() == [4, 2.5]
+        assert instance.communication_range.tolist() == [float("inf"), 12]
+        assert instance.skills == (("a", "b"), ())
+        assert instance.task_ids == ("1", "2")
+        assert instance.workload.tolist() == [3.5, 4]
+        assert instance.needs == (("b",), ())
+
+
+def test_distances_are_dicts_too() -> None:
+    """Distances from Python, as rows and as a matrix."""
+    agents, tasks = {"id": ["a"], "ability": [1]}, {"id": ["s", "t"], "workload": [1, 2]}
+    rows = Instance.from_tables(agents, tasks, [{"from": "a", "to": "s", "distance": 3}])
+    matrix = Instance.from_tables(agents, tasks, {"": ["a"], "s": [3], "t": [None]})
+    for instance in (rows, matrix):
+        assert found(instance, "distances") == [("a", "s", 3)]
+
+
+@pytest.mark.parametrize(
+    ("agents", "line"),
+    [
+        (3, "agents: must be a table: a data frame, a dict of columns or a list of dicts, got 3"),
+        ([3], "agents[0]: must be a dict of columns' names and cells, got 3"),
+        ({"id": ["a"], "ability": [1, 2]}, "agents: has columns of unequal length: {'id': 1, 'ability': 2}"),
+        ({"id": ["a", "b"], "ability": [1, "x"]}, "agents: row 1, column 'ability': must be a number, got 'x'"),
+        ({"id": ["a", "b"], "ability": [1, -1]}, "agents: row 1: must be a finite number > 0, got -1 (agent 'b')"),
+    ],
+)
+def test_what_is_no_table_is_refused(agents: object, line: str) -> None:
+    """From Python too, errors name the argument, the row and the column."""
+    with pytest.raises(InputError) as raised:
+        Instance.from_tables(agents, {"workload": [1]})
+    assert str(raised.value) == line
