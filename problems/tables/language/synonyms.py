@@ -61,7 +61,8 @@ AGENTS: Synonyms = {
     ),
     "speed": (
         "speed",
-        "velocity, v, cruise speed, flight speed, travel speed, top speed, vmax, geschwindigkeit, geschw, tempo, vitesse, velocidad",
+        "velocity, v, cruise speed, flight speed, travel speed, "
+        "top speed, vmax, geschwindigkeit, geschw, tempo, vitesse, velocidad",
     ),
     "energy_per_distance": (
         "energy per distance",
