@@ -211,7 +211,11 @@ HEADERS = [
             "units.distance": "km",
             "units.work": "kg",
         },
-        lines=("agents.csv: Drone -> id", "agents.csv: Payload kg -> ability", "tasks.csv: Prio -> priority"),
+        lines=(
+            "agents.csv: Drone -> id",
+            "agents.csv: Payload kg -> ability",
+            "tasks.csv: Prio -> priority (larger is more urgent)",
+        ),
     ),
     Case(
         "German",
@@ -440,6 +444,17 @@ VALUES = [
         " and one cannot be turned into the other; use one unit",
     ),
     Case(
+        "consumption in W",
+        "id,ability,Consumption (W)\na,1,30\n",
+        error="agents.csv: column 'Consumption (W)': is in W, which is no unit of energy; map another column",
+    ),
+    Case(
+        "an unknown unit of speed",
+        "id,ability,Speed [furlongs/h]\na,1,30\n",
+        error="agents.csv: column 'Speed [furlongs/h]': is in furlongs, which is no unit of distance;"
+        " map another column",
+    ),
+    Case(
         "battery in minutes",
         "id,ability,Battery (min)\na,1,30\n",
         error="agents.csv: column 'Battery (min)': is in min, which is no unit of energy; map another column",
@@ -467,6 +482,19 @@ PLACES = [
         "where agents begin",
         "id,ability,Home lat,Home lon\na,1,50.5,4.5\n",
         fields={"agent_position": [[4.5, 50.5, 0]], "metric": "geographic"},
+    ),
+    Case(
+        "where agents begin, in German",
+        "Drohnen-ID;Nutzlast;Standort Lat;Standort Lon\na;1;50,5;4,5\n",
+        "id,workload,lat,lon,elevation_ft\nt1,5,50,4,100\n",
+        fields={"agent_position": [[4.5, 50.5, 0]], "task_position": [[4, 50, 30.48]]},
+        lines=("tasks.csv: elevation_ft -> z in m, times 0.3048",),
+    ),
+    Case(
+        "places of tasks alone",
+        tasks="id,workload,lat,lon\nt1,5,50,4\n",
+        fields={"task_position": [[4, 50, 0]]},
+        lines=("agents.csv: no column gives the places of the agents, so that all distances are 0",),
     ),
     Case(
         "GPS in one column",
@@ -506,6 +534,11 @@ PLACES = [
         "id,ability,lat,lon\na,1,147.1,8.5\n",
         error="agents.csv: line 2: latitude 147.1 and longitude 8.5 are no place on earth;"
         " are they swapped, or x and y?",
+    ),
+    Case(
+        "east as a latitude",
+        "id,ability,lat,lon\na,1,8.5 E,47.1 N\n",
+        error="agents.csv: line 2, column 'lat': must be a number, got '8.5 E'",
     ),
     Case(
         "latitude alone",
@@ -585,6 +618,11 @@ WORKBOOKS = [
         [["id", "ability"], ["d1", 4], ["d2", None]],
         merged=("B2:B3",),
         error="agents.xlsx: row 2, column 'ability': is merged: each or all together? Unmerge the cells",
+    ),
+    Case(
+        "yes and no as values",
+        [["id", "ability", "Returns"], ["d1", 4, True], ["d2", 2, False]],
+        fields={"returns": [True, False]},
     ),
     Case(
         "a number that became a date",

@@ -19,6 +19,9 @@ WORDS = {
 }
 """What messages call a field whose name is no plain English."""
 
+REMARKS = {"priority": " (larger is more urgent)"}
+"""What a line about a column adds, because people have it both ways."""
+
 TEXTS = ("id", "start_task", "tasks", "skills", "needs", "returns", "gps", "lonlat", "position", "from", "to")
 """Fields that no constant stands for."""
 
@@ -56,7 +59,7 @@ class Match:
             called = header.text or f"column {column + 1}"
             name = fields.get(column)
             if name is not None:
-                lines.append(f"{called} -> {name}{conversions.get(name, '')}")
+                lines.append(f"{called} -> {name}{conversions.get(name, '')}{REMARKS.get(name, '')}")
             elif header.text or any(row[column] is not None for row in self.table.rows):
                 lines.append(f"{called}: ignored")
         return lines

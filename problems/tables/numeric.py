@@ -1,5 +1,6 @@
 """Columns of numbers, and the units in their headers and cells."""
 
+import re
 from collections.abc import Mapping
 
 import numpy as np
@@ -8,12 +9,18 @@ from alloc.problems.arguments import shown
 from alloc.problems.fields import FloatArray
 from alloc.problems.tables.grid import Cell, is_real
 from alloc.problems.tables.language.digits import Mark, decimal_mark, is_absent, mark_of, number_of, split_number
-from alloc.problems.tables.language.measures import Measure, measure_of, rate_of
+from alloc.problems.tables.language.measures import Measure, measure_of, own_measure, rate_of
 from alloc.problems.tables.language.synonyms import LEVELS
 from alloc.problems.tables.layout import Table
 from alloc.problems.tables.values import angle
 
 ANGLES = ("lat", "lon")
+OTHER_SIDES = {"lat": "[EWew]", "lon": "[NSns]"}
+"""Marks of the compass that stand for the other angle."""
+
+NO_UNIT = ("priority", "x", "y", "z")
+"""Fields of which a text in brackets that is no known unit is a remark, such as a scale or a projection."""
+
 WORK = ("ability", "workload")
 """Fields whose unit may be any word, and of which a merged cell may hold the sum or each."""
 
@@ -105,7 +112,7 @@ class Numbers:
         parts = split_number(cell)
         if parts is not None and mark_of(parts[0]) != "!" and (not parts[1] or self._is_unit(name, parts[1])):
             return self._value(parts[0], mark, row, column), parts[1]
-        degrees = angle(cell) if name in ANGLES else None
+        degrees = angle(cell) if name in ANGLES and not re.search(OTHER_SIDES[name], cell) else None
         if degrees is not None:
             return degrees, ""
         raise self._table.error(f"must be a number, got {shown(cell)}", row, column)
@@ -128,8 +135,8 @@ class Numbers:
             return None
         header = self._table.headers[column]
         measure = header.measure
-        if measure is None and name in WORK and header.label and ("[" in header.text or "/" in header.label):
-            measure = rate_of(header.label)
+        if measure is None and name not in NO_UNIT and header.label and ("[" in header.text or "/" in header.label):
+            measure = rate_of(header.label) if name in WORK else own_measure(header.label)
         for unit, row in units.items():
             found = measure_of(unit) or rate_of(unit)
             if measure is not None and found != measure:

@@ -121,8 +121,13 @@ def read_tables(
         raise InputError(f"must be point or comma, got {decimal!r}", "decimal")
     mark = None if decimal is None else DECIMALS[decimal]
     wanted = Wanted(columns or {})
-    first = _records(grid_of(agents, "agents"), "agents", wanted, mark)
-    second = _records(grid_of(tasks, "tasks"), "tasks", wanted, mark)
+    first_grid, second_grid = grid_of(agents, "agents"), grid_of(tasks, "tasks")
+    if first_grid.source == second_grid.source:
+        raise InputError(
+            "holds agents and tasks at once; name a sheet for each, or two files", source=first_grid.source
+        )
+    first = _records(first_grid, "agents", wanted, mark)
+    second = _records(second_grid, "tasks", wanted, mark)
     pairs = None
     if distances is not None:
         grid = grid_of(distances, "distances")
@@ -136,7 +141,9 @@ def read_tables(
     lines = [*_lines(first, common), *_lines(second, common)]
     places = {"agents": (first.table.source, first.table.places), "tasks": (second.table.source, second.table.places)}
     reading = Reading(arguments, places)
-    if pairs is not None:
+    if pairs is None:
+        lines += _unplaced(first, second)
+    else:
         rest = missing or _missing(pairs, first, second)
         places["distances.rows"] = (pairs.source, pairs.places)
         arguments["distances"] = reading.table(pairs, common, rest)
@@ -176,7 +183,7 @@ def _missing(pairs: Pairs, first: Records, second: Records) -> str:
 def _lines(records: Records, common: Conversion) -> list[str]:
     source = records.table.source
     words = {field: text for (owner, field), text in common.words.items() if owner == source}
-    lines = [*records.match.guesses(words), *records.table.notes, *records.notes]
+    lines = [*records.match.guesses(words | records.conversions), *records.table.notes, *records.notes]
     return [f"{source}: {line}" for line in lines]
 
 
@@ -186,6 +193,15 @@ def _pair_lines(pairs: Pairs, common: Conversion, missing: str) -> list[str]:
     if (pairs.source, "distance") in common.words:
         told.append(f"distances{common.words[pairs.source, 'distance']}")
     return [f"{pairs.source}: {line}" for line in told]
+
+
+def _unplaced(first: Records, second: Records) -> list[str]:
+    """Return a line where one table gives places and the other does not."""
+    without = [records for records in (first, second) if records.geographic is None]
+    if len(without) != 1:
+        return []
+    what = "agents" if without[0] is first else "tasks"
+    return [f"{without[0].table.source}: no column gives the places of the {what}, so that all distances are 0"]
 
 
 def _unmet(arguments: Arguments) -> list[str]:

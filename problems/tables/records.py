@@ -53,6 +53,10 @@ class Records:
         The units of the columns.
     geographic : bool or None
         Whether places are latitude and longitude; None where there are none.
+    notes : list of str
+        What became of rows without id.
+    conversions : dict of str to str
+        What became of the units of some fields.
     """
 
     match: Match
@@ -61,6 +65,7 @@ class Records:
     found: list[Found]
     geographic: bool | None
     notes: list[str] = field(default_factory=list)
+    conversions: dict[str, str] = field(default_factory=dict)
 
     @property
     def table(self) -> Table:
@@ -146,7 +151,9 @@ def _metres(records: Records) -> None:
         factor = 1.0 if one.measure is None else proportion(one.measure.top, "m")
         if factor is None or (one.measure is not None and one.measure.bottom):
             raise InputError(f"is in {one.measure}, which is no height", f"column {one.header!r}", one.source)
-        records.numbers["z"] = records.numbers["z"] * factor
+        if factor != 1:
+            records.numbers["z"] = records.numbers["z"] * factor
+            records.conversions["z"] = f" in m, times {factor:g}"
 
 
 def _combined(match: Match) -> dict[str, FloatArray]:

@@ -21,9 +21,12 @@ TAIL = re.compile(
 FILLERS = re.compile(
     r"^(?:max|maximum|maximal\w*|nominal|net|rated|est|estimated|required|the|our|mean|avg|average|home|base|start|depot"
     r"|launch|current|initial|agent|drone|robot|vehicle|task|job|site|target|customer)\s+"
-    r"|\s+(?:max|maximum|nominal|net|rated|est|estimated|w|h|v)$"
+    r"|\s+(?:max|maximum|nominal|net|rated|est|estimated|w|h)$"
 )
 """Words that change nothing of what a column is."""
+
+ENDINGS = frozenset(("id", "lat", "lon"))
+"""Fields that a name is of where its last word alone is, such as `Standort Lat` and `Asset ID`."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +84,8 @@ def ranks_of(text: str, kind: Kind) -> dict[str, int]:
     without = re.sub(FILLERS, "", name)
     if without in known:
         return {field: max(rank, 1) for field, rank in known[without].items()}
-    return {"id": 2} if name.endswith(" id") and kind != "distances" else {}
+    last = name.split()[-1] if " " in name else ""
+    return dict.fromkeys(ENDINGS & known.get(last, {}).keys(), 2) if kind != "distances" else {}
 
 
 def header_of(text: str, kind: Kind) -> Header:

@@ -4,6 +4,8 @@ import re
 import unicodedata
 from dataclasses import dataclass
 
+from alloc.problems.units import LONGEST_LABEL
+
 SCALES: dict[str, dict[str, float]] = {
     "distance": {"m": 1.0, "km": 1000.0, "mi": 1609.344, "nmi": 1852.0, "ft": 0.3048},
     "time": {"s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0},
@@ -11,6 +13,7 @@ SCALES: dict[str, dict[str, float]] = {
     "mass": {"g": 1e-3, "kg": 1.0, "t": 1e3, "lb": 0.45359237},
     "area": {"m2": 1.0, "ha": 1e4, "km2": 1e6},
     "volume": {"l": 1e-3, "m3": 1.0},
+    "power": {"W": 1.0, "kW": 1e3},
     "charge": {"mAh": 1e-3, "Ah": 1.0},
     "share": {"%": 1.0},
     "angle": {"°": 1.0},
@@ -82,8 +85,12 @@ def _label(text: str) -> str | None:
 
 def rate_of(text: str) -> Measure | None:
     """Return a unit of work of the user's own, alone or by time: ``panels/h``; None where that is no word."""
-    top, slash, bottom = re.sub(r"\s+per\s+", "/", text.strip()).partition("/")
-    time = _label(bottom) if slash else ""
-    if time is None or (slash and kind_of(time) != "time") or not 0 < len(top.strip()) <= 20:
-        return None
-    return Measure(_label(top) or top.strip(), time)
+    found = own_measure(text)
+    is_rate = not found.bottom or kind_of(found.bottom) == "time"
+    return found if is_rate and 0 < len(found.top) <= LONGEST_LABEL else None
+
+
+def own_measure(text: str) -> Measure:
+    """Return the unit that a text must be, known or not."""
+    top, _, bottom = re.sub(r"\s+per\s+", "/", text.strip()).partition("/")
+    return Measure(_label(top) or top.strip(), _label(bottom) or bottom.strip())

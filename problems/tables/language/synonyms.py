@@ -61,7 +61,7 @@ AGENTS: Synonyms = {
     ),
     "speed": (
         "speed",
-        "velocity, v, cruise speed, flight speed, travel speed, "
+        "velocity, cruise speed, flight speed, travel speed, "
         "top speed, vmax, geschwindigkeit, geschw, tempo, vitesse, velocidad",
     ),
     "energy_per_distance": (

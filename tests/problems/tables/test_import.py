@@ -1,13 +1,17 @@
 """Spreadsheets as people write them are read rightly, or refused in one line."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
-from spreadsheets import TEXTS, WORKBOOKS, Case
+from hypothesis import given
+from hypothesis import strategies as st
+from spreadsheets import TEXTS, WORKBOOKS, Case, workbook
 
 from alloc.problems import InputError, Instance
 from alloc.problems.formats.spreadsheet import read_grid
+from alloc.problems.tables.grid import Grid
 
 
 def imported(case: Case, folder: Path) -> tuple[Instance, list[str]]:
@@ -132,3 +136,62 @@ def test_what_is_no_table_is_refused(agents: object, line: str) -> None:
     with pytest.raises(InputError) as raised:
         Instance.from_tables(agents, {"workload": [1]})
     assert str(raised.value) == line
+
+
+def refusal(read: Callable[[], Grid]) -> str:
+    """Return the line with which a table of agents is refused, nothing if it is taken."""
+    try:
+        Instance.from_tables(read(), {"workload": [1]})
+    except InputError as error:
+        return str(error)
+    return ""
+
+
+@given(st.binary(max_size=60), st.sampled_from(["", "id,ability\n", "id;ability;x;y\n1;2;"]))
+def test_no_bytes_are_a_defect(tmp_path_factory: pytest.TempPathFactory, data: bytes, start: str) -> None:
+    """Whatever is in a file, an instance comes out or an error of one line."""
+    path = tmp_path_factory.getbasetemp() / "agents.csv"
+    path.write_bytes(start.encode() + data)
+    assert refusal(lambda: read_grid(path)).isprintable()
+
+
+CELLS = ["1,5", "1.234", "x", "yes", "-", "8° 30' W", "a;b", "#REF!", "Total", "5 kg", "1 000", "", "1,2,3", "47.1, 8"]
+HEADINGS = ["id", "ability", "Payload", "x", "y", "lat", "lon", "GPS", "Location", "speed [m/s]", "skills", "tasks"]
+
+
+@given(
+    st.lists(st.sampled_from(HEADINGS), min_size=1, max_size=5),
+    st.lists(st.lists(st.sampled_from(CELLS), max_size=6), max_size=4),
+)
+def test_no_cells_are_a_defect(header: list[str], rows: list[list[str]]) -> None:
+    """Whatever is in the cells under known headers, an instance comes out or an error of one line."""
+    grid = Grid("agents.csv", [list(header), *[[cell or None for cell in row] for row in rows]], [*"01234"])
+    assert refusal(lambda: grid).isprintable()
+
+
+@pytest.mark.needs("openpyxl")
+def test_sheets_are_named_or_the_first(tmp_path: Path) -> None:
+    """An unknown sheet is refused with the nearest one; the same table for agents and tasks is refused."""
+    path = tmp_path / "fleet.xlsx"
+    path.write_bytes(workbook([["id", "ability"], ["a", 1]], sheet="Drones"))
+    with pytest.raises(InputError, match=r"has no sheet 'Drone' \(did you mean 'Drones'\?\)"):
+        read_grid(f"{path}:Drone")
+    with pytest.raises(InputError, match="holds agents and tasks at once; name a sheet for each, or two files"):
+        Instance.from_tables(read_grid(f"{path}:Drones"), read_grid(f"{path}:Drones"))
+    assert read_grid(path).notes == ("the first of 2 sheets, 'Sheet', was read",)
+
+
+@pytest.mark.needs("openpyxl")
+def test_hidden_rows_are_told(tmp_path: Path) -> None:
+    """Rows that a filter hides are read, and it says so; what is no workbook is refused."""
+    from openpyxl import load_workbook
+
+    path = tmp_path / "fleet.xlsx"
+    path.write_bytes(workbook([["id", "ability"], ["a", 1], ["b", 2]]))
+    book = load_workbook(path)
+    book.active.row_dimensions[3].hidden = True
+    book.save(path)
+    assert read_grid(path).notes == ("1 hidden rows were read too",)
+    path.write_bytes(b"PK nothing")
+    with pytest.raises(InputError, match="is no workbook that can be read"):
+        read_grid(path)
