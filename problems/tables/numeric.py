@@ -6,9 +6,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from alloc.problems.arguments import shown
+from alloc.problems.errors import InputError
 from alloc.problems.fields import FloatArray
 from alloc.problems.tables.grid import Cell, is_real
-from alloc.problems.tables.language.digits import Mark, decimal_mark, is_absent, mark_of, number_of, split_number
+from alloc.problems.tables.language.digits import Mark, decimal_marks, is_absent, mark_of, number_of, split_number
 from alloc.problems.tables.language.measures import Measure, measure_of, own_measure, rate_of
 from alloc.problems.tables.language.synonyms import LEVELS
 from alloc.problems.tables.layout import Table
@@ -39,9 +40,8 @@ class Numbers:
 
     def __init__(self, table: Table, columns: Mapping[str, int], decimal: Mark | None) -> None:
         self._table, self._columns, self._decimal = table, columns, decimal
-        self._shown: set[Mark] = set()
-        for column in columns.values():
-            self._shown |= decimal_mark(self._digits(column))
+        self._digits = {column: _digits(table, column) for column in columns.values()}
+        self._shown = decimal_marks(digits for column in self._digits.values() for digits in column)
 
     def read(self, name: str) -> tuple[FloatArray, Measure | None]:
         """Return the numbers of a field, NaN for empty cells, and their unit.
@@ -64,16 +64,12 @@ class Numbers:
                 raise self._table.error("is merged: each or all together? Unmerge the cells", row, column)
         return values, self._measure(name, column, units)
 
-    def _digits(self, column: int) -> list[str]:
-        found = (split_number(row[column]) for row in self._table.rows if isinstance(row[column], str))  # type: ignore[arg-type]
-        return [parts[0] for parts in found if parts is not None]
-
     def _mark(self, name: str, column: int) -> Mark:
         """Return the decimal mark of a column: by its own numbers, else by those of the whole table."""
         if self._decimal is not None:
             return self._decimal
-        digits = self._digits(column)
-        own = decimal_mark(digits)
+        digits = self._digits[column]
+        own = decimal_marks(digits)
         unclear = [one for one in digits if mark_of(one).startswith("?")]
         if len(own) == 2:
             raise self._table.error("has decimal commas and decimal points; write all alike", column=column)
@@ -83,15 +79,17 @@ class Numbers:
             return "," if "," in unclear[0] else "."  # thousands of degrees there are none
         if len(self._shown) == 1:
             return next(iter(self._shown))
-        is_mixed = any(
-            mark_of(one) == "" for one in digits
-        )  # whole numbers among those with three decimals: thousands?
-        if self._table.decimal_point and not is_mixed and not any("," in one for one in unclear):
+        has_whole = any(mark_of(one) == "" for one in digits)  # then those with three decimals may be thousands
+        if self._table.decimal_point and not has_whole and not any("," in one for one in unclear):
             return "."
+        raise self._unclear(unclear, column)
+
+    def _unclear(self, unclear: list[str], column: int) -> InputError:
+        """Return the error of a number that may be one of two."""
         row = next(row for row, cells in enumerate(self._table.rows) if str(cells[column]).startswith(unclear[0]))
         as_decimal, as_group = unclear[0].replace(",", "."), unclear[0].replace(",", "").replace(".", "")
         choice = "comma or --decimal point" if "," in unclear[0] else "point or --decimal comma"
-        raise self._table.error(
+        return self._table.error(
             f"{unclear[0]!r} may be {as_decimal} or {as_group}; say which by --decimal {choice}", row, column
         )
 
@@ -143,6 +141,12 @@ class Numbers:
                 raise self._table.error(f"is in {unit}, others are in {measure}; write all in one unit", row, column)
             measure = found
         return measure
+
+
+def _digits(table: Table, column: int) -> list[str]:
+    """Return the digits of a column's texts that are numbers."""
+    texts = [cell for cell in (row[column] for row in table.rows) if isinstance(cell, str)]
+    return [parts[0] for parts in map(split_number, texts) if parts is not None]
 
 
 def require_numbers(table: Table, column: int | None, name: str, values: FloatArray) -> None:

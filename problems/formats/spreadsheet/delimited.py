@@ -21,8 +21,6 @@ MARKS = (
 )
 DECLARED = re.compile(r"^\"?sep=(.)\"?\r?\n", re.IGNORECASE)
 FORMULA_TEXT = re.compile(r'^="([^"]*)"$')
-"""How spreadsheets are kept from taking a text for a number."""
-
 SAMPLE = 200
 """Rows by which the separator is chosen."""
 
@@ -50,7 +48,7 @@ def grid_of_text(data: bytes, source: str) -> Grid:
     line = 1
     try:
         for row in reader:
-            rows.append([clean(FORMULA_TEXT.sub(r"\1", cell)) for cell in row])
+            rows.append([clean(_unescaped(cell)) for cell in row])
             places.append(f"line {first + line}")
             line = reader.line_num + 1
     except csv.Error as error:
@@ -58,6 +56,11 @@ def grid_of_text(data: bytes, source: str) -> Grid:
             f"has a cell that cannot be read: {error}; are its quotes in pairs?", f"line {line}"
         ) from error
     return Grid(source, rows, places, decimal_point=separator == ",", notes=tuple(notes))
+
+
+def _unescaped(cell: str) -> str:
+    """Return the text of a cell that is written as a formula, so that no spreadsheet takes it for a number."""
+    return FORMULA_TEXT.sub(r"\1", cell) if cell.startswith('="') else cell
 
 
 def decoded(data: bytes) -> tuple[str, str]:

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterable
+from functools import lru_cache
 from typing import Literal
 
 from alloc.problems.tables.language.synonyms import words
@@ -18,11 +19,16 @@ ABSENT = words(
 """Texts that stand for no number, or for no limit."""
 
 
+REMEMBERED = 1 << 16
+"""Texts whose reading is kept: columns hold the same numbers again and again, and each is looked at several times."""
+
+
 def is_absent(text: str) -> bool:
     """Whether a text stands for no number, or for no limit."""
     return text.casefold() in ABSENT
 
 
+@lru_cache(REMEMBERED)
 def split_number(text: str) -> tuple[str, str] | None:
     """Return the digits of a number with their marks, and what stands behind them; None where no number begins."""
     text = text.translate(MINUS)
@@ -40,6 +46,7 @@ def split_number(text: str) -> tuple[str, str] | None:
     return (found[1], found[2].strip()) if found else None
 
 
+@lru_cache(REMEMBERED)
 def mark_of(digits: str) -> str:
     """Return the decimal mark that a number shows, ``?,`` or ``?.`` where it may be that of groups, ``""`` for none.
 
@@ -68,7 +75,7 @@ def number_of(digits: str, mark: Mark) -> float:
     return float(digits.replace(group, "").replace(mark, "."))
 
 
-def decimal_mark(numbers: Iterable[str]) -> set[Mark]:
+def decimal_marks(numbers: Iterable[str]) -> set[Mark]:
     """Return the decimal marks that some numbers show beyond doubt."""
     found = {mark_of(digits) for digits in numbers}
     return {mark for mark in (",", ".") if mark in found}
