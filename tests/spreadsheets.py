@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
 
+from alloc.problems import Units
+
 Rows = list[list[object]]
 Content = str | bytes | Rows
 
@@ -405,6 +407,12 @@ VALUES = [
         fields={"skills": (("camera", "winch"),), "needs": (("winch",),)},
     ),
     Case(
+        "lists with other marks here than there",
+        "id;ability;skills\na;1;camera | heavy lift\n",
+        'id,workload,needs\nt1,5,"heavy lift, camera"\n',
+        fields={"skills": (("camera", "heavy lift"),), "needs": (("camera", "heavy lift"),)},
+    ),
+    Case(
         "a skill that nobody has",
         "id;ability;skills\na;1;camera\n",
         "id;workload;needs\nt1;5;cmera\n",
@@ -541,9 +549,22 @@ PLACES = [
         error="agents.csv: line 2, column 'lat': must be a number, got '8.5 E'",
     ),
     Case(
+        "position in one column, in m here and in km there",
+        "id;ability;Position [km]\na;1;1,5 2\n",
+        "id,workload,x (m),y (m),z\nt1,5,1000,0,7\n",
+        options={"units": Units(distance="km")},
+        fields={"agent_position": [[1.5, 2, 0]], "task_position": [[1, 0, 0.007]], "units.distance": "km"},
+    ),
+    Case(
+        "one base for all",
+        tasks="id,workload,lat,lon\nt1,5,50,4\n",
+        options={"columns": {"agents.lat": "51", "agents.lon": "5"}},
+        fields={"agent_position": [[5, 51, 0], [5, 51, 0]], "metric": "geographic"},
+    ),
+    Case(
         "latitude alone",
         "id,ability,lat\na,1,47.1\n",
-        error="agents.csv: there is a column 'lat' but none for lon; add it, or --map lon=COLUMN",
+        error="agents.csv: 'lat' is there, but no column for lon; add it, or --map lon=COLUMN",
     ),
     Case(
         "half a place",

@@ -12,7 +12,7 @@ from alloc.problems.fields import FloatArray, IntArray
 from alloc.problems.tables.conversion import Conversion
 from alloc.problems.tables.grid import as_name
 from alloc.problems.tables.records import Records
-from alloc.problems.tables.values import names_in, separator_of
+from alloc.problems.tables.values import names_in, separators
 from alloc.problems.units import Units
 from alloc.problems.vocabulary import IDLE
 
@@ -57,7 +57,7 @@ def arguments_of(first: Records, second: Records, common: Conversion) -> Argumen
         If an agent names a task that there is not.
     """
     task_ids = ids_of(second, "t")
-    skills_at = separator_of([*_cells(first, "skills"), *_cells(second, "needs")])
+    skills_at = separators([*_cells(first, "skills"), *_cells(second, "needs")])
     skills, needs = first.lists("skills", skills_at), second.lists("needs", skills_at)
     spellings: dict[str, str] = {}
     returns = first.flags("returns")
@@ -105,7 +105,9 @@ def _positions(records: Records, common: Conversion) -> FloatArray | None:
     place = records.positions()
     if place is None or records.geographic:
         return place
-    return place * [common.factors.get((records.table.source, axis), 1.0) for axis in "xyz"]
+    source, factors = records.table.source, common.factors
+    first = factors.get((source, "x"), 1.0)  # a height without unit is in that of the others
+    return place * [factors.get((source, axis), first) for axis in "xyz"]
 
 
 def _alike(names: list[str], spellings: dict[str, str]) -> list[str]:
@@ -130,10 +132,10 @@ def _allowed(records: Records, task_ids: list[str]) -> list[list[int] | None] | 
         return None
     index = {name: number for number, name in enumerate(task_ids)}
     cells = records.match.cells("tasks")
-    separator = separator_of(cells)
+    marks = separators(cells)[:1]  # the other marks may be part of an id
     allowed: list[list[int] | None] = []
     for row, cell in enumerate(cells):
-        names = [as_name(cell)] if as_name(cell) in index else [as_name(name) for name in names_in(cell, separator)]
+        names = [as_name(cell)] if as_name(cell) in index else [as_name(name) for name in names_in(cell, marks)]
         if cell is None or [name.casefold() for name in names] in (["all"], ["alle"], ["*"], ["any"]):
             allowed.append(None)
             continue

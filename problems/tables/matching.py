@@ -85,13 +85,9 @@ def match_columns(table: Table, kind: Kind, wanted: Mapping[str, str]) -> Match:
         _take(match, name, text)
     taken = set(match.columns.values())
     candidates: dict[str, list[int]] = {}
-    for column, header in enumerate(table.headers):
-        if column in taken:
-            continue
-        for name in _readings(match, column):
+    for column in range(len(table.headers)):
+        for name in () if column in taken else _readings(match, column):
             candidates.setdefault(name, []).append(column)
-        if plain(header.text) in UNCLEAR_PLACES:
-            _refuse_places(match, column)
     for name, found in candidates.items():
         surest = min(table.headers[column].ranks[name] for column in found)
         best = [column for column in found if table.headers[column].ranks[name] == surest]
@@ -99,6 +95,7 @@ def match_columns(table: Table, kind: Kind, wanted: Mapping[str, str]) -> Match:
             raise _ambiguous(table, name, best)
         match.columns[name] = best[0]
     _choose_place(match, wanted)
+    _refuse_unclear_places(match)
     return match
 
 
@@ -158,39 +155,39 @@ def _quoted(text: str) -> str:
     return f"'{text}'" if " " in text or "[" in text or "(" in text else text
 
 
-def _refuse_places(match: Match, column: int) -> None:
-    """Refuse a column of pairs of numbers that may be degrees or not."""
-    header = match.table.headers[column]
-    if any(name in match.columns for name in ("gps", "lonlat", "position", "x", "lat")):
+def _refuse_unclear_places(match: Match) -> None:
+    """Refuse a column of pairs of numbers that may be degrees or not, where no other column gives places."""
+    if any(name in match.columns or name in match.constants for family in FAMILIES for name in family):
         return
-    cell = next((row[column] for row in match.table.rows if row[column] is not None), None)
-    if coordinates(cell) is not None:
-        text = _quoted(header.text)
-        raise match.table.error(
-            f"may be latitude and longitude, or x and y; say which by --map gps={text} or --map position={text}",
-            column=column,
-        )
+    for column, header in enumerate(match.table.headers):
+        cell = next((row[column] for row in match.table.rows if row[column] is not None), None)
+        if plain(header.text) in UNCLEAR_PLACES and coordinates(cell) is not None:
+            text = _quoted(header.text)
+            raise match.table.error(
+                f"may be latitude and longitude, or x and y; say which by --map gps={text} or --map position={text}",
+                column=column,
+            )
 
 
 def _choose_place(match: Match, wanted: Mapping[str, str]) -> None:
     """Keep the way of giving places that the user names, or the only one."""
-    given = [family for family in FAMILIES if any(name in match.columns for name in family)]
+    held = {**match.columns, **match.constants}
+    given = [family for family in FAMILIES if any(name in held for name in family)]
     named = [family for family in given if any(name in wanted for name in family)]
     if len(named) == 1:
-        for family in given:
-            for name in family if family not in named else ():
-                match.columns.pop(name, None)
+        for name in [name for family in given if family not in named for name in family]:
+            match.columns.pop(name, None)
         given = named
     if len(given) > 1:
-        what = " and ".join(
-            repr(match.table.headers[match.columns[n]].text) for f in given for n in f if n in match.columns
-        )
+        what = " and ".join(repr(_called(match, name)) for family in given for name in family if name in held)
         raise match.table.error(f"columns {what} give places in two ways; say which, as by --map {given[0][0]}=...")
     for family in given:
         for name in family:
-            if name not in match.columns and name not in match.constants:
-                other = next(one for one in family if one in match.columns)
-                text = match.table.headers[match.columns[other]].text
-                raise match.table.error(
-                    f"there is a column {text!r} but none for {name}; add it, or --map {name}=COLUMN"
-                )
+            if name not in held:
+                other = _called(match, next(one for one in family if one in held))
+                raise match.table.error(f"{other!r} is there, but no column for {name}; add it, or --map {name}=COLUMN")
+
+
+def _called(match: Match, name: str) -> str:
+    """Return the header of the column of a field, or the field that a constant stands for."""
+    return match.table.headers[match.columns[name]].text if name in match.columns else name

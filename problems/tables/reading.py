@@ -198,7 +198,7 @@ def _pair_lines(pairs: Pairs, common: Conversion, missing: str) -> list[str]:
 def _unplaced(first: Records, second: Records) -> list[str]:
     """Return a line where one table gives places and the other does not."""
     without = [records for records in (first, second) if records.geographic is None]
-    if len(without) != 1:
+    if len(without) != 1 or "start_task" in without[0].match.columns:
         return []
     what = "agents" if without[0] is first else "tasks"
     return [f"{without[0].table.source}: no column gives the places of the {what}, so that all distances are 0"]

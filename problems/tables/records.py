@@ -16,21 +16,9 @@ from alloc.problems.tables.matching import Match
 from alloc.problems.tables.numeric import Numbers, require_numbers
 from alloc.problems.tables.values import coordinates, flag, names_in
 
-NUMERIC = (
-    "ability",
-    "workload",
-    "battery",
-    "range",
-    "speed",
-    "energy_per_distance",
-    "priority",
-    "x",
-    "y",
-    "z",
-    "lat",
-    "lon",
+NUMERIC = frozenset(
+    ("ability", "workload", "battery", "range", "speed", "energy_per_distance", "priority", "x", "y", "z", "lat", "lon")
 )
-PLACE = ("x", "y", "z", "lat", "lon")
 REQUIRED = {"agents": "ability", "tasks": "workload"}
 EXAMPLES = {
     "agents": "ability=Capacity, or ability=1 for all alike",
@@ -78,11 +66,11 @@ class Records:
             return None
         return [flag(self.table, row, self.match.columns[name]) for row in range(len(self.table.rows))]
 
-    def lists(self, name: str, separator: str) -> list[list[str]] | None:
+    def lists(self, name: str, marks: str) -> list[list[str]] | None:
         """Return the lists of names of a field, None where there is no such column."""
         if name not in self.match.columns:
             return None
-        return [names_in(cell, separator) for cell in self.match.cells(name)]
+        return [names_in(cell, marks) for cell in self.match.cells(name)]
 
     def positions(self) -> FloatArray | None:
         """Return places, shape (count, 3), in the order of an instance: longitude before latitude."""
@@ -132,6 +120,7 @@ def records_of(match: Match, decimal: Mark | None) -> Records:
         numbers[name] = np.full(len(table.rows), value)
     require_numbers(table, match.columns.get(required), required, numbers[required])
     numbers |= _combined(match)
+    found += _unit_of_position(match)
     records = Records(match, None, numbers, found, _is_geographic(numbers))
     records.ids = _ids(match, numbers[required], records.notes)
     _metres(records)
@@ -171,6 +160,14 @@ def _combined(match: Match) -> dict[str, FloatArray]:
             values[row] = [*place, 0.0][:3]
     order = {"gps": ("lat", "lon"), "lonlat": ("lon", "lat"), "position": ("x", "y")}[name]
     return {order[0]: values[:, 0], order[1]: values[:, 1], "z": np.nan_to_num(values[:, 2])}
+
+
+def _unit_of_position(match: Match) -> list[Found]:
+    """Return the unit of x, y and z that one column holds."""
+    if "position" not in match.columns:
+        return []
+    header = match.table.headers[match.columns["position"]]
+    return [Found(match.table.source, header.text, axis, header.measure) for axis in "xyz"]
 
 
 def _ids(match: Match, required: FloatArray, notes: list[str]) -> list[str] | None:

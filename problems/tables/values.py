@@ -13,8 +13,8 @@ ANGLE = re.compile(
     r"(?:(\d+(?:[.,]\d+)?)\s*(?:\"|″|''|”)\s*)?([NSEW])?(?![\w])",
     re.IGNORECASE,
 )
-SPLITS = (";", "|", "\n", ",")
-BLANK = "blanks"
+MARKS = (";", "|", "\n", ",")
+"""What separates names, in the order in which they are looked for."""
 
 
 def flag(table: Table, row: int, column: int) -> bool:
@@ -30,14 +30,14 @@ def flag(table: Table, row: int, column: int) -> bool:
     raise table.error(f"must be yes or no, got {shown(cell)}", row, column)
 
 
-def separator_of(cells: Iterable[Cell]) -> str:
-    """Return what separates the names in some cells: the first of ``; | , `` that occurs, else blanks."""
+def separators(cells: Iterable[Cell]) -> str:
+    """Return the marks that separate the names in some cells, nothing where blanks do."""
     texts = [cell for cell in cells if isinstance(cell, str)]
-    return next((mark for mark in SPLITS if any(mark in text for text in texts)), BLANK)
+    return "".join(mark for mark in MARKS if any(mark in text for text in texts))
 
 
-def names_in(cell: Cell, separator: str) -> list[str]:
-    """Return the names that a cell lists."""
+def names_in(cell: Cell, marks: str) -> list[str]:
+    """Return the names that a cell lists, separated by any of these marks, or by blanks where there are none."""
     if cell is None:
         return []
     if isinstance(cell, Sequence | set | frozenset) and not isinstance(cell, str):
@@ -45,7 +45,7 @@ def names_in(cell: Cell, separator: str) -> list[str]:
     text = as_text(cell)
     if text[:1] + text[-1:] in ("[]", "{}", "()"):
         text = text[1:-1]
-    parts = text.split() if separator == BLANK else text.split(separator)
+    parts = re.split(f"[{re.escape(marks)}]", text) if marks else text.split()
     return [part for part in (part.strip().strip("'\"") for part in parts) if part]
 
 

@@ -21,7 +21,7 @@ TAIL = re.compile(
 FILLERS = re.compile(
     r"^(?:max|maximum|maximal\w*|nominal|net|rated|est|estimated|required|the|our|mean|avg|average|home|base|start|depot"
     r"|launch|current|initial|agent|drone|robot|vehicle|task|job|site|target|customer)\s+"
-    r"|\s+(?:max|maximum|nominal|net|rated|est|estimated|w|h)$"
+    r"|\s+(?:max|maximum|nominal|net|rated|est|estimated)$"
 )
 """Words that change nothing of what a column is."""
 
@@ -83,7 +83,7 @@ def ranks_of(text: str, kind: Kind) -> dict[str, int]:
             return known[candidate]
     without = re.sub(FILLERS, "", name)
     if without in known:
-        return {field: max(rank, 1) for field, rank in known[without].items()}
+        return {field: max(rank, 1) for field, rank in known[without].items() if field != "id"}
     last = name.split()[-1] if " " in name else ""
     return dict.fromkeys(ENDINGS & known.get(last, {}).keys(), 2) if kind != "distances" else {}
 
