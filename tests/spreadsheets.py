@@ -426,6 +426,12 @@ VALUES = [
     ),
     Case("priorities in words", tasks="id,workload,Priority\nt1,5,high\nt2,7,Low\n", fields={"priority": [3, 1]}),
     Case(
+        "priorities that count from the most urgent",
+        tasks="id,workload,Prio (1 = urgent)\nt1,5,1\n",
+        error="tasks.csv: column 'Prio (1 = urgent)': counts from 1, the most urgent,"
+        " but here larger is more urgent; turn it round",
+    ),
+    Case(
         "m/s",
         "id,ability,speed_mps\na,1,10\n",
         fields={"speed": [36], "units.time": "h"},
@@ -595,6 +601,32 @@ DISTANCES = [
         distances=";a1;a2;t1;t2\na1;0;1;2;3\na2;1;0;4;5\n",
         fields={"distances": [("a1", "t1", 2), ("a1", "t2", 3), ("a2", "t1", 4), ("a2", "t2", 5)]},
         lines=("distances.csv: 4 distances between agents, or from an id to itself, are left out",),
+    ),
+    Case(
+        "ids of an agent and of a task",
+        "id,ability\n1,4\n",
+        "id,workload\n1,5\n",
+        distances="agent,task,km\n1,1,3\n",
+        error="distances.csv: line 2: '1' is the id of an agent and of a task; give them different ids",
+    ),
+    Case(
+        "the same pair twice",
+        distances="from,to,distance\na1,t1,3\na2,t1,3\na1,t1,4\n",
+        error="distances.csv: line 4: gives the same pair as line 2; keep one",
+    ),
+    Case(
+        "matrix with closed roads",
+        "id,ability,x,y\na1,4,0,0\n",
+        "id,workload,x,y\nt1,5,1,1\nt2,7,2,2\n",
+        distances="from\\to,t1,t2\na1,3.5,∞\n",
+        fields={"distances": [("a1", "t1", 3.5)], "missing": "unreachable"},
+    ),
+    Case(
+        "matrix between places",
+        "id,ability,x,y\na1,4,0,0\n",
+        "id,workload,x,y\nt1,5,1,1\nt2,7,2,2\n",
+        distances=",t1,t2\na1,3.5,\n",
+        fields={"distances": [("a1", "t1", 3.5)], "missing": "metric"},
     ),
     Case(
         "unknown id",

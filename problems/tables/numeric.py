@@ -11,7 +11,7 @@ from alloc.problems.fields import FloatArray
 from alloc.problems.tables.grid import Cell, is_real
 from alloc.problems.tables.language.digits import Mark, decimal_marks, is_absent, mark_of, number_of, split_number
 from alloc.problems.tables.language.measures import Measure, measure_of, own_measure, rate_of
-from alloc.problems.tables.language.synonyms import LEVELS
+from alloc.problems.tables.language.synonyms import FIRST_IS_HIGHEST, LEVELS
 from alloc.problems.tables.layout import Table
 from alloc.problems.tables.values import angle
 
@@ -52,6 +52,10 @@ class Numbers:
             If a cell is no number, or may be one of two.
         """
         column = self._columns[name]
+        if name == "priority" and re.search(FIRST_IS_HIGHEST, self._table.headers[column].text, re.IGNORECASE):
+            raise self._table.error(
+                "counts from 1, the most urgent, but here larger is more urgent; turn it round", column=column
+            )
         mark = self._mark(name, column)
         values = np.full(len(self._table.rows), np.nan)
         units: dict[str, int] = {}

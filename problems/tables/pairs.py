@@ -66,7 +66,7 @@ def pairs_of(
             "is no table of distances; it needs the columns from, to and distance, or a column for each id",
             source=table.source,
         )
-    _leave_out(pairs, set(agents) - set(tasks))
+    _leave_out(pairs, set(agents) - set(tasks), set(agents) & set(tasks))
     return pairs
 
 
@@ -114,12 +114,15 @@ def _is_closed(cell: Cell) -> bool:
     return as_name(cell).casefold() in NO_WAY
 
 
-def _leave_out(pairs: Pairs, agents: set[str]) -> None:
-    """Leave out what lies between two agents, or between an id and itself, as full matrices have it."""
+def _leave_out(pairs: Pairs, agents: set[str], unclear: set[str]) -> None:
+    """Leave out what lies between two agents, or between an id and itself, as full matrices have it.
+
+    Ids that are `unclear`, those of an agent and of a task, are left for the table of distances to refuse.
+    """
     kept = [
         number
         for number, (source, target, _) in enumerate(pairs.rows)
-        if source != target and not (source in agents and target in agents)
+        if (source != target or source in unclear) and not (source in agents and target in agents)
     ]
     if len(kept) < len(pairs.rows):
         pairs.notes.append(

@@ -65,7 +65,8 @@ class Reading:
         if match is None or int(match[2]) >= len(self.places[match[1]][1]):
             return error
         source, rows = self.places[match[1]]
-        return InputError(error.message, rows[int(match[2])], source)
+        message = re.sub(r"\brows\[(\d+)\]", lambda other: rows[int(other[1])], error.message)
+        return InputError(message, rows[int(match[2])], source)
 
     def table(self, pairs: Pairs, common: Conversion, missing: str) -> DistanceTable:
         """Return the distances between pairs, in the common unit."""

@@ -147,5 +147,10 @@ LEVELS = {
 }  # fmt: skip
 """Priorities in words."""
 
+FIRST_IS_HIGHEST = (
+    r"\b1\s*(?:=|is|:|ist)\s*(?:the |most |very )*(?:urgent|high|top|first|hoch|hö|dring|sehr|haut|alt|prior)"
+)
+"""What a header says in which small numbers are urgent."""
+
 YES = words("yes, y, true, 1, x, ja, j, wahr, oui, o, vrai, si, sí, s, verdadero, \u2713, \u2714, on")
 NO = words("no, n, false, 0, nein, falsch, non, faux, falso, \u2717, \u2718, -, off")
