@@ -661,6 +661,23 @@ WORKBOOKS = [
         fields={"agent_position": [[1, 2, 0]]},
     ),
     Case(
+        "merged headers with units below",
+        [["Drone", "Payload", "Position", None], [None, "kg", "x [km]", "y [km]"], ["d1", 4, 1, 2]],
+        merged=("C1:D1",),
+        fields={"agent_ids": ("d1",), "units.work": "kg", "units.distance": "km", "agent_position": [[1, 2, 0]]},
+    ),
+    Case(
+        "a first column that is empty, and a title over all",
+        [["Fleet"], [None, "Drone", "Battery %", "Payload"], [None, "d1", 80, 4], [None, "Total", 80, 4]],
+        merged=("A1:D1",),
+        fields={"agent_ids": ("d1",), "battery": [80], "units.energy": "%"},
+    ),
+    Case(
+        "rows of sections",
+        [["Drone", "Payload"], ["North", None], ["d1", 4]],
+        error="agents.xlsx: row 2, column 'Payload': has no ability; fill it in, or leave the row out",
+    ),
+    Case(
         "merged cells below each other",
         [["id", "ability", "speed"], ["d1", 4, 30], ["d2", 2, None], ["d3", 1, 20]],
         merged=("C2:C3",),

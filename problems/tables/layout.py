@@ -1,6 +1,7 @@
 """Where a table begins and ends: its header, a row of units, totals, footnotes and empty rows."""
 
 from dataclasses import dataclass, field
+from itertools import zip_longest
 
 from alloc.problems.arguments import shown
 from alloc.problems.errors import InputError
@@ -120,13 +121,19 @@ def _header_row(grid: Grid, rows: list[int], kind: Kind, mapped: frozenset[str])
 
 
 def _names(grid: Grid, row: int) -> list[str]:
-    """Return the names of columns in a row; where it has none, those of the row above that belong to no number."""
+    """Return the names of columns in a row; where it has none, or a unit, with those of the row above."""
     texts = [as_name(cell) for cell in grid.rows[row]]
-    above = grid.rows[row - 1] if row else []
-    if sum(cell is not None for cell in above) < 2 or any(_is_number(cell) for cell in above):
+    above = [as_name(cell) for cell in grid.rows[row - 1]] if row else []
+    if sum(map(bool, above)) < 2 or any(map(_is_number, grid.rows[row - 1])):
         return texts
-    texts += [""] * (len(above) - len(texts))
-    return [text or (as_name(above[column]) if column < len(above) else "") for column, text in enumerate(texts)]
+    return [_joined(upper, lower) for upper, lower in zip_longest(above, texts, fillvalue="")]
+
+
+def _joined(upper: str, lower: str) -> str:
+    """Return the name of a column out of two rows: the lower cell, or the upper one with its unit."""
+    if upper and lower and upper != lower and measure_of(lower.strip("[]()")) is not None:
+        return f"{upper} [{lower.strip('[]()')}]"
+    return lower or upper
 
 
 def _is_number(cell: Cell) -> bool:

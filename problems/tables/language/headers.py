@@ -96,10 +96,9 @@ def header_of(text: str, kind: Kind) -> Header:
         inner = header_of(f"{bracket[1]} {bracket[3]}".strip(), kind)
         label = "" if measure else bracket[2]
         return Header(text, inner.ranks, measure or inner.measure, label)
-    ranks = ranks_of(text, kind)
     tail = TAIL.match(text)
-    if not ranks and tail:
-        measure = measure_of(tail[2])
-        if measure and ranks_of(tail[1], kind):
-            return Header(text, ranks_of(tail[1], kind), measure)
-    return Header(text, ranks, measure_of(text) if kind == "distances" else None)  # "km" is a distance in km
+    measure = measure_of(tail[2]) if tail else None
+    if tail and measure and ranks_of(tail[1], kind):
+        return Header(text, ranks_of(tail[1], kind), measure)
+    whole = measure_of(text) if kind == "distances" else None  # "km" is a distance in km
+    return Header(text, ranks_of(text, kind), whole)
