@@ -11,7 +11,7 @@ from alloc.problems import Allocation, read_allocation, read_instance
 from alloc.problems.formats.columns import AGENT_FIELDS, TASK_FIELDS
 from alloc.problems.formats.csv_folder import AGENT_COLUMNS, TASK_COLUMNS
 from alloc.problems.formats.document import INSTANCE_FIELDS
-from alloc.problems.formats.npz import FIELDS
+from alloc.problems.formats.npz_archive import FIELDS
 
 TEXT = (Path(__file__).parents[3] / "docs" / "formats.md").read_text("utf-8")
 
