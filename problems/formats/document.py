@@ -173,13 +173,12 @@ def unit_labels(instance: Instance) -> dict[str, str]:
 
 def header_values(header: Row, default_name: str) -> HeaderValues:
     """Return what concerns neither a single agent nor a single task, defaults where it is absent."""
-    name = _text(header, "name", "name")
     units, speed_unit = _units(header.get("units"))
     return {
-        "name": default_name if name is None else name,
+        "name": _text(header, "name", "name", default_name),
         "tau": _number(header, "tau", DEFAULT_TAU),
         "energy_per_distance": _number(header, "energy_per_distance", DEFAULT_ENERGY_PER_DISTANCE),
-        "metric": _text(header, "metric", "metric") or EUCLIDEAN,
+        "metric": _text(header, "metric", "metric", EUCLIDEAN),
         "units": units,
         "speed_unit": speed_unit,
     }
@@ -187,7 +186,7 @@ def header_values(header: Row, default_name: str) -> HeaderValues:
 
 def missing_rule(table: Row) -> str:
     """Return what holds for pairs that a table of distances leaves out."""
-    return _text(table, "missing", "distances.missing") or DEFAULT_MISSING
+    return _text(table, "missing", "distances.missing", DEFAULT_MISSING)
 
 
 def _units(given: object) -> tuple[Units, str]:
@@ -196,7 +195,7 @@ def _units(given: object) -> tuple[Units, str]:
         return Units(), ""
     fields = require_object(given, "units")
     require_known(fields, UNIT_FIELDS, "units")
-    labels = {name: _text(fields, name, f"units.{name}") or "" for name in UNIT_FIELDS}
+    labels = {name: _text(fields, name, f"units.{name}", "") for name in UNIT_FIELDS}
     speed = labels.pop("speed")
     return Units(**labels), speed
 
@@ -223,11 +222,11 @@ def _distances(given: object) -> DistanceColumns | None:
     return DistanceColumns(source=source, target=target, distance=values, missing=missing_rule(table))
 
 
-def _text(fields: Row, name: str, place: str) -> str | None:
+def _text(fields: Row, name: str, place: str, default: str) -> str:
     value = fields.get(name)
-    if isinstance(value, str | None):
-        return value
-    raise InputError(f"must be a string, got {described(value)}", place)
+    if not isinstance(value, str | None):
+        raise InputError(f"must be a string, got {described(value)}", place)
+    return default if value is None else value
 
 
 def _number(header: Row, field: str, default: float) -> float:

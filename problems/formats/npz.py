@@ -40,8 +40,6 @@ def from_npz(data: bytes, default_name: str) -> Instance:
         if name not in arrays:
             raise InputError("is missing", f"array {name}")
     _check_lengths(arrays)
-    labels = {name: _text(arrays, f"units_{name}", "") for name in UNIT_FIELDS}
-    speed_unit = labels.pop("speed")
     columns = Columns(
         name=_text(arrays, "name", default_name),
         tau=_scalar(arrays, "tau", DEFAULT_TAU),
@@ -58,9 +56,9 @@ def from_npz(data: bytes, default_name: str) -> Instance:
         speed=_optional(arrays, "agent_speed"),
         tasks=_lists(arrays, "agent_tasks"),
         priority=_optional(arrays, "task_priority"),
-        metric=_text(arrays, "metric", EUCLIDEAN),
-        units=Units(**labels),
-        speed_unit=speed_unit,
+        metric=_text(arrays, "metric", "") or EUCLIDEAN,
+        units=_units(arrays),
+        speed_unit=_text(arrays, "units_speed", ""),
         agent_energy_per_distance=_optional(arrays, "agent_energy_per_distance"),
         returns=arrays["agent_returns"].tolist() if "agent_returns" in arrays else None,
         skills=_lists(arrays, "agent_skills"),
@@ -175,6 +173,13 @@ def _scalar(arrays: Arrays, name: str, default: float) -> float:
 
 def _text(arrays: Arrays, name: str, default: str) -> str:
     return str(arrays[name][()]) if name in arrays else default
+
+
+def _units(arrays: Arrays) -> Units:
+    try:
+        return Units(**{name: _text(arrays, f"units_{name}", "") for name in UNIT_FIELDS if name != "speed"})
+    except InputError as error:
+        raise InputError(error.message, _translated(error.place)) from error
 
 
 def _start_tasks(arrays: Arrays) -> list[str | None] | None:

@@ -151,7 +151,7 @@ def test_geographic_tables_name_their_coordinates(varied: Instance, tmp_path: Pa
     assert json.loads((tmp_path / "x" / "instance.json").read_text("utf-8"))["distances"] == {"missing": "unreachable"}
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(
     st.lists(st.tuples(st.floats(-180, 360), st.floats(-90, 90), st.floats(-1e60, 1e60)), min_size=1, max_size=3),
     st.permutations(FORMATS),
