@@ -6,12 +6,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from alloc.problems.distances.given import DistanceTable
-from alloc.problems.distances.metric import EUCLIDEAN
 from alloc.problems.errors import InputError, nearest
 from alloc.problems.formats.messages import described, quoted
 from alloc.problems.instance import FloatArray, Instance, IntArray
 from alloc.problems.units import Units, speed_factor
-from alloc.problems.vocabulary import IDLE
+from alloc.problems.vocabulary import EUCLIDEAN, IDLE
 
 INSTANCE_FORMAT = "alloc-instance/1"
 

@@ -9,7 +9,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
-from alloc.problems.distances.metric import GEOGRAPHIC
 from alloc.problems.errors import InputError
 from alloc.problems.formats import json_text
 from alloc.problems.formats.columns import Columns, DistanceColumns, check_names, require_format
@@ -27,6 +26,7 @@ from alloc.problems.formats.document import (
 from alloc.problems.formats.files import read_text, reason, write_text_atomically
 from alloc.problems.formats.json_columns import Row, require_known
 from alloc.problems.instance import Instance
+from alloc.problems.vocabulary import GEOGRAPHIC
 
 AXES, GEOGRAPHIC_AXES = ("x", "y", "z"), ("lon", "lat", "alt")
 AGENT_COLUMNS = ("id", "ability", *AXES, "start_task", "battery", "range", "speed", "tasks")

@@ -5,7 +5,6 @@ from typing import TypedDict
 
 import numpy as np
 
-from alloc.problems.distances.metric import EUCLIDEAN
 from alloc.problems.errors import InputError
 from alloc.problems.formats import json_columns as columns_of
 from alloc.problems.formats.columns import (
@@ -29,6 +28,7 @@ from alloc.problems.formats.json_text import require_object
 from alloc.problems.formats.messages import described
 from alloc.problems.instance import FloatArray, Instance
 from alloc.problems.units import Units
+from alloc.problems.vocabulary import EUCLIDEAN
 
 HEADER_FIELDS = ("format", "name", "tau", "energy_per_distance", "metric", "units", "distances")
 INSTANCE_FIELDS = (*HEADER_FIELDS, "agents", "tasks")

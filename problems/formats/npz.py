@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from alloc.problems.distances.metric import EUCLIDEAN
 from alloc.problems.errors import InputError
 from alloc.problems.formats.columns import (
     DEFAULT_ENERGY_PER_DISTANCE,
@@ -22,6 +21,7 @@ from alloc.problems.formats.document import allowed_task_ids, own_rates, start_t
 from alloc.problems.formats.npz_archive import FIELDS, LARGEST, REQUIRED, load, packed
 from alloc.problems.instance import FloatArray, Instance
 from alloc.problems.units import Units
+from alloc.problems.vocabulary import EUCLIDEAN
 
 Arrays = Mapping[str, NDArray[np.generic]]
 
