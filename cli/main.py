@@ -19,6 +19,7 @@ from alloc.cli.commands import (
     methods,
     pareto,
     plot,
+    schema,
     solve,
     train,
     tune,
@@ -50,7 +51,22 @@ app = typer.Typer(
         closing="Exit codes: 0 every task is served, 1 not, 2 bad usage or bad input.",
     ),
 )
-for module in (solve, compare, pareto, evaluate, plot, generate, import_, validate, convert, methods, train, tune):
+COMMANDS = (
+    solve,
+    compare,
+    pareto,
+    evaluate,
+    plot,
+    generate,
+    import_,
+    validate,
+    convert,
+    schema,
+    methods,
+    train,
+    tune,
+)
+for module in COMMANDS:
     module.register(app)
 
 
