@@ -612,7 +612,7 @@ DISTANCES = [
     Case(
         "the same pair twice",
         distances="from,to,distance\na1,t1,3\na2,t1,3\na1,t1,4\n",
-        error="distances.csv: line 4: gives the same pair as line 2; keep one",
+        error="distances.csv: line 4: gives a pair that an earlier row gives; keep one of them",
     ),
     Case(
         "matrix with closed roads",
