@@ -10,7 +10,20 @@ from typing import NoReturn
 
 import typer
 
-from alloc.cli.commands import compare, convert, evaluate, generate, methods, pareto, plot, solve, train, tune, validate
+from alloc.cli.commands import (
+    compare,
+    convert,
+    evaluate,
+    export,
+    generate,
+    methods,
+    pareto,
+    plot,
+    solve,
+    train,
+    tune,
+    validate,
+)
 from alloc.cli.options import Parameter, examples, option_of
 from alloc.cli.output.console import complain, flush, write_out
 
@@ -37,7 +50,7 @@ app = typer.Typer(
         closing="Exit codes: 0 every task is served, 1 not, 2 bad usage or bad input.",
     ),
 )
-for module in (solve, compare, pareto, evaluate, plot, generate, validate, convert, methods, train, tune):
+for module in (solve, compare, pareto, evaluate, plot, generate, validate, convert, export, methods, train, tune):
     module.register(app)
 
 

@@ -77,6 +77,7 @@ OPTION_NAMES = {
     "scenario": "family",
     "low": "ability_min",
     "high": "ability_max",
+    "format": "file_format",
 }
 """Options by the parameter of the library that they set, where the two have different names."""
 
