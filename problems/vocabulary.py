@@ -5,6 +5,9 @@ from enum import StrEnum
 IDLE = -1
 """The task index of an agent without a task."""
 
+EUCLIDEAN, MANHATTAN, GEOGRAPHIC = METRICS = ("euclidean", "manhattan", "geographic")
+"""How far two places are apart: (1) of the paper, the sum over the axes, or along the surface of the earth."""
+
 
 class Objective(StrEnum):
     """What is optimised, in this order, after the number of unserved tasks."""
