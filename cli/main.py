@@ -23,6 +23,7 @@ from alloc.cli.commands import (
     train,
     tune,
     validate,
+    whatif,
 )
 from alloc.cli.options import Parameter, examples, option_of
 from alloc.cli.output.console import complain, flush, write_out
@@ -50,7 +51,21 @@ app = typer.Typer(
         closing="Exit codes: 0 every task is served, 1 not, 2 bad usage or bad input.",
     ),
 )
-for module in (solve, compare, pareto, evaluate, plot, generate, validate, convert, export, methods, train, tune):
+for module in (
+    solve,
+    compare,
+    pareto,
+    whatif,
+    evaluate,
+    plot,
+    generate,
+    validate,
+    convert,
+    export,
+    methods,
+    train,
+    tune,
+):
     module.register(app)
 
 
