@@ -14,6 +14,11 @@ class Objective(StrEnum):
 
     MAKESPAN = "makespan"
     MAKESPAN_ENERGY = "makespan-energy"
+    MAKESPAN_MOVES = "makespan-moves"
+
+
+OBJECTIVES = (Objective.MAKESPAN, Objective.MAKESPAN_ENERGY)
+"""What methods optimise; moves are to them a kind of energy, see `replanning`."""
 
 
 class Distribution(StrEnum):
