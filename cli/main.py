@@ -20,11 +20,10 @@ from alloc.cli.commands import (
     pareto,
     plot,
     solve,
-    train,
-    tune,
     validate,
     whatif,
 )
+from alloc.cli.commands.training import train, tune
 from alloc.cli.options import Parameter, examples, option_of
 from alloc.cli.output.console import complain, flush, write_out
 

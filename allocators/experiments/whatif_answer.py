@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from alloc.allocators.contract.tolerance import PROVEN
 from alloc.allocators.result import Result
 from alloc.problems.text import counted, number
-from alloc.problems.units import labelled
 
 FleetFigures = tuple[int, tuple[str, ...], Result]
 """How many agents are added, which are removed, and the result."""
@@ -63,11 +62,13 @@ def _is_worse(result: Result, now: Result) -> bool:
 def _change(result: Result, now: Result, *, short: bool = False) -> str:
     """Return the makespan of a fleet against that of the fleet as it is, or how many tasks are unserved."""
     unserved, before = _unserved(result), _unserved(now)
+    if result.evaluation is None:
+        return "no plan was found"
     if result.makespan is None:
         return f"{counted(unserved, 'task')} unserved {f'instead of {before}' if before != unserved else 'as before'}"
     then = _time(result)
     if now.makespan is None:
-        return then if short else f"every task is served, in {then}; {counted(before, 'task')} unserved before"
+        return f"every task is served, in {then}"
     share = result.makespan / now.makespan - 1 if now.makespan else 0.0
     if abs(share) <= PROVEN:
         is_proven = (result.lower_bound or 0.0) >= now.makespan * (1 - PROVEN)
@@ -77,7 +78,7 @@ def _change(result: Result, now: Result, *, short: bool = False) -> str:
 
 
 def _time(result: Result) -> str:
-    return labelled(number(result.makespan, 4), result.instance.units.time)
+    return f"{number(result.makespan, 4)} {result.instance.units.time}".rstrip()
 
 
 def _unserved(result: Result) -> int:

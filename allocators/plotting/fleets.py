@@ -8,7 +8,6 @@ from alloc.allocators.plotting.colours import LIMIT, MAKESPAN
 from alloc.allocators.plotting.sites import plain_text, shortened
 from alloc.allocators.plotting.style import drawn, new_figure
 from alloc.problems.text import counted
-from alloc.problems.units import labelled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -91,7 +90,7 @@ def _changed(fleet: "Fleet") -> str:
 
 
 def _axis(name: str, unit: str) -> str:
-    return plain_text(labelled(name, f"({unit})" if unit else ""))
+    return plain_text(f"{name} ({unit})" if unit else name)
 
 
 def _title(found: "WhatIf") -> str:

@@ -13,9 +13,6 @@ def test_the_solution_of_an_exported_model_is_evaluated(alloc, small):
     highs.run()
     highs.writeSolution("small.sol", 0)
     assert alloc("evaluate", "small.json", "small.sol", "--json").json["makespan"] == pytest.approx(13 / 11)
-    options = ("--method", "greedy", "--json")
-    started = alloc("solve", "small.json", "--start", "small.sol", *options)
-    assert started.json["makespan"] == pytest.approx(13 / 11)
 
 
 def test_standard_output_needs_a_format(alloc, small):
