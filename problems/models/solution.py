@@ -14,7 +14,8 @@ from alloc.problems.models.names import SEPARATOR, plain_names
 from alloc.problems.models.programme import RATIO
 
 HEAD = re.compile(
-    r"(model status|solution status|objective value:|# (solution|objective)|optimal|infeasible|unbounded|stopped|integer infeasible)",
+    r"(model status|solution status|objective value:|# (solution|objective)|optimal|(integer )?infeasible|unbounded"
+    r"|stopped)",
     re.IGNORECASE,
 )
 """How the first line of such a file begins, in HiGHS, SCIP, Gurobi and CBC."""
