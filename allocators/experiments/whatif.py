@@ -14,7 +14,7 @@ from alloc.allocators.registry import load
 from alloc.allocators.result import Result
 from alloc.allocators.runtime.interrupts import signals_set
 from alloc.allocators.solve import solve
-from alloc.problems import InputError, Instance, Objective
+from alloc.problems import Allocation, InputError, Instance, Objective
 from alloc.problems.arguments import choice, event, flag, function, listed, of_type, shown, whole
 from alloc.problems.errors import nearest
 
@@ -218,7 +218,9 @@ def _solved(
         others = {row["id"] for row in new}.difference(added) | removed
         problem = full.without_agents(others) if others else full
         missing = tuple(name for name in instance.agent_ids if name in removed)
-        fleet = Fleet(tuple(added), missing, run(problem, start=None if smaller is None else _plan(smaller.result)))
+        fleet = Fleet(
+            tuple(added), missing, run(problem, start=None if smaller is None else _plan(smaller.result, problem))
+        )
         on_fleet(fleet)
         return fleet
 
@@ -234,9 +236,11 @@ def _solved(
     return fleets
 
 
-def _plan(result: Result) -> dict[str, str | None] | None:
-    """Return the plan by ids, for a larger fleet: the agents that it leaves out are idle."""
-    return None if result.allocation is None else result.allocation.to_ids(result.instance)
+def _plan(smaller: Result, fleet: Instance) -> Allocation | None:
+    """Return the plan of a smaller fleet for a larger one, in which the others are idle."""
+    if smaller.allocation is None:
+        return None
+    return Allocation.from_ids(fleet, smaller.allocation.to_ids(smaller.instance))
 
 
 def _with_shared_bounds(fleets: Sequence[Fleet]) -> tuple[Fleet, ...]:

@@ -39,7 +39,8 @@ def answer(fleets: Sequence[FleetFigures], like: Sequence[str]) -> str:
     if dropped is not None and _is_worse(dropped[2], now):
         enough = next((fleet for fleet in changed if not _is_worse(fleet[2], now)), None)
         if enough is not None:
-            parts.append(f"{_more(enough[0] // len(like), like)} makes up for it")
+            steps = enough[0] // len(like)
+            parts.append(f"{_more(steps, like)} {'makes' if steps == 1 else 'make'} up for it")
     return "; ".join(parts) if parts else "interrupted before a fleet was changed"
 
 
