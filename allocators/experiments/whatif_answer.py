@@ -74,8 +74,28 @@ def _change(result: Result, now: Result, *, short: bool = False) -> str:
     if abs(share) <= PROVEN:
         is_proven = (result.lower_bound or 0.0) >= now.makespan * (1 - PROVEN)
         return f"{then} as before, which is proven" if is_proven else f"{then} as before"
-    percent = f"{100 * share:+.0f}" if abs(share) >= 0.1 else f"{100 * share:+.2g}"
-    return f"{then}{'' if short else f' instead of {_time(now)}'} ({percent} %)"
+    return f"{then}{'' if short else f' instead of {_time(now)}'} ({_percent(share)} %{_range(result, now)})"
+
+
+def _range(result: Result, now: Result) -> str:
+    """Return between which changes that of the optimum lies, where that is not proven to be the one found."""
+    gaps = (result.gap, now.gap)
+    if None in gaps or max(gap or 0.0 for gap in gaps) <= PROVEN or not now.lower_bound or not now.makespan:
+        return ""
+    least = (result.lower_bound or 0.0) / now.makespan - 1
+    most = (result.makespan or 0.0) / now.lower_bound - 1
+    old, new = set(now.instance.agent_ids), set(result.instance.agent_ids)
+    if old < new:
+        most = min(most, 0.0)  # more agents never make it longer
+    if new < old:
+        least = max(least, 0.0)
+    return f"; the optimum: {_percent(least)} to {_percent(most)} %"
+
+
+def _percent(share: float) -> str:
+    if abs(share) < PROVEN:
+        return "0"
+    return f"{100 * share:+.0f}" if abs(share) >= 0.1 else f"{100 * share:+.2g}"
 
 
 def _time(result: Result) -> str:

@@ -1,5 +1,6 @@
 """What more or fewer agents bring."""
 
+import re
 import threading
 from itertools import pairwise
 
@@ -90,6 +91,21 @@ def test_the_answer_where_tasks_are_unserved_or_nothing_changes() -> None:
     assert whatif(few, remove=["a1"]).answer == "without a1: 2 tasks unserved instead of 1"
     bound = Instance(ability=[1, 1], workload=[4, 1], allowed_tasks=[[0], [1]])
     assert whatif(bound, "a2").answer == "one more like a2: 4 as before, which is proven"
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_answer_says_what_is_not_proven(seed: int) -> None:
+    """The change of the optimum lies in the range that is said, by brute force, where the methods prove less."""
+    instance = varied_instance(seed)
+    found = whatif(instance, instance.agent_ids[0], method="greedy", iterations=1, time_limit_s=None)
+    now, more = (fleet.result for fleet in found.fleets)
+    best = [brute_force(result.instance).makespan for result in (now, more)]
+    ranges = re.findall(r"the optimum: (\S+) to (\S+) %", found.answer)
+    is_open = max(now.gap, more.gap) > 1e-6 and "as before" not in found.answer
+    assert len(ranges) == is_open
+    for least, most in ranges:
+        change = 100 * (best[1] / best[0] - 1)
+        assert float(least) - 0.51 <= change <= float(most) + 0.51
 
 
 def test_stopping_keeps_the_fleets_so_far() -> None:
