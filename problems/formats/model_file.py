@@ -9,7 +9,7 @@ import numpy as np
 
 from alloc.problems.arguments import choice, of_type, real
 from alloc.problems.errors import InputError
-from alloc.problems.formats.files import PathLike, write_text_atomically
+from alloc.problems.formats.files import PathLike, named, write_text_atomically
 from alloc.problems.instance import Instance
 from alloc.problems.models.comments import comments
 from alloc.problems.models.programme import Programme, build_programme
@@ -65,7 +65,7 @@ def write_model(
         If the model has no solution, or would be too large.
     """
     of_type(instance, Instance, "instance")
-    suffix = Path(path).suffix.lower().removeprefix(".")
+    suffix = Path(named(path)).suffix.lower().removeprefix(".")
     if format is None and suffix not in list(ModelFormat):
         raise InputError(
             f"must be given, {' or '.join(ModelFormat)}, as the name of the file does not say it", "format"
