@@ -9,6 +9,9 @@ from alloc.problems.text import counted, number
 FleetFigures = tuple[int, tuple[str, ...], Result]
 """How many agents are added, which are removed, and the result."""
 
+DIGITS = range(4, 9)
+"""Significant digits of makespans: as few as tell two apart."""
+
 MOST_NAMES = 3
 """Ids of agents before they are counted."""
 
@@ -73,8 +76,12 @@ def _change(result: Result, now: Result, *, short: bool = False) -> str:
     share = result.makespan / now.makespan - 1 if now.makespan else 0.0
     if abs(share) <= PROVEN:
         is_proven = (result.lower_bound or 0.0) >= now.makespan * (1 - PROVEN)
-        return f"{then} as before, which is proven" if is_proven else f"{then} as before"
-    return f"{then}{'' if short else f' instead of {_time(now)}'} ({_percent(share)} %{_range(result, now)})"
+        limits = _range(result, now)
+        return f"{then} as before{', which is proven' if is_proven else f' ({limits})' if limits else ''}"
+    digits = next((count for count in DIGITS if _time(result, count) != _time(now, count)), DIGITS[-1])
+    instead = "" if short else f" instead of {_time(now, digits)}"
+    changes = "; ".join(filter(None, [f"{_percent(share)} %", _range(result, now)]))
+    return f"{_time(result, digits)}{instead} ({changes})"
 
 
 def _range(result: Result, now: Result) -> str:
@@ -89,7 +96,7 @@ def _range(result: Result, now: Result) -> str:
         most = min(most, 0.0)  # more agents never make it longer
     if new < old:
         least = max(least, 0.0)
-    return f"; the optimum: {_percent(least)} to {_percent(most)} %"
+    return f"the optimum: {_percent(least)} to {_percent(most)} %"
 
 
 def _percent(share: float) -> str:
@@ -98,8 +105,8 @@ def _percent(share: float) -> str:
     return f"{100 * share:+.0f}" if abs(share) >= 0.1 else f"{100 * share:+.2g}"
 
 
-def _time(result: Result) -> str:
-    return f"{number(result.makespan, 4)} {result.instance.units.time}".rstrip()
+def _time(result: Result, digits: int = DIGITS[0]) -> str:
+    return f"{number(result.makespan, digits)} {result.instance.units.time}".rstrip()
 
 
 def _unserved(result: Result) -> int:

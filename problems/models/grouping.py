@@ -8,7 +8,7 @@ from alloc.problems.classes import AgentClasses, agent_classes, count_classes
 from alloc.problems.errors import RefusedError
 from alloc.problems.instance import Instance
 
-MOST_PAIRS = 5_000_000
+MOST_PAIRS = 2_000_000
 """Pairs of agent, or class, and task beyond which no model is made."""
 
 
