@@ -1,5 +1,6 @@
 """The answer of a comparison of fleets in one sentence."""
 
+import math
 from collections.abc import Sequence
 
 from alloc.allocators.contract.tolerance import PROVEN
@@ -9,8 +10,8 @@ from alloc.problems.text import counted, number
 FleetFigures = tuple[int, tuple[str, ...], Result]
 """How many agents are added, which are removed, and the result."""
 
-DIGITS = range(4, 9)
-"""Significant digits of makespans: as few as tell two apart."""
+FEWEST_DIGITS = 4
+"""Significant digits of a makespan, unless it takes more to tell two apart."""
 
 MOST_NAMES = 3
 """Ids of agents before they are counted."""
@@ -78,7 +79,7 @@ def _change(result: Result, now: Result, *, short: bool = False) -> str:
         is_proven = (result.lower_bound or 0.0) >= now.makespan * (1 - PROVEN)
         limits = _range(result, now)
         return f"{then} as before{', which is proven' if is_proven else f' ({limits})' if limits else ''}"
-    digits = next((count for count in DIGITS if _time(result, count) != _time(now, count)), DIGITS[-1])
+    digits = max(FEWEST_DIGITS, math.ceil(-math.log10(abs(share))) + 1)
     instead = "" if short else f" instead of {_time(now, digits)}"
     changes = "; ".join(filter(None, [f"{_percent(share)} %", _range(result, now)]))
     return f"{_time(result, digits)}{instead} ({changes})"
@@ -105,7 +106,7 @@ def _percent(share: float) -> str:
     return f"{100 * share:+.0f}" if abs(share) >= 0.1 else f"{100 * share:+.2g}"
 
 
-def _time(result: Result, digits: int = DIGITS[0]) -> str:
+def _time(result: Result, digits: int = FEWEST_DIGITS) -> str:
     return f"{number(result.makespan, digits)} {result.instance.units.time}".rstrip()
 
 

@@ -54,7 +54,7 @@ def _draw(found: "WhatIf") -> "Figure":
         _bars(axes[1], energy, [result.energy_lower_bound for result in results])
         axes[1].set_ylabel(_axis("energy", units.energy))
     _name(axes[-1], found.fleets)
-    axes[0].set_title(_title(found), fontsize=12)
+    axes[0].set_title(_title(found), fontsize=10)
     return figure
 
 
@@ -96,4 +96,4 @@ def _axis(name: str, unit: str) -> str:
 def _title(found: "WhatIf") -> str:
     name = plain_text(shortened(found.instance.name, 60))
     size = f"{counted(found.instance.n, 'agent')}, {counted(found.instance.m, 'task')}"
-    return "\n".join([f"{name}: {size}", *map(plain_text, wrap(shortened(found.answer, 200), 90))])
+    return "\n".join([f"{name}: {size}", *map(plain_text, wrap(shortened(found.answer, 260), 95))])
