@@ -18,6 +18,8 @@ from alloc.allocators.experiments.whatif import Fleet, WhatIf, whatif
 from alloc.allocators.explain import Bottleneck, explain
 from alloc.allocators.pareto import Front, pareto
 from alloc.allocators.registry import TARGETS, describe, load, method_parameters, names
+from alloc.allocators.replanning.moves import Moves
+from alloc.allocators.replanning.reasons import reasons_of_moves
 from alloc.allocators.result import Result, read_result
 from alloc.allocators.solve import solve
 from alloc.problems import AllocError, InputError, MissingPackageError, RefusedError, TrainingError
@@ -61,6 +63,7 @@ __all__ = [
     "Method",
     "Milp",
     "MissingPackageError",
+    "Moves",
     "Ppo",
     "Proposal",
     "RefusedError",
@@ -81,6 +84,7 @@ __all__ = [
     "pareto",
     "plot",
     "read_result",
+    "reasons_of_moves",
     "solve",
     "train",
     "whatif",

@@ -16,9 +16,11 @@ from alloc.cli.commands import (
     evaluate,
     export,
     generate,
+    import_,
     methods,
     pareto,
     plot,
+    schema,
     solve,
     validate,
     whatif,
@@ -50,7 +52,7 @@ app = typer.Typer(
         closing="Exit codes: 0 every task is served, 1 not, 2 bad usage or bad input.",
     ),
 )
-for module in (
+COMMANDS = (
     solve,
     compare,
     pareto,
@@ -58,13 +60,16 @@ for module in (
     evaluate,
     plot,
     generate,
+    import_,
     validate,
     convert,
     export,
+    schema,
     methods,
     train,
     tune,
-):
+)
+for module in COMMANDS:
     module.register(app)
 
 
