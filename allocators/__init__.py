@@ -14,6 +14,7 @@ from alloc.allocators.contract.search import Search
 from alloc.allocators.contract.status import Status
 from alloc.allocators.contract.tolerance import MakespanTolerance
 from alloc.allocators.experiments.compare import Row, compare
+from alloc.allocators.experiments.whatif import Fleet, WhatIf, whatif
 from alloc.allocators.explain import Bottleneck, explain
 from alloc.allocators.pareto import Front, pareto
 from alloc.allocators.registry import TARGETS, describe, load, method_parameters, names
@@ -46,6 +47,7 @@ __all__ = [
     "CpSat",
     "Ddpg",
     "Dqn",
+    "Fleet",
     "Front",
     "Gappo",
     "GappoLs",
@@ -72,6 +74,7 @@ __all__ = [
     "StopReason",
     "TracePoint",
     "TrainingError",
+    "WhatIf",
     "compare",
     "describe",
     "explain",
@@ -84,6 +87,7 @@ __all__ = [
     "reasons_of_moves",
     "solve",
     "train",
+    "whatif",
 ]
 
 _LAZY = {

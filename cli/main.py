@@ -14,6 +14,7 @@ from alloc.cli.commands import (
     compare,
     convert,
     evaluate,
+    export,
     generate,
     import_,
     methods,
@@ -21,10 +22,10 @@ from alloc.cli.commands import (
     plot,
     schema,
     solve,
-    train,
-    tune,
     validate,
+    whatif,
 )
+from alloc.cli.commands.training import train, tune
 from alloc.cli.options import Parameter, examples, option_of
 from alloc.cli.output.console import complain, flush, write_out
 
@@ -55,12 +56,14 @@ COMMANDS = (
     solve,
     compare,
     pareto,
+    whatif,
     evaluate,
     plot,
     generate,
     import_,
     validate,
     convert,
+    export,
     schema,
     methods,
     train,
