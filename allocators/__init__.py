@@ -14,9 +14,12 @@ from alloc.allocators.contract.search import Search
 from alloc.allocators.contract.status import Status
 from alloc.allocators.contract.tolerance import MakespanTolerance
 from alloc.allocators.experiments.compare import Row, compare
+from alloc.allocators.experiments.whatif import Fleet, WhatIf, whatif
 from alloc.allocators.explain import Bottleneck, explain
 from alloc.allocators.pareto import Front, pareto
 from alloc.allocators.registry import TARGETS, describe, load, method_parameters, names
+from alloc.allocators.replanning.moves import Moves
+from alloc.allocators.replanning.reasons import reasons_of_moves
 from alloc.allocators.result import Result, read_result
 from alloc.allocators.solve import solve
 from alloc.problems import AllocError, InputError, MissingPackageError, RefusedError, TrainingError
@@ -44,6 +47,7 @@ __all__ = [
     "CpSat",
     "Ddpg",
     "Dqn",
+    "Fleet",
     "Front",
     "Gappo",
     "GappoLs",
@@ -59,6 +63,7 @@ __all__ = [
     "Method",
     "Milp",
     "MissingPackageError",
+    "Moves",
     "Ppo",
     "Proposal",
     "RefusedError",
@@ -69,6 +74,7 @@ __all__ = [
     "StopReason",
     "TracePoint",
     "TrainingError",
+    "WhatIf",
     "compare",
     "describe",
     "explain",
@@ -78,8 +84,10 @@ __all__ = [
     "pareto",
     "plot",
     "read_result",
+    "reasons_of_moves",
     "solve",
     "train",
+    "whatif",
 ]
 
 _LAZY = {

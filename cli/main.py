@@ -14,16 +14,18 @@ from alloc.cli.commands import (
     compare,
     convert,
     evaluate,
+    export,
     generate,
+    import_,
     methods,
     pareto,
     plot,
     schema,
     solve,
-    train,
-    tune,
     validate,
+    whatif,
 )
+from alloc.cli.commands.training import train, tune
 from alloc.cli.options import Parameter, examples, option_of
 from alloc.cli.output.console import complain, flush, write_out
 
@@ -50,7 +52,24 @@ app = typer.Typer(
         closing="Exit codes: 0 every task is served, 1 not, 2 bad usage or bad input.",
     ),
 )
-for module in (solve, compare, pareto, evaluate, plot, generate, validate, convert, schema, methods, train, tune):
+COMMANDS = (
+    solve,
+    compare,
+    pareto,
+    whatif,
+    evaluate,
+    plot,
+    generate,
+    import_,
+    validate,
+    convert,
+    export,
+    schema,
+    methods,
+    train,
+    tune,
+)
+for module in COMMANDS:
     module.register(app)
 
 

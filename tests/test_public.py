@@ -14,7 +14,7 @@ import alloc.problems
 PACKAGES = (alloc.problems, alloc.allocators)
 VERBS = {
     "compare", "describe", "explain", "load", "method_parameters", "names", "pareto", "plot", "read_result", "solve",
-    "train",
+    "train", "whatif",
 }  # fmt: skip
 METHODS = {
     "A2c", "Auction", "CpSat", "Ddpg", "Dqn", "Gappo", "GappoLs", "GeneticAlgorithm", "Greedy", "Hedonic",

@@ -10,6 +10,7 @@ SCHEMAS = {
     "alloc-allocation/1": "the task of each agent",
     "alloc-result/1": "what `alloc solve` writes",
     "alloc-pareto/1": "the front that `alloc pareto` writes",
+    "alloc-whatif/1": "the fleets that `alloc whatif` compares",
     "alloc-evaluation/1": "the scores that `alloc evaluate --json` prints",
     "alloc-comparison/1": "the rows that `alloc compare --json` prints",
     "alloc-policy/1": "the metadata of a policy file",
