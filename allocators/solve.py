@@ -41,6 +41,9 @@ REPAIR_S = 0.2
 MATCHED_PAIRS = 1_000_000
 """Pairs of origin and task beyond which the libraries for matchings are loaded before the run."""
 
+REPAIR_SHARE = 0.05
+"""Part of the time limit for the repair of a plan in force, after the method's own time is up."""
+
 
 def solve(
     instance: Instance,
@@ -228,5 +231,6 @@ def _propose(allocator: Allocator, search: Search) -> tuple[Proposal, StopReason
     if search.best is not None and search.instance.reach.move is not None:
         from alloc.allocators.heuristic.local_search.improve import repair
 
-        repair(search, seconds=math.inf if search.budget.time_limit_s is None else REPAIR_S)
+        limit = search.budget.time_limit_s
+        repair(search, seconds=math.inf if limit is None else max(REPAIR_S, REPAIR_SHARE * limit))
     return proposal, stop_reason

@@ -25,7 +25,10 @@ FIRST_CYCLE_SHARE = 0.1
 REPORT_INTERVAL = 20.0
 """Time between two reports, as a multiple of the time that scoring one plan takes."""
 
-REPAIRS_PER_AGENT = 200
+MOVES_NOISE = 1.0
+"""First noise where moves have a price, relative to the mean cost: much, as nearly all moves cost the same."""
+
+REPAIRS_PER_AGENT = 400
 """Most exchanges of a repair, for each agent."""
 
 
@@ -123,14 +126,18 @@ def reduce_energy(search: Search, state: AnnealingState, parameters: LocalSearch
     assert best is not None
     if clock.is_over or best.evaluation.cost == 0:
         return
-    state.begin(best.allocation, search.makespan_limit)
+    plan = _plan_in_force(search)
+    state.begin(
+        best.allocation if plan is None else _serving(plan, best.allocation, search.instance.m), search.makespan_limit
+    )
     clock = Clock(search, clock.until_s, clock.until_iteration)
     report = _Reporter(search, state)
     final = parameters.final_noise
     state.run(parameters.exchanges, parameters.weights(state, final, HARD))  # measures the pace
     search.iteration += 1
     exchanges = parameters.exchanges * clock.iterations_left / search.instance.n
-    initial = parameters.initial_noise * parameters.noise_reduction(exchanges)
+    initial = parameters.initial_noise if plan is None else MOVES_NOISE
+    initial *= parameters.noise_reduction(exchanges)
     while not clock.is_over:
         progress = clock.progress
         noise = initial * (final / initial) ** progress
@@ -171,22 +178,28 @@ def repair(search: Search, *, seconds: float) -> None:
     seconds : float
         Time for it; at most `REPAIRS_PER_AGENT` are made.
     """
-    move, origin = search.instance.reach.move, search.instance.reach.origin
-    assert move is not None
-    assert search.best is not None
-    parameters, best = LocalSearchParameters(), search.best
+    plan, best, parameters = _plan_in_force(search), search.best, LocalSearchParameters()
+    assert plan is not None
+    assert best is not None
     if best.evaluation.cost == 0 or best.evaluation.served_makespan == 0:
         return
     state = AnnealingState(search.instance, search.seed, parameters.neighbours)
-    start = _serving(only_allowed(search.instance, Allocation(move.task[origin])), best.allocation, search.instance.m)
-    state.begin(start, search.makespan_limit)
-    end = time.monotonic() + seconds
-    for _ in range(1 + REPAIRS_PER_AGENT * search.instance.n // parameters.exchanges):
-        if search.interrupted or time.monotonic() >= end:
+    state.begin(_serving(plan, best.allocation, search.instance.m), search.makespan_limit)
+    begin, most = time.monotonic(), 1 + REPAIRS_PER_AGENT * search.instance.n // parameters.exchanges
+    for count in range(most):
+        progress = max(count / most, (time.monotonic() - begin) / seconds)
+        if search.interrupted or progress >= 1:
             break
-        state.run(parameters.exchanges, parameters.weights(state, parameters.final_noise, HARD))
+        noise = MOVES_NOISE * (parameters.final_noise / MOVES_NOISE) ** progress
+        state.run(parameters.exchanges, parameters.weights(state, noise, HARD if progress > HARD_FROM else 1.0))
     if state.best is not None:
         search.submit(state.best)
+
+
+def _plan_in_force(search: Search) -> Allocation | None:
+    """Return the plan from which moves have a price, None where they have none."""
+    move, origin = search.instance.reach.move, search.instance.reach.origin
+    return None if move is None else only_allowed(search.instance, Allocation(move.task[origin]))
 
 
 def _serving(plan: Allocation, other: Allocation, m: int) -> Allocation:
