@@ -11,7 +11,7 @@ from alloc.allocators import Allocator, Result, load, reasons_of_moves, solve
 from alloc.problems.formats import read_instance
 
 EARTHQUAKES = Path(__file__).parent / "earthquakes" / "alaska.json"
-BUDGET_S = 4.0
+BUDGET_S = 1.5
 SLACK = 0.01
 SHOWN = 5
 
@@ -52,12 +52,12 @@ class Planner:
 def main() -> None:
     """Plan; then a drone drops out and a task comes in, and forty drones drop out."""
     rng = np.random.default_rng(0)
-    planner = Planner(EARTHQUAKES, load("cpsat"))
+    planner = Planner(EARTHQUAKES, load("local-search"))
     print(f"{planner.instance.n} drones, {planner.instance.m} sites")
     site = planner.instance.task_position.mean(axis=0)
     busy = [name for name, task in planner.plan.items() if task is not None]
     changes = [
-        ("a drone drops out, and a task comes in", busy[:1], [{"id": "new", "workload": 500.0, "position": site}]),
+        ("a drone drops out, and a task comes in", busy[:1], [{"id": "new", "workload": 60.0, "position": site}]),
         ("forty drones drop out", rng.choice(busy[1:], 40, replace=False).tolist(), []),
     ]
     for what, gone, added in changes:

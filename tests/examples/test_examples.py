@@ -25,14 +25,14 @@ def test_solve_from_python(checkout):
 
 
 def test_replan(checkout):
-    """Every plan serves all sites again, and with fewer drones takes longer."""
+    """Few drones move as one drops out, each with a reason; with forty fewer, all is done later."""
     printed = run(checkout / "examples" / "replan.py")
-    hours = [float(part.split(" h")[0]) for part in printed.split("done in ")[1:]]
-    assert len(hours) == 2
+    shares = [float(part.split(" %")[0]) for part in printed.split("drones move (")[1:]]
+    hours = [float(part.split(" h")[0]) for part in printed.split("done at ")[1:] if " h\n" in part[:12]]
+    assert len(shares) == len(hours) == 2
+    assert shares[0] < 20
     assert hours[0] < hours[1]
-    assert printed.count("drones drop out") == 2
-    last_lines = [block.strip().splitlines()[-2] for block in printed.split("; done in")[:-1]]
-    assert all(line.endswith(" 0 unserved") for line in last_lines)
+    assert " without it, at " in printed
 
 
 @pytest.mark.slow
