@@ -173,7 +173,7 @@ def _tasks(result: "Result") -> list[TaskScore]:
 def _tell(result: "Result") -> None:
     from alloc.allocators.summary import bottleneck_lines, figures
     from alloc.cli.output.console import table
-    from alloc.problems.text import number
+    from alloc.problems.text import heading, number
 
     score = result.evaluation
     assert score is not None
@@ -188,7 +188,9 @@ def _tell(result: "Result") -> None:
         ]
         for entry in _tasks(result)
     ]
-    say(table(["task", "workload", "agents", "ability W", "W - h", "done at (h)"], rows))
+    units = result.instance.units
+    header = ["task", heading("workload", units.work), "agents", "ability W", "W - h", heading("done at", units.time)]
+    say(table(header, rows))
     say("\n".join(["", f"{result.instance.name}:", *figures(result), *bottleneck_lines(result)]))
     for violation in score.violations:
         agent, task = result.instance.agent_ids[violation.agent], result.instance.task_ids[violation.task]
