@@ -170,7 +170,7 @@ function drawGrid(width, height) {
       element(grid, "text", axis ? { x: 4, y: line[1] - 3 } : { x: line[0] + 3, y: height - 5 }, text);
     }
   }
-  element(grid, "text", { x: width - 6, y: height - 5, "text-anchor": "end" }, plan.axes[0]);
+  element(grid, "text", { x: width - 6, y: height - 20, "text-anchor": "end" }, plan.axes[0]);
   element(grid, "text", { x: 4, y: 14 }, plan.axes[1]);
 }
 function drawLabels() {

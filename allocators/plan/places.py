@@ -14,6 +14,9 @@ from alloc.problems.units import labels
 STEEPEST = 0.05
 """Least cosine of a latitude by which a map is stretched."""
 
+MOST_BASES = 20_000
+"""Places beyond which a sample is shown: more would only overlap."""
+
 
 @dataclass(frozen=True, eq=False)
 class Places:
@@ -86,19 +89,20 @@ class Base:
     task: int | None
 
 
-def bases(instance: Instance, where: Places, agents: IntArray | None = None) -> list[Base]:
-    """Return where the agents begin, or those of `agents`; those whose place is unknown are left out."""
-    chosen = np.arange(instance.n) if agents is None else agents
-    chosen = chosen[~np.isnan(where.starts[chosen, 0])]
-    if not len(chosen):
+def bases(instance: Instance, where: Places, most: int = MOST_BASES) -> list[Base]:
+    """Return where the agents begin, evenly spaced ones beyond `most`; agents whose place is unknown are left out."""
+    known = np.flatnonzero(~np.isnan(where.starts[:, 0]))
+    if not len(known):
         return []
-    place, group = np.unique(where.starts[chosen], axis=0, return_inverse=True)
+    place, group = np.unique(where.starts[known], axis=0, return_inverse=True)
     order = np.argsort(group.ravel(), kind="stable")
-    members = np.split(chosen[order], np.searchsorted(group.ravel()[order], np.arange(1, len(place))))
+    first = np.searchsorted(group.ravel()[order], np.arange(len(place) + 1))
+    kept = np.unique(np.linspace(0, len(place) - 1, min(len(place), most)).astype(np.intp)).tolist()
+    members = [known[order[first[k] : first[k + 1]]] for k in kept]
     task_at = {tuple(row): j for j, row in reversed(list(enumerate(where.tasks.tolist())))}
-    tasks = [task_at.get(tuple(row)) for row in place.tolist()]
+    tasks = [task_at.get(tuple(row)) for row in place[kept].tolist()]
     names = _names(instance, members, tasks)
-    return [Base(*base) for base in zip(names, place, members, tasks, strict=True)]
+    return [Base(*base) for base in zip(names, place[kept], members, tasks, strict=True)]
 
 
 def _names(instance: Instance, members: list[IntArray], tasks: list[int | None]) -> list[str]:

@@ -7,8 +7,8 @@ from alloc.problems.instance import FloatArray
 
 Box = tuple[float, float, float, float]
 
-SIDES = ((0, 1), (0, -1), (1, 0), (-1, 0))
-"""Above, below, right, left."""
+SIDES = ((0, 1), (0, -1), (1, 0), (-1, 0), (0.75, 0.75), (-0.75, 0.75), (0.75, -0.75), (-0.75, -0.75))
+"""Above, below, right, left, and between."""
 
 
 def place_labels(centre: FloatArray, radius: FloatArray, width: FloatArray, height: float) -> FloatArray:
