@@ -81,12 +81,15 @@ class Base:
         Those who begin there.
     task : int or None
         The task that is there.
+    is_named : bool
+        Whether the name says more than a number.
     """
 
     name: str
     place: FloatArray
     agents: IntArray
     task: int | None
+    is_named: bool
 
 
 def bases(instance: Instance, where: Places, most: int = MOST_BASES) -> list[Base]:
@@ -102,19 +105,23 @@ def bases(instance: Instance, where: Places, most: int = MOST_BASES) -> list[Bas
     task_at = {tuple(row): j for j, row in reversed(list(enumerate(where.tasks.tolist())))}
     tasks = [task_at.get(tuple(row)) for row in place[kept].tolist()]
     names = _names(instance, members, tasks)
-    return [Base(*base) for base in zip(names, place[kept], members, tasks, strict=True)]
+    count = Counter(names)
+    found = []
+    for k, (name, agents, task) in enumerate(zip(names, members, tasks, strict=True)):
+        is_named = bool(name) and count[name] == 1
+        found.append(Base(name if is_named else f"base {k + 1}", place[kept[k]], agents, task, is_named))
+    return found
 
 
 def _names(instance: Instance, members: list[IntArray], tasks: list[int | None]) -> list[str]:
-    """Return the name of each base: a number where the ids of its agents say nothing."""
+    """Return the name of each base, empty where the ids of its agents say nothing."""
     everybody = _beginning(list(instance.agent_ids))
     names = []
     for agents, task in zip(members, tasks, strict=True):
         ids = [instance.agent_ids[i] for i in agents.tolist()]
         shared = "" if len(members) > 1 and _beginning(ids) == everybody else _beginning(ids)
         names.append(instance.task_ids[task] if task is not None else ids[0] if len(ids) == 1 else shared)
-    count = Counter(names)
-    return [name if name and count[name] == 1 else f"base {number}" for number, name in enumerate(names, 1)]
+    return names
 
 
 def _beginning(ids: list[str]) -> str:

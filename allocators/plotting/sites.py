@@ -156,7 +156,7 @@ def _finish(axes: "Axes", result: "Result", where: Places) -> None:
     if is_late_coloured(result):
         bar = ScalarMappable(Normalize(*colour_range(result)), scale())
         label = heading("completion time", result.instance.units.time)
-        axes.figure.colorbar(bar, ax=axes, label=label, shrink=0.8, pad=0.02)
+        axes.figure.colorbar(bar, cax=axes.inset_axes((1.03, 0.1, 0.035, 0.8)), label=label)
 
 
 def name_sites(axes: "Axes", result: "Result", sites: Sites) -> None:
@@ -171,17 +171,18 @@ def name_sites(axes: "Axes", result: "Result", sites: Sites) -> None:
     if not any(names):
         return
     size = 8.0 if len([name for name in names if name]) <= MAX_LABELS // 2 else 6.5
-    shown = len(names)  # small marks of many bases may be written over
-    place = np.vstack([sites.where.tasks, *(base.place for base in sites.bases)])[:shown]
+    place = np.vstack([sites.where.tasks, *(base.place for base in sites.bases[: len(starts)])])
+    radius = sites.radius[: len(place)].copy()
+    radius[: 0 if is_named else m] = 0.0  # many small circles may be written over
     centre = axes.transData.transform(place) * 72 / axes.figure.dpi
     width = np.array([0.62 * size * len(name) for name in names])
-    middle = place_labels(centre, sites.radius[:shown], width, 1.1 * size)
+    middle = place_labels(centre, radius, width, 1.1 * size)
     for j in np.flatnonzero(~np.isnan(middle[:, 0])):
         if names[j]:
             colour = "black" if j < m else "#3a4450"
             _write(axes, plain_text(names[j]), place[j], middle[j] - centre[j], size, colour, italic=bool(j >= m))
     if is_named:
-        _write_counts(axes, result, centre[:m], sites.radius[:m], size, place[:m])
+        _write_counts(axes, result, centre[:m], radius[:m], size, place[:m])
 
 
 def _write_counts(
@@ -190,7 +191,7 @@ def _write_counts(
     counts, dark = _group_sizes(result), shades(result) > 0.5
     room = visible(centre, radius, 0.5 * size) & ~unserved_tasks(result)
     for j in np.flatnonzero(room & (radius >= 0.65 * size) & ~np.isnan(centre[:, 0])):
-        if 0.36 * size * len(str(counts[j])) < radius[j]:
+        if 0.42 * size * len(str(counts[j])) < radius[j]:
             _write(axes, str(counts[j]), place[j], np.zeros(2), size, "white" if dark[j] else "black")
 
 

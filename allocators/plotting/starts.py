@@ -19,7 +19,7 @@ MAX_NAMES = 40
 """Number of bases above which they are not named."""
 
 FEW_AGENTS = 15
-"""Number of agents up to which all are named where they begin."""
+"""Number of agents of a fleet up to which they are named at bases without a name."""
 
 LONGEST_NAME = 18
 """Characters of a name before it is shortened."""
@@ -50,16 +50,15 @@ def sizes(result: "Result", begin: list[Base]) -> "FloatArray":
 
 
 def start_names(result: "Result", begin: list[Base]) -> list[str]:
-    """Return what is written beside each base: its agents where they are few, else its name and their number."""
+    """Return what is written beside each base: its name and how many agents begin there, or few agents."""
     if len(begin) > MAX_NAMES:
         return []
-    ids = short_names(result.instance.agent_ids, LONGEST_NAME) if result.instance.n <= FEW_AGENTS else None
     short = short_names([base.name for base in begin], LONGEST_NAME)
     names = []
     for base, name in zip(begin, short, strict=True):
         count = len(base.agents)
-        if ids is not None and count <= 3:
-            names.append(", ".join(ids[i] for i in base.agents.tolist()))
+        if result.instance.n <= FEW_AGENTS and count <= 3 and not base.is_named:
+            names.append(", ".join(short_names([result.instance.agent_ids[i] for i in base.agents], LONGEST_NAME)))
         else:
             names.append(name if count == 1 else f"{name} ({count})")
     return names

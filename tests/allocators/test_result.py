@@ -184,13 +184,8 @@ def test_the_table_has_a_row_per_agent() -> None:
     assert frame["task"].tolist()[:2] == ["t1", "t2"]
     assert frame["distance"].tolist() == [0.0, 1.0, 0.0]
     assert frame["completion_time"].tolist()[:2] == pytest.approx([4 / 3, 1.0])
-    assert frame.columns[frame.isna().to_numpy()[2]].tolist() == [
-        "task",
-        "arrival",
-        "completion_time",
-        "battery",
-        "battery_left",
-    ]
+    unknown = frame.columns[frame.isna().to_numpy()[2]].tolist()
+    assert unknown == ["task", "arrival", "completion_time", "battery", "battery_left"]
     assert replace(found, allocation=None, evaluation=None).to_frame().empty
 
 
