@@ -109,7 +109,8 @@ def bases(instance: Instance, where: Places, most: int = MOST_BASES) -> list[Bas
     found = []
     for k, (name, agents, task) in enumerate(zip(names, members, tasks, strict=True)):
         is_named = bool(name) and count[name] == 1
-        found.append(Base(name if is_named else f"base {k + 1}", place[kept[k]], agents, task, is_named))
+        shown = name if is_named else f"base {k + 1}" if len(kept) > 1 else "base"
+        found.append(Base(shown, place[kept[k]], agents, task, is_named))
     return found
 
 
