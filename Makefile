@@ -3,6 +3,8 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := PYTHONWARNINGS=ignore $(BIN)/python -m pip --quiet --disable-pip-version-check
+# A process of tests for each processor, each with one thread in torch, and most of a gigabyte of memory.
+PARALLEL := -n logical --maxprocesses 8 --dist worksteal
 CODE := pyproject.toml $(shell find problems allocators cli -name '*.py' -o -name '*.safetensors')
 EXAMPLE := examples/earthquakes/alaska.json
 
@@ -12,8 +14,8 @@ solve: $(VENV)/.installed  ## allocate the agents of a real instance with GAPPO,
 	@mkdir -p out
 	$(BIN)/alloc solve $(EXAMPLE) --method gappo --objective makespan-energy --output out/alaska-result.json --plot out/alaska.png
 
-test: $(VENV)/.tested  ## run the tests
-	$(BIN)/python -m pytest
+test: $(VENV)/.tested  ## run the tests, on all processors
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest $(PARALLEL)
 
 check: $(VENV)/.checked  ## lint, format, imports and types
 	$(BIN)/ruff check .

@@ -9,7 +9,7 @@ from alloc.allocators.contract.improvement import Improvement
 from alloc.allocators.contract.tolerance import EXACT, MakespanTolerance
 from alloc.allocators.result import Result
 from alloc.problems import Allocation, InputError, Instance, Objective
-from alloc.problems.allocation import require_fit
+from alloc.problems.allocation import CarriedOver, require_fit
 from alloc.problems.arguments import of_type, real, whole
 
 LARGEST_SEED = 2**63 - 1
@@ -81,6 +81,40 @@ def checked_seed(seed: int, name: str = "seed") -> int:
 def checked_threads(threads: int | None) -> int | None:
     """Return the number of threads, or None if none is given."""
     return None if threads is None else whole(threads, "threads", 1, MOST_THREADS)
+
+
+def checked_pins(pins: object) -> dict[str, str | None]:
+    """Return the task id of each agent id that is pinned, None for idle."""
+    found: dict[str, str | None] = {}
+    for agent, task in of_type({} if pins is None else pins, Mapping, "pins").items():
+        if not isinstance(agent, str) or not isinstance(task, str | None):
+            raise InputError(f"must give the id of a task, or None, for ids of agents, got {agent!r}: {task!r}", "pins")
+        found[agent] = task
+    return found
+
+
+def as_start(instance: Instance, given: Start) -> tuple[Allocation, CarriedOver]:
+    """Return the plan that a run starts from, and how the instance differs from the one that it was made for.
+
+    Parameters
+    ----------
+    instance : Instance
+    given : Allocation, Result or mapping
+        Agents and tasks of a result or a mapping that have gone are left out.
+
+    Raises
+    ------
+    InputError
+        If it is none of these, or does not fit `instance` at all; its place is ``start``.
+    """
+    if isinstance(given, Result) and given.allocation is not None:
+        given = given.allocation.to_ids(given.instance)
+    if not isinstance(given, Mapping):
+        return as_allocation(instance, given, "start"), CarriedOver()
+    try:
+        return Allocation.carried_over(instance, given)
+    except InputError as error:
+        raise InputError(error.message, "start") from error
 
 
 def as_allocation(instance: Instance, given: Start, name: str) -> Allocation:

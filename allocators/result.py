@@ -9,7 +9,8 @@ from alloc.allocators.contract.improvement import TracePoint
 from alloc.allocators.contract.status import Status
 from alloc.allocators.contract.tolerance import EXACT, PROVEN, MakespanTolerance, relative_gap
 from alloc.allocators.plan.table import AgentRow, agent_rows
-from alloc.allocators.result_document import read_document, result_fields
+from alloc.allocators.replanning.moves import Moves
+from alloc.allocators.result_document import moves_document, read_document, result_fields
 from alloc.allocators.summary import summary
 from alloc.problems import Allocation, Evaluation, InputError, Instance, MissingPackageError, Objective
 from alloc.problems.evaluation import RELATIVE_TOLERANCE
@@ -51,6 +52,8 @@ class Result:
     notes : tuple of str
         Messages for the user: what ``auto`` picked and why, notes of the method on its run, which tasks too few agents
         can reach.
+    moves : Moves or None
+        How the allocation differs from the plan in force, where there is one.
     tolerance : MakespanTolerance
         The slack and the limit that were given for the makespan.
     """
@@ -69,6 +72,7 @@ class Result:
     notes: tuple[str, ...] = ()
     makespan_limit: float | None = None
     tolerance: MakespanTolerance = EXACT
+    moves: Moves | None = None
 
     @property
     def makespan(self) -> float | None:
@@ -101,7 +105,8 @@ class Result:
             return Status.NO_SOLUTION
         if self.evaluation.unserved_tasks:
             return Status.INFEASIBLE
-        cheap = self.energy_gap is not None and self.energy_gap <= PROVEN
+        gap = self.energy_gap if self.moves is None or self.moves.cost is None else self.moves.gap
+        cheap = gap is not None and gap <= PROVEN
         proven = self._is_fast_enough and (cheap or self.objective is Objective.MAKESPAN)
         return Status.OPTIMAL if proven else Status.FEASIBLE
 
@@ -153,6 +158,7 @@ class Result:
                 {"agent": ids.agent_ids[v.agent], "task": ids.task_ids[v.task], "reason": v.reason}
                 for v in score.violations
             ],
+            **({} if self.moves is None else {"moves": moves_document(self.moves, ids)}),
             "runtime_s": self.runtime_s,
             **({"units": units} if units else {}),
             "assignment": {} if self.allocation is None else self.allocation.to_ids(ids),

@@ -9,6 +9,7 @@ from alloc.allocators.contract.budget import StopReason
 from alloc.allocators.contract.improvement import TracePoint
 from alloc.allocators.contract.status import Status
 from alloc.allocators.contract.tolerance import EXACT, MakespanTolerance
+from alloc.allocators.replanning.moves import Moves
 from alloc.problems import Allocation, Evaluation, InputError, Instance, Objective, evaluate
 from alloc.problems.arguments import choice, of_type, real, shown, text, whole
 from alloc.problems.evaluation import RELATIVE_TOLERANCE
@@ -40,6 +41,7 @@ class ResultFields(TypedDict):
     trace: tuple[TracePoint, ...]
     makespan_limit: float | None
     tolerance: MakespanTolerance
+    moves: Moves | None
 
 
 def read_document(path: PathLike) -> dict[str, object]:
@@ -103,7 +105,38 @@ def result_fields(document: Mapping[str, object], instance: Instance) -> ResultF
         "makespan_limit": limit,
         # the slack is not in the document; that there was one matters only where it was needed for the proof
         "tolerance": MakespanTolerance(limit=limit) if limit and status is Status.OPTIMAL else EXACT,
+        "moves": None if fields.get("moves") is None else _moves(of_type(fields["moves"], dict, "moves"), instance),
     }
+
+
+def moves_document(moves: Moves, instance: Instance) -> dict[str, object]:
+    """Return how an allocation differs from the plan in force, ready for JSON."""
+    return {
+        "moved": [instance.agent_ids[i] for i in moves.agents],
+        "stayed": moves.stayed,
+        "idle": [instance.agent_ids[i] for i in moves.idle],
+        "price": moves.price,
+        "cost": moves.cost,
+        "cost_lower_bound": moves.cost_lower_bound,
+        "gap": moves.gap,
+    }
+
+
+def _moves(fields: Mapping[str, object], instance: Instance) -> Moves:
+    """Return what `moves_document` turned into `fields`."""
+    names = {key: of_type(fields.get(key), list, f"moves.{key}") for key in ("moved", "idle")}
+    for key, ids in names.items():
+        for name in ids:
+            if name not in instance.agent_index:
+                raise InputError(f"no agent {shown(name)} in instance {instance.name!r}", f"moves.{key}")
+    return Moves(
+        agents=tuple(instance.agent_index[name] for name in names["moved"]),
+        stayed=whole(_integral(fields.get("stayed")), "moves.stayed"),
+        idle=tuple(instance.agent_index[name] for name in names["idle"]),
+        price=real(fields.get("price"), "moves.price"),
+        cost=_nullable(fields, "cost"),
+        cost_lower_bound=_nullable(fields, "cost_lower_bound"),
+    )
 
 
 def _require_scores(fields: Mapping[str, object], evaluation: Evaluation) -> None:

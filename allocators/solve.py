@@ -4,7 +4,7 @@ import importlib
 import math
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 
 from alloc.allocators.auto import choose
@@ -15,17 +15,31 @@ from alloc.allocators.contract.budget import Budget, StopReason
 from alloc.allocators.contract.improvement import Improvement
 from alloc.allocators.contract.search import Search
 from alloc.allocators.decomposition import Decomposition
+from alloc.allocators.heuristic.greedy.list_schedule import load_compiled
 from alloc.allocators.parallel.processors import available_threads
 from alloc.allocators.refusal import refuse
 from alloc.allocators.registry import load
-from alloc.allocators.request import Request, Start, as_allocation, checked_seed, checked_threads, checked_tolerance
+from alloc.allocators.replanning.plan import concluded, replanning
+from alloc.allocators.request import (
+    Request,
+    Start,
+    as_start,
+    checked_pins,
+    checked_seed,
+    checked_threads,
+    checked_tolerance,
+)
 from alloc.allocators.result import Result
 from alloc.allocators.runtime.interrupts import ended_with_process, signals_set
 from alloc.problems import InputError, Instance, Objective, find_shortage, serve_all
-from alloc.problems.arguments import choice, event, flag, function, of_type
+from alloc.problems.allocation import CarriedOver
+from alloc.problems.arguments import choice, event, flag, function, of_type, real
 
-REPAIR_S = 0.3
+REPAIR_S = 0.2
 """Time to serve more tasks after a run whose own time is up."""
+
+MATCHED_PAIRS = 1_000_000
+"""Pairs of origin and task beyond which the libraries for matchings are loaded before the run."""
 
 
 def solve(
@@ -41,6 +55,8 @@ def solve(
     threads: int | None = None,
     makespan_slack: float = 0.0,
     makespan_limit: float | None = None,
+    move_price: float = 0.0,
+    pins: Mapping[str, str | None] | None = None,
     on_improvement: Callable[[Improvement], None] | None = None,
     stop: threading.Event | None = None,
     handle_signals: bool = True,
@@ -55,18 +71,25 @@ def solve(
     method : str or Allocator
         A name, or an allocator with its own parameters, such as ``GeneticAlgorithm(population=200)``.
     objective : Objective or str
-        ``makespan``, or ``makespan-energy`` for the least energy at the least makespan.
+        ``makespan``; ``makespan-energy`` for the least energy at the least makespan; or ``makespan-moves`` for the
+        fewest agents that get another task than they have in `start`.
     time_limit_s, iterations, target_gap
         The budget; see `Budget`.
     seed : int
         Seed of all random numbers, from 0 to 2^63 - 1.
     start : Allocation, Result or dict, optional
-        A warm start; the answer is never worse. A dict gives the task id of each agent id, None for idle.
+        A warm start; the answer is never worse. A dict gives the task id of each agent id, None for idle. Agents and
+        tasks that have gone since are left out.
     threads : int, optional
         Threads that the method may use; as many as there are processors by default.
     makespan_slack, makespan_limit : float
         Relative excess over the fastest allocation found, and hours, up to which makespans are equally good, so that
         the energy decides; for the objective ``makespan-energy``. See `MakespanTolerance`.
+    move_price : float
+        Energy that each agent counts for that gets another task than in `start`, with the objective
+        ``makespan-energy``.
+    pins : mapping, optional
+        Agents that must do one task: its id, or None for idle, by agent id.
     on_improvement : callable, optional
         Called with every new best; an exception from it ends the run and propagates.
     stop : threading.Event, optional
@@ -93,21 +116,26 @@ def solve(
     of_type(instance, Instance, "instance")
     of_type(method, (str, Allocator), "method")
     goal = choice(Objective, objective, "objective")
+    plan, carried = (None, CarriedOver()) if start is None else as_start(instance, start)
+    price = float(real(move_price, "move_price"))
+    plan_in_force = replanning(instance, goal, plan, carried, price, checked_pins(pins))
     request = Request(
-        instance=instance,
-        objective=goal,
+        instance=plan_in_force.priced_instance,
+        objective=plan_in_force.method_objective,
         budget=Budget(time_limit_s, iterations, target_gap),
         tolerance=checked_tolerance(makespan_slack, makespan_limit, goal),
         seed=checked_seed(seed),
-        start=None if start is None else as_allocation(instance, start, "start"),
+        start=None if plan is None else plan_in_force.completed(plan),
         threads=checked_threads(threads) or available_threads(),
         on_improvement=function(on_improvement, "on_improvement"),
         stop=event(stop, "stop") or threading.Event(),
     )
     handle_signals = flag(handle_signals, "handle_signals")
+    carried_notes = [f"since the plan was made, {carried}"] if str(carried) else []
     allocator, notes, spent_s = _prepared(method, request, parameters, settings)
     with ended_with_process(request.stop.set), signals_set(request.stop) if handle_signals else nullcontext():
-        return _run(allocator, request, notes, spent_s)
+        result = _run(allocator, request, [*notes, *carried_notes], spent_s)
+    return concluded(result, plan_in_force)
 
 
 def _prepared(
@@ -137,10 +165,19 @@ def _prepared(
     allocator = load(method, parameters, **settings) if isinstance(method, str) else method
     begin = time.monotonic()
     refuse(allocator, request.instance, request.objective, request.budget, request.tolerance)
+    is_matched = _is_matched(request.instance)
     spent_s += time.monotonic() - begin
+    load_compiled(request.instance)  # loading is not part of the run
+    for library in ("scipy.spatial", "scipy.sparse.csgraph") if is_matched else ():
+        importlib.import_module(library)
     if request.budget.target_gap is not None:
-        importlib.import_module("scipy.optimize")  # for the bound before the run; loading is not part of it
+        importlib.import_module("scipy.optimize")  # for the bound before the run
     return allocator, notes, spent_s
+
+
+def _is_matched(instance: Instance) -> bool:
+    """Whether matchings are likely to be sought, among so many pairs that loading takes little time beside that."""
+    return instance.reach.pairs > MATCHED_PAIRS and (instance.n < instance.m or not instance.reach.is_complete)
 
 
 def _require_none(parameters: object, settings: dict[str, object]) -> None:

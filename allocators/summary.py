@@ -13,6 +13,7 @@ from alloc.problems.text import counted, labelled, number, percent
 from alloc.problems.units import labels
 
 if TYPE_CHECKING:
+    from alloc.allocators.replanning.moves import Moves
     from alloc.allocators.result import Result
 
 STOPS = {
@@ -93,9 +94,33 @@ def figures(result: "Result") -> list[str]:
         least = labelled(number(result.energy_lower_bound), units.energy)
         energy += f" (at least {least} {when}, gap {percent(result.energy_gap)})"
     lines.append(f"{energy}, distance {labelled(number(score.distance), units.distance)}")
+    if result.moves is not None:
+        lines.append(f"  moves     {moves_line(result.moves, result.instance)}")
     if score.battery_remaining_percent is not None:
         lines.append(f"  battery   {score.battery_remaining_percent:.1f} % left on average")
     return lines
+
+
+def moves_line(moves: "Moves", instance: Instance) -> str:
+    """Return how many agents get another task than they had, and which.
+
+    Parameters
+    ----------
+    moves : Moves
+    instance : Instance
+    """
+    count = len(moves.agents)
+    total = count + moves.stayed + len(moves.idle)
+    line = f"{count} of {total} {'moves' if count == 1 else 'move'}"
+    if count:
+        line += f": {_list([instance.agent_ids[i] for i in moves.agents])}"
+    if moves.idle:
+        line += f"; {counted(len(moves.idle), 'agent')} of them {'is' if len(moves.idle) == 1 else 'are'} idle now"
+    if moves.cost is not None:
+        line += f"; cost {number(moves.cost)}"
+    if moves.cost_lower_bound is not None:
+        line += f" (at least {number(moves.cost_lower_bound)}, gap {percent(moves.gap)})"
+    return line
 
 
 def _ending(result: "Result") -> str:

@@ -49,7 +49,9 @@ InstanceArgument = Annotated[str, typer.Argument(metavar="INSTANCE", help=f"The 
 InstancesArgument = Annotated[list[str], typer.Argument(metavar="INSTANCE...", help=f"Instances, each {READABLE}.")]
 ObjectiveOption = Annotated[
     Objective,
-    typer.Option(help="What is minimised, after the number of unserved tasks: the makespan, or then the energy too."),
+    typer.Option(
+        help="What is minimised, after the number of unserved tasks: the makespan, then the energy or the moves."
+    ),
 ]
 TimeLimitOption = Annotated[
     float | None,

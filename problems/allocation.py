@@ -10,7 +10,39 @@ from alloc.problems.arguments import of_type
 from alloc.problems.errors import InputError, nearest
 from alloc.problems.fields import ReadOnly, indices
 from alloc.problems.instance import Instance
+from alloc.problems.text import counted
 from alloc.problems.vocabulary import IDLE
+
+
+@dataclass(frozen=True)
+class CarriedOver:
+    """How an instance differs from the one that a plan was made for, by ids.
+
+    Attributes
+    ----------
+    gone_agents, new_agents : tuple of str
+        Agents that only the plan has, and only the instance.
+    gone_tasks : tuple of str
+        Tasks that only the plan has.
+    agents_without_task : tuple of str
+        Agents whose task has gone.
+    """
+
+    gone_agents: tuple[str, ...] = ()
+    gone_tasks: tuple[str, ...] = ()
+    new_agents: tuple[str, ...] = ()
+    agents_without_task: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        """One line, empty where nothing has changed."""
+        parts = [
+            f"{counted(len(names), kind)} {'has' if len(names) == 1 else 'have'} gone"
+            for kind, names in (("agent", self.gone_agents), ("task", self.gone_tasks))
+            if names
+        ]
+        if self.new_agents:
+            parts.append(f"{counted(len(self.new_agents), 'agent')} {'is' if len(self.new_agents) == 1 else 'are'} new")
+        return ", ".join(parts)
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +99,29 @@ class Allocation(ReadOnly):
                 )
             tasks[instance.agent_index[agent]] = IDLE if task is None else instance.task_index[task]
         return cls(tasks)
+
+    @classmethod
+    def carried_over(cls, instance: Instance, assignment: Mapping[str, str | None]) -> "tuple[Allocation, CarriedOver]":
+        """Return what is left of a plan for another state of affairs, and what has changed since.
+
+        Agents that have gone are left out, and those whose task has gone are idle.
+
+        Raises
+        ------
+        InputError
+            If the plan has no agent of `instance`, or a task is no string.
+        """
+        here = {name: task for name, task in assignment.items() if name in instance.agent_index}
+        if assignment and not here:
+            raise InputError(f"names no agent of instance {instance.name!r}", "assignment")
+        lost = {name for name, task in here.items() if task is not None and task not in instance.task_index}
+        plan = cls.from_ids(instance, {name: None if name in lost else task for name, task in here.items()})
+        return plan, CarriedOver(
+            gone_agents=tuple(name for name in assignment if name not in instance.agent_index),
+            gone_tasks=tuple(dict.fromkeys(str(here[name]) for name in here if name in lost)),
+            new_agents=tuple(name for name in instance.agent_ids if name not in assignment),
+            agents_without_task=tuple(sorted(lost)),
+        )
 
     def to_ids(self, instance: Instance) -> dict[str, str | None]:
         """Return the task id of each agent id, None for idle, in the order of the agents."""

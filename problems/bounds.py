@@ -179,8 +179,8 @@ def energy_lower_bound(instance: Instance, makespan: float, time_limit_s: float 
     """Return a lower bound on the energy of every allocation with at most this makespan, or None if none is at hand.
 
     With a price on moves, on energy and price together. The linear programme buys ability for each task at that cost;
-    an agent that could do a task alone within `makespan` counts as just enough for it. None where it would take more than `time_limit_s` or
-    `LP_SIZE_LIMIT` pairs, or if `makespan` is too small.
+    an agent that could do a task alone within `makespan` counts as just enough for it. None where it would take more
+    than `time_limit_s` or `LP_SIZE_LIMIT` pairs, or if `makespan` is too small.
 
     Parameters
     ----------

@@ -8,9 +8,9 @@ from numbers import Real
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from alloc.problems.arguments import listed
+from alloc.problems.arguments import listed, shown
 from alloc.problems.errors import InputError
-from alloc.problems.vocabulary import IDLE
+from alloc.problems.vocabulary import IDLE, METRICS
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
@@ -231,6 +231,20 @@ def _indices(entry: Iterable[int], row: int) -> IntArray:
     if array.ndim != 1 or (len(array) and array.dtype.kind not in "iu"):
         raise InputError(message, place)
     return indices(array, place, message)
+
+
+def metric(name: object) -> str:
+    """Return the name of a metric."""
+    if name in METRICS:
+        return str(name)
+    raise InputError(f"must be one of {', '.join(METRICS)}, got {shown(name)}", "metric")
+
+
+def unit_share(tau: float) -> float:
+    """Return a number strictly between 0 and 1."""
+    if isinstance(tau, Real) and not isinstance(tau, bool) and 0 < tau < 1:
+        return float(tau)
+    raise InputError(f"must lie strictly between 0 and 1, got {shown(tau)}", "tau")
 
 
 def require(

@@ -1,39 +1,25 @@
 """What is to be solved: agents with abilities, tasks with workloads, and who can reach what."""
 
-from collections.abc import Iterable, Sequence, Set
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
-from numbers import Real
-from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from alloc.problems import eligibility, fields
-from alloc.problems.arguments import listed, of_type, real, shown, text
-from alloc.problems.distances.build import build_reach, restricted_reach
+from alloc.problems.arguments import of_type, real, text
+from alloc.problems.changes import add, move, remove
+from alloc.problems.distances.build import build_reach
 from alloc.problems.distances.geodesic import METRES
 from alloc.problems.distances.given import DistanceTable
-from alloc.problems.distances.metric import GEOGRAPHIC, METRICS
 from alloc.problems.distances.reach import Reach
-from alloc.problems.errors import InputError, nearest
+from alloc.problems.errors import InputError
 from alloc.problems.fields import BoolArray, FloatArray, IntArray
 from alloc.problems.units import Units
-from alloc.problems.vocabulary import IDLE
+from alloc.problems.vocabulary import GEOGRAPHIC
 
 __all__ = ["FloatArray", "Instance", "IntArray"]
-
-AGENT_ARRAYS = (
-    "ability",
-    "agent_position",
-    "start_task",
-    "battery",
-    "communication_range",
-    "speed",
-    "agent_energy_per_distance",
-    "returns",
-)
-"""Fields of an instance with one row per agent; ids, allowed tasks and skills are tuples."""
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
@@ -152,12 +138,13 @@ class Instance(fields.ReadOnly):
         n, m = len(w), len(h)
         if n == 0 or m == 0:
             raise InputError("an instance needs at least one agent and one task", "tasks" if n else "agents")
+        agents, tasks = fields.ids(agent_ids, n, "a", "agent"), fields.ids(task_ids, m, "t", "task")
         values: dict[str, object] = {
             "ability": w,
             "workload": h,
             "name": text(name, "name"),
-            "agent_ids": fields.ids(agent_ids, n, "a", "agent"),
-            "task_ids": fields.ids(task_ids, m, "t", "task"),
+            "agent_ids": agents,
+            "task_ids": tasks,
             "agent_position": fields.positions(agent_position, n, "agent"),
             "task_position": fields.positions(task_position, m, "task"),
             "start_task": fields.starts(start_task, n, m),
@@ -166,16 +153,16 @@ class Instance(fields.ReadOnly):
             "speed": fields.limits(speed, "speed", n),
             "allowed_tasks": fields.allowed(allowed_tasks, n, m),
             "priority": np.ones(m) if priority is None else fields.vector(priority, "priority", m),
-            "tau": _unit_share(tau),
+            "tau": fields.unit_share(tau),
             "energy_per_distance": float(real(energy_per_distance, "energy_per_distance")),
             "agent_energy_per_distance": fields.rates(agent_energy_per_distance, energy_per_distance, n),
             "returns": fields.flags(returns, "returns", n),
             "skills": eligibility.name_sets(skills, n, "agent", "skills"),
             "needs": eligibility.name_sets(needs, m, "task", "needs"),
-            "metric": _metric(metric),
+            "metric": fields.metric(metric),
+            "distances": None if distances is None else DistanceTable.fitting(distances, agents, tasks),
             "units": Units() if units is None else of_type(units, Units, "units"),
         }
-        values["distances"] = _table(distances, values["agent_ids"], values["task_ids"])
         for key, value in values.items():
             if isinstance(value, np.ndarray):
                 value.setflags(write=False)
@@ -235,7 +222,7 @@ class Instance(fields.ReadOnly):
     def start_position(self) -> FloatArray:
         """Where each agent begins, shape (n, 3): its position, else that of its start task, else NaN."""
         place = self.agent_position.copy()
-        unknown = np.isnan(place[:, 0]) & (self.start_task != IDLE)
+        unknown = np.isnan(place[:, 0]) & (self.start_task >= 0)
         place[unknown] = self.task_position[self.start_task[unknown]]
         place.setflags(write=False)
         return place
@@ -271,91 +258,25 @@ class Instance(fields.ReadOnly):
         return {name: index for index, name in enumerate(self.task_ids)}
 
     def restricted(self, agents: IntArray, tasks: IntArray) -> "Instance":
-        """Return the problem of some agents and tasks alone, in this order; agents stay where they begin.
-
-        Parameters
-        ----------
-        agents, tasks : ndarray of int
-            Indices, none twice.
-        """
-        number = np.full(self.m + 1, IDLE, dtype=np.intp)
-        number[tasks] = np.arange(len(tasks))
-        arrays = {name: getattr(self, name)[agents] for name in AGENT_ARRAYS}
-        arrays |= {"agent_position": self.start_position[agents], "start_task": number[self.start_task[agents]]}
-        lists, table = self.allowed_tasks, self.distances
-        part = replace(
-            self,
-            agent_ids=tuple(self.agent_ids[i] for i in agents.tolist()),
-            task_ids=tuple(self.task_ids[j] for j in tasks.tolist()),
-            workload=self.workload[tasks],
-            task_position=self.task_position[tasks],
-            priority=self.priority[tasks],
-            allowed_tasks=None if lists is None else tuple(_renamed(lists[i], number) for i in agents.tolist()),
-            skills=None if self.skills is None else tuple(self.skills[i] for i in agents.tolist()),
-            needs=None if self.needs is None else tuple(self.needs[j] for j in tasks.tolist()),
-            distances=None if table is None else table.restricted(agents, tasks),
-            **arrays,
-        )
-        part.__dict__["reach"] = restricted_reach(
-            self.reach, agents, tasks
-        )  # what a start outside the part gives, stays
-        return part
+        """Return the problem of some agents and tasks alone, by their indices."""
+        return remove.restricted(self, agents, tasks)
 
     def without_agents(self, gone: Iterable[str]) -> "Instance":
-        """Return the same problem without these agents, as when they drop out.
+        """Return the same problem without these agents, as when they drop out; see `remove.without_agents`."""
+        return remove.without_agents(self, gone)
 
-        Parameters
-        ----------
-        gone : iterable of str
-            Their ids.
+    def without_tasks(self, gone: Iterable[str]) -> "Instance":
+        """Return the same problem without these tasks; see `remove.without_tasks`."""
+        return remove.without_tasks(self, gone)
 
-        Raises
-        ------
-        InputError
-            If an id is unknown, or no agent is left.
-        """
-        ids = gone if isinstance(gone, Set) else listed(gone, "gone", "ids of agents")
-        for name in ids:
-            if not isinstance(name, str):
-                raise InputError(f"must be ids of agents, got {shown(name)}", "gone")
-            if name not in self.agent_index:
-                raise InputError(f"no agent {name!r} in instance {self.name!r}{nearest(name, self.agent_ids)}", "gone")
-        dropped = set(ids)
-        left = np.array([index for index, name in enumerate(self.agent_ids) if name not in dropped], dtype=np.intp)
-        lists, skills, table = self.allowed_tasks, self.skills, self.distances
-        return replace(
-            self,
-            agent_ids=tuple(self.agent_ids[index] for index in left),
-            allowed_tasks=None if lists is None else tuple(lists[index] for index in left),
-            skills=None if skills is None else tuple(skills[index] for index in left),
-            distances=None if table is None else table.restricted(left, np.arange(self.m)),
-            **{name: getattr(self, name)[left] for name in AGENT_ARRAYS},
-        )
+    def with_agents(self, added: Iterable[Mapping[str, object]]) -> "Instance":
+        """Return the same problem with more agents, at the end; see `add.with_agents`."""
+        return add.with_agents(self, added)
 
+    def with_tasks(self, added: Iterable[Mapping[str, object]]) -> "Instance":
+        """Return the same problem with more tasks, at the end; see `add.with_tasks`."""
+        return add.with_tasks(self, added)
 
-def _renamed(tasks: IntArray | None, number: IntArray) -> IntArray | None:
-    return None if tasks is None else number[tasks][number[tasks] != IDLE]
-
-
-def _metric(name: object) -> str:
-    if name in METRICS:
-        return str(name)
-    raise InputError(f"must be one of {', '.join(METRICS)}, got {shown(name)}", "metric")
-
-
-def _table(given: object, agent_ids: object, task_ids: object) -> DistanceTable | None:
-    """Return a table of distances that fits the instance."""
-    agents, tasks = cast("tuple[str, ...]", agent_ids), cast("tuple[str, ...]", task_ids)
-    if given is None:
-        return None
-    if isinstance(given, DistanceTable):
-        if (given.n, given.m) != (len(agents), len(tasks)):
-            raise InputError(f"is for {given.n} agents and {given.m} tasks", "distances")
-        return given
-    return DistanceTable.of(cast("Iterable[tuple[str, str, float]]", given), agents, tasks)
-
-
-def _unit_share(tau: float) -> float:
-    if isinstance(tau, Real) and not isinstance(tau, bool) and 0 < tau < 1:
-        return float(tau)
-    raise InputError(f"must lie strictly between 0 and 1, got {shown(tau)}", "tau")
+    def moved_to(self, places: Mapping[str, str | Sequence[float]]) -> "Instance":
+        """Return the same problem with agents at other places; see `move.moved_to`."""
+        return move.moved_to(self, places)

@@ -5,12 +5,20 @@ from enum import StrEnum
 IDLE = -1
 """The task index of an agent without a task."""
 
+EUCLIDEAN, MANHATTAN, GEOGRAPHIC = METRICS = ("euclidean", "manhattan", "geographic")
+"""How far two places are apart: (1) of the paper, the sum over the axes, or along the surface of the earth."""
+
 
 class Objective(StrEnum):
     """What is optimised, in this order, after the number of unserved tasks."""
 
     MAKESPAN = "makespan"
     MAKESPAN_ENERGY = "makespan-energy"
+    MAKESPAN_MOVES = "makespan-moves"
+
+
+OBJECTIVES = (Objective.MAKESPAN, Objective.MAKESPAN_ENERGY)
+"""What methods optimise; moves are to them a kind of energy, see `replanning`."""
 
 
 class Distribution(StrEnum):

@@ -1,13 +1,18 @@
-"""Functions that the tests of the engines run in other processes, which find them by their name."""
+"""Functions that the tests of the engines run in other processes, which find them by their name.
+
+Torch, which takes a process a second to load, is left to those that need it.
+"""
+
+from __future__ import annotations
 
 import os
 import signal
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import torch
-
-from alloc.allocators.runtime.torch_state import torch_threads
+if TYPE_CHECKING:
+    import torch
 
 
 def square(item: int) -> int:
@@ -18,6 +23,10 @@ def square(item: int) -> int:
 
 def step(state: dict[str, torch.Tensor]) -> dict[str, torch.Tensor]:
     """Multiply a seeded random matrix often enough for the last bits to show how it was computed."""
+    import torch
+
+    from alloc.allocators.runtime.torch_state import torch_threads
+
     generator = torch.Generator().manual_seed(int(state["seed"]))
     with torch_threads(1):
         weight = state["weight"] + torch.rand(state["weight"].shape, generator=generator)

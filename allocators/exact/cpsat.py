@@ -45,11 +45,12 @@ class CpSatSolver:
         _set_parameters(solver, model)
 
         def work() -> Answer:
-            program = formulate(model, monitor.stopped.is_set)
-            if program is None:
+            formulated = formulate(model, monitor.stopped.is_set)
+            if formulated is None:
                 return Answer()
+            program, scale = formulated
             reporter = None if model.cost is None else _Reporter(len(model.demand.class_of_pair), monitor)
-            return _read(solver, solver.solve(program, reporter), model)
+            return _read(solver, solver.solve(program, reporter), model, scale)
 
         return monitor.run(work, solver.stop_search) or Answer()
 
@@ -77,13 +78,14 @@ class _Reporter(cp_model.CpSolverSolutionCallback):
         self._monitor.report(_counts(self.response_proto.solution, self._pairs))
 
 
-def formulate(model: SolverModel, stopped: Callable[[], bool] = lambda: False) -> cp_model.CpModel | None:
+def formulate(model: SolverModel, stopped: Callable[[], bool] = lambda: False) -> tuple[cp_model.CpModel, float] | None:
     """Write the model of `exact.model` down in integers; its first variables are x.
 
     Returns
     -------
-    CpModel or None
-        None if `stopped` says so before it is complete.
+    program : CpModel
+    scale : float
+        Of its costs, see `integer_costs`; 1 without costs. None is returned if `stopped` says so before all is done.
     """
     demand, program = model.demand, cp_model.CpModel()
     x: list[cp_model.IntVar] = []
@@ -92,10 +94,11 @@ def formulate(model: SolverModel, stopped: Callable[[], bool] = lambda: False) -
         return None
     for variable, agents in zip(x, [] if model.hint is None else model.hint.tolist(), strict=False):
         program.add_hint(variable, agents)
+    scale = 1.0
     if model.cost is not None:
-        cost, _ = integer_costs(model)
+        cost, scale = integer_costs(model)
         program.minimize(cp_model.LinearExpr.weighted_sum(x, cost.tolist()))
-    return program
+    return program, scale
 
 
 def _add_variables(program: cp_model.CpModel, x: list[cp_model.IntVar], demand: Demand) -> Iterator[None]:
@@ -175,10 +178,10 @@ def _set_parameters(solver: cp_model.CpSolver, model: SolverModel) -> None:
         parameters.max_deterministic_time = REPEATABLE_EFFORT
 
 
-def _read(solver: cp_model.CpSolver, status: "cp_model.CpSolverStatus", model: SolverModel) -> Answer:
+def _read(solver: cp_model.CpSolver, status: "cp_model.CpSolverStatus", model: SolverModel, scale: float) -> Answer:
     if status == cp_model.INFEASIBLE:
         return Answer(Verdict.INFEASIBLE)
-    bound = 0.0 if model.cost is None else max(0.0, solver.best_objective_bound / integer_costs(model)[1])
+    bound = 0.0 if model.cost is None else max(0.0, solver.best_objective_bound / scale)
     if status not in (cp_model.OPTIMAL, cp_model.FEASIBLE):
         return Answer(bound=bound)
     counts = _counts(solver.response_proto.solution, len(model.demand.class_of_pair))

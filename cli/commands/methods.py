@@ -65,8 +65,12 @@ def methods_command(
 
 
 def _prepare() -> None:
-    """Load each installed method, which compiles its loops; a plugin that fails gives a note."""
+    """Load each installed method, which compiles its loops; a plugin that fails gives a note.
+
+    `greedy` compiles its loops apart, as it needs none but on large instances.
+    """
     from alloc.allocators import describe, load, names
+    from alloc.allocators.heuristic.greedy import tree_search
     from alloc.problems import InputError
 
     for name in names():
@@ -75,6 +79,7 @@ def _prepare() -> None:
                 load(name)
         except InputError as error:
             note(str(error))
+    tree_search.compile_loops()
 
 
 def _facts(name: str) -> Fact:

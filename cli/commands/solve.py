@@ -9,7 +9,7 @@ import typer
 from alloc.cli import options
 from alloc.cli.options import examples
 from alloc.cli.output.console import note, say, to_json
-from alloc.cli.output.files import check_outputs, check_picture, check_result, read_pair, save
+from alloc.cli.output.files import STANDARD, check_outputs, check_picture, check_result, save
 from alloc.cli.output.plan import plan_tables
 from alloc.problems.vocabulary import Objective
 
@@ -24,6 +24,7 @@ EXAMPLES = examples(
     "alloc solve demo.json --objective makespan-energy --plot demo.png",
     "alloc solve demo.json --objective makespan-energy --makespan-slack 0.05",
     "alloc solve demo.json --start best.json --target-gap 0.01",
+    "alloc solve demo.json --start best.json --objective makespan-moves --makespan-slack 0.01 --pin a1=t3",
     "alloc generate paper-1 --seed 7 --output - | alloc solve - --method cpsat --json",
     closing="Ctrl-C ends a run as its time limit does: the best allocation so far is printed and saved.",
 )
@@ -42,7 +43,18 @@ LimitOption = Annotated[
 ]
 StartOption = Annotated[
     str | None,
-    typer.Option(metavar="FILE", help="An allocation or a result to start from; the answer is never worse."),
+    typer.Option(metavar="FILE", help="A plan to start from, or the one in force; what has gone since is left out."),
+]
+MovePriceOption = Annotated[
+    float,
+    typer.Option(min=0, help="With energy: what each agent counts for that gets another task than in --start."),
+]
+PinOption = Annotated[
+    list[str] | None,
+    typer.Option(metavar="AGENT=TASK", help="An agent that must do this task, or none after the =; may be repeated."),
+]
+PinFileOption = Annotated[
+    str | None, typer.Option(metavar="FILE", help="Agents that must do the tasks that this allocation gives them.")
 ]
 PolicyOption = Annotated[str | None, typer.Option(metavar="FILE", help="A trained policy, for learned methods.")]
 DeviceOption = Annotated[
@@ -73,6 +85,9 @@ def solve_command(
     makespan_limit: LimitOption = None,
     seed: options.SeedOption = 0,
     start: StartOption = None,
+    pin: PinOption = None,
+    pin_file: PinFileOption = None,
+    move_price: MovePriceOption = 0.0,
     settings: options.SettingsOption = None,
     policy: PolicyOption = None,
     threads: options.ThreadsOption = None,
@@ -85,11 +100,16 @@ def solve_command(
     """Allocate the agents of one instance to its tasks."""
     from alloc.allocators import solve
     from alloc.cli.output.progress import Progress
+    from alloc.problems import InputError
+    from alloc.problems.formats import read_assignment, read_instance
 
-    check_outputs(("--output", output), ("--plot", plot), read=[("INSTANCE", instance), ("--policy", policy)])
+    read = [("INSTANCE", instance), ("--policy", policy), ("--pin-file", pin_file)]
+    check_outputs(("--output", output), ("--plot", plot), read=read)
     check_picture(plot)
     check_result(output)
-    problem, first, _ = read_pair(instance, start, quiet=quiet)
+    if [instance, start, pin_file].count(STANDARD) > 1:
+        raise InputError("can be only one of instance, --start and --pin-file", source="standard input")
+    problem = read_instance(instance)
     check_result(output, problem)
     with Progress(not quiet, problem.units.time, problem.units.energy) as progress:
         result = solve(
@@ -100,7 +120,9 @@ def solve_command(
             iterations=iterations,
             target_gap=target_gap,
             seed=seed,
-            start=first,
+            start=None if start is None else read_assignment(start),
+            move_price=move_price,
+            pins=_pins(pin, pin_file),
             threads=threads,
             makespan_slack=makespan_slack,
             makespan_limit=makespan_limit,
@@ -109,6 +131,19 @@ def solve_command(
         )
     _save(result, output, plot, json=json, quiet=quiet)
     raise typer.Exit(0 if result.evaluation is not None and not result.evaluation.unserved_tasks else 1)
+
+
+def _pins(pin: list[str] | None, file: str | None) -> dict[str, str | None]:
+    """Return the task of each agent that is pinned, by options and by a file."""
+    from alloc.problems.formats import read_assignment
+
+    found: dict[str, str | None] = {} if file is None else read_assignment(file)
+    for pair in pin or []:
+        agent, sign, task = pair.partition("=")
+        if not sign or not agent:
+            raise typer.BadParameter(f"must be AGENT=TASK, got {pair!r}", param_hint="'--pin'")
+        found[agent] = task or None
+    return found
 
 
 def _settings(settings: list[str] | None) -> dict[str, Any]:

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from alloc.problems.distances.geometry import Geometry, GivenRows, given_rows
 from alloc.problems.distances.given import DistanceTable
 from alloc.problems.distances.metric import Floats
+from alloc.problems.distances.move import Move
 from alloc.problems.distances.neighbours import Indices
 from alloc.problems.distances.origins import group_rows, number_lists
-from alloc.problems.distances.reach import Move, Reach
+from alloc.problems.distances.reach import Reach
 
 if TYPE_CHECKING:
     from alloc.problems.instance import Instance
@@ -62,8 +63,8 @@ def build_reach(instance: "Instance") -> Reach:
     return reach
 
 
-def with_move_price(reach: Reach, task_of_agent: Indices, price: Floats) -> Reach:
-    """Return a reach by which an agent pays for another task than it has.
+def replanned(reach: Reach, task_of_agent: Indices, price: Floats, pinned: Flags, *, energy_counts: bool) -> Reach:
+    """Return a reach in which agents pay for another task than they have, and some keep theirs.
 
     Parameters
     ----------
@@ -71,23 +72,34 @@ def with_move_price(reach: Reach, task_of_agent: Indices, price: Floats) -> Reac
     task_of_agent : ndarray of int, shape (n,)
         -1 where it is idle.
     price : ndarray, shape (n,)
-        Of each agent, in units of cost.
+        Energy that an agent's move counts for.
+    pinned : ndarray of bool, shape (n,)
+        Agents that can do nothing but the task that they have, at no cost.
+    energy_counts : bool
+        Whether the energy of flights is part of the cost.
     """
-    first, origin = group_rows([column.astype(np.float64) for column in (reach.origin, task_of_agent, price)])
-    old = reach.origin[first]
-    geometry = reach.geometry
-    given = geometry.given
+    first, origin = group_rows([part.astype(np.float64) for part in (reach.origin, task_of_agent, price, pinned)])
+    old, task, fixed = reach.origin[first], task_of_agent[first], pinned[first]
+    unit = reach.energy_per_distance or 1.0
+    rate = np.ones(len(first)) if reach.factor is None else reach.factor[old]
+    factor = np.where(fixed, 0.0, rate * (reach.energy_per_distance / unit))
+    own = [reach.lists[number] if number >= 0 else None for number in reach.list_of[old].tolist()]
+    for row in np.flatnonzero(fixed).tolist():
+        own[row] = task[[row]] if task[row] >= 0 else task[:0]
+    list_of, lists = number_lists(own, len(own))
+    given = reach.geometry.given
+    start = reach.geometry.start[old]
     return Reach(
         origin=origin,
-        geometry=replace(geometry, start=geometry.start[old], given=None if given is None else given.chosen(old)),
-        communication_range=reach.communication_range[old],
-        battery=reach.battery[old],
-        energy_per_distance=reach.energy_per_distance,
-        factor=None if reach.factor is None else reach.factor[old],
+        geometry=replace(reach.geometry, start=start, given=None if given is None else given.chosen(old)),
+        communication_range=np.where(fixed, np.inf, reach.communication_range[old]),
+        battery=np.where(fixed, np.inf, reach.battery[old]),
+        energy_per_distance=unit,
+        factor=factor,
         returns=None if reach.returns is None else reach.returns[old],
-        list_of=reach.list_of[old],
-        lists=reach.lists,
-        move=Move(task_of_agent[first], price[first]),
+        list_of=list_of,
+        lists=lists,
+        move=Move(task, np.where(fixed, 0.0, price[first] / unit), float(energy_counts)),
     )
 
 
@@ -108,7 +120,7 @@ def restricted_reach(reach: Reach, agents: Indices, tasks: Indices) -> Reach:
         returns=None if reach.returns is None else reach.returns[old],
         list_of=reach.list_of[old],
         lists=tuple(np.sort(number[named][number[named] >= 0]) for named in reach.lists),
-        move=None if move is None else Move(number[move.task[old]], move.price[old]),
+        move=None if move is None else Move(number[move.task[old]], move.price[old], move.energy_weight),
     )
 
 
@@ -121,7 +133,7 @@ def _factors(rate: Floats, base: float) -> tuple[float, Floats | None]:
 
 
 def _rows_of(table: DistanceTable, start: Indices) -> Indices:
-    """Return the node of a table that gives the distances of each agent, its own before its start task's; -1 for none."""
+    """Return the node of a table that gives each agent's distances, its own before its start task's; -1 for none."""
     nodes = np.zeros(table.n + table.m + 1, dtype=np.bool_)
     nodes[table.source] = nodes[table.target] = True
     agents = np.arange(len(start))

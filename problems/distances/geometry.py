@@ -8,15 +8,13 @@ import numpy as np
 from alloc.problems.distances.geodesic import METRES, embedded, geodesic_distances
 from alloc.problems.distances.given import DistanceTable
 from alloc.problems.distances.metric import (
-    EUCLIDEAN,
-    GEOGRAPHIC,
-    MANHATTAN,
     Floats,
     distance_table,
     distances,
     manhattan_distances,
 )
 from alloc.problems.fields import IntArray, ReadOnly
+from alloc.problems.vocabulary import EUCLIDEAN, GEOGRAPHIC, MANHATTAN
 
 LONGEST_GEODESIC_M = 20_003_932.0
 """From pole to pole, the farthest that two places on the earth are apart."""

@@ -81,6 +81,20 @@ class DistanceTable(ReadOnly):
             array.setflags(write=False)
         return table
 
+    @classmethod
+    def fitting(
+        cls,
+        given: "DistanceTable | Iterable[tuple[str, str, float]]",
+        agent_ids: Sequence[str],
+        task_ids: Sequence[str],
+    ) -> "DistanceTable":
+        """Return a table that is given, or that of the rows that are given, for an instance with these ids."""
+        if not isinstance(given, DistanceTable):
+            return cls.of(given, agent_ids, task_ids)
+        if (given.n, given.m) != (len(agent_ids), len(task_ids)):
+            raise InputError(f"is for {given.n} agents and {given.m} tasks", "distances")
+        return given
+
     def check(self) -> None:
         """Raise `InputError` for the first row that breaks a rule."""
         for wrong, rule in (
@@ -100,13 +114,22 @@ class DistanceTable(ReadOnly):
             raise InputError(f"gives the same pair as rows[{other}]; keep one", f"distances.rows[{row}]")
 
     def restricted(self, agents: IntArray, tasks: IntArray) -> "DistanceTable":
-        """Return what the table says of some agents and tasks, numbered anew in this order."""
+        """Return what the table says of some agents and tasks, numbered anew in this order; agents may be repeated."""
         number = np.full(self.n + self.m, -1, dtype=np.intp)
-        number[agents] = np.arange(len(agents))
         number[self.n + tasks] = len(agents) + np.arange(len(tasks))
-        source, target = number[self.source], number[self.target]
-        kept = (source >= 0) & (target >= 0)
-        return DistanceTable(len(agents), len(tasks), source[kept], target[kept], self.distance[kept], self.missing)
+        fixed = (number[self.source] >= 0) & (number[self.target] >= 0)
+        parts = [(number[self.source[fixed]], number[self.target[fixed]], self.distance[fixed])]
+        for ends, others in ((self.source, self.target), (self.target, self.source)):
+            row = np.flatnonzero((ends < self.n) & (number[others] >= 0))
+            row = row[np.argsort(ends[row], kind="stable")]
+            begin = np.searchsorted(ends[row], np.arange(self.n + 1))
+            length = begin[agents + 1] - begin[agents]
+            new = np.repeat(np.arange(len(agents)), length)
+            entry = row[np.arange(length.sum()) + np.repeat(begin[agents] - (np.cumsum(length) - length), length)]
+            pair = (new, number[others[entry]])
+            parts.append((*(pair if ends is self.source else pair[::-1]), self.distance[entry]))
+        source, target, distance = (np.concatenate([part[column] for part in parts]) for column in range(3))
+        return DistanceTable(len(agents), len(tasks), source, target, distance, self.missing)
 
     def to_tasks(self) -> tuple[IntArray, IntArray, Floats, Floats]:
         """Return node, task, distance there and distance back for all known pairs, in order of node and task."""

@@ -11,10 +11,6 @@ BLOCK = 1 << 16
 """Distances that are worked out together: as many as fit a cache."""
 
 
-EUCLIDEAN, MANHATTAN, GEOGRAPHIC = METRICS = ("euclidean", "manhattan", "geographic")
-"""How far two places are apart: (1) of the paper, the sum over the axes, or along the surface of the earth."""
-
-
 def distances(place: Floats, goal: Floats) -> Floats:
     """Return Euclidean distances (1) between places that broadcast, 0 where a coordinate is NaN.
 

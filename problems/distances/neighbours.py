@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from alloc.problems.distances.geometry import Geometry, entries
-from alloc.problems.distances.metric import MANHATTAN
+from alloc.problems.vocabulary import MANHATTAN
 
 CHUNK = 1 << 21
 """Pairs of origin and task that are looked at together, about."""

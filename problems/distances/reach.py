@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from alloc.problems.distances.geometry import Geometry
+from alloc.problems.distances.move import Move
 from alloc.problems.distances.neighbours import Neighbours, estimated_pairs, find_neighbours
 from alloc.problems.fields import ReadOnly
 
@@ -63,7 +64,7 @@ class Reach(ReadOnly):
     returns: Flags | None
     list_of: Indices
     lists: tuple[Indices, ...]
-    move: "Move | None" = None
+    move: Move | None = None
 
     @property
     def place(self) -> Floats:
@@ -107,7 +108,7 @@ class Reach(ReadOnly):
 
     @cached_property
     def cost(self) -> Floats:
-        """What the flight from each origin to each task costs, see `costs`; shape (origins, m), as large as `distance`."""
+        """What the flight from each origin to each task costs, see `costs`; shape (origins, m), like `distance`."""
         if self.cost_is_distance:
             return self.distance
         origins, tasks = np.arange(len(self.place))[:, None], np.arange(len(self.goal))
@@ -222,7 +223,7 @@ class Reach(ReadOnly):
         moving to another task.
         """
         cost = self.flown(origin, task, distance)
-        return cost if self.move is None else cost + self.move.price[origin] * (self.move.task[origin] != task)
+        return cost if self.move is None else cost * self.move.energy_weight + self.move.of(origin, task)
 
     def trips(self, origin: Indices, task: Indices, distance: Floats) -> Floats:
         """Length of the flight from each of these origins to the task, `distance` away, back again if it returns."""
@@ -296,19 +297,3 @@ class Reach(ReadOnly):
         rows = max(1, TABLE_LIMIT // (8 * len(self.goal)))
         parts = (worst[begin : begin + rows] for begin in range(0, len(worst), rows))
         return all(self._is_near(part[:, None], tasks, self.geometry.table(part)).all() for part in parts)
-
-
-@dataclass(frozen=True, eq=False)
-class Move(ReadOnly):
-    """What an agent costs that gets another task than it has.
-
-    Attributes
-    ----------
-    task : ndarray of int, shape (origins,)
-        The task that the agents of each origin have, -1 where they are idle.
-    price : ndarray, shape (origins,)
-        In units of cost.
-    """
-
-    task: Indices
-    price: Floats

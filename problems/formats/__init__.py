@@ -5,6 +5,7 @@ from alloc.problems.formats.allocation_file import (
     allocation_to_document,
     read_allocation,
     read_allocations,
+    read_assignment,
     read_claims,
     write_allocation,
 )
@@ -27,6 +28,7 @@ __all__ = [
     "is_standard_output",
     "read_allocation",
     "read_allocations",
+    "read_assignment",
     "read_bytes",
     "read_claims",
     "read_instance",

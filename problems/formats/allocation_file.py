@@ -67,6 +67,25 @@ def read_claims(path: PathLike, instance: Instance) -> tuple[Allocation, str | N
     return allocation, _other_instance(source, name, instance), claims
 
 
+def read_assignment(path: PathLike) -> dict[str, str | None]:
+    """Read the task id of each agent id, whatever instance they belong to.
+
+    Parameters
+    ----------
+    path : str or path
+        As for `read_allocation`.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or breaks the rules of its format.
+    """
+    try:
+        return _assignment(json_text.require_object(json_text.parse(read_text(path))))
+    except InputError as error:
+        raise told(error, named(path)) from error.__cause__
+
+
 def read_allocations(path: PathLike, instance: Instance) -> tuple[list[Allocation], str | None]:
     """Read all allocations of a front (alloc-pareto/1), or the one of a file that `read_allocation` takes.
 
@@ -154,12 +173,17 @@ def allocation_from_document(document: object, instance: Instance) -> tuple[Allo
         If the document breaks the rules of the format, or names an unknown agent or task.
     """
     fields = json_text.require_object(document)
+    return Allocation.from_ids(instance, _assignment(fields)), _instance_name(fields)
+
+
+def _assignment(fields: dict[str, object]) -> dict[str, str | None]:
+    """Return the task id of each agent id in an allocation or a result."""
     require_format(fields.get("format"), (ALLOCATION_FORMAT, RESULT_FORMAT))
     if fields["format"] == ALLOCATION_FORMAT:
         require_known(fields, ALLOCATION_FIELDS, "")
     elif fields.get("status") == "no_solution":
         raise InputError("this result holds no allocation; give one with another status", "status")
-    name = _instance_name(fields)
+    _instance_name(fields)
     if fields.get("assignment") is None:
         raise InputError("is missing; it must give the task of each agent", "assignment")
     assignment = json_text.require_object(fields["assignment"], "assignment")
@@ -167,7 +191,7 @@ def allocation_from_document(document: object, instance: Instance) -> tuple[Allo
         for agent, task in assignment.items():
             if not isinstance(task, str | None):
                 raise InputError(f"must be the id of a task, or null, got {described(task)}", f"assignment.{agent}")
-    return Allocation.from_ids(instance, cast("dict[str, str | None]", assignment)), name
+    return cast("dict[str, str | None]", assignment)
 
 
 def _instance_name(document: dict[str, object]) -> str | None:

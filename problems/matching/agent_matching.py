@@ -6,7 +6,7 @@ import numpy as np
 
 from alloc.problems.instance import Instance, IntArray
 from alloc.problems.matching.assignment import Pairs
-from alloc.problems.matching.clock import Clock, unlimited
+from alloc.problems.matching.clock import Clock, share_of, unlimited
 from alloc.problems.matching.hopcroft_karp import largest_matching
 from alloc.problems.matching.pairs import bound_by_size, sampled_pairs
 from alloc.problems.vocabulary import IDLE
@@ -89,10 +89,10 @@ class AgentMatching:
 def _fast_matching(pairs: Pairs, bound: float, time_left: Clock) -> IntArray:
     """Return a large matching, by the faster pairs as far as they will do."""
     matched = np.full(len(pairs.first) - 1, IDLE, dtype=np.intp)
-    end = time_left() / 2
+    time_left = share_of(0.5, time_left)
     for factor in SLOWER:
         within = pairs.within(factor * bound)
-        matched, _ = largest_matching(within.first, within.task, matched, lambda: time_left() - end)
+        matched, _ = largest_matching(within.first, within.task, matched, time_left)
         if (matched != IDLE).all():
             break
     return matched

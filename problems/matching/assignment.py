@@ -1,17 +1,17 @@
 """Agents and tasks one to one: the fastest such assignment, and the cheapest."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from alloc.problems.instance import FloatArray, IntArray
-from alloc.problems.matching.clock import MATCHED_PER_SECOND, Clock
+from alloc.problems.matching.clock import GATHERED_PER_SECOND, MATCHED_PER_SECOND, Clock
+from alloc.problems.matching.hopcroft_karp import largest_matching
 from alloc.problems.vocabulary import IDLE
 
-SEARCH = 10_000_000_000
-"""Agents times pairs at which looking for the cheapest assignment takes about a second."""
+SEARCH = 500_000_000
+"""Agents times pairs at which looking for the cheapest assignment takes a second as a rule, ten at the most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,36 +47,23 @@ class Pairs:
         return np.repeat(np.arange(len(self.first) - 1), np.diff(self.first))
 
 
-def match(first: IntArray, task: IntArray) -> IntArray:
-    """Return a task for each row of compressed pairs, `IDLE` for none, so that as many as can be have one.
+def match_in_time(pairs: Pairs, known: IntArray, time_left: Clock) -> IntArray | None:
+    """Return a largest matching of agents with tasks, begun with what `pairs` holds of another; None if time runs out.
 
-    By Hopcroft and Karp (1973), doi:10.1137/0202019.
+    Parameters
+    ----------
+    known : ndarray of int, shape (k,)
+        The other matching.
     """
-    from scipy.sparse import csr_matrix
-    from scipy.sparse.csgraph import maximum_bipartite_matching
-
-    size = (len(first) - 1, int(task.max(initial=0)) + 1)
-    graph = csr_matrix((np.ones(len(task), dtype=np.int8), task, first), size)
-    if size[0] > len(np.unique(task)):  # fast where the side that it begins from can all be matched
-        found = maximum_bipartite_matching(graph.T.tocsr(), perm_type="row")
-    else:
-        found = maximum_bipartite_matching(graph, perm_type="column")
-    matched: IntArray = found.astype(np.intp)
-    return matched
+    row = pairs.row
+    kept = pairs.task == known[row]
+    start = np.full(len(known), IDLE, dtype=np.intp)
+    start[row[kept]] = pairs.task[kept]
+    found, is_largest = largest_matching(pairs.first, pairs.task, start, time_left)
+    return found if is_largest else None
 
 
-Matcher = Callable[[Pairs, IntArray], IntArray | None]
-"""Gives a largest matching, see `match`, of some pairs, with another to begin with; None where time runs out."""
-
-
-def by_scipy(pairs: Pairs, _: IntArray) -> IntArray:
-    """Match by SciPy."""
-    return match(pairs.first, pairs.task)
-
-
-def bottleneck(
-    pairs: Pairs, known: IntArray, latest: float, time_left: Clock, matcher: Matcher = by_scipy
-) -> tuple[IntArray, float]:
+def bottleneck(pairs: Pairs, known: IntArray, latest: float, time_left: Clock) -> tuple[IntArray, float]:
     """Return a task for each agent so that the last is done as early as can be, and a bound on when that is.
 
     By halving the hours in question, with a matching for each; the bound falls short where time runs out.
@@ -91,7 +78,6 @@ def bottleneck(
         When the last agent is done in it.
     time_left : callable
         Seconds.
-    matcher : callable
     """
     best, least = known, 0.0
     bound = float(np.minimum.reduceat(pairs.hours, pairs.first[:-1]).max())  # each takes its fastest
@@ -103,7 +89,7 @@ def bottleneck(
         half = (len(in_range) - 1) // 2
         middle = float(np.partition(in_range, half)[half])
         within = pairs.within(middle)
-        found = matcher(within, best)
+        found = match_in_time(within, best, time_left)
         if found is None:
             break
         if (found == IDLE).any():
@@ -128,7 +114,7 @@ def cheapest(pairs: Pairs, known: IntArray, cost: FloatArray, time_left: Clock) 
     k = len(known)
     work = min(1.0, 0.1 * time_left()) * SEARCH
     most = int(work // max(1, k * k))
-    if most < 1 or not len(cost):
+    if most < 1 or not len(cost) or len(cost) > GATHERED_PER_SECOND * time_left():
         return known
     held = pairs.task == known[pairs.row]
     if len(cost) > most * k:

@@ -1,17 +1,40 @@
 """A largest matching whose running time is bounded, whatever the graph; that of SciPy may take minutes."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from alloc.problems.instance import IntArray
-from alloc.problems.matching.assignment import Pairs
-from alloc.problems.matching.clock import Clock
+from alloc.problems.matching.clock import Clock, unlimited
 from alloc.problems.vocabulary import IDLE
 
 CHECK_EVERY = 16
 """Rows between two looks at the clock."""
 
 UNSEEN = -1
-"""The level of a row that no alternating path has reached."""
+"""The level of a row that no alternating path has reached, or that leads to no free column any more."""
+
+
+def match(first: IntArray, column: IntArray, time_left: Clock = unlimited) -> tuple[IntArray, bool]:
+    """Do as `largest_matching`, but from whichever side has fewer to match: the others would be tried to no end.
+
+    Parameters
+    ----------
+    first : ndarray of int, shape (rows + 1,)
+    column : ndarray of int, shape (pairs,)
+    time_left : callable
+        Seconds; no limit by default.
+    """
+    rows, columns = len(first) - 1, int(column.max(initial=-1)) + 1
+    matched = np.full(rows, IDLE, dtype=np.intp)
+    if rows <= columns:
+        return largest_matching(first, column, matched, time_left)
+    order = np.argsort(column, kind="stable")
+    begin = np.searchsorted(column[order], np.arange(columns + 1))
+    row = np.repeat(np.arange(rows), np.diff(first))[order]
+    found, is_largest = largest_matching(begin, row, np.full(columns, IDLE, dtype=np.intp), time_left)
+    matched[found[found != IDLE]] = np.flatnonzero(found != IDLE)
+    return matched, is_largest
 
 
 def largest_matching(first: IntArray, column: IntArray, start: IntArray, time_left: Clock) -> tuple[IntArray, bool]:
@@ -30,57 +53,50 @@ def largest_matching(first: IntArray, column: IntArray, start: IntArray, time_le
     time_left : callable
         Seconds.
     """
-    matching = _Matching(first, column, start)
+    matching = _Matching(first, column, start, time_left)
     while is_larger := matching.find_levels():
-        if not matching.augment_all(time_left):
+        if not matching.augment_all():
             break
     return np.array(matching.held, dtype=np.intp), not is_larger
-
-
-def match_in_time(pairs: Pairs, known: IntArray, time_left: Clock) -> IntArray | None:
-    """Return a largest matching of agents with tasks, begun with what `pairs` holds of another; None if time runs out.
-
-    Parameters
-    ----------
-    known : ndarray of int, shape (k,)
-        The other matching.
-    """
-    row = pairs.row
-    kept = pairs.task == known[row]
-    start = np.full(len(known), IDLE, dtype=np.intp)
-    start[row[kept]] = pairs.task[kept]
-    found, is_largest = largest_matching(pairs.first, pairs.task, start, time_left)
-    return found if is_largest else None
 
 
 class _Matching:
     """A matching, and how far each row is from a row without a column."""
 
-    def __init__(self, first: IntArray, column: IntArray, start: IntArray) -> None:
-        self.first, self.column = first.tolist(), column.tolist()
+    def __init__(self, first: IntArray, column: IntArray, start: IntArray, time_left: Clock) -> None:
+        self.first, self.column, self.time_left = first.tolist(), column, time_left
         self.owner = [IDLE] * (int(column.max(initial=0)) + 1)
-        self.held = start.tolist()
+        self.held: list[int] = start.tolist()
+        self.level: list[int] = []
         for row, held in enumerate(self.held):
             if held != IDLE:
                 self.owner[held] = row
         for row in [row for row, held in enumerate(self.held) if held == IDLE]:
-            for place in range(self.first[row], self.first[row + 1]):
-                if self.owner[self.column[place]] == IDLE:
-                    self.owner[self.column[place]], self.held[row] = row, self.column[place]
+            for one in self._columns(row):
+                if self.owner[one] == IDLE:
+                    self.owner[one], self.held[row] = row, one
                     break
-        self.level: list[int] = []
-        self.next: list[int] = []
+
+    def _columns(self, row: int) -> list[int]:
+        columns: list[int] = self.column[self.first[row] : self.first[row + 1]].tolist()
+        return columns
+
+    def _in_time(self, rows: list[int]) -> Iterator[int]:
+        """Yield one of `rows` after the other until time runs out."""
+        for count, row in enumerate(rows):
+            if count % CHECK_EVERY == 0 and self.time_left() <= 0:
+                return
+            yield row
 
     def find_levels(self) -> bool:
-        """Set the level of each row on a shortest augmenting path; return whether there is such a path."""
+        """Set the level of each row on a shortest augmenting path; False if there is no such path."""
         self.level = [0 if held == IDLE else UNSEEN for held in self.held]
-        self.next = self.first[:-1]
         front = [row for row, level in enumerate(self.level) if level == 0]
         depth, found = 0, False
         while front and not found:
             depth, behind = depth + 1, []
-            for row in front:
-                for column in self.column[self.first[row] : self.first[row + 1]]:
+            for row in self._in_time(front):
+                for column in self._columns(row):
                     owner = self.owner[column]
                     if owner == IDLE:
                         found = True
@@ -88,34 +104,36 @@ class _Matching:
                         self.level[owner] = depth
                         behind.append(owner)
             front = behind
+            found = found or self.time_left() <= 0  # then nobody knows
         return found
 
-    def augment_all(self, time_left: Clock) -> bool:
+    def augment_all(self) -> bool:
         """Augment along as many paths of this phase as can be; False if time runs out."""
-        for count, row in enumerate([row for row, held in enumerate(self.held) if held == IDLE]):
-            if count % CHECK_EVERY == 0 and time_left() <= 0:
-                return False
+        for row in self._in_time([row for row, held in enumerate(self.held) if held == IDLE]):
             self._augment(row)
-        return True
+        return self.time_left() > 0
 
     def _augment(self, root: int) -> None:
         """Give `root` a column along a path on which levels rise by one, if there is one left in this phase."""
-        path = [root]
+        path, options, steps = [root], [iter(self._columns(root))], 0
+        taken: list[int] = []
         while path:
-            row = path[-1]
-            if self.next[row] == self.first[row + 1]:
-                path.pop()
-                if path:
-                    self.next[path[-1]] += 1
+            column = next(options[-1], None)
+            if column is None:
+                self.level[path.pop()] = UNSEEN
+                options.pop()
+                if taken:
+                    taken.pop()
                 continue
-            owner = self.owner[self.column[self.next[row]]]
+            owner = self.owner[column]
             if owner == IDLE:
-                for mover in path:
-                    column = self.column[self.next[mover]]
-                    self.held[mover], self.owner[column] = column, mover
-                    self.next[mover] += 1
+                for row, one in zip(path, [*taken, column], strict=True):
+                    self.held[row], self.owner[one], self.level[row] = one, row, UNSEEN
                 return
-            if self.level[owner] == self.level[row] + 1:
+            if self.level[owner] == self.level[path[-1]] + 1:
+                steps += 1
+                if steps % CHECK_EVERY == 0 and self.time_left() <= 0:
+                    return
+                taken.append(column)
                 path.append(owner)
-            else:
-                self.next[row] += 1
+                options.append(iter(self._columns(owner)))

@@ -2,6 +2,7 @@
 
 from collections import deque
 from collections.abc import Iterator
+from itertools import compress
 
 import numpy as np
 
@@ -18,8 +19,11 @@ SPENT = -1
 NEARBY = 64
 """Origins next to a task that are looked at first where there are many."""
 
-CHUNK = 4_096
-"""Tasks that are looked at together."""
+NEXT = 8
+"""Of these, the origins that will do for most tasks."""
+
+CHUNK = 16_384
+"""Tasks that are looked at together, between two looks at the clock: a tenth of a second, for which there is time."""
 
 MANY = 50_000_000
 """Pairs of agent, or of origin, and unserved task that are too many to look at one by one."""
@@ -29,7 +33,7 @@ class _Matching:
     """One agent kept for each served task, grown by augmenting paths (Berge 1957, doi:10.1073/pnas.43.9.842)."""
 
     def __init__(self, instance: Instance, task_of_agent: IntArray, unserved: int, time_left: Clock) -> None:
-        self.reach, self.m = instance.reach, instance.m
+        self.reach, self.time_left = instance.reach, time_left
         self.task_of_agent = task_of_agent.copy()
         self.keeper = np.full(instance.m, IDLE, dtype=np.intp)
         working = np.flatnonzero(task_of_agent != IDLE)
@@ -40,17 +44,23 @@ class _Matching:
         self.met = np.zeros(instance.n, dtype=np.intp)  # the search that met an agent last
         self.search = 0
         reach = self.reach
+        self._mask_by_task = np.ascontiguousarray(reach.mask.T) if reach.has_table else None
         many = not reach.has_table and unserved * len(reach.place) > MANY and not reach.is_complete
         many = many and (limit := GATHERED_PER_SECOND * time_left()) > 0 and estimated_pairs(reach) <= limit
         near = reach.neighbours if many else None
         self._rows = None if near is None else near.by_task(instance.m)
 
     def serve(self, task: int) -> IntArray | None:
-        """Serve `task` along a path with the fewest moves; None if done, else the tasks that compete for its agents."""
+        """Serve `task` along a path with the fewest moves; None if done, else the tasks that compete for its agents.
+
+        Where time runs out, these are not all.
+        """
         came_from: dict[int, tuple[int, int]] = {}  # task -> (task that wants its keeper, that keeper)
         self.search += 1
         queue, seen = deque([task]), {task}
         while queue:
+            if self.time_left() <= 0:
+                return np.array(sorted(seen), dtype=np.intp)
             wanting = queue.popleft()
             able = self._able(wanting)
             able = able[(self.met[able] != self.search) & (self.met[able] != SPENT)]
@@ -70,6 +80,8 @@ class _Matching:
 
     def _able(self, task: int) -> IntArray:
         """Return the agents that can take `task`; looked up where many tasks will be asked for."""
+        if self._mask_by_task is not None:
+            return np.flatnonzero(self._mask_by_task[task][self.reach.origin])
         if self._rows is None:
             return self.reach.agents_of(task)
         (first, origins), (begin, agents) = self._rows, self.reach.agents_by_origin
@@ -111,10 +123,15 @@ def only_allowed(instance: Instance, allocation: Allocation) -> Allocation:
     -------
     Allocation
     """
+    return Allocation(_allowed(instance, allocation))
+
+
+def _allowed(instance: Instance, allocation: Allocation) -> IntArray:
+    """Return the task of each agent, `IDLE` where it cannot go to that of `allocation`."""
     task = require_fit(instance, allocation).copy()
     working = np.flatnonzero(task != IDLE)
     task[working[~instance.reach.allows(working, task[working])]] = IDLE
-    return Allocation(task)
+    return task
 
 
 def serve_all(instance: Instance, allocation: Allocation, time_left: Clock = unlimited) -> Allocation:
@@ -135,7 +152,7 @@ def serve_all(instance: Instance, allocation: Allocation, time_left: Clock = unl
     -------
     Allocation
     """
-    task = only_allowed(instance, allocation).task_of_agent
+    task = _allowed(instance, allocation)
     served = np.zeros(instance.m, dtype=bool)
     served[task[task != IDLE]] = True
     unserved = [j for j in needs_agent(instance).tolist() if not served[j]]
@@ -145,10 +162,10 @@ def serve_all(instance: Instance, allocation: Allocation, time_left: Clock = unl
         return Allocation(_serve_by_anyone(instance, task, unserved))
     pairs = len(instance.reach.place) * len(unserved)
     if not instance.reach.has_table and (pairs > MANY or pairs > EVALUATED_PER_SECOND * time_left()):
-        task, unserved = _serve_nearby(instance, task, unserved)
+        task, unserved = _serve_nearby(instance, task, unserved, time_left)
     matching = _start(instance, task, len(unserved), time_left)
     for j in unserved:
-        if time_left() <= 0 and not instance.reach.has_table:
+        if time_left() <= 0:
             break
         matching.serve(j)
     return Allocation(matching.task_of_agent)
@@ -167,7 +184,9 @@ def _serve_by_anyone(instance: Instance, task_of_agent: IntArray, unserved: list
     return task_of_agent
 
 
-def _serve_nearby(instance: Instance, task_of_agent: IntArray, unserved: list[int]) -> tuple[IntArray, list[int]]:
+def _serve_nearby(
+    instance: Instance, task_of_agent: IntArray, unserved: list[int], time_left: Clock
+) -> tuple[IntArray, list[int]]:
     """Serve tasks by idle agents from the `NEARBY` nearest origins that have one; return the tasks that are left."""
     from scipy.spatial import cKDTree
 
@@ -175,22 +194,33 @@ def _serve_nearby(instance: Instance, task_of_agent: IntArray, unserved: list[in
     by_origin = reach.agents_by_origin[1]
     idle = by_origin[task_of_agent[by_origin] == IDLE]
     bounds = np.searchsorted(reach.origin[idle], np.arange(len(reach.place) + 1))
-    first, end = bounds[:-1].copy(), bounds[1:]
+    first, end = bounds[:-1], bounds[1:]
     origins = np.flatnonzero((first < end) & ~np.isnan(reach.place[:, 0]))
     goals = np.array(unserved)[~np.isnan(reach.goal[unserved, 0])]
     if not len(origins) or not len(goals):
         return task_of_agent, unserved
-    count, tree, served = min(NEARBY, len(origins)), cKDTree(reach.place[origins]), set()
-    for begin in range(0, len(goals), CHUNK):
-        some = goals[begin : begin + CHUNK]
+    tree, free, last, served = cKDTree(reach.place[origins]), first.tolist(), end.tolist(), set()
+
+    def nearest(some: IntArray, count: int) -> Iterator[list[int]]:
+        """For each of these tasks, the origins within reach among its `count` nearest, the nearest first."""
+        count = min(count, len(origins))
         near = origins[tree.query(reach.goal[some], k=count)[1].reshape(len(some), count)]
         within = reach.is_within(near, some[:, None], reach.distances_between(near, some[:, None]))
-        for j, row, good in zip(some.tolist(), near, within, strict=True):
-            able = row[good & (first[row] < end[row])]
-            if len(able):
-                task_of_agent[idle[first[able[0]]]] = j
-                first[able[0]] += 1
-                served.add(j)
+        return (list(compress(*row)) for row in zip(near.tolist(), within.tolist(), strict=True))
+
+    for begin in range(0, len(goals), CHUNK):
+        if begin and time_left() <= 0:
+            break
+        some = goals[begin : begin + CHUNK]
+        for j, near in zip(some, nearest(some, NEXT), strict=True):
+            able = next((origin for origin in near if free[origin] < last[origin]), IDLE)
+            if able == IDLE:
+                further = next(nearest(np.array([j]), NEARBY))
+                able = next((origin for origin in further if free[origin] < last[origin]), IDLE)
+            if able != IDLE:
+                task_of_agent[idle[free[able]]] = j
+                free[able] += 1
+                served.add(int(j))
     return task_of_agent, [j for j in unserved if j not in served]
 
 

@@ -7,16 +7,14 @@ left is an instance of its own, in which every task can be served.
 """
 
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
 from alloc.problems.allocation import Allocation
 from alloc.problems.evaluation import last_equal
 from alloc.problems.instance import FloatArray, Instance, IntArray
-from alloc.problems.matching.assignment import Matcher, Pairs, bottleneck, by_scipy, cheapest
+from alloc.problems.matching.assignment import Pairs, bottleneck, cheapest
 from alloc.problems.matching.clock import Clock, unlimited
-from alloc.problems.matching.hopcroft_karp import match_in_time
 from alloc.problems.matching.pairs import all_pairs, bound_by_size, hours_alone, sampled_pairs
 from alloc.problems.matching.unservable import competing_part
 from alloc.problems.vocabulary import IDLE
@@ -139,13 +137,10 @@ def _fastest(
     instance: Instance, agents: IntArray, tasks: IntArray, chosen: IntArray, time_left: Clock
 ) -> tuple[IntArray, float]:
     """Return a matching with the least makespan and, of these, one with little work; and a bound on that makespan."""
-    matcher: Matcher = by_scipy
-    if not instance.reach.has_table:
-        matcher = partial(match_in_time, time_left=time_left)
     latest, bound = float(_hours(instance, agents, chosen).max()), 0.0
     pairs, complete = _pairs(instance, agents, tasks, chosen, latest, time_left)
     while pairs is not None:
-        chosen, least = bottleneck(pairs, chosen, latest, time_left, matcher)
+        chosen, least = bottleneck(pairs, chosen, latest, time_left)
         before, latest = latest, float(_hours(instance, agents, chosen).max())
         bound = least if complete else bound_by_size(instance, agents, tasks)
         if complete or latest >= before:

@@ -7,10 +7,16 @@ import numpy as np
 from alloc.problems.distances.neighbours import Neighbours, estimated_pairs
 from alloc.problems.instance import Instance, IntArray
 from alloc.problems.matching.agent_matching import AgentMatching
-from alloc.problems.matching.assignment import match
-from alloc.problems.matching.clock import GATHERED_PER_SECOND, Clock, unlimited
+from alloc.problems.matching.clock import GATHERED_PER_SECOND, Clock, at_least, share_of, unlimited
+from alloc.problems.matching.hopcroft_karp import match
 from alloc.problems.matching.serving import needs_agent, serve_in_turn
 from alloc.problems.vocabulary import IDLE
+
+PROOF_SHARE = 0.5
+"""Share of the time in which it is found out whether all tasks can be served, where agents may be enough."""
+
+SHORTEST_S = 0.1
+"""How long a table of all pairs is looked at where there is no time."""
 
 FEW, SAMPLE = 8, 20
 """Agents near a task that a quick try looks at, and agents for each task from which they are taken."""
@@ -60,11 +66,18 @@ def fewest_unserved(instance: Instance) -> int:
     near = reach.neighbours
     if near is None:
         return sum(rivals is not None for rivals in serve_in_turn(instance, tasks))
-    return int((_origin_of_task(instance, near, tasks)[tasks] == IDLE).sum())
+    origin = _origin_of_task(instance, near, tasks)
+    assert origin is not None, "there is no limit of time"
+    return int((origin[tasks] == IDLE).sum())
 
 
-def _origin_of_task(instance: Instance, near: Neighbours, tasks: IntArray) -> IntArray:
-    """Return the origin of an agent for each of `tasks`, no agent twice, `IDLE` where it has none; shape (m,)."""
+def _origin_of_task(
+    instance: Instance, near: Neighbours, tasks: IntArray, time_left: Clock = unlimited
+) -> IntArray | None:
+    """Return the origin of an agent for each of `tasks`, no agent twice, `IDLE` where it has none; shape (m,).
+
+    As many tasks as can be have one; None is returned if time runs out.
+    """
     degree, wanted = np.diff(near.first), np.zeros(instance.m, dtype=np.bool_)
     wanted[tasks] = True
     copies = np.minimum(np.bincount(instance.reach.origin, minlength=len(degree)), degree)
@@ -77,9 +90,13 @@ def _origin_of_task(instance: Instance, near: Neighbours, tasks: IntArray) -> In
     first = np.concatenate([[0], np.cumsum(useful)])[near.first]
     row = np.repeat(np.arange(len(degree)), copies)
     length = np.diff(first)[row]
+    if length.sum() > GATHERED_PER_SECOND * time_left():
+        return None
     begin = np.concatenate([[0], np.cumsum(length)])
     entry = np.repeat(first[row] - begin[:-1], length) + np.arange(begin[-1])
-    found = match(begin, near.task[useful][entry])
+    found, is_largest = match(begin, near.task[useful][entry], time_left)
+    if not is_largest:
+        return None
     origin[found[found != IDLE]] = row[found != IDLE]
     return origin
 
@@ -98,11 +115,14 @@ def competing_part(instance: Instance, time_left: Clock = unlimited) -> Competin
         return CompetingPart(everyone, tasks, chosen, tasks[: instance.n + 1])
     if len(tasks) > instance.n and not reach.has_table:
         return _of_scarce_agents(instance, tasks, time_left)
-    if _are_served_simply(instance, tasks):
+    time_left = share_of(PROOF_SHARE, time_left)
+    if reach.has_table:
+        time_left = at_least(SHORTEST_S, time_left)
+    if _are_served_simply(instance, tasks, time_left):
         return None
     if not reach.has_table and estimated_pairs(reach) > GATHERED_PER_SECOND * time_left():
         return None
-    return None if reach.neighbours is None else _of_neighbours(instance, tasks, reach.neighbours)
+    return None if reach.neighbours is None else _of_neighbours(instance, tasks, reach.neighbours, time_left)
 
 
 def _of_scarce_agents(instance: Instance, tasks: IntArray, time_left: Clock) -> CompetingPart:
@@ -116,9 +136,11 @@ def _of_scarce_agents(instance: Instance, tasks: IntArray, time_left: Clock) -> 
     return CompetingPart(agents, left, matching.task_of_agent[agents], unservable, matching.is_largest)
 
 
-def _of_neighbours(instance: Instance, tasks: IntArray, near: Neighbours) -> CompetingPart | None:
+def _of_neighbours(instance: Instance, tasks: IntArray, near: Neighbours, time_left: Clock) -> CompetingPart | None:
     """The same from all pairs within reach."""
-    origin = _origin_of_task(instance, near, tasks)
+    origin = _origin_of_task(instance, near, tasks, time_left)
+    if origin is None:
+        return None
     left_out = tasks[origin[tasks] == IDLE]
     if not len(left_out):
         return None
@@ -173,14 +195,14 @@ def _entries(first: IntArray, values: IntArray, rows: IntArray) -> IntArray:
     return found
 
 
-def _are_served_simply(instance: Instance, tasks: IntArray) -> bool:
+def _are_served_simply(instance: Instance, tasks: IntArray, time_left: Clock) -> bool:
     """Whether a quick try serves all of `tasks`; where agents abound, it does."""
     if instance.n < len(tasks):
         return False
-    return (_by_scarcity if instance.reach.has_table else _by_sample)(instance, tasks)
+    return (_by_scarcity if instance.reach.has_table else _by_sample)(instance, tasks, time_left)
 
 
-def _by_scarcity(instance: Instance, tasks: IntArray) -> bool:
+def _by_scarcity(instance: Instance, tasks: IntArray, time_left: Clock) -> bool:
     """The task with the fewest agents first, by an agent that can take the fewest tasks."""
     reach = instance.reach
     order = np.argsort(reach.mask[:, tasks].sum(axis=1), kind="stable")
@@ -188,13 +210,13 @@ def _by_scarcity(instance: Instance, tasks: IntArray) -> bool:
     for j in np.argsort(left @ mask, kind="stable").tolist():
         able = mask[:, j] & (left > 0)
         row = int(able.argmax())
-        if not able[row]:
+        if not able[row] or time_left() <= 0:
             return False
         left[row] -= 1
     return True
 
 
-def _by_sample(instance: Instance, tasks: IntArray) -> bool:
+def _by_sample(instance: Instance, tasks: IntArray, time_left: Clock) -> bool:
     """Match the tasks with agents of a sample that begin nearby."""
     from scipy.spatial import cKDTree
 
@@ -208,7 +230,7 @@ def _by_sample(instance: Instance, tasks: IntArray) -> bool:
     agent, task = sample[near].ravel(), np.repeat(tasks, near.size // len(tasks))
     able = reach.allows(agent, task)
     first = np.concatenate([[0], np.cumsum(able.reshape(len(tasks), -1).sum(axis=1))])
-    return bool((match(first, agent[able]) != IDLE).all())
+    return bool((match(first, agent[able], time_left)[0] != IDLE).all())
 
 
 def minimal_unservable_set(instance: Instance) -> IntArray | None:
@@ -232,6 +254,7 @@ def minimal_unservable_set(instance: Instance) -> IntArray | None:
     near = reach.neighbours
     if near is not None:
         origin = _origin_of_task(instance, near, tasks)
+        assert origin is not None, "there is no limit of time"
         left_out = tasks[origin[tasks] == IDLE]
         return _rivals(near, origin, left_out[:1], instance.m)[0] if len(left_out) else None
     return next((rivals for rivals in serve_in_turn(instance, tasks) if rivals is not None), None)

@@ -87,14 +87,20 @@ def test_methods_survives_a_broken_plugin(alloc, monkeypatch):
 
 
 def test_methods_are_prepared_once_for_all(alloc, monkeypatch):
-    """Every method that is installed is loaded, and nothing is printed; a broken plugin is a note."""
+    """Every method that is installed is loaded, what loading leaves out is compiled, and nothing is printed.
+
+    A broken plugin is a note.
+    """
     from importlib.metadata import EntryPoint
 
     broken = EntryPoint("broken", "no_such_module:Thing", "alloc.allocators")
     monkeypatch.setattr("alloc.allocators.registry.entry_points", lambda group: [broken])
     loaded = []
     monkeypatch.setattr("alloc.allocators.load", loaded.append)
+    monkeypatch.setattr(
+        "alloc.allocators.heuristic.greedy.tree_search.compile_loops", lambda: loaded.append("the tree of greedy")
+    )
     ran = alloc("methods", "--prepare")
     assert (ran.code, ran.out) == (0, "")
-    assert {"greedy", "cpsat", "local-search"} <= set(loaded)
+    assert {"greedy", "cpsat", "local-search", "the tree of greedy"} <= set(loaded)
     assert "plugin 'broken'" in ran.err

@@ -1,15 +1,20 @@
 """What the documents show runs: their Python blocks, and their `alloc` commands; what takes too long is understood."""
 
+import io
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 from command_line import USAGE_ERROR, understand
+
+from alloc.cli.main import main
 
 ROOT = Path(__file__).parents[2]
 DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -18,6 +23,7 @@ LINK = re.compile(r"\]\(([^)#\s]+)(?:#[^)]*)?\)")
 NOT_RUN = re.compile(r"<!--\s*not run:\s*\S.*?-->\s*\Z", re.DOTALL)
 INDENTED = re.compile(r"^(?: {4})+(?=\S)(.*)$", re.MULTILINE)
 SCRIPT = re.compile(r"python (\S+\.py)")
+SHELL = re.compile(r"[^\w\s.,=:/-]")
 COMMAND_LANGUAGES = ("console", "bash", "sh", "shell")
 
 
@@ -89,23 +95,31 @@ def fault(line):
 
 def run_document(text, name, folder):
     """Run all blocks of a document in order, in one namespace and one folder."""
-    namespace = {"__name__": "document"}
-    environment = os.environ | {"PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
+    namespace, is_first = {"__name__": "document"}, True
     for block in filter(runs, blocks(text)):
         if block.language == "python":
             exec(compile("\n" * (block.line - 1) + block.code, name, "exec"), namespace)
         else:
             for command in commands(block.code):
-                done = subprocess.run(
-                    ["bash", "-o", "pipefail", "-c", command],
-                    cwd=folder,
-                    env=environment,
-                    capture_output=True,
-                    text=True,
-                    timeout=100,
-                    check=False,
-                )
-                assert done.returncode == 0, f"{name}:{block.line}: {command}\n{done.stderr}"
+                code, errors = run_by_shell(command, folder) if is_first or SHELL.search(command) else run_here(command)
+                assert code == 0, f"{name}:{block.line}: {command}\n{errors}"
+                is_first = False
+
+
+def run_by_shell(command, folder):
+    """Run a command as a user does; return its exit code and what it prints on standard error."""
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    bash = ["bash", "-o", "pipefail", "-c", command]
+    done = subprocess.run(
+        bash, cwd=folder, env=os.environ | {"PATH": path}, capture_output=True, text=True, timeout=100, check=False
+    )
+    return done.returncode, done.stderr
+
+
+def run_here(command):
+    """Do as `run_by_shell`, in this process, which has loaded all packages: for what means nothing to a shell."""
+    with redirect_stdout(io.TextIOWrapper(io.BytesIO())), redirect_stderr(io.StringIO()) as errors:
+        return main(shlex.split(command)[1:]), errors.getvalue()
 
 
 @pytest.fixture
@@ -188,9 +202,14 @@ def test_wrong_python_is_noticed(folder):
 
 
 def test_wrong_command_is_noticed(folder):
-    """A command that fails, also behind a pipe or on a second line, fails its document."""
-    for command in ("alloc solve absent.json", "alloc solve absent.json --json | cat", "alloc solve \\\n  absent.json"):
-        with pytest.raises(AssertionError, match=r"absent\.json"):
+    """A command that fails, also behind a pipe, on a second line or after others, fails its document."""
+    for command in (
+        "alloc solve absent.json",
+        "alloc solve absent.json --json | cat",
+        "alloc solve \\\n  absent.json",
+        "alloc methods\n$ alloc solve absent.json",
+    ):
+        with pytest.raises(AssertionError, match=r"absent\.json.*\n.*there is no such file"):
             run_document(f"```console\n$ {command}\n```\n", "wrong.md", folder)
 
 

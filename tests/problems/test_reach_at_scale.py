@@ -95,8 +95,12 @@ def test_neighbours_are_the_rows_of_the_table(instance: Instance, factor: float,
 
 @given(allocated(), st.sampled_from([0, 50_000_000]))
 def test_same_scores_bounds_and_matchings(case: tuple[Instance, Allocation], many: int) -> None:
-    """Scores, bounds and how many tasks can be served do not depend on how reach is looked at."""
+    """Scores, bounds and how many tasks can be served do not depend on how reach is looked at, to the last bit.
+
+    Abilities are made such that sums of them are exact, as each way of looking sums them up in another order.
+    """
     instance, allocation = case
+    instance = replace(instance, ability=np.ceil(1024 * instance.ability) / 1024)
     with_table = _figures(instance, allocation)
     with tableless(), patch("alloc.problems.matching.serving.MANY", many):
         assert _figures(replace(instance), allocation) == with_table
@@ -105,7 +109,7 @@ def test_same_scores_bounds_and_matchings(case: tuple[Instance, Allocation], man
 def _figures(instance: Instance, allocation: Allocation) -> list[Any]:
     score = evaluate(instance, allocation)
     return [
-        pytest.approx(makespan_lower_bound(instance), rel=1e-15),
+        makespan_lower_bound(instance),
         fewest_unserved(instance),
         len(evaluate(instance, serve_all(instance, allocation)).unserved_tasks),
         minimal_unservable_set(instance) is None,

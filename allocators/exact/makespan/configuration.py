@@ -106,7 +106,10 @@ class ConfigurationProgramme:
         else:
             whole_weight = np.ceil(weight / self._step).astype(np.int64)
             whole_need = np.maximum(1, np.floor(need / self._step * (1 - 1e-12))).astype(np.int64)
-        return [TaskNeeds(tasks, whole_weight[:, tasks[0]], whole_need[tasks]) for tasks in self._tasks_alike]
+        return [
+            TaskNeeds(tasks, np.ascontiguousarray(whole_weight[:, tasks[0]]), whole_need[tasks])  # as loops take it
+            for tasks in self._tasks_alike
+        ]
 
     def largest_infeasible(self, prices: DualPrices, low: float, high: float) -> float:
         """Return the largest T from `low` to `high`, or close to it, that these prices prove impossible, else `low`."""

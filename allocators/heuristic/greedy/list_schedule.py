@@ -48,9 +48,21 @@ def greedy(instance: Instance, search: Search | None = None) -> Allocation:
         if search is not None and search.objective is Objective.MAKESPAN_ENERGY:
             task = reduce_distance(instance, task, search.should_stop)
         return Allocation(task)
-    if instance.reach.has_table and instance.n <= MOST_SCANNED:
+    if _is_scanned(instance):
         return Allocation(_by_scan(instance, search))
     return Allocation(_by_tree(instance, search))
+
+
+def load_compiled(instance: Instance) -> None:
+    """Load the compiled code that `greedy` uses for this instance, if it does, which may take a second."""
+    if not (_is_scanned(instance) or (instance.reach.is_complete and not instance.has_travel_time)):
+        from alloc.allocators.heuristic.greedy.tree_search import compile_loops
+
+        compile_loops()
+
+
+def _is_scanned(instance: Instance) -> bool:
+    return instance.reach.has_table and instance.n <= MOST_SCANNED
 
 
 def _by_tree(instance: Instance, search: Search | None) -> NDArray[np.intp]:

@@ -78,20 +78,20 @@ def build_tree(position: Floats, tasks: Indices) -> Tree:
     begin, end = np.zeros(nodes, dtype=np.intp), np.full(nodes, len(tasks), dtype=np.intp)
     low, high = np.empty((nodes, 3)), np.empty((nodes, 3))
     order, leaf = tasks.copy(), np.full(len(position), -1, dtype=np.intp)
-    for node in range(nodes):
-        part = order[begin[node] : end[node]]
-        where = position[part]
-        unknown = np.isnan(where).any()
-        low[node] = -np.inf if unknown else where.min(axis=0)
-        high[node] = np.inf if unknown else where.max(axis=0)
-        if 2 * node + 2 >= nodes:
-            leaf[part] = node
-            continue
-        axis = 0 if unknown else int(np.argmax(high[node] - low[node]))
-        order[begin[node] : end[node]] = part[np.argsort(where[:, axis], kind="stable")]
-        middle = (begin[node] + end[node]) // 2
-        begin[2 * node + 1], end[2 * node + 1] = begin[node], middle
-        begin[2 * node + 2], end[2 * node + 2] = middle, end[node]
+    for level in range(depth + 1):
+        here, below = slice(2**level - 1, 2 ** (level + 1) - 1), slice(2 ** (level + 1) - 1, 2 ** (level + 2) - 1)
+        node, where = np.repeat(np.arange(2**level), end[here] - begin[here]), position[order]
+        unknown = np.logical_or.reduceat(np.isnan(where).any(axis=1), begin[here])[:, None]
+        low[here] = np.where(unknown, -np.inf, np.minimum.reduceat(where, begin[here]))
+        high[here] = np.where(unknown, np.inf, np.maximum.reduceat(where, begin[here]))
+        if level == depth:
+            leaf[order] = here.start + node
+            break
+        axis = np.argmax(high[here] - low[here], axis=1)  # the first where a location is unknown
+        order = order[np.lexsort((where[np.arange(len(order)), axis[node]], node))]
+        middle = (begin[here] + end[here]) // 2
+        begin[below] = np.column_stack([begin[here], middle]).ravel()
+        end[below] = np.column_stack([middle, end[here]]).ravel()
     return Tree(begin, end, low, high, order, leaf, np.zeros(nodes, dtype=np.intp))
 
 

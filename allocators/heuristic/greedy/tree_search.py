@@ -141,6 +141,11 @@ def _lists(reach: Reach) -> _Lists:
     )
 
 
+def compile_loops() -> None:
+    """Compile the loops, or read them from the cache."""
+    TreeGreedy(Instance(ability=[1.0], workload=[1.0]), 1.0).assign(np.zeros(1, dtype=np.intp))
+
+
 @compiled
 def _assign(chosen: Indices, tree: Tree, tasks: Tasks, agents: Agents) -> None:
     stack = np.empty(STACK_SIZE, dtype=np.intp)

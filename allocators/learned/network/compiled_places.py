@@ -104,14 +104,14 @@ def embed_tasks(
     fill_shared_features(game, group, shortfall, x)
     for j in range(places):
         need = max(game.need[j], F(SMALLEST))
-        x[TaskFeature.SHORTFALL_PER_NEED] = clip(shortfall[j] / need)
-        x[TaskFeature.SHORTFALL] = clip(shortfall[j] / F(SHORTFALL_DIVISOR))
-        x[TaskFeature.FINE_SHORTFALL_PER_NEED] = clip(F(FINE_FACTOR) * shortfall[j] / need)
-        x[TaskFeature.LOG_NEED] = clip(game.log_need[j] - F(LOG_NEED_OFFSET))
-        x[TaskFeature.MEAN_CONTRIBUTION] = clip(group[j] / max(members[j], F(1)) - F(1))
-        x[TaskFeature.LOG_MEMBERS] = clip(np.log1p(members[j]) - F(LOG_NEED_OFFSET))
-        x[TaskFeature.IS_IDLE_PLACE] = F(1) if j == places - 1 else F(0)
-        x[TaskFeature.SUPPLY_RATIO] = clip(game.supply_ratio[j])
+        x[TaskFeature.SHORTFALL_PER_NEED.value] = clip(shortfall[j] / need)
+        x[TaskFeature.SHORTFALL.value] = clip(shortfall[j] / F(SHORTFALL_DIVISOR))
+        x[TaskFeature.FINE_SHORTFALL_PER_NEED.value] = clip(F(FINE_FACTOR) * shortfall[j] / need)
+        x[TaskFeature.LOG_NEED.value] = clip(game.log_need[j] - F(LOG_NEED_OFFSET))
+        x[TaskFeature.MEAN_CONTRIBUTION.value] = clip(group[j] / max(members[j], F(1)) - F(1))
+        x[TaskFeature.LOG_MEMBERS.value] = clip(np.log1p(members[j]) - F(LOG_NEED_OFFSET))
+        x[TaskFeature.IS_IDLE_PLACE.value] = F(1) if j == places - 1 else F(0)
+        x[TaskFeature.SUPPLY_RATIO.value] = clip(game.supply_ratio[j])
         linear(x, weights.embed, token[j], True)
 
 
@@ -126,10 +126,10 @@ def fill_shared_features(game: GameArrays, group: Floats, shortfall: Floats, x: 
         lowest = min(lowest, group[j] / max(game.need[j], F(SMALLEST)) if game.need[j] > 0 else F(1))
     total = max(total, F(1e-9))
     short, surplus = short / total, surplus / total
-    x[TaskFeature.LOWEST_COVERAGE] = clip(lowest)
-    x[TaskFeature.TOTAL_SHORTFALL] = clip(F(FINE_FACTOR) * short)
-    x[TaskFeature.NET_SURPLUS] = clip(F(FINE_FACTOR) * (surplus - short))
-    x[TaskFeature.ENERGY_WEIGHT] = clip(F(game.energy_weight) - F(1))
+    x[TaskFeature.LOWEST_COVERAGE.value] = clip(lowest)
+    x[TaskFeature.TOTAL_SHORTFALL.value] = clip(F(FINE_FACTOR) * short)
+    x[TaskFeature.NET_SURPLUS.value] = clip(F(FINE_FACTOR) * (surplus - short))
+    x[TaskFeature.ENERGY_WEIGHT.value] = clip(F(game.energy_weight) - F(1))
 
 
 @compiled_loosely
@@ -174,14 +174,14 @@ def fill_agent_features(game: GameArrays, shortfall: Floats, agent: int, own: in
     )
     own_shortfall, own_need = shortfall[place], max(game.need[place], F(SMALLEST))
     divisor = max(contribution, F(SMALLEST))
-    x[AgentFeature.ABILITY] = clip(game.ability[agent] - F(1))
-    x[AgentFeature.SHORTFALL_PER_CONTRIBUTION] = clip(own_shortfall / divisor / F(SHORTFALL_DIVISOR))
-    x[AgentFeature.SHORTFALL_WITHOUT_PER_CONTRIBUTION] = clip_to_one((own_shortfall + contribution) / divisor)
-    x[AgentFeature.CONTRIBUTION_PER_NEED] = clip(contribution / own_need)
-    x[AgentFeature.DISTANCE] = clip(distance)
-    x[AgentFeature.ENERGY_COST] = clip(F(game.energy_weight) * distance)
-    x[AgentFeature.REACHABLE_SHARE] = clip(game.reachable_share[agent])
-    x[AgentFeature.SHORTFALL_PER_NEED] = clip(own_shortfall / own_need)
+    x[AgentFeature.ABILITY.value] = clip(game.ability[agent] - F(1))
+    x[AgentFeature.SHORTFALL_PER_CONTRIBUTION.value] = clip(own_shortfall / divisor / F(SHORTFALL_DIVISOR))
+    x[AgentFeature.SHORTFALL_WITHOUT_PER_CONTRIBUTION.value] = clip_to_one((own_shortfall + contribution) / divisor)
+    x[AgentFeature.CONTRIBUTION_PER_NEED.value] = clip(contribution / own_need)
+    x[AgentFeature.DISTANCE.value] = clip(distance)
+    x[AgentFeature.ENERGY_COST.value] = clip(F(game.energy_weight) * distance)
+    x[AgentFeature.REACHABLE_SHARE.value] = clip(game.reachable_share[agent])
+    x[AgentFeature.SHORTFALL_PER_NEED.value] = clip(own_shortfall / own_need)
 
 
 @compiled_loosely

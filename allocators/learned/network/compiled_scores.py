@@ -1,6 +1,7 @@
 """The local part of the scores of `ActorCritic` in compiled loops: features of pairs, and a small network on them.
 
 The features are those of `problems.game.observation.pair_features` in single precision; tests compare the two.
+numba before 0.68 takes the value of an IntEnum as an index, not its member.
 """
 
 from typing import NamedTuple
@@ -74,28 +75,32 @@ def fill_pair_features(game: GameArrays, shortfall: Floats, agent: int, own: int
         its_shortfall, after = shortfall[there], shortfall[there] - brought
         extra = distance - distances[own]
         gain = positive(its_shortfall) - positive(after) + own_increase
-        x[k, PairFeature.SHORTFALL_PER_CONTRIBUTION] = clip(its_shortfall * per_brought * F(1 / SHORTFALL_DIVISOR))
-        x[k, PairFeature.SHORTFALL_AFTER_PER_CONTRIBUTION] = clip_to_one(after * per_brought)
-        x[k, PairFeature.OWN_SHORTFALL_PER_CONTRIBUTION] = clip(own_shortfall * per_given * F(1 / SHORTFALL_DIVISOR))
-        x[k, PairFeature.OWN_SHORTFALL_AFTER_PER_CONTRIBUTION] = clip_to_one(own_after * per_given)
-        x[k, PairFeature.SHORTFALL_PER_NEED] = clip(its_shortfall * per_need)
-        x[k, PairFeature.SHORTFALL_AFTER_PER_NEED] = clip(after * per_need)
-        x[k, PairFeature.OWN_SHORTFALL_PER_NEED] = clip(own_shortfall * per_own_need)
-        x[k, PairFeature.OWN_SHORTFALL_AFTER_PER_NEED] = clip(own_after * per_own_need)
-        x[k, PairFeature.EXTRA_DISTANCE] = clip(extra)
-        x[k, PairFeature.DISTANCE] = clip(distance)
-        x[k, PairFeature.EXTRA_ENERGY_COST] = clip(energy_weight * extra)
-        x[k, PairFeature.ENERGY_WEIGHT] = clip(energy_weight - F(1))
-        x[k, PairFeature.LOG_NEED] = clip(game.log_need[there] - F(LOG_NEED_OFFSET))
-        x[k, PairFeature.OWN_LOG_NEED] = clip(game.log_need[here] - F(LOG_NEED_OFFSET))
-        x[k, PairFeature.ABILITY] = clip(ability - F(1))
-        x[k, PairFeature.GAIN_PER_CONTRIBUTION] = clip(gain * per_brought)
-        x[k, PairFeature.GAIN] = clip(gain)
-        x[k, PairFeature.IS_IDLE_PLACE] = F(1) if its_shortfall < F(-IDLE_SURPLUS / 2) else F(0)
-        x[k, PairFeature.OWN_SUPPLY_RATIO] = clip(game.supply_ratio[here])
-        x[k, PairFeature.SUPPLY_RATIO] = clip(game.supply_ratio[there])
-        x[k, PairFeature.REACHABLE_SHARE] = clip(game.reachable_share[agent])
-        x[k, PairFeature.CONTRIBUTION_PER_ABILITY] = clip(brought * per_ability - F(1))
+        x[k, PairFeature.SHORTFALL_PER_CONTRIBUTION.value] = clip(
+            its_shortfall * per_brought * F(1 / SHORTFALL_DIVISOR)
+        )
+        x[k, PairFeature.SHORTFALL_AFTER_PER_CONTRIBUTION.value] = clip_to_one(after * per_brought)
+        x[k, PairFeature.OWN_SHORTFALL_PER_CONTRIBUTION.value] = clip(
+            own_shortfall * per_given * F(1 / SHORTFALL_DIVISOR)
+        )
+        x[k, PairFeature.OWN_SHORTFALL_AFTER_PER_CONTRIBUTION.value] = clip_to_one(own_after * per_given)
+        x[k, PairFeature.SHORTFALL_PER_NEED.value] = clip(its_shortfall * per_need)
+        x[k, PairFeature.SHORTFALL_AFTER_PER_NEED.value] = clip(after * per_need)
+        x[k, PairFeature.OWN_SHORTFALL_PER_NEED.value] = clip(own_shortfall * per_own_need)
+        x[k, PairFeature.OWN_SHORTFALL_AFTER_PER_NEED.value] = clip(own_after * per_own_need)
+        x[k, PairFeature.EXTRA_DISTANCE.value] = clip(extra)
+        x[k, PairFeature.DISTANCE.value] = clip(distance)
+        x[k, PairFeature.EXTRA_ENERGY_COST.value] = clip(energy_weight * extra)
+        x[k, PairFeature.ENERGY_WEIGHT.value] = clip(energy_weight - F(1))
+        x[k, PairFeature.LOG_NEED.value] = clip(game.log_need[there] - F(LOG_NEED_OFFSET))
+        x[k, PairFeature.OWN_LOG_NEED.value] = clip(game.log_need[here] - F(LOG_NEED_OFFSET))
+        x[k, PairFeature.ABILITY.value] = clip(ability - F(1))
+        x[k, PairFeature.GAIN_PER_CONTRIBUTION.value] = clip(gain * per_brought)
+        x[k, PairFeature.GAIN.value] = clip(gain)
+        x[k, PairFeature.IS_IDLE_PLACE.value] = F(1) if its_shortfall < F(-IDLE_SURPLUS / 2) else F(0)
+        x[k, PairFeature.OWN_SUPPLY_RATIO.value] = clip(game.supply_ratio[here])
+        x[k, PairFeature.SUPPLY_RATIO.value] = clip(game.supply_ratio[there])
+        x[k, PairFeature.REACHABLE_SHARE.value] = clip(game.reachable_share[agent])
+        x[k, PairFeature.CONTRIBUTION_PER_ABILITY.value] = clip(brought * per_ability - F(1))
 
 
 @inlined

@@ -74,26 +74,27 @@ from test_budget import hard
 from alloc.allocators import load, solve
 exact, instance = load({method!r}), hard()
 solve(instance, exact, time_limit_s=0.01)
-print("READY", flush=True)
-result = solve(instance, exact, time_limit_s=60.0)
-print(result.stop_reason, result.makespan is not None, flush=True)
+for _ in range(2):
+    print("READY", flush=True)
+    result = solve(instance, exact, time_limit_s=60.0)
+    print(result.stop_reason, result.makespan is not None, flush=True)
 """
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("method", ["cpsat", "milp"])
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_signal_ends_a_run_and_leaves_the_process_in_order(method, number):
-    """The best plan is there soon after the signal, and the process ends with status 0, without a crash."""
+def test_signals_end_runs_and_leave_the_process_in_order(method):
+    """The best plan is there soon after either signal, and the process goes on, and ends with status 0."""
     code = PROGRAMME.format(folder=__file__.rpartition("/")[0], method=method)
     with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
-        assert process.stdout.readline().strip() == "READY"
-        time.sleep(0.8)
-        process.send_signal(number)
-        begin = time.monotonic()
-        assert process.stdout.readline().split() == ["interrupted", "True"]
-        assert time.monotonic() - begin < 1.5
+        for number in (signal.SIGINT, signal.SIGTERM):
+            assert process.stdout.readline().strip() == "READY"
+            time.sleep(0.8)
+            process.send_signal(number)
+            begin = time.monotonic()
+            assert process.stdout.readline().split() == ["interrupted", "True"]
+            assert time.monotonic() - begin < 1.5
         assert process.wait(timeout=10) == 0
 
 

@@ -68,9 +68,16 @@ def test_least_energy_by_hand(method, unit):
 
 
 @pytest.mark.parametrize(("method", "unit"), [("milp", 2.0**-30), ("cpsat", 2.0**-30), ("milp", 2.0**30)])
-def test_larger_instances_are_proven_in_any_unit(method, unit):
+@pytest.mark.parametrize(
+    ("plain", "budget"),
+    [
+        (paper_like(20, 10, 70, 1), {"time_limit_s": 10}),  # both sides meet
+        (paper_like(24, 12, 80, 3), {"time_limit_s": None, "iterations": 20}),  # the solver closes what they leave
+    ],
+    ids=["in time", "in iterations"],
+)
+def test_larger_instances_are_proven_in_any_unit(method, unit, plain, budget):
     """Where both sides of the gap come before the solver, the least energy is the same number of units too."""
-    plain = paper_like(24, 12, 80, 3)
     scaled = Instance(
         ability=plain.ability,
         workload=plain.workload,
@@ -78,7 +85,7 @@ def test_larger_instances_are_proven_in_any_unit(method, unit):
         task_position=plain.task_position * unit,
         energy_per_distance=plain.energy_per_distance,
     )
-    one, other = (solve(each, method, objective="makespan-energy", time_limit_s=10) for each in (plain, scaled))
+    one, other = (solve(each, method, objective="makespan-energy", **budget) for each in (plain, scaled))
     assert one.status is other.status is Status.OPTIMAL
     assert other.energy == pytest.approx(one.energy * unit, rel=1e-6, abs=0)
 

@@ -3,7 +3,6 @@
 import pytest
 import torch
 from probes import PROBES, best_utility, probe, share_learned, share_solved
-from resuming import assert_resumes_elsewhere
 
 from alloc.allocators.learned.algorithms.hyperparameters import GappoParameters, PpoParameters
 from alloc.allocators.learned.algorithms.ppo import Ppo
@@ -46,9 +45,3 @@ def test_playing_without_learning_is_not_enough(name: str) -> None:
 def test_ppo_solves_probes(name: str, method: str) -> None:
     """Games with known answers are solved, all of them."""
     assert share_learned(Ppo(parameters=PARAMETERS[method]), name) == 1.0
-
-
-@pytest.mark.parametrize("method", PARAMETERS)
-def test_a_job_depends_on_state_and_job_only(method: str) -> None:
-    """Stored with its replay buffer between jobs and restored in another learner, training continues bit for bit."""
-    assert_resumes_elsewhere(lambda seed: Ppo(parameters=PARAMETERS[method], seed=seed))

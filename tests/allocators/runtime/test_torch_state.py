@@ -61,7 +61,7 @@ def test_the_callers_torch_changes_no_answer(method: str, context: str) -> None:
 def test_learning_on_works_in_the_callers_torch(context: str, runs: list[FineTuning]) -> None:
     """Gradients are had, and in full precision, though the caller wants none."""
     with CONTEXTS[context]():
-        result = solve(paper_like(24, 6, 100, 0), "gappo", objective="makespan-energy", time_limit_s=1.5)
+        result = solve(paper_like(24, 6, 100, 0), "gappo", objective="makespan-energy", time_limit_s=1.0)
     assert result.notes == ()
     assert runs[0].jobs > 0
 

@@ -1,14 +1,18 @@
 """Far more tasks than agents: as many are served as can be, within the time limit."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import maximum_bipartite_matching
 
 from alloc.allocators import solve
-from alloc.problems import IDLE, Instance, evaluate, fewest_unserved, find_shortage
-from alloc.problems.matching.assignment import match
-from alloc.problems.matching.hopcroft_karp import largest_matching
+from alloc.problems import IDLE, Allocation, Instance, evaluate, fewest_unserved, find_shortage, serve_all
+from alloc.problems.matching.clock import at_least, share_of, unlimited
+from alloc.problems.matching.hopcroft_karp import largest_matching, match
 from alloc.problems.matching.pairs import bound_by_size, sampled_pairs
 
 
@@ -88,7 +92,13 @@ def test_hopcroft_and_karp_agree_with_scipy(seed: int) -> None:
     found, is_largest = largest_matching(first, column, start, lambda: np.inf)
     served = np.flatnonzero(found != IDLE)
     assert is_largest
-    assert len(served) == (match(first, column) != IDLE).sum()
+    graph = csr_matrix((np.ones(len(column)), column, first), (rows, columns))
+    size = (maximum_bipartite_matching(graph, perm_type="column") != IDLE).sum()
+    assert len(served) == size
+    other, is_largest = match(first, column)  # from the side with fewer
+    assert is_largest
+    assert (other != IDLE).sum() == len(set(other[other != IDLE])) == size
+    assert all(other[i] in column[first[i] : first[i + 1]] for i in np.flatnonzero(other != IDLE))
     assert len(set(found[served])) == len(served)
     assert all(found[i] in column[first[i] : first[i + 1]] for i in served)
 
@@ -104,3 +114,80 @@ def test_a_sample_has_pairs_of_every_size() -> None:
     assert (np.maximum.reduceat(work, few.first[:-1]) > 500).mean() > 0.9
     every, _ = sampled_pairs(instance, agents, tasks, None, 100.0, lambda: np.inf)
     assert len(every.task) > 5 * len(few.task)
+
+
+def looks(number: int) -> Callable[[], float]:
+    """Return a clock that runs out after so many looks."""
+    left = iter([1.0] * number)
+    return lambda: next(left, 0.0)
+
+
+@pytest.mark.parametrize("number", [0, 1, 2, 5, 20])
+def test_a_matching_ends_with_its_time(number: int) -> None:
+    """When the clock runs out, a matching is returned that nobody calls the largest, and it is one."""
+    rng = np.random.default_rng(2)
+    row, column = np.nonzero(rng.random((400, 400)) < 0.006)
+    first = np.searchsorted(row, np.arange(401))
+    found, is_largest = largest_matching(first, column, np.full(400, IDLE), looks(number))
+    served = np.flatnonzero(found != IDLE)
+    assert not is_largest
+    assert 0 < len(served) < (match(first, column)[0] != IDLE).sum()
+    assert len(set(found[served])) == len(served)
+    assert all(found[i] in column[first[i] : first[i + 1]] for i in served)
+
+
+def test_a_long_path_is_left_when_time_runs_out() -> None:
+    """The levels, and the search along the one path, which leads through all rows, look at the clock on their way."""
+    n = 1_000  # row i holds column i - 1 and can take column i besides; row 0 holds none
+    first = np.concatenate([[0], 1 + 2 * np.arange(n)])
+    column = np.concatenate([[0], (np.arange(1, n)[:, None] + [-1, 0]).ravel()])
+    start = np.arange(-1, n - 1)
+    assert (largest_matching(first, column, start, unlimited)[0] == np.arange(n)).all()
+    for number in (n // 2, 2 * n + n // 32):  # within the levels, and along the path
+        found, is_largest = largest_matching(first, column, start, looks(number))
+        assert not is_largest
+        assert (found == start).all()
+
+
+@pytest.mark.parametrize("table", [True, False])
+def test_serving_ends_with_its_time(table: bool) -> None:
+    """Tasks stay unserved when the clock runs out, those served before stay served, and without a limit all are."""
+    rng = np.random.default_rng(3)
+    place = rng.random((60, 2))
+    instance = Instance(
+        ability=np.ones(60),
+        workload=np.ones(60),
+        agent_position=place,
+        task_position=place[rng.permutation(60)],
+        communication_range=np.full(60, 0.3),
+    )
+    with pytest.MonkeyPatch.context() as patch:
+        if not table:
+            patch.setattr("alloc.problems.distances.reach.TABLE_LIMIT", -1)
+            patch.setattr("alloc.problems.matching.serving.CHUNK", 8)  # those next to whom an agent is idle
+        unserved = [
+            len(evaluate(instance, serve_all(instance, Allocation.idle(instance), clock)).unserved_tasks)
+            for clock in (looks(0), looks(40), unlimited)
+        ]
+    assert unserved[0] == 60 if table else 52 <= unserved[0] < 60
+    assert 0 < unserved[1] < 60
+    assert unserved[2] == 0
+
+
+def test_no_proof_without_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whether tasks compete takes a matching, also in a table; without time it is not claimed that any does."""
+    instance = surplus_of_tasks(0.1, 40, 30)
+    assert find_shortage(instance) is not None
+    assert find_shortage(instance, lambda: 0.0) is not None  # small: found out all the same
+    monkeypatch.setattr("alloc.problems.matching.unservable.SHORTEST_S", 0.0)
+    assert find_shortage(instance, lambda: 0.0) is None
+
+
+def test_clocks() -> None:
+    """A share of the time ends before the time does, and a least time lasts when there is none."""
+    left = iter([10.0, 10.0, 6.0, 5.0])
+    part = share_of(0.5, lambda: next(left))
+    assert [part(), part(), part()] == [5.0, 1.0, 0.0]
+    assert share_of(0.5, unlimited)() == np.inf
+    assert 0 < at_least(5.0, lambda: 0.0)() <= 5.0
+    assert at_least(5.0, unlimited)() == np.inf

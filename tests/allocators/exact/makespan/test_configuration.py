@@ -36,6 +36,14 @@ def test_no_makespan_that_can_be_had_is_ruled_out(seed):
             assert configurations.largest_infeasible(prices, time, 2 * best.makespan) < best.makespan * (1 + 1e-9)
 
 
+def test_needs_are_what_the_loops_are_compiled_for():
+    """Weights lie contiguously, where a column of a table would have the loops compiled anew in the run."""
+    instance = Instance(ability=[3, 5, 6, 7], workload=[10, 14], allowed_tasks=[None, None, [0], [1]])
+    needs = ConfigurationProgramme(model_of(instance), 1.0).needs(1.0)
+    assert [len(each.tasks) for each in needs] == [1, 1]
+    assert all(each.weight.flags.c_contiguous for each in needs)
+
+
 def test_theta_is_that_of_all_groups():
     """Column generation ends at the optimum of the programme with every group written out."""
     instance = Instance(ability=[3, 5, 6, 7, 9, 11], workload=[10, 14, 17])

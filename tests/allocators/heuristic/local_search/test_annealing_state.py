@@ -55,4 +55,4 @@ def test_helpers_can_reach_the_task():
     instance = Instance(ability=[1.0] * 4, workload=[1.0, 1.0], allowed_tasks=[[0], [0], [1], [0, 1]])
     state = AnnealingState(instance, 0, 2)
     state.begin(Allocation([0, IDLE, 1, IDLE]), 1.0)
-    assert {int(draw_helper(state.arrays, state.plan, 1)) for _ in range(50)} == {2, 3}
+    assert {int(draw_helper(state.arrays, state.plan, np.int32(1))) for _ in range(50)} == {2, 3}

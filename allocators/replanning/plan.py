@@ -1,0 +1,215 @@
+"""Re-planning: a plan is in force, moves have a price, and some agents keep their tasks.
+
+The price of an agent's move is one more cost of its flight, so that methods minimise it, and prove bounds on it, as
+they do for energy: they get an instance whose `Reach` has these costs. An agent that is pinned can do nothing but its
+task, and costs nothing there.
+"""
+
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from alloc.allocators.replanning.moves import Moves
+from alloc.problems import IDLE, Allocation, InputError, Instance, Objective, evaluate
+from alloc.problems.allocation import CarriedOver
+from alloc.problems.distances.build import replanned
+from alloc.problems.errors import nearest
+from alloc.problems.evaluation import reason_of
+from alloc.problems.instance import FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from alloc.allocators.result import Result
+
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Replanning:
+    """What a run is told of the plan in force.
+
+    Attributes
+    ----------
+    instance : Instance
+        As it is.
+    objective : Objective
+        As it was asked for.
+    plan, target : ndarray of int, shape (n,)
+        The task that each agent has, -1 where it is idle; and the same, but for agents that are pinned to another one.
+    has_place : ndarray of bool, shape (n,)
+        Whether the agent was in the plan, and its task is still there; else it moves at no price.
+    pinned : ndarray of bool, shape (n,)
+    price : float
+    """
+
+    instance: Instance
+    objective: Objective
+    plan: IntArray
+    target: IntArray
+    has_place: Flags
+    pinned: Flags
+    price: float
+
+    @property
+    def changes_costs(self) -> bool:
+        """Whether methods get other costs than those of the instance."""
+        return self.price > 0 or bool(self.pinned.any()) or self.objective is Objective.MAKESPAN_MOVES
+
+    @property
+    def priced_instance(self) -> Instance:
+        """The instance that methods get."""
+        if not self.changes_costs:
+            return self.instance
+        only_moves = self.objective is Objective.MAKESPAN_MOVES
+        price: FloatArray = np.where(self.has_place, 1.0 if only_moves else self.price, 0.0)
+        priced = replace(self.instance)
+        priced.__dict__["reach"] = replanned(
+            self.instance.reach, self.target, price, self.pinned, energy_counts=not only_moves
+        )
+        return priced
+
+    @property
+    def method_objective(self) -> Objective:
+        """What methods are asked to optimise."""
+        return Objective.MAKESPAN_ENERGY if self.objective is Objective.MAKESPAN_MOVES else self.objective
+
+    def completed(self, allocation: Allocation) -> Allocation:
+        """Return an allocation in which all pinned agents are at their tasks."""
+        return Allocation(np.where(self.pinned, self.target, allocation.task_of_agent))
+
+    def moves(self, allocation: Allocation, bound: float | None) -> Moves:
+        """Return how an allocation differs from the plan, and what that costs.
+
+        Parameters
+        ----------
+        allocation : Allocation
+        bound : float or None
+            On the cost that methods minimise, for `priced_instance`.
+        """
+        task, had = allocation.task_of_agent, self.plan
+        moved = self.has_place & (task != had) & (task != IDLE)
+        idle = self.has_place & (task == IDLE) & (had != IDLE)
+        cost, total = None, None
+        if self.price > 0 or self.objective is Objective.MAKESPAN_MOVES:
+            if self.objective is Objective.MAKESPAN_MOVES:
+                cost = float(moved.sum())
+                total = None if bound is None else bound + float((moved & self.pinned).sum())
+            elif self.objective is Objective.MAKESPAN_ENERGY:
+                cost = evaluate(self.instance, allocation).energy + self.price * float(moved.sum())
+                total = None if bound is None else bound + self.energy_of_pinned
+                total = None if total is None else total + self.price * float((moved & self.pinned).sum())
+        return Moves(
+            agents=tuple(np.flatnonzero(moved).tolist()),
+            stayed=int((self.has_place & (task == had) & (had != IDLE)).sum()),
+            idle=tuple(np.flatnonzero(idle).tolist()),
+            price=self.price,
+            cost=cost,
+            cost_lower_bound=total,
+        )
+
+    @property
+    def energy_of_pinned(self) -> float:
+        """Energy of the flights of pinned agents, which methods do not see."""
+        agents = np.flatnonzero(self.pinned & (self.target != IDLE))
+        task = np.full(self.instance.n, IDLE, dtype=np.intp)
+        task[agents] = self.target[agents]
+        return min(evaluate(self.instance, Allocation(task)).energy, sys.float_info.max)
+
+
+def concluded(result: "Result", plan: Replanning) -> "Result":
+    """Return the result of a run on `Replanning.priced_instance` as that on the instance itself.
+
+    Parameters
+    ----------
+    result : Result
+    plan : Replanning
+    """
+    if result.allocation is None:
+        return replace(result, instance=plan.instance, objective=plan.objective)
+    allocation = plan.completed(result.allocation)
+    bound = result.energy_lower_bound
+    energy_bound = bound
+    if plan.price > 0 or plan.objective is Objective.MAKESPAN_MOVES:
+        energy_bound = None
+    elif bound is not None:
+        energy_bound = bound + plan.energy_of_pinned
+    return replace(
+        result,
+        instance=plan.instance,
+        objective=plan.objective,
+        allocation=allocation,
+        evaluation=evaluate(plan.instance, allocation),
+        energy_lower_bound=energy_bound,
+        moves=plan.moves(allocation, bound) if plan.has_place.any() else None,
+    )
+
+
+def replanning(
+    instance: Instance,
+    objective: Objective,
+    plan: Allocation | None,
+    carried: CarriedOver | None,
+    price: float,
+    pins: Mapping[str, str | None],
+) -> Replanning:
+    """Return what a run is told of the plan in force.
+
+    Parameters
+    ----------
+    instance : Instance
+    objective : Objective
+    plan : Allocation or None
+        None where there is none; then nothing can have a price.
+    carried : CarriedOver or None
+        How the instance differs from that of the plan.
+    price : float
+        Energy that each move counts for.
+    pins : mapping
+        Task id of each agent id that is pinned, None for idle.
+
+    Raises
+    ------
+    InputError
+        If moves have a price and there is no plan, or a pinned agent cannot do its task.
+    """
+    if plan is None and (price > 0 or objective is Objective.MAKESPAN_MOVES):
+        name = "move_price" if price > 0 else "objective"
+        raise InputError("needs the plan that is in force; give it as start", name)
+    if price > 0 and objective is not Objective.MAKESPAN_ENERGY:
+        raise InputError(
+            f"is weighed against energy; use it with the objective {Objective.MAKESPAN_ENERGY}", "move_price"
+        )
+    task = np.full(instance.n, IDLE, dtype=np.intp) if plan is None else plan.task_of_agent.copy()
+    has_place = np.full(instance.n, plan is not None)
+    if carried is not None:
+        unknown = [instance.agent_index[name] for name in (*carried.new_agents, *carried.agents_without_task)]
+        has_place[unknown] = False
+    target, pinned = task.copy(), np.zeros(instance.n, dtype=np.bool_)
+    for name, goal in pins.items():
+        agent = _agent(instance, name)
+        pinned[agent], target[agent] = True, _task(instance, agent, goal)
+    return Replanning(instance, objective, task, target, has_place, pinned, price)
+
+
+def _agent(instance: Instance, name: str) -> int:
+    if name not in instance.agent_index:
+        message = f"no agent {name!r} in instance {instance.name!r}{nearest(name, instance.agent_ids)}"
+        raise InputError(message, "pins")
+    return instance.agent_index[name]
+
+
+def _task(instance: Instance, agent: int, goal: str | None) -> int:
+    if goal is None:
+        return IDLE
+    if goal not in instance.task_index:
+        message = f"no task {goal!r} in instance {instance.name!r}{nearest(goal, instance.task_ids)}"
+        raise InputError(message, "pins")
+    task = instance.task_index[goal]
+    if not instance.reach.allows(np.array([agent]), np.array([task]))[0]:
+        raise InputError(
+            f"{instance.agent_ids[agent]!r} cannot do {goal!r}: {reason_of(instance, agent, task)}", "pins"
+        )
+    return task

@@ -1,0 +1,133 @@
+"""The same problem with more agents or tasks."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from alloc.problems.arguments import listed, shown
+from alloc.problems.changes.move import index_of, position, set_place
+from alloc.problems.changes.remove import AGENT_ARRAYS, with_rows
+from alloc.problems.distances.given import DistanceTable
+from alloc.problems.errors import InputError, nearest
+from alloc.problems.fields import IntArray
+
+if TYPE_CHECKING:
+    from alloc.problems.instance import Instance
+
+NUMBERS_OF_AGENT = {
+    "ability": "ability",
+    "battery": "battery",
+    "range": "communication_range",
+    "speed": "speed",
+    "energy_per_distance": "agent_energy_per_distance",
+}
+"""Fields of an agent in a file that hold a number, and what they are called in an instance."""
+
+AGENT_FIELDS = ("id", "like", "position", "start_task", "returns", "tasks", "skills", *NUMBERS_OF_AGENT)
+
+TASK_FIELDS = ("id", "workload", "position", "priority", "needs")
+
+
+def with_agents(instance: "Instance", added: Iterable[Mapping[str, object]]) -> "Instance":
+    """Return the same problem with more agents, at the end.
+
+    Parameters
+    ----------
+    instance : Instance
+    added : iterable of mappings
+        Fields of each as in a file: ``id`` and ``ability`` at least; ``like`` is the id of an agent that it equals in
+        all that is not given, distances of its own included.
+
+    Raises
+    ------
+    InputError
+        If a field is unknown or wrong, or an id is not new.
+    """
+    rows = [
+        _known(row, AGENT_FIELDS, f"agents[{number}]") for number, row in enumerate(listed(added, "added", "agents"))
+    ]
+    if not rows:
+        return instance
+    models = [index_of(instance, row["like"]) if row.get("like") is not None else 0 for row in rows]
+    source = np.concatenate([np.arange(instance.n), np.array(models, dtype=np.intp)])
+    grown = with_rows(instance, source, np.arange(instance.m), names=[str(row.get("id")) for row in rows])
+    fields: dict[str, object] = {name: np.array(getattr(grown, name)) for name in AGENT_ARRAYS}
+    lists = [None] * grown.n if grown.allowed_tasks is None else list(grown.allowed_tasks)
+    skills = [()] * grown.n if grown.skills is None else list(grown.skills)
+    for index, row in enumerate(rows, start=instance.n):
+        blank = row.get("like") is None
+        _set_numbers(fields, row, index, blank=blank)
+        if blank or "tasks" in row:
+            lists[index] = _task_indices(instance, row.get("tasks"), index)
+        if blank or "skills" in row:
+            skills[index] = tuple(row.get("skills") or ())  # type: ignore[call-overload]
+        if blank or "position" in row or "start_task" in row:
+            set_place(fields, instance, row, index)
+    return replace(grown, **fields, allowed_tasks=lists, skills=skills)
+
+
+def with_tasks(instance: "Instance", added: Iterable[Mapping[str, object]]) -> "Instance":
+    """Return the same problem with more tasks, at the end; agents with a list of tasks may not do them.
+
+    Parameters
+    ----------
+    instance : Instance
+    added : iterable of mappings
+        Fields of each as in a file: ``id`` and ``workload`` at least.
+
+    Raises
+    ------
+    InputError
+        If a field is unknown or wrong, or an id is not new.
+    """
+    rows = [_known(row, TASK_FIELDS, f"tasks[{number}]") for number, row in enumerate(listed(added, "added", "tasks"))]
+    if not rows:
+        return instance
+    table, needs = instance.distances, [()] * instance.m if instance.needs is None else list(instance.needs)
+    place = [position(row.get("position")) for row in rows]
+    return replace(
+        instance,
+        task_ids=(*instance.task_ids, *(str(row.get("id")) for row in rows)),
+        workload=[*instance.workload.tolist(), *(row.get("workload") for row in rows)],
+        priority=[
+            *instance.priority.tolist(),
+            *(1.0 if row.get("priority") is None else row["priority"] for row in rows),
+        ],
+        task_position=np.vstack([instance.task_position, np.array(place).reshape(-1, 3)]),
+        needs=[*needs, *(row.get("needs") for row in rows)],
+        distances=None
+        if table is None
+        else DistanceTable(table.n, table.m + len(rows), table.source, table.target, table.distance, table.missing),
+    )
+
+
+def _known(row: Mapping[str, object], fields: Sequence[str], place: str) -> Mapping[str, object]:
+    for field in row:
+        if field not in fields:
+            raise InputError(f"unknown field {field!r}{nearest(str(field), fields)}", place)
+    return row
+
+
+def _set_numbers(fields: dict[str, object], row: Mapping[str, object], index: int, *, blank: bool) -> None:
+    for field, name in NUMBERS_OF_AGENT.items():
+        array = fields[name]
+        assert isinstance(array, np.ndarray)
+        if blank or field in row:
+            value = row.get(field)
+            array[index] = np.nan if value is None else value
+    returns = fields["returns"]
+    assert isinstance(returns, np.ndarray)
+    if blank or "returns" in row:
+        returns[index] = bool(row.get("returns"))
+
+
+def _task_indices(instance: "Instance", names: object, index: int) -> IntArray | None:
+    if names is None:
+        return None
+    place = f"agents[{index}].tasks"
+    for name in listed(names, place, "ids of tasks"):  # type: ignore[arg-type]
+        if name not in instance.task_index:
+            raise InputError(f"there is no task {shown(name)}{nearest(str(name), instance.task_ids)}", place)
+    return np.array(sorted({instance.task_index[name] for name in names}), dtype=np.intp)  # type: ignore[attr-defined]

@@ -1,0 +1,75 @@
+"""The same problem with agents at other places."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from alloc.problems.arguments import listed, shown
+from alloc.problems.errors import InputError, nearest
+from alloc.problems.vocabulary import IDLE
+
+if TYPE_CHECKING:
+    from alloc.problems.instance import Instance
+
+
+def moved_to(instance: "Instance", places: Mapping[str, str | Sequence[float]]) -> "Instance":
+    """Return the same problem with agents at other places.
+
+    Parameters
+    ----------
+    instance : Instance
+    places : mapping
+        For each id of an agent that has moved, the id of the task where it is now, or its coordinates. Distances given
+        for the agent itself are dropped, as they are from where it was.
+
+    Raises
+    ------
+    InputError
+        If an id is unknown, or a place is none.
+    """
+    fields: dict[str, object] = {name: np.array(getattr(instance, name)) for name in ("agent_position", "start_task")}
+    moved = np.zeros(instance.n, dtype=np.bool_)
+    for name, place in places.items():
+        index = index_of(instance, name)
+        moved[index] = True
+        key = "start_task" if isinstance(place, str) else "position"
+        set_place(fields, instance, {key: place}, index)
+    table = instance.distances
+    if table is not None:
+        of_moved = np.append(moved, np.zeros(table.m, dtype=np.bool_))
+        kept = ~(of_moved[table.source] | of_moved[table.target])
+        table = replace(table, source=table.source[kept], target=table.target[kept], distance=table.distance[kept])
+    return replace(instance, **fields, distances=table)
+
+
+def index_of(instance: "Instance", name: object) -> int:
+    """Return the index of an agent by its id."""
+    if not isinstance(name, str) or name not in instance.agent_index:
+        raise InputError(
+            f"no agent {shown(name)} in instance {instance.name!r}{nearest(str(name), instance.agent_ids)}"
+        )
+    return instance.agent_index[name]
+
+
+def set_place(fields: dict[str, object], instance: "Instance", row: Mapping[str, object], index: int) -> None:
+    """Set position and start task of an agent to those in a row of fields."""
+    place, start = fields["agent_position"], fields["start_task"]
+    assert isinstance(place, np.ndarray)
+    assert isinstance(start, np.ndarray)
+    task = row.get("start_task")
+    if task is not None and task not in instance.task_index:
+        raise InputError(f"no task {shown(task)} in instance {instance.name!r}{nearest(str(task), instance.task_ids)}")
+    start[index] = IDLE if task is None else instance.task_index[str(task)]
+    place[index] = position(row.get("position"))
+
+
+def position(given: object) -> list[float]:
+    """Return three coordinates, NaN for None."""
+    if given is None:
+        return [np.nan] * 3
+    place = listed(given, "position", "2 or 3 numbers")  # type: ignore[arg-type]
+    if len(place) not in (2, 3) or not all(isinstance(x, int | float | np.number) for x in place):
+        raise InputError(f"must be 2 or 3 numbers, got {shown(given)}", "position")
+    return [float(x) for x in (*place, 0.0)[:3]]

@@ -1,0 +1,156 @@
+"""The same problem with fewer agents or tasks."""
+
+from collections.abc import Iterable, Sequence, Set
+from dataclasses import replace
+from typing import TYPE_CHECKING, TypedDict
+
+import numpy as np
+
+from alloc.problems.arguments import listed, shown
+from alloc.problems.distances.build import restricted_reach
+from alloc.problems.errors import InputError, nearest
+from alloc.problems.fields import FloatArray, IntArray
+from alloc.problems.vocabulary import IDLE
+
+if TYPE_CHECKING:
+    from alloc.problems.instance import Instance
+
+AGENT_ARRAYS = (
+    "ability",
+    "agent_position",
+    "start_task",
+    "battery",
+    "communication_range",
+    "speed",
+    "agent_energy_per_distance",
+    "returns",
+)
+"""Fields of an instance with one row per agent; ids, allowed tasks and skills are tuples."""
+
+
+def restricted(instance: "Instance", agents: IntArray, tasks: IntArray) -> "Instance":
+    """Return the problem of some agents and tasks alone, in this order; agents stay where they begin.
+
+    Parameters
+    ----------
+    instance : Instance
+    agents, tasks : ndarray of int
+        Indices, none twice.
+    """
+    number = np.full(instance.m + 1, IDLE, dtype=np.intp)
+    number[tasks] = np.arange(len(tasks))
+    start = number[instance.start_task[agents]]
+    position = instance.agent_position[agents].copy()
+    left = (instance.start_task[agents] != IDLE) & (start == IDLE)
+    position[left] = instance.start_position[agents[left]]
+    lists = instance.allowed_tasks
+    rows = agent_rows(instance, agents)
+    rows |= {"agent_position": position, "start_task": start}
+    rows["allowed_tasks"] = None if lists is None else tuple(_renamed(lists[i], number) for i in agents.tolist())
+    part = replace(
+        instance,
+        **rows,
+        task_ids=tuple(instance.task_ids[j] for j in tasks.tolist()),
+        workload=instance.workload[tasks],
+        task_position=instance.task_position[tasks],
+        priority=instance.priority[tasks],
+        needs=None if instance.needs is None else tuple(instance.needs[j] for j in tasks.tolist()),
+        distances=None if instance.distances is None else instance.distances.restricted(agents, tasks),
+    )
+    part.__dict__["reach"] = restricted_reach(
+        instance.reach, agents, tasks
+    )  # what a start outside the part gives, stays
+    return part
+
+
+def without_agents(instance: "Instance", gone: Iterable[str]) -> "Instance":
+    """Return the same problem without these agents, as when they drop out.
+
+    Parameters
+    ----------
+    instance : Instance
+    gone : iterable of str
+        Their ids.
+
+    Raises
+    ------
+    InputError
+        If an id is unknown, or no agent is left.
+    """
+    left = _others(instance.agent_ids, gone, "agent", instance.name)
+    return with_rows(instance, left, np.arange(instance.m))
+
+
+def without_tasks(instance: "Instance", gone: Iterable[str]) -> "Instance":
+    """Return the same problem without these tasks; agents that start there stay at their places.
+
+    Parameters
+    ----------
+    instance : Instance
+    gone : iterable of str
+        Their ids.
+
+    Raises
+    ------
+    InputError
+        If an id is unknown, or no task is left.
+    """
+    left = _others(instance.task_ids, gone, "task", instance.name)
+    if not len(left):
+        raise InputError("an instance needs at least one task", "tasks")
+    return restricted(instance, np.arange(instance.n), left)
+
+
+class AgentRows(TypedDict, total=False):
+    """Fields of an instance that belong to agents, for `replace`."""
+
+    agent_ids: tuple[str, ...]
+    allowed_tasks: tuple[IntArray | None, ...] | None
+    skills: tuple[tuple[str, ...], ...] | None
+    ability: FloatArray
+    agent_position: FloatArray
+    start_task: IntArray
+    battery: FloatArray
+    communication_range: FloatArray
+    speed: FloatArray
+    agent_energy_per_distance: FloatArray
+    returns: FloatArray
+
+
+def agent_rows(instance: "Instance", agents: IntArray, names: Sequence[str] = ()) -> AgentRows:
+    """Return the fields of some agents, by their indices; the last are called `names`."""
+    kept = agents.tolist()
+    rows: dict[str, object] = {name: getattr(instance, name)[agents] for name in AGENT_ARRAYS}
+    ids = [instance.agent_ids[i] for i in kept]
+    rows["agent_ids"] = (*ids[: len(ids) - len(names)], *names)
+    rows["skills"] = None if instance.skills is None else tuple(instance.skills[i] for i in kept)
+    lists = instance.allowed_tasks
+    rows["allowed_tasks"] = None if lists is None else tuple(lists[i] for i in kept)
+    return rows  # type: ignore[return-value]
+
+
+def with_rows(instance: "Instance", agents: IntArray, tasks: IntArray, names: Sequence[str] = ()) -> "Instance":
+    """Return the instance with some agents, copies of others among them."""
+    table = instance.distances
+    return replace(
+        instance,
+        **agent_rows(instance, agents, names),
+        distances=None if table is None else table.restricted(agents, tasks),
+    )
+
+
+def _renamed(tasks: IntArray | None, number: IntArray) -> IntArray | None:
+    return None if tasks is None else number[tasks][number[tasks] != IDLE]
+
+
+def _others(ids: Sequence[str], gone: Iterable[str], kind: str, name: str) -> IntArray:
+    """Return the indices of all but those that are gone."""
+    dropped = gone if isinstance(gone, Set) else listed(gone, "gone", f"ids of {kind}s")
+    known = set(ids)
+    for one in dropped:
+        if not isinstance(one, str):
+            raise InputError(f"must be ids of {kind}s, got {shown(one)}", "gone")
+        if one not in known:
+            raise InputError(f"no {kind} {one!r} in instance {name!r}{nearest(one, ids)}", "gone")
+    names = set(dropped)
+    return np.array([index for index, one in enumerate(ids) if one not in names], dtype=np.intp)

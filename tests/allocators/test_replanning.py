@@ -1,0 +1,127 @@
+"""Re-planning: a price on moves, pinned agents, and plans for another state of affairs, against brute force."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+from tiny_instances import tiny_instance, varied_instance
+
+from alloc.allocators import load, solve
+from alloc.allocators.registry import BUILT_IN
+from alloc.problems import IDLE, Allocation, InputError, Instance, Objective, evaluate
+
+METHODS = ("cpsat", "milp", "local-search", "ga", "gappo", "hedonic", "auction", "lp-round", "greedy")
+EXACT = ("cpsat", "milp")
+
+
+def cases() -> list[tuple[Instance, Allocation, dict[str, str | None]]]:
+    """Return instances with a plan in force, and a pin in every other one."""
+    found = []
+    for seed in range(24):
+        instance = varied_instance(seed) if seed % 2 else tiny_instance(seed)
+        rng = np.random.default_rng(seed)
+        plan = Allocation(rng.integers(-1, instance.m, instance.n))
+        able = np.argwhere(instance.reach.mask[instance.reach.origin])
+        pins = {}
+        if len(able) and seed % 3 == 0:
+            agent, task = able[int(rng.integers(len(able)))].tolist()
+            pins = {instance.agent_ids[agent]: instance.task_ids[task]}
+        found.append((instance, plan, pins))
+    return found
+
+
+def best_cost(
+    instance: Instance, plan: Allocation, pins: dict[str, str | None], objective: Objective, price: float
+) -> tuple[int, float, float]:
+    """Return unserved tasks, makespan and cost of the best allocation with these pins, by trying all."""
+    mask = instance.reach.mask[instance.reach.origin]
+    options = []
+    for agent in range(instance.n):
+        name = instance.agent_ids[agent]
+        options.append([instance.task_index[pins[name]]] if name in pins else [IDLE, *np.flatnonzero(mask[agent])])
+    scored = []
+    for choice in product(*options):
+        score = evaluate(instance, Allocation(choice))
+        moved = sum(new not in (old, IDLE) for new, old in zip(choice, plan.task_of_agent, strict=True))
+        cost = moved if objective is Objective.MAKESPAN_MOVES else score.energy + price * moved
+        scored.append((len(score.unserved_tasks), score.served_makespan, cost))
+    fewest = min(unserved for unserved, _, _ in scored)
+    fastest = min(hours for unserved, hours, _ in scored if unserved == fewest)
+    in_time = [cost for unserved, hours, cost in scored if unserved == fewest and hours <= fastest * (1 + 1e-9)]
+    return fewest, fastest, min(in_time)
+
+
+@pytest.mark.parametrize(
+    ("objective", "price"), [(Objective.MAKESPAN_MOVES, 0.0), (Objective.MAKESPAN_ENERGY, 2.5)], ids=["moves", "price"]
+)
+@pytest.mark.parametrize("method", METHODS)
+def test_moves_against_brute_force(method: str, objective: Objective, price: float) -> None:
+    """Exact methods find the least cost of moves with all pins kept, and no method claims less."""
+    allocator = load(method)
+    for instance, plan, pins in cases():
+        if instance.has_travel_time and not BUILT_IN[method].finite_speeds:
+            continue
+        unserved, hours, cost = best_cost(instance, plan, pins, objective, price)
+        result = solve(
+            instance,
+            allocator,
+            objective=objective,
+            move_price=price,
+            start=plan,
+            pins=pins,
+            time_limit_s=None,
+            iterations=None if method in EXACT else 20,
+        )
+        score, moves = result.evaluation, result.moves
+        assert not score.violations
+        assert len(score.unserved_tasks) == unserved
+        assert all(result.allocation.to_ids(instance)[agent] == task for agent, task in pins.items())
+        assert score.served_makespan >= hours * (1 - 1e-9)
+        assert result.lower_bound is None or result.lower_bound <= hours * (1 + 1e-9)
+        moved = (result.allocation.task_of_agent != plan.task_of_agent) & (result.allocation.task_of_agent != IDLE)
+        assert moves.agents == tuple(np.flatnonzero(moved))
+        if score.served_makespan <= hours * (1 + 1e-9):
+            assert moves.cost >= cost * (1 - 1e-6) - 1e-9
+            assert moves.cost_lower_bound is None or moves.cost_lower_bound <= cost * (1 + 1e-6) + 1e-9
+        if method in EXACT:
+            assert score.served_makespan == pytest.approx(hours, rel=1e-6)
+            assert moves.cost == pytest.approx(cost, rel=1e-6, abs=1e-9)
+
+
+def test_a_plan_for_another_state_of_affairs() -> None:
+    """Agents and tasks that have gone are said and left out; those without a task move at no price."""
+    then = Instance(
+        ability=[1, 2, 3, 4], workload=[2, 3, 4], task_position=[[0, 0], [1, 0], [2, 0]], start_task=[0] * 4
+    )
+    plan = Allocation([0, 1, 2, 2]).to_ids(then)
+    now = then.without_agents(["a1"]).without_tasks(["t2"]).with_agents([{"id": "new", "like": "a4"}])
+    result = solve(now, "cpsat", objective="makespan-moves", start=plan, makespan_slack=1.0)
+    assert "since the plan was made, 1 agent has gone, 1 task has gone, 1 agent is new" in result.notes
+    assert result.moves.agents == ()
+    assert result.status == "optimal"
+    assert "0 of 2 move" in str(result)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"move_price": 2.0, "objective": "makespan-energy"}, "move_price: needs the plan that is in force"),
+        ({"objective": "makespan-moves"}, "objective: needs the plan that is in force"),
+        ({"move_price": 2.0, "start": {"a1": "t1"}}, "move_price: is weighed against energy"),
+        ({"pins": {"a9": "t1"}}, "no agent 'a9'"),
+        ({"pins": {"a1": "t9"}}, "no task 't9'"),
+        ({"pins": {"a1": "t2"}}, "'a1' cannot do 't2': distance 5 exceeds the range 1"),
+        ({"start": {"b1": "t1"}}, "names no agent"),
+    ],
+)
+def test_errors(arguments: dict, message: str) -> None:
+    """What cannot be meant is refused before the run."""
+    instance = Instance(
+        ability=[1, 1],
+        workload=[1, 1],
+        agent_position=[[0, 0]] * 2,
+        task_position=[[0, 0], [5, 0]],
+        communication_range=[1, 9],
+    )
+    with pytest.raises(InputError, match=message):
+        solve(instance, "greedy", **arguments)
