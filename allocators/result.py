@@ -12,7 +12,16 @@ from alloc.allocators.plan.table import AgentRow, agent_rows
 from alloc.allocators.replanning.moves import Moves
 from alloc.allocators.result_document import moves_document, read_document, result_fields
 from alloc.allocators.summary import summary
-from alloc.problems import Allocation, Evaluation, InputError, Instance, MissingPackageError, Objective
+from alloc.problems import (
+    Allocation,
+    Evaluation,
+    InputError,
+    Instance,
+    MissingPackageError,
+    Objective,
+    evaluate,
+    makespan_lower_bound,
+)
 from alloc.problems.evaluation import RELATIVE_TOLERANCE
 from alloc.problems.formats.allocation_file import RESULT_FORMAT
 from alloc.problems.formats.files import PathLike, named
@@ -217,6 +226,37 @@ class Result:
             raise MissingPackageError("to_frame needs pandas; install with: pip install pandas") from error
         columns = [field.name for field in fields(AgentRow)]
         return pandas.DataFrame(map(vars, agent_rows(self)), columns=columns)
+
+
+def scored_result(instance: Instance, allocation: Allocation, method: str = "given") -> Result:
+    """Return the scores of an allocation, wherever it comes from, as a result, with a bound that is cheap to compute.
+
+    Parameters
+    ----------
+    instance : Instance
+    allocation : Allocation
+    method : str
+        What the result calls the method.
+
+    Raises
+    ------
+    InputError
+        If the allocation does not belong to the instance.
+    """
+    score = evaluate(instance, allocation)
+    return Result(
+        instance=instance,
+        method=method,
+        objective=Objective.MAKESPAN,
+        seed=0,
+        allocation=allocation,
+        evaluation=score,
+        lower_bound=None if score.unserved_tasks else makespan_lower_bound(instance),
+        energy_lower_bound=None,
+        stop_reason=StopReason.FINISHED,
+        runtime_s=0.0,
+        trace=(),
+    )
 
 
 def read_result(path: PathLike, instance: Instance) -> Result:

@@ -4,8 +4,8 @@ from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING
 
 from alloc.problems.arguments import shown
-from alloc.problems.distances.metric import GEOGRAPHIC
 from alloc.problems.errors import InputError
+from alloc.problems.vocabulary import GEOGRAPHIC
 
 if TYPE_CHECKING:
     from alloc.problems.instance import Instance

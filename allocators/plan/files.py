@@ -12,9 +12,9 @@ from alloc.allocators.plan.geojson import to_geojson
 from alloc.allocators.plan.map import MOST_AGENTS, to_html
 from alloc.allocators.plan.spreadsheet import MOST_ROWS, to_csv, to_workbook
 from alloc.problems import InputError, Instance, MissingPackageError
-from alloc.problems.distances.metric import GEOGRAPHIC
 from alloc.problems.formats import write_bytes_atomically
 from alloc.problems.formats.files import PathLike, is_stream, named
+from alloc.problems.vocabulary import GEOGRAPHIC
 
 if TYPE_CHECKING:
     from alloc.allocators.result import Result

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from alloc.problems import Instance
-from alloc.problems.distances.metric import GEOGRAPHIC
 from alloc.problems.instance import FloatArray, IntArray
 from alloc.problems.text import heading
 from alloc.problems.units import labels
+from alloc.problems.vocabulary import GEOGRAPHIC
 
 STEEPEST = 0.05
 """Least cosine of a latitude by which a map is stretched."""

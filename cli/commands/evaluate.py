@@ -14,7 +14,6 @@ from alloc.cli.output.files import read_pair
 
 if TYPE_CHECKING:
     from alloc.allocators import Result
-    from alloc.problems import Allocation, Instance
 
 EXAMPLES = examples(
     "alloc evaluate demo.json best.json",
@@ -66,9 +65,11 @@ def evaluate_command(
     json: options.JsonOption = False,
 ) -> None:
     """Score an allocation, wherever it comes from."""
+    from alloc.allocators.result import scored_result
+
     problem, answer, claims = read_pair(instance, allocation)
     assert answer is not None
-    result = _scored(problem, answer)
+    result = scored_result(problem, answer, "evaluate")
     if claims and result.lower_bound is not None:
         if _is_of(result, claims):
             result = _bounded(result, claims)
@@ -83,27 +84,6 @@ def evaluate_command(
     if score.reward_saturated:
         note("the reward (3) is too large for a float and stands at its most negative value")
     raise typer.Exit(1 if score.unserved_tasks or score.violations else 0)
-
-
-def _scored(problem: "Instance", allocation: "Allocation") -> "Result":
-    """Return the scores of an allocation as a result."""
-    from alloc.allocators import Result, StopReason
-    from alloc.problems import Objective, evaluate, makespan_lower_bound
-
-    score = evaluate(problem, allocation)
-    return Result(
-        instance=problem,
-        method="evaluate",
-        objective=Objective.MAKESPAN,
-        seed=0,
-        allocation=allocation,
-        evaluation=score,
-        lower_bound=None if score.unserved_tasks else makespan_lower_bound(problem),
-        energy_lower_bound=None,
-        stop_reason=StopReason.FINISHED,
-        runtime_s=0.0,
-        trace=(),
-    )
 
 
 def _is_of(result: "Result", claims: dict[str, object]) -> bool:

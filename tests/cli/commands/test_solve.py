@@ -158,7 +158,7 @@ def test_slack_buys_energy(alloc, small):
     [
         (["--makespan-slack", "0.1"], "it is for the objective makespan-energy"),
         (["--makespan-slack", "inf", "--objective", "makespan-energy"], "must be a finite number"),
-        (["--makespan-limit", "0", "--objective", "makespan-energy"], "hours > 0"),
+        (["--makespan-limit", "0", "--objective", "makespan-energy"], "must be a finite number > 0"),
         (
             ["--makespan-limit", "3", "--objective", "makespan-energy", "--method", "ga"],
             "makes no use of slack for the makespan; use ",
