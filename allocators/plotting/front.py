@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from alloc.allocators import Result
     from alloc.allocators.pareto import Front
 
 WIDE = 3.0
@@ -86,11 +87,14 @@ def _logarithmic(axes: "Axes") -> None:
 
 
 def _title(front: "Front") -> str:
-    instance, units = front.instance, front.instance.units
+    instance = front.instance
     name = plain_text(short_names([instance.name], 60)[0])
-    fastest, cheapest = front.points[0], front.points[-1]
-    ends = (
-        f"from T = {labelled(number(fastest.makespan, 4), units.time)}, energy {number(fastest.energy, 6)}"
-        f" to T = {labelled(number(cheapest.makespan, 4), units.time)}, energy {number(cheapest.energy, 6)}"
-    )
+    fastest, cheapest = _figures(front.points[0]), _figures(front.points[-1])
+    ends = fastest if fastest == cheapest else f"from {fastest} to {cheapest}"
     return f"{name}: {counted(instance.n, 'agent')}, {counted(instance.m, 'task')}\n{ends}"
+
+
+def _figures(result: "Result") -> str:
+    units = result.instance.units
+    makespan = labelled(number(result.makespan, 4), units.time)
+    return f"T = {makespan}, energy {labelled(number(result.energy, 6), units.energy)}"

@@ -132,7 +132,7 @@ def _window(where: Places) -> "tuple[FloatArray, FloatArray]":
     known = known[~np.isnan(known[:, 0])]
     low, high = known.min(axis=0), known.max(axis=0)
     size = max(float((high - low)[0]) / WIDTH, float((high - low)[1]) * where.aspect) or 1.0
-    half = 0.58 * size * np.array([WIDTH, 1 / where.aspect])
+    half = 0.62 * size * np.array([WIDTH, 1 / where.aspect])
     return (low + high) / 2 - half, (low + high) / 2 + half
 
 
