@@ -25,7 +25,7 @@ SITES = {
     "Vesterålen": (15.4, 68.9, 5),
     "Karasjok": (25.5, 69.47, 9),
 }
-"""Longitude, latitude and km2 to survey."""
+"""Longitude, latitude and km2 to photograph."""
 
 
 def north(**more: object) -> Instance:
