@@ -14,9 +14,12 @@ from alloc.allocators.contract.search import Search
 from alloc.allocators.contract.status import Status
 from alloc.allocators.contract.tolerance import MakespanTolerance
 from alloc.allocators.experiments.compare import Row, compare
+from alloc.allocators.experiments.whatif import Fleet, WhatIf, whatif
 from alloc.allocators.explain import Bottleneck, explain
 from alloc.allocators.pareto import Front, pareto
 from alloc.allocators.registry import TARGETS, describe, load, method_parameters, names
+from alloc.allocators.replanning.moves import Moves
+from alloc.allocators.replanning.reasons import reasons_of_moves
 from alloc.allocators.result import Result, read_result
 from alloc.allocators.solve import solve
 from alloc.problems import AllocError, InputError, MissingPackageError, RefusedError, TrainingError
@@ -45,6 +48,7 @@ __all__ = [
     "CpSat",
     "Ddpg",
     "Dqn",
+    "Fleet",
     "Front",
     "Gappo",
     "GappoLs",
@@ -60,6 +64,7 @@ __all__ = [
     "Method",
     "Milp",
     "MissingPackageError",
+    "Moves",
     "Ppo",
     "Proposal",
     "RefusedError",
@@ -70,6 +75,7 @@ __all__ = [
     "StopReason",
     "TracePoint",
     "TrainingError",
+    "WhatIf",
     "compare",
     "describe",
     "explain",
@@ -80,8 +86,10 @@ __all__ = [
     "plot",
     "plot_convergence",
     "read_result",
+    "reasons_of_moves",
     "solve",
     "train",
+    "whatif",
     "write_result",
 ]
 

@@ -225,4 +225,8 @@ def _propose(allocator: Allocator, search: Search) -> tuple[Proposal, StopReason
         end = time.monotonic() + max(REPAIR_S, search.remaining_s)
         search.submit(serve_all(search.instance, search.best.allocation, lambda: end - time.monotonic()))
     search.raise_bound(proposal.makespan_lower_bound or 0.0)
+    if search.best is not None and search.instance.reach.move is not None:
+        from alloc.allocators.heuristic.local_search.improve import repair
+
+        repair(search, seconds=math.inf if search.budget.time_limit_s is None else REPAIR_S)
     return proposal, stop_reason

@@ -25,6 +25,13 @@ STOPS = {
     StopReason.INTERRUPTED: "it was interrupted",
 }
 
+LESS = {
+    Objective.MAKESPAN: "less energy",
+    Objective.MAKESPAN_ENERGY: "less energy",
+    Objective.MAKESPAN_MOVES: "fewer moves",
+}
+"""What a better allocation at the same makespan would have."""
+
 MOST_NAMES = 8
 """Ids in a list before it is cut."""
 
@@ -55,9 +62,10 @@ def _headline(result: "Result") -> str:
 def _status(result: "Result") -> str:
     unserved = 0 if result.evaluation is None else len(result.evaluation.unserved_tasks)
     if result.status is Status.OPTIMAL:
+        less = LESS[result.objective]
         if result.makespan_limit is not None:
-            return f"optimal, no allocation within {_time(result.instance, result.makespan_limit)} takes less energy"
-        better = "is sooner" if result.objective is Objective.MAKESPAN else "is sooner, or as soon with less energy"
+            return f"optimal, no allocation within {_time(result.instance, result.makespan_limit)} has {less}"
+        better = "is sooner" if result.objective is Objective.MAKESPAN else f"is sooner, or as soon with {less}"
         return f"optimal, no allocation {better}"
     if result.status is Status.FEASIBLE:
         return "every task is served; not proven to be the best"

@@ -10,7 +10,22 @@ from typing import NoReturn
 
 import typer
 
-from alloc.cli.commands import compare, convert, evaluate, generate, methods, pareto, plot, solve, train, tune, validate
+from alloc.cli.commands import (
+    compare,
+    convert,
+    evaluate,
+    export,
+    generate,
+    import_,
+    methods,
+    pareto,
+    plot,
+    schema,
+    solve,
+    validate,
+    whatif,
+)
+from alloc.cli.commands.training import train, tune
 from alloc.cli.options import Parameter, examples, option_of
 from alloc.cli.output.console import complain, flush, write_out
 
@@ -37,7 +52,24 @@ app = typer.Typer(
         closing="Exit codes: 0 every task is served, 1 not, 2 bad usage or bad input.",
     ),
 )
-for module in (solve, compare, pareto, evaluate, plot, generate, validate, convert, methods, train, tune):
+COMMANDS = (
+    solve,
+    compare,
+    pareto,
+    whatif,
+    evaluate,
+    plot,
+    generate,
+    import_,
+    validate,
+    convert,
+    export,
+    schema,
+    methods,
+    train,
+    tune,
+)
+for module in COMMANDS:
     module.register(app)
 
 

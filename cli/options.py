@@ -79,6 +79,8 @@ OPTION_NAMES = {
     "scenario": "family",
     "low": "ability_min",
     "high": "ability_max",
+    "format": "file_format",
+    "like": "add",
 }
 """Options by the parameter of the library that they set, where the two have different names."""
 

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from alloc.problems.evaluation import Evaluation, Violation, evaluate
     from alloc.problems.formats.allocation_file import read_allocation, write_allocation
     from alloc.problems.formats.instance_file import read_instance, write_instance
+    from alloc.problems.formats.model_file import write_model
     from alloc.problems.generate.covering import machine_covering
     from alloc.problems.generate.family import Family
     from alloc.problems.generate.paper_scenarios import paper, paper_like
@@ -65,6 +66,7 @@ __all__ = [
     "serve_all",
     "write_allocation",
     "write_instance",
+    "write_model",
 ]
 
 _MODULE_OF = {
@@ -104,6 +106,7 @@ _MODULE_OF = {
     "serve_all": "matching.serving",
     "write_allocation": "formats.allocation_file",
     "write_instance": "formats.instance_file",
+    "write_model": "formats.model_file",
 }
 """Where each name is defined; the imports above say the same to type checkers."""
 

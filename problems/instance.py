@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +17,7 @@ from alloc.problems.distances.given import DistanceTable
 from alloc.problems.distances.reach import Reach
 from alloc.problems.errors import InputError
 from alloc.problems.fields import BoolArray, FloatArray, IntArray
+from alloc.problems.tables.reading import TableOptions, read_tables
 from alloc.problems.units import Units
 from alloc.problems.vocabulary import GEOGRAPHIC
 
@@ -168,6 +170,16 @@ class Instance(fields.ReadOnly):
                 value.setflags(write=False)
             object.__setattr__(self, key, value)
         self._check()
+
+    @classmethod
+    def from_tables(
+        cls, agents: object, tasks: object, distances: object | None = None, **options: Unpack[TableOptions]
+    ) -> "Instance":
+        """Return the instance that data frames, dicts of columns or lists of dicts describe.
+
+        Options are `columns`, `units`, `decimal`, `missing`, `name` and `report`; see `tables.reading.read_tables`.
+        """
+        return read_tables(agents, tasks, distances, **options).built(cls)
 
     def _check(self) -> None:
         agents, tasks = ("agent", self.agent_ids), ("task", self.task_ids)

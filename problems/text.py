@@ -56,6 +56,11 @@ def short_names(names: Sequence[str], longest: int) -> list[str]:
     ]
 
 
+def shortened(name: str, longest: int) -> str:
+    """Return a name on one line, cut to `longest` characters."""
+    return short_names([name], longest)[0]
+
+
 def _cut(name: str, longest: int, head: int) -> str:
     """Return the name with its middle left out, after `head` characters, if it is too long."""
     return name if len(name) <= longest else name[:head] + "…" + name[len(name) - (longest - 1 - head) :]

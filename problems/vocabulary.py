@@ -59,3 +59,17 @@ class Reward(StrEnum):
 
     MAKESPAN = "makespan"
     COVERAGE = "coverage"
+
+
+class ModelFormat(StrEnum):
+    """Files of integer programmes."""
+
+    LP = "lp"
+    MPS = "mps"
+
+
+class ModelKind(StrEnum):
+    """What the variables of an integer programme stand for: classes of agents that are alike, or agents."""
+
+    CLASS = "class"
+    PLAIN = "plain"

@@ -1,13 +1,15 @@
 """Fixtures for all tests: tiny named instances, and how hypothesis runs."""
 
 import signal
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
+from schema_checks import require_valid
 
 from alloc.problems import Instance
-from alloc.problems.formats import write_instance
+from alloc.problems.formats import json_text, write_instance
 
 # the same examples in every run, and no deadline: a busy machine is no bug
 settings.register_profile(
@@ -27,6 +29,20 @@ def interruptible() -> None:
     """Let Ctrl-C through: a shell that runs the tests in the background has them ignore it, and what they start."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def valid_documents() -> Iterator[None]:
+    """Hold every instance and allocation that is written as JSON in a test against the schema of its format."""
+    with pytest.MonkeyPatch.context() as patch:
+        write = json_text.lines
+
+        def lines(document: dict[str, object]) -> str:
+            require_valid(document)
+            return write(document)
+
+        patch.setattr(json_text, "lines", lines)
+        yield
 
 
 @pytest.fixture

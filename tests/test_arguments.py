@@ -10,6 +10,7 @@ import pytest
 
 from alloc.allocators import Budget, MakespanTolerance, load, solve
 from alloc.allocators.experiments.compare import compare
+from alloc.allocators.experiments.whatif import whatif
 from alloc.allocators.pareto import pareto
 from alloc.problems import (
     Allocation,
@@ -29,6 +30,7 @@ from alloc.problems import (
     random_instance,
     read_instance,
     serve_all,
+    write_model,
 )
 
 SMALL = Instance(ability=[1, 2, 3], workload=[2, 3, 1], start_task=[0, 1, 2])
@@ -81,6 +83,14 @@ DOORS = [
     (run, "stop", (5, True)),
     (run, "handle_signals", (None, 1, "no")),
     (load, "name", (None, 5)),
+    (partial(whatif, SMALL), "like", ("a9", 5, ["a1", 3], {"a1"}, None)),
+    (partial(whatif, SMALL), "remove", ("a1", 5, ["a9"], [1])),
+    (partial(whatif, SMALL, "a1"), "up_to", (0, 1.5, "1", None)),
+    (partial(write_model, SMALL), "path", (None, 5)),
+    (partial(write_model, SMALL, "x.lp"), "format", ("xls", 5)),
+    (partial(write_model, SMALL, "x.lp"), "model", ("mixed", None)),
+    (partial(write_model, SMALL, "x.lp"), "objective", ("energy", None)),
+    (partial(write_model, SMALL, "x.lp"), "makespan", ("1", 0, -1, NAN, INF)),
     (partial(pareto, SMALL), "points", (0, 1.5, "1", None)),
     (partial(pareto, SMALL), "starts", (Allocation([0, 1, 2]), [5], 5)),
     (partial(compare, [SMALL]), "methods", ("greedy", 5, [5])),

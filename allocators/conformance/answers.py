@@ -54,6 +54,7 @@ class AnswerChecks(Runner):
         assert result.evaluation is not None, "an allocation without scores"
         again = evaluate(instance, result.allocation)
         assert result.evaluation.key(Objective.MAKESPAN_ENERGY) == again.key(Objective.MAKESPAN_ENERGY)
+        assert result.evaluation.energy == again.energy
         assert result.evaluation.violations == ()
         assert len(again.unserved_tasks) == fewest_unserved(instance)
         best = optimum(case, objective)

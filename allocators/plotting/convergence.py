@@ -8,7 +8,7 @@ from alloc.allocators.plotting.colours import SERIES
 from alloc.allocators.plotting.sites import plain_text
 from alloc.allocators.plotting.style import drawn, new_figure
 from alloc.problems import InputError, Objective
-from alloc.problems.text import counted, heading, short_names
+from alloc.problems.text import counted, heading, shortened
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -69,7 +69,7 @@ def _draw(results: "list[Result]") -> "Figure":
     if panels[0].get_legend_handles_labels()[0]:
         panels[0].legend(frameon=False, fontsize=9)
     size = f"{counted(instance.n, 'agent')}, {counted(instance.m, 'task')}"
-    figure.suptitle(f"{plain_text(short_names([instance.name], 60)[0])}: {size}", fontsize=12)
+    figure.suptitle(f"{plain_text(shortened(instance.name, 60))}: {size}", fontsize=12)
     return figure
 
 

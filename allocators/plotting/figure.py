@@ -7,7 +7,7 @@ import numpy as np
 from alloc.allocators.plotting.sites import draw_sites, name_sites, plain_text
 from alloc.allocators.plotting.style import drawn, new_figure
 from alloc.allocators.plotting.times import MAX_ROWS, draw_times
-from alloc.problems.text import counted, labelled, number, percent, short_names
+from alloc.problems.text import counted, labelled, number, percent, shortened
 from alloc.problems.units import labels
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def _draw(result: "Result") -> "Figure":
 
 
 def _title(result: "Result") -> str:
-    name = plain_text(short_names([result.instance.name], 60)[0])
+    name = plain_text(shortened(result.instance.name, 60))
     text = f"{name}: {counted(result.instance.n, 'agent')}, {counted(result.instance.m, 'task')}, {result.method}"
     if result.evaluation is None:
         return f"{text}\nno allocation found"

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from alloc.allocators.plotting.colours import LIMIT, MAKESPAN
 from alloc.allocators.plotting.sites import plain_text
 from alloc.allocators.plotting.style import drawn, new_figure
-from alloc.problems.text import counted, heading, labelled, number, short_names
+from alloc.problems.text import counted, heading, labelled, number, shortened
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -88,7 +88,7 @@ def _logarithmic(axes: "Axes") -> None:
 
 def _title(front: "Front") -> str:
     instance = front.instance
-    name = plain_text(short_names([instance.name], 60)[0])
+    name = plain_text(shortened(instance.name, 60))
     fastest, cheapest = _figures(front.points[0]), _figures(front.points[-1])
     ends = fastest if fastest == cheapest else f"from {fastest} to {cheapest}"
     return f"{name}: {counted(instance.n, 'agent')}, {counted(instance.m, 'task')}\n{ends}"

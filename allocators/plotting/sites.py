@@ -145,8 +145,8 @@ def _finish(axes: "Axes", result: "Result", where: Places) -> None:
     axes.set_xlim(low[0], high[0])
     axes.set_ylim(low[1], high[1])
     axes.set_aspect(where.aspect, adjustable="box")
-    axes.set_xlabel(where.axes[0])
-    axes.set_ylabel(where.axes[1])
+    axes.set_xlabel(plain_text(where.axes[0]))
+    axes.set_ylabel(plain_text(where.axes[1]))
     if high[0] > 180 and result.instance.metric == "geographic":
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{(value + 180) % 360 - 180:g}"))
     if result.instance.n > MAX_AGENTS:
@@ -155,7 +155,7 @@ def _finish(axes: "Axes", result: "Result", where: Places) -> None:
     axes.set_axisbelow(True)
     if is_late_coloured(result):
         bar = ScalarMappable(Normalize(*colour_range(result)), scale())
-        label = heading("completion time", result.instance.units.time)
+        label = plain_text(heading("completion time", result.instance.units.time))
         axes.figure.colorbar(bar, cax=axes.inset_axes((1.03, 0.1, 0.035, 0.8)), label=label)
 
 

@@ -92,22 +92,20 @@ class Replanning:
         task, had = allocation.task_of_agent, self.plan
         moved = self.has_place & (task != had) & (task != IDLE)
         idle = self.has_place & (task == IDLE) & (had != IDLE)
-        cost, total = None, None
-        if self.price > 0 or self.objective is Objective.MAKESPAN_MOVES:
-            if self.objective is Objective.MAKESPAN_MOVES:
-                cost = float(moved.sum())
-                total = None if bound is None else bound + float((moved & self.pinned).sum())
-            elif self.objective is Objective.MAKESPAN_ENERGY:
-                cost = evaluate(self.instance, allocation).energy + self.price * float(moved.sum())
-                total = None if bound is None else bound + self.energy_of_pinned
-                total = None if total is None else total + self.price * float((moved & self.pinned).sum())
+        cost, unseen = None, 0.0  # methods do not see what pinned agents cost
+        pinned = float((moved & self.pinned).sum())
+        if self.objective is Objective.MAKESPAN_MOVES:
+            cost, unseen = float(moved.sum()), pinned
+        elif self.price > 0:
+            cost = evaluate(self.instance, allocation).energy + self.price * float(moved.sum())
+            unseen = self.energy_of_pinned + self.price * pinned
         return Moves(
             agents=tuple(np.flatnonzero(moved).tolist()),
             stayed=int((self.has_place & (task == had) & (had != IDLE)).sum()),
             idle=tuple(np.flatnonzero(idle).tolist()),
             price=self.price,
             cost=cost,
-            cost_lower_bound=total,
+            cost_lower_bound=None if cost is None or bound is None else bound + unseen,
         )
 
     @property
@@ -129,6 +127,9 @@ def concluded(result: "Result", plan: Replanning) -> "Result":
     """
     if result.allocation is None:
         return replace(result, instance=plan.instance, objective=plan.objective)
+    if not plan.changes_costs:
+        moves = plan.moves(result.allocation, None) if plan.has_place.any() else None
+        return replace(result, moves=moves)
     allocation = plan.completed(result.allocation)
     bound = result.energy_lower_bound
     energy_bound = bound

@@ -1,14 +1,12 @@
 """``alloc evaluate``."""
 
-import math
-import sys
-from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, TypedDict
 
 import typer
 
 from alloc.cli import options
 from alloc.cli.options import examples
+from alloc.cli.output.claims import with_claims
 from alloc.cli.output.console import note, say, write_json
 from alloc.cli.output.files import read_pair
 
@@ -18,9 +16,10 @@ if TYPE_CHECKING:
 EXAMPLES = examples(
     "alloc evaluate demo.json best.json",
     "alloc evaluate demo.json best.json --json",
+    "alloc evaluate demo.json demo.sol",
     "alloc solve demo.json --json | alloc evaluate demo.json -",
-    closing="The bounds in a result file are shown if agents and scores agree with this instance. Exit code 1 if a "
-    "task is unserved or an agent is assigned to a task that it cannot take.",
+    closing="The bounds in a result file are shown if agents and scores agree with this instance, else what differs. "
+    "Exit code 1 if a task is unserved or an agent is assigned to a task that it cannot take.",
 )
 
 SCORES = (
@@ -29,7 +28,10 @@ SCORES = (
     "served_makespan",
     "lower_bound",
     "gap",
+    "makespan_limit",
     "energy",
+    "energy_lower_bound",
+    "energy_gap",
     "distance",
     "battery_remaining_percent",
     "reward",
@@ -37,7 +39,7 @@ SCORES = (
     "violations",
     "assignment",
 )
-"""Fields of a result that are about the allocation, not about the run."""
+"""Fields of a result that are about the allocation, not about the run; the limit where one was given."""
 
 
 class TaskScore(TypedDict):
@@ -60,7 +62,11 @@ def evaluate_command(
     instance: options.InstanceArgument,
     allocation: Annotated[
         str,
-        typer.Argument(metavar="ALLOCATION", help="An allocation, or a result of `alloc solve`; - is standard input."),
+        typer.Argument(
+            metavar="ALLOCATION",
+            help="An allocation, a result of `alloc solve`, or a solver's solution of what `alloc export` wrote; "
+            "- is standard input.",
+        ),
     ],
     json: options.JsonOption = False,
 ) -> None:
@@ -70,11 +76,10 @@ def evaluate_command(
     problem, answer, claims = read_pair(instance, allocation)
     assert answer is not None
     result = scored_result(problem, answer, "evaluate")
-    if claims and result.lower_bound is not None:
-        if _is_of(result, claims):
-            result = _bounded(result, claims)
-        else:
-            note(f"{allocation}: its scores do not agree with this instance, so its bounds are left out")
+    if claims:
+        result, lines = with_claims(result, claims)
+        for line in lines:
+            note(f"{allocation}: {line}")
     score = result.evaluation
     assert score is not None
     if json:
@@ -86,45 +91,9 @@ def evaluate_command(
     raise typer.Exit(1 if score.unserved_tasks or score.violations else 0)
 
 
-def _is_of(result: "Result", claims: dict[str, object]) -> bool:
-    """Return whether the fields `claims` of a result file fit `result`: the same agents and the same scores."""
-    found = result.to_dict()
-    claimed, assignment = claims.get("assignment"), found["assignment"]
-    same = ("makespan", "energy", "distance", "battery_remaining_percent", "reward")
-    return (
-        claims.get("instance") == found["instance"]
-        and isinstance(claimed, dict)
-        and isinstance(assignment, dict)
-        and claimed.keys() == assignment.keys()
-        and all(_is_close(claims.get(name), found[name]) for name in same)
-    )
-
-
-def _is_close(one: object, other: object) -> bool:
-    first, second = _number(one), _number(other)
-    return one is other if first is None or second is None else math.isclose(first, second, rel_tol=1e-9)
-
-
-def _number(value: object) -> float | None:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= sys.float_info.max:
-        return None
-    return float(value)
-
-
-def _bounded(result: "Result", claims: dict[str, object]) -> "Result":
-    """Return `result` with the bounds of a result file, except those that exceed the value they bound."""
-    bounds = {name: _number(claims.get(name)) for name in ("lower_bound", "energy_lower_bound", "makespan_limit")}
-    least, energy = bounds["lower_bound"], bounds["energy_lower_bound"]
-    if least is not None and result.makespan is not None and least <= result.makespan * (1 + 1e-9):
-        result = replace(result, lower_bound=max(least, result.lower_bound or 0.0))
-    if energy is not None and result.energy is not None and energy <= result.energy * (1 + 1e-9):
-        result = replace(result, energy_lower_bound=energy, makespan_limit=bounds["makespan_limit"])
-    return result
-
-
 def _scores(result: "Result") -> dict[str, object]:
     fields = result.to_dict()
-    return {name: fields[name] for name in SCORES}
+    return {name: fields[name] for name in SCORES if name in fields}
 
 
 def _tasks(result: "Result") -> list[TaskScore]:

@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from alloc.problems.distances.metric import Floats
+from alloc.problems.units import METRES as EXACT_METRES
 
 if TYPE_CHECKING:
     from pyproj import Geod
 
-METRES = {"m": 1.0, "km": 1000.0, "mi": 1609.344, "nmi": 1852.0}
+METRES = {unit: float(EXACT_METRES[unit]) for unit in ("m", "km", "mi", "nmi")}
 """Metres in each unit that distances on the earth may have."""
 
 EQUATORIAL_RADIUS_M = 6_378_137.0

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import repeat
 from typing import Literal, cast
 
 import numpy as np
@@ -62,18 +63,45 @@ class DistanceTable(ReadOnly):
         InputError
             If an id is unknown or stands for an agent and a task, a pair is given twice, or two agents are paired.
         """
+        entries = [_row(entry, number) for number, entry in enumerate(listed(rows, "distances", "rows"))]
+        source, target = [entry[0] for entry in entries], [entry[1] for entry in entries]
+        distance = numbers([entry[2] for entry in entries], "distances") if entries else np.zeros(0)
+        return cls.from_columns(source, target, distance, agent_ids, task_ids, missing)
+
+    @classmethod
+    def from_columns(
+        cls,
+        source: Sequence[str],
+        target: Sequence[str],
+        distance: Floats,
+        agent_ids: Sequence[str],
+        task_ids: Sequence[str],
+        missing: str = "metric",
+    ) -> "DistanceTable":
+        """Return the table of some rows that are given by columns; takes millions of them in seconds.
+
+        Parameters
+        ----------
+        source, target : sequence of str
+            Ids of agents and tasks.
+        distance : ndarray, shape (k,)
+        agent_ids, task_ids : sequence of str
+        missing : {"metric", "unreachable"}
+
+        Raises
+        ------
+        InputError
+            As `of` does.
+        """
         if missing not in MISSING:
             raise InputError(f"must be {' or '.join(map(repr, MISSING))}, got {shown(missing)}", "distances.missing")
-        entries = [_row(entry, number) for number, entry in enumerate(listed(rows, "distances", "rows"))]
         nodes = _nodes(agent_ids, task_ids)
-        source = [_node(entry[0], nodes, f"distances.rows[{number}][0]") for number, entry in enumerate(entries)]
-        target = [_node(entry[1], nodes, f"distances.rows[{number}][1]") for number, entry in enumerate(entries)]
         table = cls(
             len(agent_ids),
             len(task_ids),
-            np.array(source, dtype=np.intp),
-            np.array(target, dtype=np.intp),
-            numbers([entry[2] for entry in entries], "distances") if entries else np.zeros(0),
+            _numbered(source, nodes, 0),
+            _numbered(target, nodes, 1),
+            np.array(distance, dtype=np.float64),
             cast("Missing", missing),
         )
         table.check()
@@ -110,8 +138,8 @@ class DistanceTable(ReadOnly):
         order = np.argsort(key, kind="stable")
         twice = key[order][1:] == key[order][:-1]
         if twice.any():
-            row, other = order[int(np.argmax(twice)) + 1], order[int(np.argmax(twice))]
-            raise InputError(f"gives the same pair as rows[{other}]; keep one", f"distances.rows[{row}]")
+            row = order[int(np.argmax(twice)) + 1]
+            raise InputError("gives a pair that an earlier row gives; keep one of them", f"distances.rows[{row}]")
 
     def restricted(self, agents: IntArray, tasks: IntArray) -> "DistanceTable":
         """Return what the table says of some agents and tasks, numbered anew in this order; agents may be repeated."""
@@ -156,17 +184,26 @@ def _row(entry: object, number: int) -> Row:
     raise InputError(f"must be [from, to, distance] with two ids, got {shown(entry)}", f"distances.rows[{number}]")
 
 
+AMBIGUOUS, UNKNOWN = -1, -2
+"""What stands in for the node of an id that an agent and a task have, and of one that there is not."""
+
+
 def _nodes(agent_ids: Sequence[str], task_ids: Sequence[str]) -> dict[str, int]:
-    """Return the node of each id, -1 for those of an agent and a task."""
+    """Return the node of each id."""
     nodes = {name: index for index, name in enumerate(agent_ids)}
     for index, name in enumerate(task_ids):
-        nodes[name] = -1 if name in nodes else len(agent_ids) + index
+        nodes[name] = AMBIGUOUS if name in nodes else len(agent_ids) + index
     return nodes
 
 
-def _node(name: str, nodes: Mapping[str, int], place: str) -> int:
-    if name not in nodes:
+def _numbered(names: Sequence[str], nodes: Mapping[str, int], column: int) -> IntArray:
+    """Return the nodes of some ids, which stand in this column of the rows."""
+    found = np.array(list(map(nodes.get, names, repeat(UNKNOWN))), dtype=np.intp)
+    wrong = found < 0
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        name, place = names[row], f"distances.rows[{row}][{column}]"
+        if found[row] == AMBIGUOUS:
+            raise InputError(f"{name!r} is the id of an agent and of a task; give them different ids", place)
         raise InputError(f"there is no agent or task {name!r}{nearest(name, tuple(nodes))}", place)
-    if nodes[name] < 0:
-        raise InputError(f"{name!r} is the id of an agent and of a task; give them different ids", place)
-    return nodes[name]
+    return found

@@ -19,6 +19,7 @@ from alloc.problems.formats.files import (
     write_text_atomically,
 )
 from alloc.problems.formats.instance_file import read_instance, write_instance
+from alloc.problems.formats.model_file import write_model
 
 __all__ = [
     "allocation_from_document",
@@ -37,5 +38,6 @@ __all__ = [
     "write_allocation",
     "write_bytes_atomically",
     "write_instance",
+    "write_model",
     "write_text_atomically",
 ]

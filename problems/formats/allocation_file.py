@@ -11,6 +11,7 @@ from alloc.problems.formats.document import require_known
 from alloc.problems.formats.files import PathLike, named, read_text, write_text_atomically
 from alloc.problems.formats.messages import described, quoted, told
 from alloc.problems.instance import Instance
+from alloc.problems.models.solution import is_solution, solution_allocation
 
 ALLOCATION_FORMAT = "alloc-allocation/1"
 RESULT_FORMAT = "alloc-result/1"
@@ -21,12 +22,12 @@ ALLOCATION_FIELDS = ("format", "instance", "assignment")
 
 
 def read_allocation(path: PathLike, instance: Instance) -> tuple[Allocation, str | None]:
-    """Read an allocation, or the allocation in a result.
+    """Read an allocation, or the allocation in a result, or in a solver's solution of a model by `write_model`.
 
     Parameters
     ----------
     path : str or path
-        A JSON file whatever its suffix, or ``-`` for standard input.
+        A JSON file whatever its suffix, or a solution file of HiGHS, CBC, Gurobi or SCIP; ``-`` for standard input.
     instance : Instance
         What the ids belong to.
 
@@ -59,7 +60,10 @@ def read_claims(path: PathLike, instance: Instance) -> tuple[Allocation, str | N
     source = named(path)
     of_type(instance, Instance, "instance")
     try:
-        document = json_text.require_object(json_text.parse(read_text(path)))
+        content = read_text(path)
+        if is_solution(content) or (source.lower().endswith(".sol") and not content.lstrip().startswith("{")):
+            return solution_allocation(content, instance), None, {}
+        document = json_text.require_object(json_text.parse(content))
         allocation, name = allocation_from_document(document, instance)
     except InputError as error:
         raise told(error, source) from error.__cause__

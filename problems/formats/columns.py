@@ -1,23 +1,59 @@
 """An instance as files hold it: by columns, tasks by their ids, NaN and None for null."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from alloc.problems.distances.given import DistanceTable
 from alloc.problems.errors import InputError, nearest
 from alloc.problems.formats.messages import described, quoted
 from alloc.problems.instance import FloatArray, Instance, IntArray
-from alloc.problems.vocabulary import IDLE
+from alloc.problems.units import Units, speed_factor
+from alloc.problems.vocabulary import EUCLIDEAN, IDLE
 
 INSTANCE_FORMAT = "alloc-instance/1"
 
-AGENT_FIELDS = ("id", "ability", "position", "start_task", "battery", "range", "speed", "tasks")
-TASK_FIELDS = ("id", "workload", "position", "priority")
+AGENT_FIELDS = (
+    "id",
+    "ability",
+    "position",
+    "start_task",
+    "battery",
+    "range",
+    "speed",
+    "tasks",
+    "energy_per_distance",
+    "returns",
+    "skills",
+)
+TASK_FIELDS = ("id", "workload", "position", "priority", "needs")
+UNIT_FIELDS = ("time", "distance", "energy", "work", "speed")
+DISTANCE_FIELDS = ("missing", "rows")
 
 DEFAULT_NAME = "instance"
 DEFAULT_TAU = 0.5
 DEFAULT_ENERGY_PER_DISTANCE = 1.0
+DEFAULT_MISSING = "metric"
+
+
+@dataclass(frozen=True, kw_only=True)
+class DistanceColumns:
+    """A table of distances.
+
+    Attributes
+    ----------
+    source, target : sequence of str, length k
+        Ids of agents and tasks.
+    distance : ndarray, shape (k,)
+    missing : str
+        What holds for pairs that are left out.
+    """
+
+    source: Sequence[str]
+    target: Sequence[str]
+    distance: FloatArray
+    missing: str = DEFAULT_MISSING
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,6 +72,14 @@ class Columns:
         Task id of each agent.
     tasks : sequence of (sequence of str, or None), or None
         Task ids that each agent may do.
+    metric : str
+    units : Units
+    speed_unit : str
+        Of `speed`, where it is not that of `units`.
+    agent_energy_per_distance : ndarray, shape (n,), or None
+    returns : sequence of bool, or None
+    skills, needs : sequence of (sequence of str, or None), or None
+    distances : DistanceColumns or None
     """
 
     agent_ids: Sequence[str]
@@ -53,6 +97,14 @@ class Columns:
     speed: FloatArray | None = None
     tasks: Sequence[Sequence[str] | None] | None = None
     priority: FloatArray | None = None
+    metric: str = EUCLIDEAN
+    units: Units = field(default_factory=Units)
+    speed_unit: str = ""
+    agent_energy_per_distance: FloatArray | None = None
+    returns: Sequence[bool] | None = None
+    skills: Sequence[Sequence[str] | None] | None = None
+    needs: Sequence[Sequence[str] | None] | None = None
+    distances: DistanceColumns | None = None
 
     def build(self) -> Instance:
         """Return the instance.
@@ -77,11 +129,32 @@ class Columns:
             start_task=_starts(self.start_task, index),
             battery=_unlimited(self.battery, "battery"),
             communication_range=_unlimited(self.communication_range, "range"),
-            speed=_unlimited(self.speed, "speed"),
+            speed=self._converted_speed(),
             allowed_tasks=_allowed(self.tasks, index),
             priority=None if self.priority is None else np.where(np.isnan(self.priority), 1.0, self.priority),
             tau=self.tau,
             energy_per_distance=self.energy_per_distance,
+            agent_energy_per_distance=self.agent_energy_per_distance,
+            returns=self.returns,
+            skills=self.skills,
+            needs=self.needs,
+            metric=self.metric,
+            distances=self._distance_table(),
+            units=self.units,
+        )
+
+    def _converted_speed(self) -> FloatArray | None:
+        """Return speeds as distance per time, converted once and for all where they are given in another unit."""
+        factor = speed_factor(self.speed_unit, self.units) if self.speed_unit else 1.0
+        speed = _unlimited(self.speed, "speed")
+        return speed if speed is None or factor == 1 else speed * factor
+
+    def _distance_table(self) -> DistanceTable | None:
+        given = self.distances
+        if given is None:
+            return None
+        return DistanceTable.from_columns(
+            given.source, given.target, given.distance, self.agent_ids, self.task_ids, given.missing
         )
 
 
@@ -90,6 +163,9 @@ def check_names(named: "Columns | Instance", name_field: str = "name") -> None:
     _check_texts([named.name], name_field)
     _check_texts(named.agent_ids, "agents[{}].id")
     _check_texts(named.task_ids, "tasks[{}].id")
+    for lists, place in ((named.skills, "agents[{}].skills"), (named.needs, "tasks[{}].needs")):
+        if lists is not None:
+            _check_texts(["".join(names or ()) for names in lists], place)
 
 
 def _check_texts(texts: Sequence[str], place: str) -> None:

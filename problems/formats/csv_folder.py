@@ -1,87 +1,50 @@
-"""An instance as a folder of tables: agents.csv, tasks.csv and, optionally, instance.json."""
+"""An instance as a folder of tables: agents.csv, tasks.csv and, optionally, distances.csv and instance.json."""
 
-import csv
-import io
 import os
 import re
 import secrets
 import shutil
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from itertools import compress
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-
-import numpy as np
+from typing import NamedTuple
 
 from alloc.problems.errors import InputError
 from alloc.problems.formats import json_text
-from alloc.problems.formats.columns import Columns, check_names, require_format, unknown_field
+from alloc.problems.formats.columns import Columns, DistanceColumns, check_names, require_format
+from alloc.problems.formats.csv_table import Table, read_table, table_text
 from alloc.problems.formats.document import (
     HEADER_FIELDS,
     HeaderValues,
-    Row,
     agent_rows,
+    distance_rows,
     header_document,
     header_values,
-    require_known,
+    missing_rule,
     task_rows,
 )
 from alloc.problems.formats.files import read_text, reason, write_text_atomically
-from alloc.problems.formats.messages import quoted
-from alloc.problems.instance import FloatArray, Instance
+from alloc.problems.formats.json_columns import Row, require_known
+from alloc.problems.instance import Instance
+from alloc.problems.vocabulary import GEOGRAPHIC
 
-AGENT_COLUMNS = ("id", "ability", "x", "y", "z", "start_task", "battery", "range", "speed", "tasks")
-TASK_COLUMNS = ("id", "workload", "x", "y", "z", "priority")
+AXES, GEOGRAPHIC_AXES = ("x", "y", "z"), ("lon", "lat", "alt")
+AGENT_COLUMNS = ("id", "ability", *AXES, "start_task", "battery", "range", "speed", "tasks")
+TASK_COLUMNS = ("id", "workload", *AXES, "priority")
+MORE_AGENT_COLUMNS = ("energy_per_distance", "returns", "skills")
+MORE_TASK_COLUMNS = ("needs",)
+"""Columns that are written where the instance makes use of them."""
 
-LONGEST_CELL = 131_072
-"""What Python's csv module reads; spreadsheets stop earlier."""
+DISTANCE_COLUMNS = ("from", "to", "distance")
+AGENTS, TASKS, DISTANCES, HEADER = "agents.csv", "tasks.csv", "distances.csv", "instance.json"
+FILES = (AGENTS, TASKS, DISTANCES, HEADER)
 
 
-@dataclass(frozen=True)
-class Table:
-    """A CSV file: cells by column, and the line on which each row ends."""
+class Header(NamedTuple):
+    """What instance.json says; the missing rule is None where it does not speak of distances."""
 
-    file: str
-    cells: dict[str, list[str]]
-    lines: list[int]
-
-    def place(self, row: int, column: str) -> str:
-        """Return the place of a cell, in words."""
-        return f"{self.file} line {self.lines[row]}, column {column}"
-
-    def numbers(self, column: str) -> FloatArray | None:
-        """Return a column of numbers, NaN where empty; None if the table does not have it."""
-        if column not in self.cells:
-            return None
-        cells = self.cells[column]
-        given = list(map(bool, cells))
-        try:
-            return self._parse(cells, given)
-        except ValueError as error:
-            row = next(row for row, cell in enumerate(cells) if cell and not _is_number(cell))
-            raise InputError(f"must be a number, got {quoted(cells[row])}", self.place(row, column)) from error
-
-    def _parse(self, cells: list[str], given: list[bool]) -> FloatArray:
-        values = np.full(len(cells), np.nan)
-        text = "".join(cells)
-        if not text.isascii() or "_" in text:
-            raise ValueError("Python's float takes more than numbers are written in")
-        values[given] = list(map(float, compress(cells, given)))
-        if not np.isfinite(values[given]).all():
-            raise ValueError("not finite")
-        return values
-
-    def positions(self) -> FloatArray | None:
-        """Return columns x, y and z, with z = 0 where only x and y are given, NaN where none is."""
-        x, y, z = (self.numbers(axis) for axis in "xyz")
-        unknown = np.full(len(self.lines), np.nan)
-        x, y, z = (unknown if axis is None else axis for axis in (x, y, z))
-        half = (np.isnan(x) != np.isnan(y)) | (np.isnan(x) & ~np.isnan(z))
-        if half.any():
-            row = int(np.argmax(half))
-            missing = "x" if np.isnan(x[row]) else "y"
-            raise InputError("is missing; a position needs x and y", self.place(row, missing))
-        return np.column_stack([x, y, np.where(np.isnan(z) & ~np.isnan(x), 0.0, z)])
+    values: HeaderValues
+    missing: str | None
 
 
 def read_folder(folder: Path, default_name: str) -> Instance:
@@ -92,36 +55,44 @@ def read_folder(folder: Path, default_name: str) -> Instance:
     InputError
         If a file is absent or breaks the rules of the format; places name the file, its line and the column.
     """
-    header = _read_header(folder / "instance.json", default_name)
-    agents = _read_table(folder / "agents.csv", AGENT_COLUMNS, ("id", "ability"))
-    tasks = _read_table(folder / "tasks.csv", TASK_COLUMNS, ("id", "workload"))
-    starts, lists = agents.cells.get("start_task"), agents.cells.get("tasks")
+    header = _read_header(folder / HEADER, default_name)
+    axes = GEOGRAPHIC_AXES if header.values["metric"] == GEOGRAPHIC else AXES
+    agents = _read_placed(folder / AGENTS, (*AGENT_COLUMNS, *MORE_AGENT_COLUMNS), ("id", "ability"), axes)
+    tasks = _read_placed(folder / TASKS, (*TASK_COLUMNS, *MORE_TASK_COLUMNS), ("id", "workload"), axes)
+    table = _read_distances(folder / DISTANCES, header.missing)
     ability, workload = agents.numbers("ability"), tasks.numbers("workload")
     assert ability is not None, "a required column"
     assert workload is not None, "a required column"
     columns = Columns(
-        **header,
+        **header.values,
         agent_ids=agents.cells["id"],
         task_ids=tasks.cells["id"],
         ability=ability,
         workload=workload,
-        agent_position=agents.positions(),
-        task_position=tasks.positions(),
-        start_task=None if starts is None else [cell or None for cell in starts],
+        agent_position=agents.positions(axes),
+        task_position=tasks.positions(axes),
+        start_task=agents.texts("start_task"),
         battery=agents.numbers("battery"),
         communication_range=agents.numbers("range"),
         speed=agents.numbers("speed"),
-        tasks=None if lists is None else [split_ids(cell) for cell in lists],
+        tasks=agents.lists("tasks"),
         priority=tasks.numbers("priority"),
+        agent_energy_per_distance=agents.numbers("energy_per_distance"),
+        returns=agents.flags("returns"),
+        skills=agents.lists("skills"),
+        needs=tasks.lists("needs"),
+        distances=None if table is None else _distances(table, header.missing),
     )
     try:
         return columns.build()
     except InputError as error:
-        raise InputError(error.message, _translated(error.place, agents, tasks)) from error
+        raise InputError(error.message, _translated(error.place, agents, tasks, table, axes)) from error
 
 
 def write_folder(instance: Instance, folder: Path) -> None:
     """Write `instance` into `folder`, which is made where it does not exist; files of other names stay.
+
+    A table of distances of the instance that was there does not stay.
 
     Raises
     ------
@@ -129,14 +100,12 @@ def write_folder(instance: Instance, folder: Path) -> None:
         If it cannot be written.
     """
     check_names(instance)
-    texts = {
-        "agents.csv": _table_text(agent_rows(instance), AGENT_COLUMNS),
-        "tasks.csv": _table_text(task_rows(instance), TASK_COLUMNS),
-        "instance.json": json_text.lines(header_document(instance)),
-    }
+    texts = _texts(instance)
     if os.path.lexists(folder):
         for name, text in texts.items():
             write_text_atomically(folder / name, text)
+        if DISTANCES not in texts:
+            _remove(folder / DISTANCES)  # of the instance that was there; it would be read as part of this one
         return
     beside = folder.parent / f".alloc-{secrets.token_hex(8)}.tmp"
     try:
@@ -152,111 +121,110 @@ def write_folder(instance: Instance, folder: Path) -> None:
         shutil.rmtree(beside, ignore_errors=True)
 
 
-def join_ids(ids: Iterable[str]) -> str:
-    r"""Return ids in one cell, separated by ``;``; ``;`` and ``\`` in an id get a ``\`` before them."""
-    return ";".join(re.sub(r"([;\\])", r"\\\1", name) for name in ids) or ";"
+def _texts(instance: Instance) -> dict[str, str]:
+    """Return the text of each file."""
+    axes = GEOGRAPHIC_AXES if instance.metric == GEOGRAPHIC else AXES
+    texts = {
+        AGENTS: table_text(_columns(agent_rows(instance), AGENT_COLUMNS, MORE_AGENT_COLUMNS, axes)),
+        TASKS: table_text(_columns(task_rows(instance), TASK_COLUMNS, MORE_TASK_COLUMNS, axes)),
+    }
+    header = header_document(instance)
+    if instance.distances is not None:
+        header["distances"] = {"missing": instance.distances.missing}
+        rows = distance_rows(instance)
+        columns = {name: [row[number] for row in rows] for number, name in enumerate(DISTANCE_COLUMNS)}
+        texts[DISTANCES] = table_text(columns)
+    return {**texts, HEADER: json_text.lines(header)}
 
 
-def split_ids(cell: str) -> list[str] | None:
-    """Return the ids in a cell, None if it is empty; empty ids are left out, so that ``;`` is the empty list."""
-    if not cell:
-        return None
-    if "\\" not in cell:
-        return [name for name in cell.split(";") if name]
-    names = re.findall(r"(?:[^;\\]|\\.|\\$)+", cell, re.DOTALL)
-    return [re.sub(r"\\(.)", r"\1", name, flags=re.DOTALL) for name in names]
+def _columns(
+    rows: Sequence[Row], columns: Sequence[str], more: Sequence[str], axes: Sequence[str]
+) -> dict[str, Sequence[object]]:
+    """Return the columns of a table, those of positions under the names `axes`."""
+    table: dict[str, Sequence[object]] = {}
+    places = [row["position"] for row in rows]
+    for column in (*columns, *(name for name in more if name in rows[0])):
+        if column in AXES:
+            axis = AXES.index(column)
+            table[axes[axis]] = [place[axis] if isinstance(place, list) else None for place in places]
+        elif column in ("skills", "needs"):  # no list and an empty one are the same
+            table[column] = [row[column] or None for row in rows]
+        else:
+            table[column] = [row[column] for row in rows]
+    return table
 
 
-def _read_header(path: Path, default_name: str) -> HeaderValues:
+def _remove(path: Path) -> None:
+    try:
+        path.unlink(missing_ok=True)
+    except OSError as error:
+        raise InputError(f"cannot be removed: {reason(error)}", path.name) from error
+
+
+def _read_header(path: Path, default_name: str) -> Header:
     if not os.path.lexists(path):
-        return header_values({}, default_name)
+        return Header(header_values({}, default_name), None)
     try:
         header = json_text.require_object(json_text.parse(read_text(path)))
         require_format(header.get("format"))
         require_known(header, HEADER_FIELDS, "")
-        return header_values(header, default_name)
+        return Header(header_values(header, default_name), _missing(header.get("distances")))
     except InputError as error:
         place = f"{path.name} {error.place}" if error.place.startswith("line") else f"{path.name}, {error.place}"
         raise InputError(error.message, place.removesuffix(", ")) from error
 
 
-def _read_table(path: Path, known: Sequence[str], required: Sequence[str]) -> Table:
-    try:
-        text = read_text(path)
-    except InputError as error:
-        raise InputError(error.message, f"{path.name} {error.place}".rstrip()) from error
-    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
-    rows: list[list[str]] = []
-    lines: list[int] = []
-    try:
-        for row in reader:
-            if any(map(str.strip, row)):  # a spreadsheet writes an empty row as commas alone
-                rows.append(row)
-                lines.append(reader.line_num)
-    except csv.Error as error:
-        raise InputError(f"is not CSV: {error}", f"{path.name} line {reader.line_num}") from error
-    if not rows:
-        raise InputError(f"is empty; its first line must name the columns: {','.join(known)}", path.name)
-    names = [name.strip() for name in rows[0]]
-    _check_names(names, known, required, f"{path.name} line {lines[0]}")
-    if set(map(len, rows)) != {len(names)}:
-        row, line = next((r, n) for r, n in zip(rows, lines, strict=True) if len(r) != len(names))
-        raise InputError(f"has {len(row)} cells, but there are {len(names)} columns", f"{path.name} line {line}")
-    cells = [list(column) for column in zip(*rows[1:], strict=True)] or [[] for _ in names]
-    return Table(path.name, dict(zip(names, cells, strict=True)), lines[1:])
+def _missing(given: object) -> str | None:
+    if given is None:
+        return None
+    table = json_text.require_object(given, "distances")
+    if "rows" in table:
+        raise InputError(f"must stand in {DISTANCES}, with columns {','.join(DISTANCE_COLUMNS)}", "distances.rows")
+    require_known(table, ("missing",), "distances")
+    return missing_rule(table)
 
 
-def _check_names(names: list[str], known: Sequence[str], required: Sequence[str], place: str) -> None:
-    if len(names) == 1 and (";" in names[0] or "\t" in names[0]):
-        raise InputError("has one column only; separate columns by commas", place)
-    for name in names:
-        if name not in known:
-            raise InputError(unknown_field(name, known, "column"), place)
-        if names.count(name) > 1:
-            raise InputError(f"the column {name!r} occurs twice; remove one", place)
-    for name in required:
-        if name not in names:
-            raise InputError(f"the column {name!r} is missing", place)
+def _read_placed(path: Path, columns: Sequence[str], required: Sequence[str], axes: Sequence[str]) -> Table:
+    """Return a table with positions; a column of the other kind of positions is an error that tells what to do."""
+    names = dict(zip(AXES, axes, strict=True))
+    table = read_table(path, (*(names.get(column, column) for column in columns), *_others(axes)), required)
+    for other, axis in zip(_others(axes), axes, strict=True):
+        if other in table.cells:
+            mend = f"or call it {axis!r}" if axes is AXES else f"call it {axis!r}"
+            metric = f'needs "metric": "geographic" in {HEADER}' if axes is AXES else "is not geographic"
+            raise InputError(f"the column {other!r} {metric}; {mend}", path.name)
+    return table
 
 
-def _translated(place: str, agents: Table, tasks: Table) -> str:
+def _others(axes: Sequence[str]) -> Sequence[str]:
+    return AXES if axes is GEOGRAPHIC_AXES else GEOGRAPHIC_AXES
+
+
+def _read_distances(path: Path, missing: str | None) -> Table | None:
+    if not os.path.lexists(path):
+        if missing is not None:
+            raise InputError(f"is missing, but {HEADER} has the field 'distances'", path.name)
+        return None
+    return read_table(path, DISTANCE_COLUMNS, DISTANCE_COLUMNS)
+
+
+def _distances(table: Table, missing: str | None) -> DistanceColumns:
+    distance = table.numbers("distance")
+    assert distance is not None, "a required column"
+    columns = DistanceColumns(source=table.cells["from"], target=table.cells["to"], distance=distance)
+    return columns if missing is None else replace(columns, missing=missing)
+
+
+def _translated(place: str, agents: Table, tasks: Table, distances: Table | None, axes: Sequence[str]) -> str:
     """Turn ``agents[3].ability`` into ``agents.csv line 5, column ability``."""
+    match = re.fullmatch(r"distances\.rows\[(\d+)\](?:\[(\d)\])?", place)
+    if match is not None and distances is not None:
+        row, column = int(match[1]), match[2]
+        return distances.place(row, DISTANCE_COLUMNS[int(column)] if column else "distance")
     match = re.fullmatch(r"(agents|tasks)(?:\[(\d+)\]\.(\w+))?", place)
     if match is None:
-        return place and f"instance.json, {place}"
+        return place and f"{HEADER}, {place}"
     table = agents if match[1] == "agents" else tasks
-    return table.file if match[2] is None else table.place(int(match[2]), match[3])
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        return cell.isascii() and "_" not in cell and bool(np.isfinite(float(cell)))
-    except ValueError:
-        return False
-
-
-def _table_text(rows: list[Row], columns: Sequence[str]) -> str:
-    cells = (_cells([row.get(column) for row in rows]) for column in columns if column not in "xyz")
-    by_name = dict(zip((column for column in columns if column not in "xyz"), cells, strict=True))
-    positions = [row["position"] for row in rows]
-    for axis, column in enumerate("xyz"):
-        by_name[column] = _cells([place[axis] if isinstance(place, list) else None for place in positions])
-    table = [by_name[column] for column in columns]
-    return "\n".join([",".join(columns), *map(",".join, zip(*table, strict=True)), ""])
-
-
-def _cells(values: Sequence[object]) -> list[str]:
-    """Return values as cells, quoted where they need it."""
-    cells = ["" if value is None else _cell(value) for value in values]
-    if re.search(r'[",\r\n]', "".join(cells)):
-        cells = ['"' + cell.replace('"', '""') + '"' if re.search(r'[",\r\n]', cell) else cell for cell in cells]
-    longest = max(map(len, cells))
-    if longest > LONGEST_CELL:
-        raise InputError(f"a cell would have {longest} characters, more than CSV readers take; use .json or .npz")
-    return cells
-
-
-def _cell(value: object) -> str:
-    if isinstance(value, list):
-        return join_ids(value)
-    return value if isinstance(value, str) else repr(value)
+    if match[2] is None:
+        return table.file
+    return table.place(int(match[2]), " and ".join(axes[:2]) if match[3] == "position" else match[3])

@@ -1,32 +1,36 @@
 """Instances as plain objects, as JSON holds them (alloc-instance/1)."""
 
-from collections.abc import Callable, Sequence
-from typing import TypedDict, TypeGuard, TypeVar, cast
+from collections.abc import Sequence
+from typing import TypedDict
 
 import numpy as np
 
 from alloc.problems.errors import InputError
+from alloc.problems.formats import json_columns as columns_of
 from alloc.problems.formats.columns import (
     AGENT_FIELDS,
     DEFAULT_ENERGY_PER_DISTANCE,
+    DEFAULT_MISSING,
     DEFAULT_NAME,
     DEFAULT_TAU,
+    DISTANCE_FIELDS,
     INSTANCE_FORMAT,
     TASK_FIELDS,
+    UNIT_FIELDS,
     Columns,
+    DistanceColumns,
     check_names,
     plain_numbers,
     require_format,
-    unknown_field,
 )
+from alloc.problems.formats.json_columns import Row, require_known
 from alloc.problems.formats.json_text import require_object
 from alloc.problems.formats.messages import described
 from alloc.problems.instance import FloatArray, Instance
+from alloc.problems.units import Units
+from alloc.problems.vocabulary import EUCLIDEAN
 
-Row = dict[str, object]
-Value = TypeVar("Value")
-
-HEADER_FIELDS = ("format", "name", "tau", "energy_per_distance")
+HEADER_FIELDS = ("format", "name", "tau", "energy_per_distance", "metric", "units", "distances")
 INSTANCE_FIELDS = (*HEADER_FIELDS, "agents", "tasks")
 
 
@@ -36,6 +40,9 @@ class HeaderValues(TypedDict):
     name: str
     tau: float
     energy_per_distance: float
+    metric: str
+    units: Units
+    speed_unit: str
 
 
 def from_document(document: object, *, default_name: str = DEFAULT_NAME) -> Instance:
@@ -56,22 +63,27 @@ def from_document(document: object, *, default_name: str = DEFAULT_NAME) -> Inst
     header = require_object(document)
     require_format(header.get("format"))
     require_known(header, INSTANCE_FIELDS, "")
-    agents = _rows(header, "agents", AGENT_FIELDS)
-    tasks = _rows(header, "tasks", TASK_FIELDS)
+    agents = columns_of.rows(header, "agents", AGENT_FIELDS)
+    tasks = columns_of.rows(header, "tasks", TASK_FIELDS)
     return Columns(
         **header_values(header, default_name),
-        agent_ids=_texts(agents, "agents", "id"),
-        task_ids=_texts(tasks, "tasks", "id"),
-        ability=_numbers(agents, "agents", "ability"),
-        workload=_numbers(tasks, "tasks", "workload"),
-        agent_position=_positions(agents, "agents"),
-        task_position=_positions(tasks, "tasks"),
-        start_task=_nullable_texts(agents, "agents", "start_task"),
-        battery=_nullable_numbers(agents, "agents", "battery"),
-        communication_range=_nullable_numbers(agents, "agents", "range"),
-        speed=_nullable_numbers(agents, "agents", "speed"),
-        tasks=_text_lists(agents, "agents", "tasks"),
-        priority=_nullable_numbers(tasks, "tasks", "priority"),
+        agent_ids=columns_of.texts(agents, "agents", "id"),
+        task_ids=columns_of.texts(tasks, "tasks", "id"),
+        ability=columns_of.numbers(agents, "agents", "ability"),
+        workload=columns_of.numbers(tasks, "tasks", "workload"),
+        agent_position=columns_of.positions(agents, "agents"),
+        task_position=columns_of.positions(tasks, "tasks"),
+        start_task=columns_of.nullable_texts(agents, "agents", "start_task"),
+        battery=columns_of.nullable_numbers(agents, "agents", "battery"),
+        communication_range=columns_of.nullable_numbers(agents, "agents", "range"),
+        speed=columns_of.nullable_numbers(agents, "agents", "speed"),
+        tasks=columns_of.text_lists(agents, "agents", "tasks"),
+        priority=columns_of.nullable_numbers(tasks, "tasks", "priority"),
+        agent_energy_per_distance=columns_of.nullable_numbers(agents, "agents", "energy_per_distance"),
+        returns=columns_of.flags(agents, "agents", "returns"),
+        skills=columns_of.name_lists(agents, "agents", "skills"),
+        needs=columns_of.name_lists(tasks, "tasks", "needs"),
+        distances=_distances(header.get("distances")),
     ).build()
 
 
@@ -84,65 +96,142 @@ def to_document(instance: Instance) -> Row:
         If an id holds what no file can keep.
     """
     check_names(instance)
-    return {**header_document(instance), "agents": agent_rows(instance), "tasks": task_rows(instance)}
+    document = {**header_document(instance), "agents": agent_rows(instance), "tasks": task_rows(instance)}
+    if instance.distances is not None:
+        document["distances"] = {
+            "missing": instance.distances.missing,
+            "rows": list(map(list, distance_rows(instance))),
+        }
+    return document
 
 
 def agent_rows(instance: Instance) -> list[Row]:
-    """Return the agents of an instance as plain objects."""
-    agents = zip(
-        instance.agent_ids,
-        plain_numbers(instance.ability),
-        plain_positions(instance.agent_position),
-        start_task_ids(instance),
-        plain_numbers(instance.battery),
-        plain_numbers(instance.communication_range),
-        plain_numbers(instance.speed),
-        allowed_task_ids(instance),
-        strict=True,
-    )
-    return [dict(zip(AGENT_FIELDS, row, strict=True)) for row in agents]
+    """Return the agents of an instance as plain objects; fields that no agent makes use of are left out."""
+    columns: dict[str, Sequence[object]] = {
+        "id": instance.agent_ids,
+        "ability": plain_numbers(instance.ability),
+        "position": plain_positions(instance.agent_position),
+        "start_task": start_task_ids(instance),
+        "battery": plain_numbers(instance.battery),
+        "range": plain_numbers(instance.communication_range),
+        "speed": plain_numbers(instance.speed),
+        "tasks": allowed_task_ids(instance),
+    }
+    rates = own_rates(instance)
+    if rates is not None:
+        columns["energy_per_distance"] = plain_numbers(rates)
+    if instance.returns.any():
+        columns["returns"] = instance.returns.tolist()
+    if instance.skills is not None:
+        columns["skills"] = list(map(list, instance.skills))
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
 def task_rows(instance: Instance) -> list[Row]:
-    """Return the tasks of an instance as plain objects."""
-    tasks = zip(
-        instance.task_ids,
-        plain_numbers(instance.workload),
-        plain_positions(instance.task_position),
-        plain_numbers(instance.priority),
-        strict=True,
-    )
-    return [dict(zip(TASK_FIELDS, row, strict=True)) for row in tasks]
+    """Return the tasks of an instance as plain objects; fields that no task makes use of are left out."""
+    columns: dict[str, Sequence[object]] = {
+        "id": instance.task_ids,
+        "workload": plain_numbers(instance.workload),
+        "position": plain_positions(instance.task_position),
+        "priority": plain_numbers(instance.priority),
+    }
+    if instance.needs is not None:
+        columns["needs"] = list(map(list, instance.needs))
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+
+
+def own_rates(instance: Instance) -> FloatArray | None:
+    """Return the energy per distance of each agent, NaN where it is that of the instance; None if it is for all."""
+    rates, usual = instance.agent_energy_per_distance, instance.energy_per_distance
+    return None if (rates == usual).all() else np.where(rates == usual, np.nan, rates)
+
+
+def distance_rows(instance: Instance) -> list[tuple[str, str, float | int | None]]:
+    """Return the table of distances by ids: from, to and distance of each row."""
+    table = instance.distances
+    if table is None:
+        return []
+    names = (*instance.agent_ids, *instance.task_ids)
+    source, target = ([names[node] for node in nodes.tolist()] for nodes in (table.source, table.target))
+    return list(zip(source, target, plain_numbers(table.distance), strict=True))
 
 
 def header_document(instance: Instance) -> Row:
-    """Return what concerns neither a single agent nor a single task."""
+    """Return what concerns neither a single agent nor a single task, but for the distances."""
     tau, energy = plain_numbers(np.array([instance.tau, instance.energy_per_distance]))
-    return {"format": INSTANCE_FORMAT, "name": instance.name, "tau": tau, "energy_per_distance": energy}
+    header: Row = {"format": INSTANCE_FORMAT, "name": instance.name, "tau": tau, "energy_per_distance": energy}
+    if instance.metric != EUCLIDEAN:
+        header["metric"] = instance.metric
+    units = unit_labels(instance)
+    return {**header, "units": units} if units else header
+
+
+def unit_labels(instance: Instance) -> dict[str, str]:
+    """Return the units that are known, by quantity."""
+    return {name: label for name, label in vars(instance.units).items() if label}
 
 
 def header_values(header: Row, default_name: str) -> HeaderValues:
-    """Return name, tau and energy_per_distance, or what stands for them where they are absent."""
-    name = header.get("name")
-    if not isinstance(name, str | None):
-        raise InputError(f"must be a string, got {described(name)}", "name")
+    """Return what concerns neither a single agent nor a single task, defaults where it is absent."""
+    units, speed_unit = _units(header.get("units"))
     return {
-        "name": default_name if name is None else name,
+        "name": _text(header, "name", "name", default_name),
         "tau": _number(header, "tau", DEFAULT_TAU),
         "energy_per_distance": _number(header, "energy_per_distance", DEFAULT_ENERGY_PER_DISTANCE),
+        "metric": _text(header, "metric", "metric", EUCLIDEAN),
+        "units": units,
+        "speed_unit": speed_unit,
     }
 
 
+def missing_rule(table: Row) -> str:
+    """Return what holds for pairs that a table of distances leaves out."""
+    return _text(table, "missing", "distances.missing", DEFAULT_MISSING)
+
+
+def _units(given: object) -> tuple[Units, str]:
+    """Return the labels of units, and the unit of speeds where that is another."""
+    if given is None:
+        return Units(), ""
+    fields = require_object(given, "units")
+    require_known(fields, UNIT_FIELDS, "units")
+    labels = {name: _text(fields, name, f"units.{name}", "") for name in UNIT_FIELDS}
+    speed = labels.pop("speed")
+    return Units(**labels), speed
+
+
+def _distances(given: object) -> DistanceColumns | None:
+    if given is None:
+        return None
+    table = require_object(given, "distances")
+    require_known(table, DISTANCE_FIELDS, "distances")
+    rows = table.get("rows")
+    if not isinstance(rows, list):
+        raise InputError(f"must be a list of [from, to, distance], got {described(rows)}", "distances.rows")
+    if not set(map(type, rows)) <= {list} or not set(map(len, rows)) <= {3}:
+        for number, row in enumerate(rows):
+            if not isinstance(row, list | tuple) or len(row) != 3:
+                raise InputError(f"must be [from, to, distance], got {described(row)}", f"distances.rows[{number}]")
+    source, target, distance = zip(*rows, strict=True) if rows else ((), (), ())
+    for column, values in enumerate((source, target)):
+        if not set(map(type, values)) <= {str}:
+            row = next(row for row, value in enumerate(values) if not isinstance(value, str))
+            message = f"must be the id of an agent or a task, got {described(values[row])}"
+            raise InputError(message, f"distances.rows[{row}][{column}]")
+    values = columns_of.required_numbers(distance, "distances.rows[{}][2]")
+    return DistanceColumns(source=source, target=target, distance=values, missing=missing_rule(table))
+
+
+def _text(fields: Row, name: str, place: str, default: str) -> str:
+    value = fields.get(name)
+    if not isinstance(value, str | None):
+        raise InputError(f"must be a string, got {described(value)}", place)
+    return default if value is None else value
+
+
 def _number(header: Row, field: str, default: float) -> float:
-    value = float(_numbers([header], "", field)[0])
+    value = float(columns_of.numbers([header], "", field)[0])
     return default if np.isnan(value) else value
-
-
-def require_known(row: Row, known: Sequence[str], place: str) -> None:
-    """Raise `InputError` if an object has a field that the format does not know."""
-    for field in row:
-        if field not in known:
-            raise InputError(unknown_field(str(field), known), place)
 
 
 def start_task_ids(instance: Instance) -> list[str | None]:
@@ -163,134 +252,3 @@ def plain_positions(positions: FloatArray) -> list[list[float | int | None] | No
     """Return positions as written to text, None where unknown."""
     columns = (plain_numbers(column) for column in positions.T)
     return [None if row[0] is None else list(row) for row in zip(*columns, strict=True)]
-
-
-def _rows(document: Row, kind: str, known: Sequence[str]) -> list[Row]:
-    rows = document.get(kind)
-    if rows is None:
-        raise InputError(f"is missing; list at least one of the {kind}", kind)
-    if not isinstance(rows, list):
-        raise InputError(f"must be a list, got {described(rows)}", kind)
-    if not set(map(type, rows)) <= {dict}:
-        for index, row in enumerate(rows):
-            require_object(row, f"{kind}[{index}]")
-    if not set().union(*rows) <= set(known):
-        for index, row in enumerate(rows):
-            require_known(row, known, f"{kind}[{index}]")
-    return rows
-
-
-def _column(
-    rows: list[Row], kind: str, field: str, types: set[type], fits: Callable[[object], TypeGuard[Value]], rule: str
-) -> list[Value]:
-    """One field of all rows, None where absent; `types` settles at once what `fits` decides one by one."""
-    column = [row.get(field) for row in rows]
-    if not set(map(type, column)) <= types:
-        for index, value in enumerate(column):
-            if not fits(value):
-                raise InputError(f"must be {rule}, got {described(value)}", _place(kind, index, field))
-    return cast("list[Value]", column)
-
-
-def _place(kind: str, index: int, field: str) -> str:
-    return f"{kind}[{index}].{field}" if kind else field
-
-
-def _nullable_numbers(rows: list[Row], kind: str, field: str) -> FloatArray | None:
-    """The numbers of a field, NaN for null; None if all are null."""
-    values = _numbers(rows, kind, field)
-    return None if np.isnan(values).all() else values
-
-
-def _numbers(rows: list[Row], kind: str, field: str) -> FloatArray:
-    """The numbers of a field, NaN for null."""
-    column = _column(rows, kind, field, {float, int, type(None)}, _is_number_or_null, "a number")
-    try:
-        values = np.array(column, dtype=np.float64)
-    except OverflowError:
-        values = np.array([_float(value) for value in column])
-    if np.isnan(values).sum() > column.count(None):
-        index = next(index for index, value in enumerate(column) if value is not None and value != value)
-        raise InputError("must be a finite number, got NaN", _place(kind, index, field))
-    return values
-
-
-def _float(value: float | None) -> float:
-    try:
-        return float("nan") if value is None else float(value)
-    except OverflowError:
-        return float("inf")
-
-
-def _texts(rows: list[Row], kind: str, field: str) -> list[str]:
-    return _column(rows, kind, field, {str}, _is_text, "a non-empty string")
-
-
-def _nullable_texts(rows: list[Row], kind: str, field: str) -> list[str | None] | None:
-    column = _column(rows, kind, field, {str, type(None)}, _is_text_or_null, "the id of a task, or null")
-    return _unless_all_null(column)
-
-
-def _text_lists(rows: list[Row], kind: str, field: str) -> list[Sequence[str] | None] | None:
-    column = _column(rows, kind, field, {list, type(None)}, _is_list_or_null, "a list of task ids, or null")
-    given = [entry for entry in column if entry is not None]
-    if not {type(name) for names in given for name in names} <= {str}:
-        for index, entry in enumerate(column):
-            for position, name in enumerate(entry or ()):
-                if not isinstance(name, str):
-                    raise InputError(
-                        f"must be the id of a task, got {described(name)}", f"{kind}[{index}].{field}[{position}]"
-                    )
-    return _unless_all_null(cast("list[Sequence[str] | None]", column))
-
-
-def _positions(rows: list[Row], kind: str) -> FloatArray | None:
-    column = _column(rows, kind, "position", {list, type(None)}, _is_list_or_null, "a list of 2 or 3 numbers, or null")
-    given = [index for index, entry in enumerate(column) if entry is not None]
-    if not given:
-        return None
-    entries = [entry for entry in column if entry is not None]
-    if not set(map(len, entries)) <= {2, 3} or not {type(x) for entry in entries for x in entry} <= {float, int}:
-        for index, entry in zip(given, entries, strict=True):
-            _check_position(entry, f"{kind}[{index}].position")
-    places = cast("list[Sequence[float]]", entries)
-    if set(map(len, places)) != {3}:
-        places = [place if len(place) == 3 else [*place, 0.0] for place in places]
-    positions = np.full((len(rows), 3), np.nan)
-    try:
-        positions[given] = places
-    except OverflowError:
-        positions[given] = [[_float(value) for value in place] for place in places]
-    if not np.isfinite(positions[given]).all():
-        row = given[int(np.argmin(np.isfinite(positions[given]).all(axis=1)))]
-        wrong = next(value for value in positions[row].tolist() if not np.isfinite(value))
-        raise InputError(f"must be finite numbers, got {described(wrong)}", f"{kind}[{row}].position")
-    return positions
-
-
-def _check_position(entry: Sequence[object], place: str) -> None:
-    if len(entry) not in (2, 3):
-        raise InputError(f"must have 2 or 3 coordinates, got {len(entry)}", place)
-    for axis, value in enumerate(entry):
-        if value is None or not _is_number_or_null(value):
-            raise InputError(f"must be a number, got {described(value)}", f"{place}[{axis}]")
-
-
-def _is_number_or_null(value: object) -> TypeGuard[float | int | None]:
-    return value is None or (isinstance(value, float | int) and not isinstance(value, bool))
-
-
-def _is_text(value: object) -> TypeGuard[str]:
-    return isinstance(value, str)
-
-
-def _is_text_or_null(value: object) -> TypeGuard[str | None]:
-    return isinstance(value, str | None)
-
-
-def _is_list_or_null(value: object) -> TypeGuard[Sequence[object] | None]:
-    return isinstance(value, list | tuple | None)
-
-
-def _unless_all_null(column: list[Value | None]) -> list[Value | None] | None:
-    return None if column.count(None) == len(column) else column

@@ -54,7 +54,7 @@ def require_object(value: object, place: str = "") -> dict[str, object]:
 
 
 def lines(document: dict[str, object]) -> str:
-    """Return a document as JSON text; its lists and objects take one line per entry."""
+    """Return a document as JSON text; its lists and objects take one line per entry, and so does a table in one."""
     return "{\n" + ",\n".join(f"{encode(key)}: {_block(value)}" for key, value in document.items()) + "\n}\n"
 
 
@@ -62,7 +62,14 @@ def _block(value: object) -> str:
     if isinstance(value, list) and value:
         return "[\n" + ",\n".join(_indented(map(encode, value))) + "\n]"
     if isinstance(value, dict) and value:
-        return "{\n" + ",\n".join(_indented(f"{encode(key)}: {encode(entry)}" for key, entry in value.items())) + "\n}"
+        return "{\n" + ",\n".join(_indented(f"{encode(key)}: {_table(entry)}" for key, entry in value.items())) + "\n}"
+    return encode(value)
+
+
+def _table(value: object) -> str:
+    """Return a list of lists with one line for each, and any other value in one line."""
+    if isinstance(value, list) and value and isinstance(value[0], list):
+        return "[\n" + ",\n".join(f"    {encode(row)}" for row in value) + "\n  ]"
     return encode(value)
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from schema_checks import require_valid
 
 from alloc.cli.main import main
 
@@ -27,14 +28,30 @@ Run = Callable[..., Ran]
 
 @pytest.fixture
 def alloc(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Run:
-    """Runs the command line in this process, in an empty folder."""
+    """Runs the command line in this process, in an empty folder; what it writes is held against the schemas."""
     monkeypatch.chdir(tmp_path)
 
     def run(*arguments: str, stdin: str = "") -> Ran:
         monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(stdin.encode())))
         capsys.readouterr()
+        before = changes(tmp_path)
         code = main(arguments)
         captured = capsys.readouterr()
+        for text in (captured.out, *(path.read_text("utf-8") for path, _ in changes(tmp_path) - before)):
+            require_valid(parsed(text))
         return Ran(code, captured.out, captured.err)
 
     return run
+
+
+def changes(folder: Path) -> set[tuple[Path, int]]:
+    """Return the JSON files in a folder, and when each was written."""
+    return {(path, path.stat().st_mtime_ns) for path in folder.glob("*.json") if path.is_file()}
+
+
+def parsed(text: str) -> object:
+    """Return the value of a JSON text, None where it is something else."""
+    try:
+        return json.loads(text)
+    except ValueError:
+        return None

@@ -73,7 +73,7 @@ def mean_candidate_cost(arrays: InstanceArrays, candidates: Candidates) -> float
     with np.errstate(over="ignore", invalid="ignore"):
         step = arrays.origin_position[rows][:, None, :] - arrays.task_position[tasks]
         cost = np.sqrt((step * step).sum(axis=2))[tasks >= 0] * arrays.distance_unit
-    if arrays.cost is not arrays.distance:
+    if len(arrays.cost) and arrays.cost is not arrays.distance:
         cost = arrays.cost[rows[:, None], tasks][tasks >= 0]
     cost = cost[np.isfinite(cost) & (cost > 0)]
     return float(cost.mean()) if len(cost) else 1.0

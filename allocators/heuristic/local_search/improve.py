@@ -1,4 +1,4 @@
-"""Improve any plan by annealing: first its makespan, then its energy within that."""
+"""Improve any plan by annealing: first its makespan, then its energy within that; or repair a plan in force."""
 
 import math
 import time
@@ -9,9 +9,9 @@ from alloc.allocators.contract.search import Search
 from alloc.allocators.heuristic.local_search.annealing_state import AnnealingState
 from alloc.allocators.heuristic.local_search.clock import Clock
 from alloc.allocators.heuristic.local_search.parameters import LocalSearchParameters
-from alloc.problems import Allocation, Objective
+from alloc.problems import IDLE, Allocation, Objective, only_allowed
 from alloc.problems.evaluation import RELATIVE_TOLERANCE
-from alloc.problems.instance import FloatArray
+from alloc.problems.instance import FloatArray, IntArray
 
 HARD = 100.0
 """Factor on penalties that makes them outweigh any distance."""
@@ -24,6 +24,9 @@ FIRST_CYCLE_SHARE = 0.1
 
 REPORT_INTERVAL = 20.0
 """Time between two reports, as a multiple of the time that scoring one plan takes."""
+
+REPAIRS_PER_AGENT = 200
+"""Most exchanges of a repair, for each agent."""
 
 
 def improve(
@@ -156,3 +159,41 @@ class _Reporter:
         if found is not None:
             self.search.submit(found)
         self.next_s = time.monotonic() + REPORT_INTERVAL * (time.monotonic() - begin)
+
+
+def repair(search: Search, *, seconds: float) -> None:
+    """Submit plans that keep to the makespan limit and are as near as possible to the plan in force.
+
+    Parameters
+    ----------
+    search : Search
+        Its instance has a price on moves, and its best plan serves the tasks that are to be served.
+    seconds : float
+        Time for it; at most `REPAIRS_PER_AGENT` are made.
+    """
+    move, origin = search.instance.reach.move, search.instance.reach.origin
+    assert move is not None
+    assert search.best is not None
+    parameters, best = LocalSearchParameters(), search.best
+    if best.evaluation.cost == 0 or best.evaluation.served_makespan == 0:
+        return
+    state = AnnealingState(search.instance, search.seed, parameters.neighbours)
+    start = _serving(only_allowed(search.instance, Allocation(move.task[origin])), best.allocation, search.instance.m)
+    state.begin(start, search.makespan_limit)
+    end = time.monotonic() + seconds
+    for _ in range(1 + REPAIRS_PER_AGENT * search.instance.n // parameters.exchanges):
+        if search.interrupted or time.monotonic() >= end:
+            break
+        state.run(parameters.exchanges, parameters.weights(state, parameters.final_noise, HARD))
+    if state.best is not None:
+        search.submit(state.best)
+
+
+def _serving(plan: Allocation, other: Allocation, m: int) -> Allocation:
+    """Return a plan that serves all tasks that another one does, with its agents where `plan` has none."""
+    task: IntArray = plan.task_of_agent.copy()
+    served = np.isin(np.arange(m), task)
+    wanted = other.task_of_agent
+    taken = (wanted != IDLE) & ~served[wanted]
+    task[taken] = wanted[taken]
+    return Allocation(task)

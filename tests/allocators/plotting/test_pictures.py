@@ -13,9 +13,9 @@ import pytest
 from matplotlib.testing.compare import compare_images
 from PIL import Image
 
-from alloc.allocators import Result, StopReason, TracePoint
+from alloc.allocators import Fleet, Result, StopReason, TracePoint, WhatIf
 from alloc.allocators.pareto import Front
-from alloc.allocators.plotting import plot, plot_convergence, plot_front
+from alloc.allocators.plotting import plot, plot_convergence, plot_front, plot_whatif
 from alloc.problems import Allocation, Instance, Objective, Units, evaluate
 
 KEPT = Path(__file__).parent / "pictures"
@@ -159,6 +159,19 @@ def front(*slow: float) -> Front:
     return Front(instance, (fastest, *later), True)
 
 
+def grown(*energies: float) -> WhatIf:
+    """Return an instance without an agent, where a task is unserved, as it is, and with one agent more for each."""
+    instance = two_sites()
+    now = planned(instance, [0, 1, 1], lower_bound=0.8)
+    fleets = [Fleet((), (), now), Fleet((), ("a1",), planned(instance, [-1, 1, 1]))]
+    for k, energy in enumerate(energies, 1):
+        assert now.evaluation is not None
+        score = replace(now.evaluation, makespan=1.2 / k, energy=energy)
+        result = replace(now, evaluation=score, lower_bound=0.9 / k, energy_lower_bound=0.8 * energy)
+        fleets.append(Fleet(tuple(f"a2+{step}" for step in range(1, k + 1)), ("a1",), result))
+    return WhatIf(instance, ("a2",), tuple(fleets), True)
+
+
 DRAWN: dict[str, Callable[[str], object]] = {
     "moves": lambda path: plot(moves(), path),
     "times": lambda path: plot(times(), path),
@@ -171,6 +184,7 @@ DRAWN: dict[str, Callable[[str], object]] = {
     "front": lambda path: plot_front(front(1.3, 2.0), path),
     "wide-front": lambda path: plot_front(front(2.0, 5.0, 20.0), path),
     "one-point": lambda path: plot_front(front(), path),
+    "fleets": lambda path: plot_whatif(grown(6.0, 9.0), path),
 }
 
 
@@ -239,6 +253,7 @@ WRONG: dict[str, tuple[str, Callable[[str], object]]] = {
     "a point is missing": ("front", lambda path: plot_front(front(2.0), path)),
     "a point elsewhere": ("front", lambda path: plot_front(front(1.5, 2.0), path)),
     "the scale": ("wide-front", lambda path: plot_front(front(1.3, 2.0), path)),
+    "another energy": ("fleets", lambda path: plot_whatif(grown(9.0, 6.0), path)),
     "more than one point": ("one-point", lambda path: plot_front(front(1.3), path)),
 }
 

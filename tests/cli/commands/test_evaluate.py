@@ -65,7 +65,8 @@ def test_the_bound_of_a_result_is_that_of_its_run(alloc, small):
     result = json.loads(Path("r.json").read_text())
     shown = alloc("evaluate", "small.json", "r.json", "--json").json
     assert result["lower_bound"] > makespan_lower_bound(small) + 1e-3
-    assert (shown["lower_bound"], shown["gap"]) == (result["lower_bound"], result["gap"])
+    for field in ("lower_bound", "gap", "energy_lower_bound", "energy_gap"):
+        assert shown[field] == result[field]
     ran = alloc("evaluate", "small.json", "r.json")
     for line in solved.err.splitlines():
         if line.startswith(("  makespan", "  energy")) or "at work until then" in line:
@@ -73,18 +74,21 @@ def test_the_bound_of_a_result_is_that_of_its_run(alloc, small):
 
 
 @pytest.mark.parametrize(
-    "change",
+    ("change", "words"),
     [
-        {"workload": [3, 13, 5]},
-        {"ability": [5, 2, 1, 8, 4]},
-        {"battery": [30] * 5},
-        {"energy_per_distance": 7},
-        {"name": "other"},
-        {"agent_ids": ["a1", "a2", "a3", "a4", "b"]},
-        {"ability": [5, 2, 1, 8, 3, 9], "start_task": [0, 0, 1, 1, 2, 0], "battery": [20] * 6},
+        ({"workload": [3, 13, 5]}, "its reward is "),
+        ({"ability": [5, 2, 1, 8, 4]}, "its reward is "),
+        ({"battery": [30] * 5}, "its battery_remaining_percent is "),
+        ({"energy_per_distance": 7}, "its energy is "),
+        ({"name": "other"}, "it is for another instance"),
+        ({"agent_ids": ["a1", "a2", "a3", "a4", "b"]}, "its energy is "),
+        (
+            {"ability": [5, 2, 1, 8, 3, 9], "start_task": [0, 0, 1, 1, 2, 0], "battery": [20] * 6},
+            "it is for another set of agents",
+        ),
     ],
 )
-def test_the_bound_of_another_instance_is_left_out(alloc, small, change):
+def test_the_bound_of_another_instance_is_left_out(alloc, small, change, words):
     """A bound holds for the instance that it was proved on: with other agents or scores there is a note instead."""
     assert alloc("solve", "small.json", "--method", "cpsat", "--output", "r.json").code == 0
     own = {"task_position": small.task_position, "start_task": small.start_task, "battery": small.battery}
@@ -97,7 +101,8 @@ def test_the_bound_of_another_instance_is_left_out(alloc, small, change):
         document["energy"] += 1
         Path("r.json").write_text(json.dumps(document))
     ran = alloc("evaluate", "other.json", "r.json", "--json")
-    assert "r.json: its scores do not agree with this instance, so its bounds are left out" in ran.err
+    assert f"note: r.json: {words}" in ran.err
+    assert ran.err.endswith("; its bounds are left out\n")
     assert ran.json["lower_bound"] == makespan_lower_bound(other)
 
 
@@ -109,3 +114,39 @@ def test_bounds_that_cannot_be_are_left_out(alloc, small, bound):
     Path("r.json").write_text(json.dumps({**document, "lower_bound": bound}))
     ran = alloc("evaluate", "small.json", "r.json", "--json")
     assert (ran.code, ran.json["lower_bound"]) == (0, makespan_lower_bound(small))
+    is_valid = bound is None or bound == 0
+    assert ("is no bound on the makespan" in ran.err) == (not is_valid or bound is True)
+
+
+def test_what_a_result_states_wrongly_is_told(alloc, small):
+    """A result whose agents were moved by hand keeps its old scores: what it says, and what is so, are told."""
+    assert alloc("solve", "small.json", "--method", "cpsat", "--output", "r.json").code == 0
+    document = json.loads(Path("r.json").read_text())
+    document["assignment"] |= {"a4": "t1"}
+    Path("r.json").write_text(json.dumps(document))
+    ran = alloc("evaluate", "small.json", "r.json", "--json")
+    stated, so = f"{document['makespan']:.10g}", f"{ran.json['makespan']:.10g}"
+    assert f"r.json: its makespan is {stated}, but on this instance it is {so}; its bounds are left out" in ran.err
+
+
+def test_unserved_tasks_that_are_stated_otherwise_are_told(alloc, unservable):
+    """A result that claims to serve every task, though one is unserved, is contradicted too."""
+    assert alloc("solve", "unservable.json", "--method", "greedy", "--output", "r.json").code == 1
+    assert "note" not in alloc("evaluate", "unservable.json", "r.json").err
+    document = json.loads(Path("r.json").read_text())
+    Path("r.json").write_text(json.dumps({**document, "makespan": 2.0}))
+    ran = alloc("evaluate", "unservable.json", "r.json")
+    assert "r.json: its makespan is 2, but on this instance it is null" in ran.err
+
+
+def test_slack_and_moves_of_a_result_are_shown(alloc, small):
+    """The limit within which energy was bounded, and the moves against a plan in force, are those of `solve`."""
+    assert alloc("solve", "small.json", "--method", "greedy", "--output", "old.json").code == 0
+    options = ("--objective", "makespan-energy", "--makespan-slack", "0.5", "--start", "old.json", "--move-price", "1")
+    solved = alloc("solve", "small.json", "--method", "milp", *options, "--output", "r.json")
+    result = json.loads(Path("r.json").read_text())
+    ran = alloc("evaluate", "small.json", "r.json")
+    for line in solved.err.splitlines():
+        if line.startswith(("  makespan", "  energy", "  moves")):
+            assert line in ran.err
+    assert alloc("evaluate", "small.json", "r.json", "--json").json["makespan_limit"] == result["makespan_limit"]

@@ -150,7 +150,7 @@ def test_slack_buys_energy(alloc, small):
     assert loose.json["energy"] < strict["energy"]
     assert loose.json["status"] == "optimal"
     shown = alloc("solve", "small.json", "--objective", "makespan-energy", "--makespan-limit", "9").err
-    assert "optimal, no allocation within 9 takes less energy" in shown
+    assert "optimal, no allocation within 9 has less energy" in shown
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,7 @@ from alloc.allocators.learned.training.families import FAMILIES
 from alloc.allocators.parallel.engine import EngineError
 from alloc.allocators.parallel.engines import ENGINES
 from alloc.allocators.parallel.serial import SerialEngine
-from alloc.cli.commands import train_options
+from alloc.cli.commands.training import train_options
 from alloc.problems import Instance
 from alloc.problems.formats import write_instance
 from alloc.problems.generate import paper_like

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import strategies as st
 
-from alloc.problems import InputError, Instance, read_instance
+from alloc.problems import DistanceTable, InputError, Instance, Units, read_instance
 from alloc.problems.fields import LEAST, MOST
 
 ARRAYS = (
@@ -23,6 +23,7 @@ ARRAYS = (
     "communication_range",
     "speed",
     "priority",
+    "agent_energy_per_distance",
 )
 
 
@@ -34,10 +35,23 @@ def assert_same(left: Instance, right: Instance) -> None:
         assert (np.signbit(a) == np.signbit(b))[~np.isnan(a)].all(), field
     assert (left.name, left.agent_ids, left.task_ids) == (right.name, right.agent_ids, right.task_ids)
     assert (left.tau, left.energy_per_distance) == (right.tau, right.energy_per_distance)
+    assert (left.metric, left.units) == (right.metric, right.units)
+    assert (left.skills, left.needs, left.returns.tolist()) == (right.skills, right.needs, right.returns.tolist())
+    assert_same_distances(left.distances, right.distances)
     assert (left.allowed_tasks is None) == (right.allowed_tasks is None)
     for one, other in zip(left.allowed_tasks or (), right.allowed_tasks or (), strict=True):
         assert (one is None) == (other is None)
         assert one is None or np.array_equal(one, other)
+
+
+def assert_same_distances(left: DistanceTable | None, right: DistanceTable | None) -> None:
+    """Compare two tables of distances exactly, row by row."""
+    assert (left is None) == (right is None)
+    if left is None or right is None:
+        return
+    assert (left.n, left.m, left.missing) == (right.n, right.m, right.missing)
+    for field in ("source", "target", "distance"):
+        np.testing.assert_array_equal(getattr(left, field), getattr(right, field), err_msg=field)
 
 
 def the_error(path: Any, read: Callable[[Any], object] = read_instance) -> InputError:
@@ -99,6 +113,42 @@ def full() -> Instance:
     )
 
 
+@pytest.fixture
+def varied() -> Instance:
+    """Three tasks and three agents on the earth that use every field which files may leave out throughout."""
+    return Instance(
+        name="varied",
+        ability=[4, 2.5, 1],
+        workload=[20, 5, 1],
+        agent_ids=["d1", 'the "big", one', "d;3"],
+        agent_position=[
+            [14.1, 67.3],
+            [np.nan] * 2,
+            [
+                -179.5,
+                -89,
+            ],
+        ],
+        task_position=[[14.2, 67.25, 100.5], [13.9, 67.4, 0], [np.nan] * 3],
+        start_task=[-1, 1, -1],
+        battery=[20, 30, np.inf],
+        speed=[60, 30, np.inf],
+        energy_per_distance=2,
+        agent_energy_per_distance=[None, 0.125, 2],
+        returns=[True, False, False],
+        skills=[["lidar", "camera"], [], ["back\\slash", "semi;colon", 'com,ma "q"']],
+        needs=[["camera"], None, ["semi;colon"]],
+        metric="geographic",
+        distances=DistanceTable.of(
+            [("d1", "t1", 7.25), ("t1", "d1", 9), ("t1", "t2", 0), ('the "big", one', "t3", 1 / 3)],
+            ["d1", 'the "big", one', "d;3"],
+            ["t1", "t2", "t3"],
+            missing="unreachable",
+        ),
+        units=Units(time="h", distance="nmi", energy="kWh", work="m²"),
+    )
+
+
 TEXT = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), min_size=1, max_size=8)
 TRICKY = st.text(st.sampled_from(list(';\\",\r\n \ta1')), min_size=1, max_size=5)
 IDS = st.one_of(TEXT, TRICKY)
@@ -111,6 +161,33 @@ def _row(free: bool) -> st.SearchStrategy[list[float]]:
     return st.one_of(st.just([np.nan] * 3), position) if free else position
 
 
+LABELS = st.text(st.characters(exclude_categories=["C", "Z"]), max_size=20)
+
+
+@st.composite
+def optional_fields(draw: st.DrawFn, agents: list[str], tasks: list[str]) -> dict[str, Any]:
+    """Draw what files may leave out throughout, but for geographic positions."""
+    n, m = len(agents), len(tasks)
+    names = st.one_of(st.none(), st.lists(IDS, max_size=3))
+    rate = st.one_of(st.none(), st.just(0.0), MAGNITUDES)
+    shared = set(agents) & set(tasks)
+    pairs = [(one, other) for one in agents + tasks for other in tasks if not shared & {one, other}]
+    pairs += [(other, one) for one, other in pairs if (other, one) not in pairs]
+    chosen = draw(st.lists(st.sampled_from(pairs), max_size=4, unique=True)) if pairs else []
+    rows = [(*pair, draw(st.floats(0, 1e100))) for pair in chosen]
+    table = DistanceTable.of(rows, agents, tasks, missing=draw(st.sampled_from(["metric", "unreachable"])))
+    fields = {
+        "agent_energy_per_distance": draw(st.lists(rate, min_size=n, max_size=n)),
+        "returns": draw(st.lists(st.booleans(), min_size=n, max_size=n)),
+        "skills": draw(st.lists(names, min_size=n, max_size=n)),
+        "needs": draw(st.lists(names, min_size=m, max_size=m)),
+        "metric": draw(st.sampled_from(["euclidean", "manhattan"])),
+        "distances": table,
+        "units": Units(*draw(st.lists(LABELS, min_size=4, max_size=4))),
+    }
+    return {name: value for name, value in fields.items() if draw(st.booleans())}
+
+
 @st.composite
 def instances(draw: st.DrawFn) -> Instance:
     """Any instance whatever, small."""
@@ -121,10 +198,12 @@ def instances(draw: st.DrawFn) -> Instance:
         return draw(st.lists(values, min_size=count, max_size=count))
 
     subset = st.one_of(st.none(), st.lists(st.integers(0, m - 1), max_size=4, unique=True))
+    ids = [draw(st.lists(IDS, min_size=count, max_size=count, unique=True)) for count in (n, m)]
     return Instance(
         name=draw(st.one_of(st.just(""), IDS)),
-        agent_ids=draw(st.lists(IDS, min_size=n, max_size=n, unique=True)),
-        task_ids=draw(st.lists(IDS, min_size=m, max_size=m, unique=True)),
+        agent_ids=ids[0],
+        task_ids=ids[1],
+        **draw(st.one_of(st.just({}), optional_fields(*ids))),
         ability=column(MAGNITUDES, n),
         workload=column(st.one_of(st.just(0.0), st.integers(0, 2**60), MAGNITUDES), m),
         agent_position=column(_row(free=True), n),

@@ -8,10 +8,16 @@ import numpy as np
 import pytest
 
 from alloc.problems import Allocation, read_allocation, read_instance
-from alloc.problems.formats.columns import AGENT_FIELDS, TASK_FIELDS
-from alloc.problems.formats.csv_folder import AGENT_COLUMNS, TASK_COLUMNS
+from alloc.problems.formats.columns import AGENT_FIELDS, DISTANCE_FIELDS, TASK_FIELDS
+from alloc.problems.formats.csv_folder import (
+    AGENT_COLUMNS,
+    DISTANCE_COLUMNS,
+    MORE_AGENT_COLUMNS,
+    MORE_TASK_COLUMNS,
+    TASK_COLUMNS,
+)
 from alloc.problems.formats.document import INSTANCE_FIELDS
-from alloc.problems.formats.npz import FIELDS
+from alloc.problems.formats.npz_archive import FIELDS
 
 TEXT = (Path(__file__).parents[3] / "docs" / "formats.md").read_text("utf-8")
 
@@ -32,9 +38,7 @@ def test_the_examples_are_read(tmp_path: Path) -> None:
     instance = read_instance(tmp_path / "x.json")
     assert (instance.name, instance.n, instance.m) == ("demo", 2, 1)
 
-    tables = re.split(r"^(\w+\.csv)", example("Instance: CSV folder", "agents.csv"), flags=re.MULTILINE)[1:]
-    for name, rows in zip(tables[::2], tables[1::2], strict=True):
-        (tmp_path / name).write_text(textwrap.dedent(rows.replace("    ", "", 1)).replace(" ", ""))
+    write_tables(tmp_path, example("Instance: CSV folder", "agents.csv"))
     folder = read_instance(tmp_path)
     assert folder.allowed_tasks is not None
     assert (folder.n, folder.m, folder.start_task.tolist()) == (2, 2, [0, -1])
@@ -47,10 +51,34 @@ def test_the_examples_are_read(tmp_path: Path) -> None:
     assert read_allocation(tmp_path / "plan.json", instance) == (Allocation([0, -1]), None)
 
 
+def write_tables(folder: Path, text: str) -> None:
+    """Write the tables that an example shows one below the other, each with its name before its first line."""
+    parts = re.split(r"^(\w+\.csv)", text, flags=re.MULTILINE)[1:]
+    for name, rows in zip(parts[::2], parts[1::2], strict=True):
+        (folder / name).write_text(rows.replace(" ", ""))
+
+
+def test_the_examples_of_distances_are_read(tmp_path: Path) -> None:
+    """The table of distances and the tables by longitude and latitude can be read as they stand."""
+    (tmp_path / "x.json").write_text(example("Instance: JSON", '{"format": "alloc-instance/1",\n "agents"'))
+    reach = read_instance(tmp_path / "x.json").reach
+    assert reach.density == 0.75
+    assert reach.distance[reach.origin][[0, 1, 1], [0, 0, 1]].tolist() == [3.5, 0, 1.25]
+
+    (tmp_path / "instance.json").write_text('{"format": "alloc-instance/1", "metric": "geographic"}')
+    write_tables(tmp_path, example("Instance: CSV folder", "agents.csv     id,ability,lon"))
+    folder = read_instance(tmp_path)
+    assert (folder.skills, folder.needs) == ((("camera", "lidar"), ()), (("camera", "lidar"), ()))
+    assert folder.returns.tolist() == [True, False]
+    assert folder.agent_energy_per_distance.tolist() == [1.5, 1]
+    assert folder.distances is not None
+    assert folder.distances.distance.tolist() == [7.9, 20.5]
+
+
 @pytest.mark.parametrize(
     ("title", "names"),
     [
-        ("Instance: JSON", {*INSTANCE_FIELDS, *AGENT_FIELDS, *TASK_FIELDS}),
+        ("Instance: JSON", {*INSTANCE_FIELDS, *AGENT_FIELDS, *TASK_FIELDS, *DISTANCE_FIELDS}),
         ("Instance: npz", set(FIELDS)),
     ],
 )
@@ -65,3 +93,6 @@ def test_every_column_is_shown() -> None:
     text = section("Instance: CSV folder")
     assert ",".join(AGENT_COLUMNS) in text
     assert ",".join(TASK_COLUMNS) in text
+    assert ",".join(MORE_AGENT_COLUMNS) in text
+    assert ",".join(MORE_TASK_COLUMNS) in text
+    assert ",".join(DISTANCE_COLUMNS) in text

@@ -26,11 +26,18 @@ def damaged(data: bytes, mutations: list[tuple[float, int, bytes]]) -> bytes:
     return data
 
 
-@pytest.mark.parametrize("file", ["x.json", "x/agents.csv", "x/tasks.csv", "x/instance.json", "x.npz", "plan.json"])
-@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(mutations=st.lists(MUTATION, min_size=1, max_size=4))
-def test_damaged_files(full: Instance, file: str, mutations: list[tuple[float, int, bytes]]) -> None:
+TABLES = ["x/agents.csv", "x/tasks.csv", "x/distances.csv", "x/instance.json"]
+
+
+@pytest.mark.parametrize("file", ["x.json", *TABLES, "x.npz", "plan.json"])
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(mutations=st.lists(MUTATION, min_size=1, max_size=4), is_varied=st.booleans())
+def test_damaged_files(
+    full: Instance, varied: Instance, file: str, mutations: list[tuple[float, int, bytes]], is_varied: bool
+) -> None:
     """A valid file with bytes replaced, removed and inserted gives an instance or one InputError of one line."""
+    if is_varied or file == "x/distances.csv":
+        full = varied
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / file
         if file == "plan.json":

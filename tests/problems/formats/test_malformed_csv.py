@@ -1,11 +1,18 @@
 """Each fault in a folder of tables is one line with folder, file, line and column, and mend."""
 
+import json
 import os
 from pathlib import Path
 
 import pytest
 
 from .conftest import the_error
+
+
+def header(**fields: object) -> str:
+    """Return an instance.json with some fields."""
+    return json.dumps({"format": "alloc-instance/1", **fields})
+
 
 TABLES: list[tuple[dict[str, str | bytes], str, str]] = [
     ({"agents.csv": ""}, "agents.csv", "is empty; its first line must name the columns: id,ability"),
@@ -64,6 +71,53 @@ TABLES: list[tuple[dict[str, str | bytes], str, str]] = [
     ({"instance.json": '{"format": "alloc-instance/1", "tau": 2}'}, "instance.json, tau", "between 0 and 1"),
     ({"instance.json": '{"format": "alloc-instance/1", "tau": "2"}'}, "instance.json, tau", "must be a number"),
     ({"instance.json": '{"format": "alloc-instance/1", "agents": []}'}, "instance.json", "unknown field 'agents'"),
+    ({"instance.json": header(metric="geo")}, "instance.json, metric", "must be one of euclidean"),
+    ({"instance.json": header(units={"speed": "m/s"})}, "instance.json, units.distance", "is missing"),
+    ({"instance.json": header(distances={})}, "distances.csv", "is missing, but instance.json has the field"),
+    ({"instance.json": header(distances={"rows": []})}, "instance.json, distances.rows", "must stand in distances.csv"),
+    ({"instance.json": header(distances={"mising": ""})}, "instance.json, distances", "did you mean 'missing'?"),
+    (
+        {"instance.json": header(distances={"missing": "x"}), "distances.csv": "from,to,distance\n"},
+        "instance.json, distances.missing",
+        "must be 'metric' or 'unreachable'",
+    ),
+    (
+        {"agents.csv": "id,ability,lon,lat\na,1,8,50\n"},
+        "agents.csv",
+        """the column 'lon' needs "metric": "geographic" in""",
+    ),
+    ({"tasks.csv": "id,workload,lon\na,1,8\n"}, "tasks.csv", "the column 'lon' needs"),
+    (
+        {"agents.csv": "id,ability,x,y\na,1,8,50\n", "instance.json": header(metric="geographic")},
+        "agents.csv",
+        "the column 'x' is not geographic; call it 'lon'",
+    ),
+    (
+        {"agents.csv": "id,ability,lon\na,1,8\n", "instance.json": header(metric="geographic")},
+        "agents.csv line 2, column lat",
+        "a position needs lon and lat",
+    ),
+    (
+        {"agents.csv": "id,ability,lon,lat\na,1,50,98\n", "instance.json": header(metric="geographic")},
+        "agents.csv line 2, column lon and lat",
+        "must be longitude (-180 to 360) and latitude",
+    ),
+    ({"agents.csv": "id,ability,returns\na,1,yes\n"}, "agents.csv line 2, column returns", "must be true or false"),
+    (
+        {"agents.csv": "id,ability,energy_per_distance\na,1,-2\n"},
+        "agents.csv line 2, column energy_per_distance",
+        "must be a finite number >= 0",
+    ),
+    ({"agents.csv": "id,ability,skills\na,1,a\0b\n"}, "agents.csv line 2, column skills", "without NUL"),
+    ({"distances.csv": "from,to\na1,t1\n"}, "distances.csv line 1", "the column 'distance' is missing"),
+    ({"distances.csv": "from,to,distance\na1,t1,\n"}, "distances.csv line 2, column distance", "must have a distance"),
+    ({"distances.csv": "from,to,distance\na1,t1,x\n"}, "distances.csv line 2, column distance", "must be a number"),
+    ({"distances.csv": "from,to,distance\n\na1,t9,1\n"}, "distances.csv line 3, column to", "no agent or task 't9'"),
+    (
+        {"distances.csv": "from,to,distance\na1,t1,1\na1,t1,2\n"},
+        "distances.csv line 3, column distance",
+        "gives a pair that an earlier row gives",
+    ),
 ]
 
 
@@ -84,12 +138,12 @@ def test_tables_that_break_a_rule(tmp_path: Path, files: dict[str, str | bytes],
     assert words in error.message, str(error)
 
 
-@pytest.mark.parametrize("name", ["agents.csv", "tasks.csv", "instance.json"])
+@pytest.mark.parametrize("name", ["agents.csv", "tasks.csv", "distances.csv", "instance.json"])
 def test_folders_with_odd_entries(tmp_path: Path, name: str) -> None:
     """A table that is a folder, a pipe or a dangling link is told by name."""
     path = table_folder(tmp_path / "fleet", {name: ""}) / name
     path.unlink()
-    if name != "instance.json":
+    if name in ("agents.csv", "tasks.csv"):
         assert the_error(tmp_path / "fleet").place == name
     path.mkdir()
     assert "is a folder where a file is expected" in the_error(tmp_path / "fleet").message

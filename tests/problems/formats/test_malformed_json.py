@@ -83,6 +83,19 @@ def task(**fields: Any) -> dict[str, Any]:
     return changed(tasks=[TASK, {"id": "t2", "workload": 1, **fields}])
 
 
+def distances(*rows: Any, **fields: Any) -> dict[str, Any]:
+    agents = [AGENT, {"id": "a2", "ability": 1}, {"id": "both", "ability": 1}]
+    return changed(
+        agents=agents,
+        tasks=[TASK, {"id": "both", "workload": 1}],
+        distances={"rows": [["a1", "t1", 2], *rows], **fields},
+    )
+
+
+def units(**labels: Any) -> dict[str, Any]:
+    return changed(units=labels)
+
+
 DOCUMENTS = [
     (changed(format="alloc-instance/2"), "format", "must be 'alloc-instance/1', got 'alloc-instance/2'"),
     (changed(format="alloc-result/1"), "format", "must be 'alloc-instance/1', got 'alloc-result/1'"),
@@ -151,6 +164,53 @@ DOCUMENTS = [
     (task(priority=-1), "tasks[1].priority", "must be a finite number >= 0, got -1"),
     (task(ability=1), "tasks[1]", "unknown field 'ability'"),
     (task(id="t1"), "tasks[1].id", "'t1' is used twice"),
+    (task(needs="camera"), "tasks[1].needs", "must be a list of strings, or null, got 'camera'"),
+    (task(skills=[]), "tasks[1]", "unknown field 'skills'"),
+    (agent(skills=[1]), "agents[1].skills[0]", "must be a string, got 1"),
+    (agent(skills=["camera", ""]), "agents[1].skills", "must be non-empty strings"),
+    (agent(skills=["a\0"]), "agents[1].skills", "without NUL"),
+    (agent(needs=[]), "agents[1]", "unknown field 'needs'"),
+    (agent(returns="yes"), "agents[1].returns", "must be true or false, got 'yes'"),
+    (agent(returns=1), "agents[1].returns", "must be true or false, got 1"),
+    (agent(energy_per_distance=-1), "agents[1].energy_per_distance", "must be a finite number >= 0, got -1"),
+    (agent(energy_per_distance=1e61), "agents[1].energy_per_distance", "must be from 1e-60 to 1e+60"),
+    (agent(energy_per_distance="1"), "agents[1].energy_per_distance", "must be a number, got '1'"),
+    (changed(metric="geodesic"), "metric", "must be one of euclidean, manhattan, geographic, got 'geodesic'"),
+    (changed(metric=1), "metric", "must be a string, got 1"),
+    (changed(units="km"), "units", "must be a JSON object, got 'km'"),
+    (units(length="km"), "units", "unknown field 'length'"),
+    (units(time=1), "units.time", "must be a string, got 1"),
+    (units(work="x" * 21), "units.work", "must be a text of at most 20 characters"),
+    (
+        units(speed="m"),
+        "units.speed",
+        "must be one of m, km, mi, nmi, ft per one of s, min, h, d, such as 'm/s', or 'kn'",
+    ),
+    (units(speed="furlong/h", time="h", distance="km"), "units.speed", "got 'furlong/h'"),
+    (units(speed="m/s", time="h"), "units.distance", "is missing; speeds in m/s are converted by it"),
+    (units(speed="m/s", distance="km"), "units.time", "is missing; speeds in m/s are converted by it"),
+    (units(speed="kn", time="hours", distance="km"), "units.time", "must be one of s, min, h, d, as speeds in kn"),
+    (changed(metric="geographic", units={"distance": "ft"}), "units.distance", "must be one of m, km, mi, nmi"),
+    (agent(position=[0, 91]) | {"metric": "geographic"}, "agents[1].position", "must be longitude (-180 to 360)"),
+    (changed(distances=[]), "distances", "must be a JSON object, got a list"),
+    (changed(distances={}), "distances.rows", "must be a list of [from, to, distance], got null"),
+    (changed(distances={"rows": {}}), "distances.rows", "must be a list of [from, to, distance], got an object"),
+    (distances(row=1), "distances", "unknown field 'row' (did you mean 'rows'?)"),
+    (distances(missing="none"), "distances.missing", "must be 'metric' or 'unreachable', got 'none'"),
+    (distances(missing=1), "distances.missing", "must be a string, got 1"),
+    (distances(["a2", "t1"]), "distances.rows[1]", "must be [from, to, distance], got a list"),
+    (distances("a2 t1 3"), "distances.rows[1]", "must be [from, to, distance], got 'a2 t1 3'"),
+    (distances([1, "t1", 3]), "distances.rows[1][0]", "must be the id of an agent or a task, got 1"),
+    (distances(["a2", None, 3]), "distances.rows[1][1]", "must be the id of an agent or a task, got null"),
+    (distances(["a2", "t1", "3"]), "distances.rows[1][2]", "must be a number, got '3'"),
+    (distances(["a2", "t1", None]), "distances.rows[1][2]", "must be a number, got null"),
+    (distances(["a2", "t1", True]), "distances.rows[1][2]", "must be a number, got true"),
+    (distances(["a2", "t1", -1]), "distances.rows[1]", "must have a distance that is a finite number >= 0"),
+    (distances(["a2", "t1", 10**400]), "distances.rows[1]", "must have a distance that is a finite number >= 0"),
+    (distances(["a2", "t2", 1]), "distances.rows[1][1]", "there is no agent or task 't2' (known: a1, a2"),
+    (distances(["both", "t1", 1]), "distances.rows[1][0]", "'both' is the id of an agent and of a task"),
+    (distances(["a1", "a2", 1]), "distances.rows[1]", "joins two agents"),
+    (distances(["t1", "a1", 1], ["a1", "t1", 3]), "distances.rows[2]", "gives a pair that an earlier row gives"),
 ]
 
 

@@ -19,6 +19,13 @@ ARRAYS: dict[str, Any] = {
     "task_id": ["t1"],
     "task_workload": [3.0],
 }
+
+
+def given(source: list[str], target: list[str], distance: list[float]) -> dict[str, Any]:
+    """Return the arrays of a table of distances."""
+    return {"distance_from": source, "distance_to": target, "distance": distance}
+
+
 COLUMNS = [
     ({"format": None}, "format", "is missing"),
     ({"format": "alloc-instance/9"}, "format", "got 'alloc-instance/9'"),
@@ -55,6 +62,22 @@ COLUMNS = [
     ({"agent_tasks": ["t1"], "agent_tasks_count": [3, -2]}, "agent_tasks_count[1]", "at least 0, or -1"),
     ({"agent_tasks": ["t1"], "agent_tasks_count": [1.0, 0]}, "array agent_tasks_count", "must hold whole numbers"),
     ({"agent_tasks": ["t5"], "agent_tasks_count": [-1, 1]}, "agent_tasks[1]", "there is no task 't5'"),
+    ({"agent_returns": [1, 0]}, "array agent_returns", "must hold booleans, got dtype int64"),
+    ({"agent_returns": [True]}, "array agent_returns", "has 1 rows, but agent_id has 2"),
+    ({"agent_skills": ["x"]}, "", "'agent_skills' and 'agent_skills_count' need each other"),
+    ({"task_needs": ["x"], "task_needs_count": [-2]}, "task_needs_count[0]", "at least 0, or -1 for none"),
+    ({"task_needs": [""], "task_needs_count": [1]}, "task_needs[0]", "must be non-empty strings"),
+    ({"agent_energy_per_distance": [1.0, -1]}, "agent_energy_per_distance[1]", "must be a finite number >= 0"),
+    ({"metric": "geo"}, "metric", "must be one of euclidean"),
+    ({"units_speed": "m/s", "units_time": "h"}, "units_distance", "is missing"),
+    ({"units_work": "x" * 21}, "units_work", "at most 20 characters"),
+    ({"distance_missing": "metric"}, "array distance_missing", "needs the arrays distance_from"),
+    ({"distance_from": ["a1"]}, "array distance_to", "distance_from, distance_to, distance need each other"),
+    (given(["a1"], ["t1"], [1.0, 2]), "array distance", "has 2 rows, but distance_from has 1"),
+    (given(["a1", "a3"], ["t1", "t1"], [1.0, 2]), "distance_from[1]", "there is no agent or task 'a3'"),
+    (given(["a1"], [""], [1.0]), "distance_to[0]", "there is no agent or task ''"),
+    (given(["a1"], ["t1"], [np.nan]), "distance[0]", "must have a distance that is a finite number >= 0"),
+    (given(["a1"], ["t1"], [1.0]) | {"distance_missing": "x"}, "distance_missing", "must be 'metric' or"),
     ({"tau": 1.5}, "tau", "must lie strictly between 0 and 1"),
     ({"tau": np.inf}, "tau", "must lie strictly between 0 and 1"),
     ({"energy_per_distance": -1}, "energy_per_distance", "must be a finite number >= 0"),

@@ -1,6 +1,7 @@
 """Instances and allocations come back from files exactly as they were."""
 
 import json
+import os
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -34,6 +35,34 @@ def test_every_field_survives(full: Instance, same: Same, tmp_path: Path, file: 
     """An instance that uses every field is the same after writing and reading."""
     write_instance(full, tmp_path / file)
     same(full, read_instance(tmp_path / file))
+
+
+@pytest.mark.parametrize("file", FORMATS)
+def test_every_field_that_may_be_left_out_survives(varied: Instance, same: Same, tmp_path: Path, file: str) -> None:
+    """Metric, distances, units, rates, returns, skills and needs are the same after writing and reading."""
+    write_instance(varied, tmp_path / file)
+    same(varied, read_instance(tmp_path / file))
+
+
+@pytest.mark.parametrize("file", FORMATS)
+def test_fields_that_are_not_used_are_not_written(full: Instance, tmp_path: Path, file: str) -> None:
+    """An instance without the fields that came later has files without any trace of them."""
+    write_instance(full, tmp_path / file)
+    if file == "x.npz":
+        with np.load(tmp_path / file) as arrays:
+            names = set(arrays)
+    elif file == "x":
+        assert sorted(os.listdir(tmp_path / file)) == ["agents.csv", "instance.json", "tasks.csv"]
+        heads = [(tmp_path / file / name).read_text("utf-8").partition("\n")[0] for name in ("agents.csv", "tasks.csv")]
+        names = {name for head in heads for name in head.split(",")} | {
+            *json.loads((tmp_path / "x/instance.json").read_text())
+        }
+    else:
+        document = json.loads((tmp_path / file).read_text("utf-8"))
+        names = {*document, *document["agents"][0], *document["tasks"][0]} - {"energy_per_distance"}
+        assert "energy_per_distance" not in document["agents"][0]
+    later = ("metric", "distance", "units", "returns", "skills", "needs", "agent_energy")
+    assert [name for name in names if any(word in name for word in later) and name != "energy_per_distance"] == []
 
 
 @settings(max_examples=150, deadline=None)
@@ -98,6 +127,44 @@ def test_allocations_survive(data: st.DataObject) -> None:
         write_allocation(allocation, instance, path)
         assert read_allocation(path, instance) == (allocation, None)
         assert list(json.loads(path.read_text("utf-8"))["assignment"]) == list(instance.agent_ids)
+
+
+def test_distances_of_another_instance_do_not_stay(
+    varied: Instance, full: Instance, same: Same, tmp_path: Path
+) -> None:
+    """In a folder of tables, an instance without distances takes the place of one with them, and other files stay."""
+    write_instance(varied, tmp_path / "x")
+    (tmp_path / "x" / "notes.txt").write_text("mine")
+    write_instance(full, tmp_path / "x")
+    same(full, read_instance(tmp_path / "x"))
+    assert sorted(os.listdir(tmp_path / "x")) == ["agents.csv", "instance.json", "notes.txt", "tasks.csv"]
+
+
+def test_geographic_tables_name_their_coordinates(varied: Instance, tmp_path: Path) -> None:
+    """Longitude, latitude and altitude have columns of these names, and lists without entries are empty cells."""
+    write_instance(varied, tmp_path / "x")
+    agents = (tmp_path / "x" / "agents.csv").read_text("utf-8").splitlines()
+    head = "id,ability,lon,lat,alt,start_task,battery,range,speed,tasks,energy_per_distance,returns,skills"
+    assert agents[:2] == [head, "d1,4,14.1,67.3,0,,20,,60,,,true,camera;lidar"]
+    assert agents[2] == '"the ""big"", one",2.5,,,,t2,30,,30,,0.125,false,'
+    assert (tmp_path / "x" / "distances.csv").read_text("utf-8").startswith("from,to,distance\nd1,t1,7.25\nt1,d1,9\n")
+    assert json.loads((tmp_path / "x" / "instance.json").read_text("utf-8"))["distances"] == {"missing": "unreachable"}
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.lists(st.tuples(st.floats(-180, 360), st.floats(-90, 90), st.floats(-1e60, 1e60)), min_size=1, max_size=3),
+    st.permutations(FORMATS),
+)
+def test_places_on_the_earth_survive(places: list[tuple[float, float, float]], order: list[str]) -> None:
+    """Longitude, latitude and altitude come back to the bit through all formats."""
+    instance = Instance(ability=[1] * len(places), workload=[1], agent_position=places, metric="geographic")
+    with tempfile.TemporaryDirectory() as folder:
+        current = instance
+        for file in order:
+            write_instance(current, Path(folder) / file)
+            current = read_instance(Path(folder) / file)
+            assert_same(instance, current)
 
 
 def test_npz_arrays_are_as_documented(full: Instance, tmp_path: Path) -> None:

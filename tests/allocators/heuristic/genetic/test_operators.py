@@ -153,7 +153,7 @@ def test_saving_moves_reduce_the_distance() -> None:
     task = np.array([rng.choice(np.flatnonzero(row)) for row in instance.reach.mask[instance.reach.origin]])
     genes = np.tile(task.astype(np.int32), (50, 1))
     giver, to = draw_saving_move(genes, encoding, rng)
-    away, new = encoding.distance(giver, task[giver]), encoding.distance(giver, to)
+    away, new = encoding.cost(giver, task[giver]), encoding.cost(giver, to)
     nearest = np.where(instance.reach.mask, instance.reach.distance, np.inf).min(axis=1)[instance.reach.origin]
     could = nearest[giver] < away
     assert could.any()

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from alloc.cli.commands import train_options as options
-from alloc.cli.commands.train_options import Engine
+from alloc.cli.commands.training import train_options as options
+from alloc.cli.commands.training.train_options import Engine
 from alloc.cli.options import SeedOption, assignments, examples
 from alloc.cli.output.console import STANDARD, complain, note, say
 from alloc.cli.output.files import check_output, check_outputs, read_instances

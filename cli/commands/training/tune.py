@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from alloc.cli.commands.train_options import MethodArgument
+from alloc.cli.commands.training.train_options import MethodArgument
 from alloc.cli.options import examples
 from alloc.cli.output.console import note, say
 from alloc.cli.output.files import check_output

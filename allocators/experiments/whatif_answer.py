@@ -1,0 +1,114 @@
+"""The answer of a comparison of fleets in one sentence."""
+
+import math
+from collections.abc import Sequence
+
+from alloc.allocators.contract.tolerance import PROVEN
+from alloc.allocators.result import Result
+from alloc.problems.text import counted, number
+
+FleetFigures = tuple[int, tuple[str, ...], Result]
+"""How many agents are added, which are removed, and the result."""
+
+FEWEST_DIGITS = 4
+"""Significant digits of a makespan, unless it takes more to tell two apart."""
+
+MOST_NAMES = 3
+"""Ids of agents before they are counted."""
+
+
+def answer(fleets: Sequence[FleetFigures], like: Sequence[str]) -> str:
+    """Return what the first change brings against the fleet as it is, what the last one, and what makes up for a loss.
+
+    Parameters
+    ----------
+    fleets : sequence of FleetFigures
+        The first is the fleet as it is.
+    like : sequence of str
+        The agents that are copied, one of each per step.
+
+    Returns
+    -------
+    str
+        Such as ``one more like d2: 4.1 instead of 4.6 (-11 %)``.
+    """
+    now = fleets[0][2]
+    changed = [fleet for fleet in fleets[1:] if fleet[0]]
+    dropped = next((fleet for fleet in fleets[1:] if not fleet[0]), None)
+    parts = []
+    if dropped is not None:
+        parts.append(f"without {_listed(dropped[1])}: {_change(dropped[2], now)}")
+    for fleet in [*changed[:1], *changed[1:][-1:]]:
+        parts.append(f"{_more(fleet[0] // len(like), like)}: {_change(fleet[2], now, short=bool(parts))}")
+    if dropped is not None and _is_worse(dropped[2], now):
+        enough = next((fleet for fleet in changed if not _is_worse(fleet[2], now)), None)
+        if enough is not None:
+            steps = enough[0] // len(like)
+            parts.append(f"{_more(steps, like)} {'makes' if steps == 1 else 'make'} up for it")
+    return "; ".join(parts) if parts else "interrupted before a fleet was changed"
+
+
+def _more(steps: int, like: Sequence[str]) -> str:
+    return f"{'one' if steps == 1 else steps} more like {'' if len(like) == 1 else 'each of '}{_listed(like)}"
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ", ".join(names) if len(names) <= MOST_NAMES else f"{len(names)} agents"
+
+
+def _is_worse(result: Result, now: Result) -> bool:
+    """Whether a plan serves fewer tasks than that of the fleet as it is, or is slower by more than what is proven."""
+    unserved, before = _unserved(result), _unserved(now)
+    if unserved != before or result.makespan is None or now.makespan is None:
+        return unserved > before
+    return result.makespan > now.makespan * (1 + PROVEN)
+
+
+def _change(result: Result, now: Result, *, short: bool = False) -> str:
+    """Return the makespan of a fleet against that of the fleet as it is, or how many tasks are unserved."""
+    unserved, before = _unserved(result), _unserved(now)
+    if result.evaluation is None:
+        return "no plan was found"
+    if result.makespan is None:
+        return f"{counted(unserved, 'task')} unserved {f'instead of {before}' if before != unserved else 'as before'}"
+    then = _time(result)
+    if now.makespan is None:
+        return f"every task is served, in {then}"
+    share = result.makespan / now.makespan - 1 if now.makespan else 0.0
+    if abs(share) <= PROVEN:
+        is_proven = (result.lower_bound or 0.0) >= now.makespan * (1 - PROVEN)
+        limits = _range(result, now)
+        return f"{then} as before{', which is proven' if is_proven else f' ({limits})' if limits else ''}"
+    digits = max(FEWEST_DIGITS, math.ceil(-math.log10(abs(share))) + 1)
+    instead = "" if short else f" instead of {_time(now, digits)}"
+    changes = "; ".join(filter(None, [f"{_percent(share)} %", _range(result, now)]))
+    return f"{_time(result, digits)}{instead} ({changes})"
+
+
+def _range(result: Result, now: Result) -> str:
+    """Return between which changes that of the optimum lies, where that is not proven to be the one found."""
+    gaps = (result.gap, now.gap)
+    if None in gaps or max(gap or 0.0 for gap in gaps) <= PROVEN or not now.lower_bound or not now.makespan:
+        return ""
+    least = (result.lower_bound or 0.0) / now.makespan - 1
+    most = (result.makespan or 0.0) / now.lower_bound - 1
+    old, new = set(now.instance.agent_ids), set(result.instance.agent_ids)
+    if old < new:
+        most = min(most, 0.0)  # more agents never make it longer
+    if new < old:
+        least = max(least, 0.0)
+    return f"the optimum: {_percent(least)} to {_percent(most)} %"
+
+
+def _percent(share: float) -> str:
+    if abs(share) < PROVEN:
+        return "0"
+    return f"{100 * share:+.0f}" if abs(share) >= 0.1 else f"{100 * share:+.2g}"
+
+
+def _time(result: Result, digits: int = FEWEST_DIGITS) -> str:
+    return f"{number(result.makespan, digits)} {result.instance.units.time}".rstrip()
+
+
+def _unserved(result: Result) -> int:
+    return 0 if result.evaluation is None else len(result.evaluation.unserved_tasks)

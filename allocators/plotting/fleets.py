@@ -1,0 +1,95 @@
+"""The drawing of makespan and energy by size of the fleet."""
+
+from collections.abc import Sequence
+from textwrap import wrap
+from typing import TYPE_CHECKING
+
+from alloc.allocators.plotting.colours import LIMIT, MAKESPAN
+from alloc.allocators.plotting.sites import plain_text
+from alloc.allocators.plotting.style import drawn, new_figure
+from alloc.problems.text import counted, heading, shortened
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from alloc.allocators.experiments.whatif import Fleet, WhatIf
+
+MOST_LABELS = 12
+"""Fleets that are all labelled below their bars."""
+
+
+def plot_whatif(found: "WhatIf", path: str | None = None) -> "Figure":
+    """Draw the makespan of each fleet, with what is proven of it, and the energy below.
+
+    Parameters
+    ----------
+    found : WhatIf
+    path : str, optional
+        A .png, .svg or .pdf file to write as well, whole or not at all.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        On a canvas of its own; matplotlib's current figure stays as it is.
+
+    Raises
+    ------
+    InputError
+        If `path` has another suffix, or cannot be written.
+    """
+    return drawn(lambda: _draw(found), path)
+
+
+def _draw(found: "WhatIf") -> "Figure":
+    has_energy = any(fleet.result.energy for fleet in found.fleets)
+    figure = new_figure(8, 6.2 if has_energy else 4.2)
+    axes = figure.subplots(1 + has_energy, 1, sharex=True, squeeze=False)[:, 0]
+    units, results = found.instance.units, [fleet.result for fleet in found.fleets]
+    _bars(axes[0], [result.makespan for result in results], [result.lower_bound for result in results])
+    axes[0].set_ylabel(plain_text(heading("makespan", units.time)))
+    axes[0].legend(frameon=False, loc="upper right", ncols=3, fontsize=9)
+    if has_energy:
+        energy = [result.energy if result.makespan is not None else None for result in results]
+        _bars(axes[1], energy, [result.energy_lower_bound for result in results])
+        axes[1].set_ylabel(plain_text(heading("energy", units.energy)))
+    _name(axes[-1], found.fleets)
+    axes[0].set_title(_title(found), fontsize=10)
+    return figure
+
+
+def _bars(axes: "Axes", values: Sequence[float | None], bounds: Sequence[float | None]) -> None:
+    """Draw a bar for each fleet, and over it what is proven to be needed; a cross where tasks are unserved."""
+    at = range(len(values))
+    axes.bar(at, [value or 0.0 for value in values], color=MAKESPAN, label="best found", width=0.7)
+    if any(bound is not None for bound in bounds):
+        axes.bar(at, [bound or 0.0 for bound in bounds], color=LIMIT, label="proven to be needed", width=0.7)
+    unserved = [place for place, value in enumerate(values) if value is None]
+    if unserved:
+        axes.plot(unserved, [0.0] * len(unserved), "x", color="black", clip_on=False, label="a task is unserved")
+    axes.set_ylim(0, max((value or 0.0 for value in values), default=0.0) * 1.25 or 1.0)
+    for place, value in enumerate(values):
+        if value is not None and len(values) <= MOST_LABELS:
+            axes.annotate(f"{value:.3g}", (place, value), (0, 2), textcoords="offset points", ha="center", fontsize=9)
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def _name(axes: "Axes", fleets: Sequence["Fleet"]) -> None:
+    """Write below the bars how many agents the fleets have, and what is changed."""
+    step = -(-len(fleets) // MOST_LABELS)
+    labels = [f"{fleet.result.instance.n}\n{_changed(fleet)}" for fleet in fleets]
+    axes.set_xticks(range(0, len(fleets), step), labels[::step])
+    axes.set_xlabel("agents")
+
+
+def _changed(fleet: "Fleet") -> str:
+    less, more = fleet.removed, f"+{len(fleet.added)}" if fleet.added else ""
+    if not less:
+        return more or "now"
+    return f"−{plain_text(shortened(less[0], 12)) if len(less) == 1 else len(less)}{' ' + more if more else ''}"
+
+
+def _title(found: "WhatIf") -> str:
+    name = plain_text(shortened(found.instance.name, 60))
+    size = f"{counted(found.instance.n, 'agent')}, {counted(found.instance.m, 'task')}"
+    return "\n".join([f"{name}: {size}", *map(plain_text, wrap(shortened(found.answer, 260), 95))])

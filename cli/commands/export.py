@@ -1,0 +1,58 @@
+"""``alloc export``."""
+
+from typing import Annotated
+
+import typer
+
+from alloc.cli import options
+from alloc.cli.options import examples
+from alloc.cli.output.files import check_outputs
+from alloc.problems.vocabulary import ModelFormat, ModelKind, Objective
+
+EXAMPLES = examples(
+    "alloc export demo.json --output demo.lp",
+    "alloc export demo.json --model plain --format mps --output -",
+    "alloc export demo.json --objective makespan-energy --makespan 1.5 --output demo.lp",
+    "alloc evaluate demo.json demo.sol",
+    closing="HiGHS, CBC, Gurobi and SCIP read the model, and `alloc evaluate` their solution of it.",
+)
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to `app`."""
+    app.command("export", epilog=EXAMPLES)(export_command)
+
+
+def export_command(
+    instance: options.InstanceArgument,
+    output: Annotated[str, typer.Option(metavar="FILE", help="File to write; - is standard output.")],
+    file_format: Annotated[
+        ModelFormat | None, typer.Option("--format", help="Format of the file.", show_default="by the suffix")
+    ] = None,
+    model: Annotated[
+        ModelKind, typer.Option(help="Variables count agents that are alike, or there is one per agent and task.")
+    ] = ModelKind.CLASS,
+    objective: Annotated[
+        Objective, typer.Option(help="What is minimised: the makespan, or the energy at --makespan.")
+    ] = Objective.MAKESPAN,
+    makespan: Annotated[
+        float | None,
+        typer.Option(
+            metavar="TIME",
+            help="Time by which every task must be done: for the energy, and for agents with speeds.",
+            show_default="it is minimised",
+        ),
+    ] = None,
+) -> None:
+    """Write the integer programme of an instance, for any solver."""
+    from alloc.problems import read_instance, write_model
+
+    check_outputs(("--output", output), read=[("INSTANCE", instance)])
+    write_model(
+        read_instance(instance),
+        output,
+        format=file_format,
+        model=model,
+        objective=objective,
+        makespan=makespan,
+    )

@@ -1,0 +1,143 @@
+"""``alloc import``."""
+
+import re
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from alloc.cli import options
+from alloc.cli.options import examples
+from alloc.cli.output.console import STANDARD, say
+from alloc.cli.output.files import check_outputs
+from alloc.problems.text import counted, one_line
+
+if TYPE_CHECKING:
+    from alloc.problems import Units
+
+EXAMPLES = examples(
+    "alloc import --agents drones.csv --tasks sites.xlsx --output fleet.json",
+    "alloc import --agents fleet.xlsx:Drones --tasks fleet.xlsx:Sites --output fleet.json",
+    "alloc import --agents crews.csv --tasks jobs.csv --map ability=Rate,tasks.id=Job --output fleet.json",
+    closing="It says what each column was taken for. Exit code 2 if a table can be read in two ways, or in none.",
+)
+
+TABLE = "text with any separator, .xlsx, or .xlsx:SHEET"
+
+
+class Decimal(StrEnum):
+    """The decimal mark."""
+
+    POINT = "point"
+    COMMA = "comma"
+
+
+class Missing(StrEnum):
+    """What holds for pairs without a distance."""
+
+    METRIC = "metric"
+    UNREACHABLE = "unreachable"
+
+
+MapOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--map",
+        metavar="FIELD=COLUMN,...",
+        help="The column of a field, or a number for all rows; tasks.id=Job for one table alone. May be repeated.",
+    ),
+]
+UnitsOption = Annotated[
+    str | None,
+    typer.Option(metavar="QUANTITY=UNIT,...", help="Units of time, distance, energy and work that no header gives."),
+]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to `app`."""
+    app.command("import", epilog=EXAMPLES)(import_command)
+
+
+def import_command(
+    agents: Annotated[str, typer.Option(metavar="FILE", help=f"Table of agents: {TABLE}.")],
+    tasks: Annotated[str, typer.Option(metavar="FILE", help="Table of tasks.")],
+    output: Annotated[str, typer.Option(metavar="FILE", help="Instance to write: .json, .npz, a folder, or -.")],
+    distances: Annotated[
+        str | None, typer.Option(metavar="FILE", help="Table with from, to and distance, or a matrix.")
+    ] = None,
+    columns: MapOption = None,
+    units: UnitsOption = None,
+    decimal: Annotated[Decimal | None, typer.Option(help="The decimal mark, where numbers do not show it.")] = None,
+    missing: Annotated[
+        Missing | None,
+        typer.Option(
+            help="Pairs without a distance: by the metric, or nobody can go there.",
+            show_default="metric where all have places",
+        ),
+    ] = None,
+    quiet: options.QuietOption = False,
+) -> None:
+    """Make an instance of tables as people keep them: spreadsheets of agents and tasks."""
+    from alloc.problems import Instance
+    from alloc.problems.formats import write_instance
+    from alloc.problems.formats.spreadsheet import read_grid
+
+    read = [("--agents", _file(agents)), ("--tasks", _file(tasks))]
+    read += [] if distances is None else [("--distances", _file(distances))]
+    check_outputs(("--output", output), read=read)
+    instance = Instance.from_tables(
+        read_grid(agents),
+        read_grid(tasks),
+        None if distances is None else read_grid(distances),
+        columns=_pairs(columns, "--map"),
+        units=_units(units),
+        decimal=decimal,
+        missing=missing,
+        name=Path(agents if output == STANDARD else output).stem or "instance",
+        report=_silent if quiet else _say,
+    )
+    write_instance(instance, output)
+    if not quiet and output != STANDARD:
+        say(f"wrote {output}: {counted(instance.n, 'agent')}, {counted(instance.m, 'task')}")
+
+
+def _say(line: str) -> None:
+    say(one_line(line))
+
+
+def _silent(line: str) -> None:
+    """Take a line and do nothing."""
+
+
+def _file(name: str) -> str:
+    """Return the file of a table, without the name of its sheet."""
+    return re.sub(r"(?i)(\.xls[xm]):.*", r"\1", name)
+
+
+def _pairs(given: list[str] | None, option: str) -> dict[str, str]:
+    """Return names and values of ``NAME=VALUE,NAME=VALUE``; a comma within a value is no end of it."""
+    parts = [part for text in given or () for part in re.split(r",(?=\s*[\w.]+\s*=)", text)]
+    pairs: dict[str, str] = {}
+    for part in parts:
+        name, equals, value = part.partition("=")
+        if not equals or not name.strip() or not value.strip():
+            raise typer.BadParameter(f"{part!r} is not NAME=VALUE", param_hint=f"'{option}'")
+        if name.strip() in pairs:
+            raise typer.BadParameter(f"{name.strip()!r} is given twice", param_hint=f"'{option}'")
+        pairs[name.strip()] = value.strip().strip("'\"")
+    return pairs
+
+
+def _units(given: str | None) -> "Units | None":
+    from alloc.problems import InputError, Units
+    from alloc.problems.errors import nearest
+
+    if given is None:
+        return None
+    pairs = _pairs([given], "--units")
+    known = ("time", "distance", "energy", "work")
+    for name in pairs:
+        if name not in known:
+            raise InputError(f"there is no quantity {name!r}{nearest(name, known)}", "units")
+    return Units(**pairs)

@@ -1,0 +1,1 @@
+"""``alloc train`` and ``alloc tune``, which make the policies of learned methods."""

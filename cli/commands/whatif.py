@@ -1,0 +1,158 @@
+"""``alloc whatif``."""
+
+import sys
+from collections.abc import Callable
+from functools import cache
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from alloc.cli import options
+from alloc.cli.options import examples
+from alloc.cli.output.console import is_terminal, note, say, table, to_json
+from alloc.cli.output.files import check_outputs, check_picture, save
+from alloc.problems.text import number, percent
+from alloc.problems.vocabulary import Objective
+
+if TYPE_CHECKING:
+    from alloc.allocators import Fleet, WhatIf
+
+EXAMPLES = examples(
+    'alloc whatif demo.json --add "like a2"',
+    'alloc whatif demo.json --add "like a2" --up-to 5 --time-limit 2 --plot fleets.png',
+    "alloc whatif demo.json --remove a7 --remove a8",
+    'alloc whatif demo.json --remove a7 --add "like a2" --up-to 3 --objective makespan-energy --json',
+    closing="Each fleet is solved from the plan of the next smaller one. Ctrl-C ends the run in progress: the fleets "
+    "so far are printed and saved.",
+)
+
+LIKE = "like "
+
+MOST_NAMES = 3
+"""Ids of agents in a row of the table, before they are counted."""
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to `app`."""
+    app.command("whatif", epilog=EXAMPLES)(whatif_command)
+
+
+def whatif_command(
+    instance: options.InstanceArgument,
+    add: Annotated[
+        list[str] | None,
+        typer.Option(metavar='"like ID"', help="Add copies of this agent; may be repeated: one of each per step."),
+    ] = None,
+    up_to: Annotated[int, typer.Option(min=1, max=10_000, help="Steps: how many copies are added at most.")] = 1,
+    remove: Annotated[
+        list[str] | None, typer.Option(metavar="ID", help="An agent that drops out; may be repeated.")
+    ] = None,
+    method: Annotated[
+        str,
+        typer.Option(autocompletion=options.complete_methods, help="One of `alloc methods`, or auto, which picks one."),
+    ] = "auto",
+    objective: options.ObjectiveOption = Objective.MAKESPAN,
+    time_limit: Annotated[
+        float | None,
+        typer.Option(min=0, help="Seconds for each fleet.", show_default="10; none where --iterations is given"),
+    ] = None,
+    iterations: Annotated[int | None, typer.Option(min=0, help="Iterations for each fleet.")] = None,
+    seed: options.SeedOption = 0,
+    threads: options.ThreadsOption = None,
+    output: Annotated[
+        str | None, typer.Option(metavar="FILE", help="Write the fleets here as JSON; - is standard output.")
+    ] = None,
+    plot: options.PlotOption = None,
+    json: options.JsonOption = False,
+    quiet: options.QuietOption = False,
+) -> None:
+    """Say what more or fewer agents bring: makespan, energy and bounds by size of the fleet."""
+    from alloc.allocators import whatif
+    from alloc.problems import read_instance
+
+    check_outputs(("--output", output), ("--plot", plot), read=[("INSTANCE", instance)])
+    check_picture(plot)
+    found = whatif(
+        read_instance(instance),
+        [_model(text) for text in add or ()],
+        up_to=up_to,
+        remove=remove or (),
+        method=method,
+        objective=objective,
+        time_limit_s=options.time_limit(time_limit, iterations),
+        iterations=iterations,
+        seed=seed,
+        threads=threads,
+        on_fleet=None if quiet else _show_fleet,
+    )
+    then: list[Callable[[], object]] = [] if quiet else [lambda: _tell(found, with_table=not json)]
+    if plot is not None:
+        from alloc.allocators.plotting import plot_whatif
+
+        then.append(lambda: plot_whatif(found, plot))
+    text = cache(lambda: to_json(found.to_dict()))
+    save(text, output, text if json else None, then)
+    raise typer.Exit(0 if all(fleet.result.makespan is not None for fleet in found.fleets) else 1)
+
+
+def _model(text: str) -> str:
+    """Return the id in ``like ID``."""
+    if not text.startswith(LIKE):
+        raise typer.BadParameter(f'{text!r} is not "like ID", as in --add "like a2"', param_hint="'--add'")
+    return text.removeprefix(LIKE).strip()
+
+
+def _show_fleet(fleet: "Fleet") -> None:
+    """On a terminal, print each fleet as soon as it is solved; the table follows at the end."""
+    if is_terminal(sys.stderr):
+        result = fleet.result
+        say(f"{result.instance.n} agents: makespan {number(result.makespan)}, gap {percent(result.gap)}")
+
+
+def _tell(found: "WhatIf", *, with_table: bool) -> None:
+    if with_table:
+        say(_table(found))
+        say(f"\n{found.answer[0].upper()}{found.answer[1:]}.")
+    told = {line.partition(":")[0]: line for fleet in reversed(found.fleets) for line in fleet.result.notes}
+    for line in told.values():  # what auto picked is told once for each method
+        note(line)
+
+
+def _table(found: "WhatIf") -> str:
+    units = found.instance.units
+    header = ["agents", "change", _named("makespan", units.time), "change", "at least", "gap"]
+    header += [_named("energy", units.energy), "at least", "time (s)", "status"]
+    now = found.fleets[0].result.makespan
+    rows = [
+        [
+            str(fleet.result.instance.n),
+            _changes(fleet),
+            number(fleet.result.makespan, 5),
+            _against(fleet.result.makespan, now),
+            number(fleet.result.lower_bound, 5),
+            percent(fleet.result.gap),
+            number(fleet.result.energy, 5),
+            number(fleet.result.energy_lower_bound, 5),
+            number(fleet.result.runtime_s, 3),
+            str(fleet.result.status),
+        ]
+        for fleet in found.fleets
+    ]
+    return table(header, rows, left=0)
+
+
+def _named(quantity: str, unit: str) -> str:
+    return f"{quantity} ({unit})" if unit else quantity
+
+
+def _changes(fleet: "Fleet") -> str:
+    """Return what a fleet has less and more, such as ``-d7 +2``."""
+    less = [f"-{name}" for name in fleet.removed] if len(fleet.removed) <= MOST_NAMES else [f"-{len(fleet.removed)}"]
+    return " ".join([*less, *([f"+{len(fleet.added)}"] if fleet.added else [])]) or "as it is"
+
+
+def _against(value: float | None, base: float | None) -> str:
+    """Return by how much a makespan is longer, or shorter, than that of the fleet as it is."""
+    if value is None or base is None or value == base:
+        return "-"
+    return f"{100 * (value / base - 1):+.3g} %"

@@ -1,0 +1,178 @@
+"""CSV tables: their cells by column, with the line of each, and their text."""
+
+import csv
+import io
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import compress
+from pathlib import Path
+
+import numpy as np
+
+from alloc.problems.errors import InputError
+from alloc.problems.formats.columns import unknown_field
+from alloc.problems.formats.files import read_text
+from alloc.problems.formats.messages import quoted
+from alloc.problems.instance import FloatArray
+
+LONGEST_CELL = 131_072
+"""What Python's csv module reads; spreadsheets stop earlier."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """A CSV file: cells by column, and the line on which each row ends."""
+
+    file: str
+    cells: dict[str, list[str]]
+    lines: list[int]
+
+    def place(self, row: int, column: str) -> str:
+        """Return the place of a cell, in words."""
+        return f"{self.file} line {self.lines[row]}, column {column}"
+
+    def numbers(self, column: str) -> FloatArray | None:
+        """Return a column of numbers, NaN where empty; None if the table does not have it."""
+        if column not in self.cells:
+            return None
+        cells = self.cells[column]
+        given = list(map(bool, cells))
+        try:
+            return self._parse(cells, given)
+        except ValueError as error:
+            row = next(row for row, cell in enumerate(cells) if cell and not _is_number(cell))
+            raise InputError(f"must be a number, got {quoted(cells[row])}", self.place(row, column)) from error
+
+    def _parse(self, cells: list[str], given: list[bool]) -> FloatArray:
+        values = np.full(len(cells), np.nan)
+        text = "".join(cells)
+        if not text.isascii() or "_" in text:
+            raise ValueError("Python's float takes more than numbers are written in")
+        values[given] = list(map(float, compress(cells, given)))
+        if not np.isfinite(values[given]).all():
+            raise ValueError("not finite")
+        return values
+
+    def positions(self, axes: Sequence[str]) -> FloatArray:
+        """Return three columns of coordinates, with 0 for the last where only two are given, NaN where none is."""
+        unknown = np.full(len(self.lines), np.nan)
+        x, y, z = (unknown if column is None else column for column in map(self.numbers, axes))
+        half = (np.isnan(x) != np.isnan(y)) | (np.isnan(x) & ~np.isnan(z))
+        if half.any():
+            row = int(np.argmax(half))
+            missing = axes[0] if np.isnan(x[row]) else axes[1]
+            raise InputError(f"is missing; a position needs {axes[0]} and {axes[1]}", self.place(row, missing))
+        return np.column_stack([x, y, np.where(np.isnan(z) & ~np.isnan(x), 0.0, z)])
+
+    def texts(self, column: str) -> list[str | None] | None:
+        """Return a column of strings, None where empty; None if the table does not have it."""
+        return [cell or None for cell in self.cells[column]] if column in self.cells else None
+
+    def lists(self, column: str) -> list[list[str] | None] | None:
+        """Return a column of lists of strings, None where empty; None if the table does not have it."""
+        return list(map(split_ids, self.cells[column])) if column in self.cells else None
+
+    def flags(self, column: str) -> list[bool] | None:
+        """Return a column of true and false, false where empty; None if the table does not have it."""
+        if column not in self.cells:
+            return None
+        words = [cell.strip().lower() for cell in self.cells[column]]
+        wrong = next((row for row, word in enumerate(words) if word not in ("true", "false", "")), None)
+        if wrong is not None:
+            message = f"must be true or false, got {quoted(self.cells[column][wrong])}"
+            raise InputError(message, self.place(wrong, column))
+        return [word == "true" for word in words]
+
+
+def read_table(path: Path, known: Sequence[str], required: Sequence[str]) -> Table:
+    """Return the table in a CSV file.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, is no CSV, has a column that is not `known`, or does not have one that is `required`.
+    """
+    try:
+        text = read_text(path)
+    except InputError as error:
+        raise InputError(error.message, f"{path.name} {error.place}".rstrip()) from error
+    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+    rows: list[list[str]] = []
+    lines: list[int] = []
+    try:
+        for row in reader:
+            if any(map(str.strip, row)):  # a spreadsheet writes an empty row as commas alone
+                rows.append(row)
+                lines.append(reader.line_num)
+    except csv.Error as error:
+        raise InputError(f"is not CSV: {error}", f"{path.name} line {reader.line_num}") from error
+    if not rows:
+        raise InputError(f"is empty; its first line must name the columns: {','.join(known)}", path.name)
+    names = [name.strip() for name in rows[0]]
+    _check_names(names, known, required, f"{path.name} line {lines[0]}")
+    if set(map(len, rows)) != {len(names)}:
+        row, line = next((r, n) for r, n in zip(rows, lines, strict=True) if len(r) != len(names))
+        raise InputError(f"has {len(row)} cells, but there are {len(names)} columns", f"{path.name} line {line}")
+    cells = [list(column) for column in zip(*rows[1:], strict=True)] or [[] for _ in names]
+    return Table(path.name, dict(zip(names, cells, strict=True)), lines[1:])
+
+
+def _check_names(names: list[str], known: Sequence[str], required: Sequence[str], place: str) -> None:
+    if len(names) == 1 and (";" in names[0] or "\t" in names[0]):
+        raise InputError("has one column only; separate columns by commas", place)
+    for name in names:
+        if name not in known:
+            raise InputError(unknown_field(name, known, "column"), place)
+        if names.count(name) > 1:
+            raise InputError(f"the column {name!r} occurs twice; remove one", place)
+    for name in required:
+        if name not in names:
+            raise InputError(f"the column {name!r} is missing", place)
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        return cell.isascii() and "_" not in cell and bool(np.isfinite(float(cell)))
+    except ValueError:
+        return False
+
+
+def table_text(columns: dict[str, Sequence[object]]) -> str:
+    """Return a table, given by columns, as CSV."""
+    cells = [_cells(values) for values in columns.values()]
+    return "\n".join([",".join(columns), *map(",".join, zip(*cells, strict=True)), ""])
+
+
+def _cells(values: Sequence[object]) -> list[str]:
+    """Return values as cells, quoted where they need it."""
+    cells = ["" if value is None else _cell(value) for value in values]
+    if re.search(r'[",\r\n]', "".join(cells)):
+        cells = ['"' + cell.replace('"', '""') + '"' if re.search(r'[",\r\n]', cell) else cell for cell in cells]
+    longest = max(map(len, cells), default=0)
+    if longest > LONGEST_CELL:
+        raise InputError(f"a cell would have {longest} characters, more than CSV readers take; use .json or .npz")
+    return cells
+
+
+def _cell(value: object) -> str:
+    if isinstance(value, list):
+        return join_ids(value)
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return value if isinstance(value, str) else repr(value)
+
+
+def join_ids(ids: Iterable[str]) -> str:
+    r"""Return ids in one cell, separated by ``;``; ``;`` and ``\`` in an id get a ``\`` before them."""
+    return ";".join(re.sub(r"([;\\])", r"\\\1", name) for name in ids) or ";"
+
+
+def split_ids(cell: str) -> list[str] | None:
+    """Return the ids in a cell, None if it is empty; empty ids are left out, so that ``;`` is the empty list."""
+    if not cell:
+        return None
+    if "\\" not in cell:
+        return [name for name in cell.split(";") if name]
+    names = re.findall(r"(?:[^;\\]|\\.|\\$)+", cell, re.DOTALL)
+    return [re.sub(r"\\(.)", r"\1", name, flags=re.DOTALL) for name in names]

@@ -1,0 +1,106 @@
+"""Text with separators, in the encodings and with the separators that spreadsheets write."""
+
+import codecs
+import csv
+import io
+import re
+from collections import Counter
+
+from alloc.problems.errors import InputError
+from alloc.problems.tables.grid import Grid, clean
+
+SEPARATORS = ("\t", ";", ",", "|")
+"""In the order in which they are preferred where several would do."""
+
+MARKS = (
+    (codecs.BOM_UTF8, "utf-8"),
+    (codecs.BOM_UTF32_LE, "utf-32-le"),
+    (codecs.BOM_UTF32_BE, "utf-32-be"),
+    (codecs.BOM_UTF16_LE, "utf-16-le"),
+    (codecs.BOM_UTF16_BE, "utf-16-be"),
+)
+DECLARED = re.compile(r"^\"?sep=(.)\"?\r?\n", re.IGNORECASE)
+FORMULA_TEXT = re.compile(r'^="([^"]*)"$')
+SAMPLE = 200
+"""Rows by which the separator is chosen."""
+
+
+def grid_of_text(data: bytes, source: str) -> Grid:
+    """Return the cells of a text file, whatever its encoding and separator.
+
+    Raises
+    ------
+    InputError
+        If it is no text, or its quotes do not fit.
+    """
+    text, encoding = decoded(data)
+    if text.lstrip().startswith(("<", "{")):
+        raise InputError("is HTML, XML or JSON, not a table; save it as .csv or .xlsx")
+    notes = [] if encoding.startswith("utf") else [f"is no UTF-8 and was read as {encoding}"]
+    declared = DECLARED.match(text)
+    first = 0
+    if declared:
+        text, first = text[declared.end() :], 1
+    separator = declared[1] if declared else separator_of(text)
+    rows: list[list[object]] = []
+    places: list[str] = []
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator, strict=True, skipinitialspace=True)
+    line = 1
+    try:
+        for row in reader:
+            rows.append([clean(_unescaped(cell)) for cell in row])
+            places.append(f"line {first + line}")
+            line = reader.line_num + 1
+    except csv.Error as error:
+        raise InputError(
+            f"has a cell that cannot be read: {error}; are its quotes in pairs?", f"line {line}"
+        ) from error
+    return Grid(source, rows, places, decimal_point=separator == ",", notes=tuple(notes))
+
+
+def _unescaped(cell: str) -> str:
+    """Return the text of a cell that is written as a formula, so that no spreadsheet takes it for a number."""
+    return FORMULA_TEXT.sub(r"\1", cell) if cell.startswith('="') else cell
+
+
+def decoded(data: bytes) -> tuple[str, str]:
+    """Return a text and its encoding: by its byte order mark, else UTF-16 by its zeros, UTF-8, or Windows-1252."""
+    for mark, encoding in MARKS:
+        if data.startswith(mark):
+            return _decode(data[len(mark) :], encoding), encoding
+    head = data[:2000]
+    if head.count(0) > len(head) // 4:
+        encoding = "utf-16-le" if head[1::2].count(0) > head[::2].count(0) else "utf-16-be"
+        return _decode(data, encoding), encoding
+    if b"\0" in data:
+        raise InputError("is no text; save it as .csv or .xlsx")
+    for encoding in ("utf-8", "Windows-1252"):
+        try:
+            return data.decode(encoding), encoding
+        except UnicodeDecodeError:
+            continue
+    return data.decode("latin-1"), "Latin-1"
+
+
+def _decode(data: bytes, encoding: str) -> str:
+    try:
+        return data.decode(encoding)
+    except UnicodeDecodeError as error:
+        raise InputError(f"begins like {encoding.upper()}, but is none; save it as UTF-8") from error
+
+
+def separator_of(text: str) -> str:
+    """Return the separator that gives most rows the same number of cells, two or more; a comma for a single column."""
+    best, score = ",", (0, 0)
+    for separator in SEPARATORS:
+        try:
+            reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator)
+            counts = Counter(len(row) for row, _ in zip(reader, range(SAMPLE), strict=False) if any(row))
+        except csv.Error:
+            continue
+        counts.pop(1, None)
+        if counts:
+            width, rows = max(counts.items(), key=lambda item: (item[1], item[0]))
+            if (rows, width) > score and (rows > score[0] or separator != ","):
+                best, score = separator, (rows, width)
+    return best

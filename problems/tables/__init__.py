@@ -1,0 +1,1 @@
+"""Tables as people keep them, in spreadsheets and data frames, to the fields of an instance."""

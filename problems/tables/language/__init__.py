@@ -1,0 +1,1 @@
+"""How people write what tables hold: names of columns, units and numbers."""

@@ -1,0 +1,212 @@
+"""Tables of agents, tasks and distances to the arguments of an instance."""
+
+import logging
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TypedDict, TypeVar
+
+from alloc.problems.distances.given import DistanceTable
+from alloc.problems.errors import InputError
+from alloc.problems.tables.arguments import Arguments, arguments_of, ids_of
+from alloc.problems.tables.conversion import Conversion, conversion
+from alloc.problems.tables.grid import Grid, grid_of
+from alloc.problems.tables.language.digits import Mark
+from alloc.problems.tables.language.headers import Kind
+from alloc.problems.tables.layout import table_of
+from alloc.problems.tables.matching import column_named, match_columns
+from alloc.problems.tables.pairs import Pairs, pairs_of
+from alloc.problems.tables.records import Records, records_of
+from alloc.problems.tables.wanted import Wanted, is_number
+from alloc.problems.units import Units
+from alloc.problems.vocabulary import EUCLIDEAN, GEOGRAPHIC
+
+DECIMALS: Mapping[str, Mark] = {"point": ".", "comma": ","}
+Built = TypeVar("Built")
+ROW = re.compile(r"^(agents|tasks|distances\.rows)\[(\d+)\]")
+
+
+class TableOptions(TypedDict, total=False):
+    """What `read_tables` takes besides tables."""
+
+    columns: Mapping[str, str] | None
+    units: Units | None
+    decimal: str | None
+    missing: str | None
+    name: str
+    report: Callable[[str], object] | None
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What tables say.
+
+    Attributes
+    ----------
+    arguments : dict
+        Those of an instance.
+    places : dict of str to (str, list of str)
+        The source of each table, and what messages call its rows.
+    """
+
+    arguments: Arguments
+    places: Mapping[str, tuple[str, list[str]]]
+
+    def built(self, build: Callable[..., Built]) -> Built:
+        """Return the instance; its errors name the place in the tables."""
+        try:
+            return build(**self.arguments)
+        except InputError as error:
+            raise self.located(error) from error
+
+    def located(self, error: InputError) -> InputError:
+        """Return an error of the instance with its place in the tables."""
+        match = ROW.match(error.place)
+        if match is None or int(match[2]) >= len(self.places[match[1]][1]):
+            return error
+        source, rows = self.places[match[1]]
+        message = re.sub(r"\brows\[(\d+)\]", lambda other: rows[int(other[1])], error.message)
+        return InputError(message, rows[int(match[2])], source)
+
+    def table(self, pairs: Pairs, common: Conversion, missing: str) -> DistanceTable:
+        """Return the distances between pairs, in the common unit."""
+        factor = common.factors.get((pairs.source, "distance"), 1.0)
+        rows = [(source, target, distance * factor) for source, target, distance in pairs.rows]
+        ids = self.arguments["agent_ids"], self.arguments["task_ids"]
+        try:
+            return DistanceTable.of(rows, *ids, missing)
+        except InputError as error:
+            raise self.located(error) from error
+
+
+def read_tables(
+    agents: object,
+    tasks: object,
+    distances: object | None = None,
+    *,
+    columns: Mapping[str, str] | None = None,
+    units: Units | None = None,
+    decimal: str | None = None,
+    missing: str | None = None,
+    name: str = "instance",
+    report: Callable[[str], object] | None = None,
+) -> Reading:
+    """Return what tables as people keep them say, by the names of their columns.
+
+    Parameters
+    ----------
+    agents, tasks : DataFrame, dict of columns, list of dicts, or Grid
+    distances : the same, optional
+        With columns from, to and distance, or as a matrix.
+    columns : dict of str to str, optional
+        The column of a field where it cannot be guessed, or a number for all rows, such as ``{"ability": "1"}``;
+        ``agents.id`` and ``tasks.id`` where both tables have it.
+    units : Units, optional
+        Those that the headers do not give.
+    decimal : {"point", "comma"}, optional
+        The decimal mark, where the numbers do not show it.
+    missing : {"metric", "unreachable"}, optional
+        What holds for pairs without a distance; the first where all have places, unless a pair is marked as closed.
+    name : str
+        Of the instance.
+    report : function, optional
+        Called with a line for each column, on what it was taken for, and for each row that was left out; they are
+        logged where it is None.
+
+    Raises
+    ------
+    InputError
+        If a table can be read in two ways or in none, in one line with the place and the mend.
+    """
+    if decimal is not None and decimal not in DECIMALS:
+        raise InputError(f"must be point or comma, got {decimal!r}", "decimal")
+    mark = None if decimal is None else DECIMALS[decimal]
+    wanted = Wanted(columns or {})
+    first_grid, second_grid = grid_of(agents, "agents"), grid_of(tasks, "tasks")
+    if first_grid.source == second_grid.source:
+        raise InputError(
+            "holds agents and tasks at once; name a sheet for each, or two files", source=first_grid.source
+        )
+    first = _records(first_grid, "agents", wanted, mark)
+    second = _records(second_grid, "tasks", wanted, mark)
+    pairs = None
+    if distances is not None:
+        grid = grid_of(distances, "distances")
+        pairs = pairs_of(grid, ids_of(first, "a"), ids_of(second, "t"), wanted.of("distances", grid), mark)
+    wanted.require_all_used()
+    geographic = _geographic(first, second)
+    found = [*first.found, *second.found, *(pairs.found if pairs else [])]
+    common = conversion(found, units or Units(), geographic=geographic)
+    arguments = arguments_of(first, second, common)
+    arguments |= {"name": name, "metric": GEOGRAPHIC if geographic else EUCLIDEAN}
+    lines = [*_lines(first, common), *_lines(second, common)]
+    places = {"agents": (first.table.source, first.table.places), "tasks": (second.table.source, second.table.places)}
+    reading = Reading(arguments, places)
+    if pairs is None:
+        lines += _unplaced(first, second)
+    else:
+        rest = missing or _missing(pairs, first, second)
+        places["distances.rows"] = (pairs.source, pairs.places)
+        arguments["distances"] = reading.table(pairs, common, rest)
+        lines += _pair_lines(pairs, common, rest)
+    tell = logging.getLogger("alloc").info if report is None else report
+    for line in [*lines, *_unmet(arguments)]:
+        tell(line)
+    return reading
+
+
+def _records(grid: Grid, kind: Kind, wanted: Wanted, mark: Mark | None) -> Records:
+    named = wanted.of(kind, grid)
+    table = table_of(grid, kind, frozenset(named.values()))
+    for field in [field for field, text in named.items() if column_named(table, text) is None and not is_number(text)]:
+        match_columns(table, kind, {field: named[field]})  # raises the error that names the columns
+    return records_of(match_columns(table, kind, named), mark)
+
+
+def _geographic(first: Records, second: Records) -> bool:
+    """Return whether places are latitude and longitude; refuse tables that differ."""
+    kinds = {records.geographic for records in (first, second)} - {None}
+    if len(kinds) > 1:
+        told = ["latitude and longitude" if records.geographic else "x and y" for records in (first, second)]
+        raise InputError(
+            f"gives places by {told[1]}, but {first.table.source} by {told[0]}; give both alike",
+            source=second.table.source,
+        )
+    return bool(kinds and kinds.pop())
+
+
+def _missing(pairs: Pairs, first: Records, second: Records) -> str:
+    """Return what holds for pairs without a distance: the metric where all have places and none is closed."""
+    placed = first.geographic is not None and second.geographic is not None
+    return "metric" if placed and not pairs.closed else "unreachable"
+
+
+def _lines(records: Records, common: Conversion) -> list[str]:
+    source = records.table.source
+    words = {field: text for (owner, field), text in common.words.items() if owner == source}
+    lines = [*records.match.guesses(words | records.conversions), *records.table.notes, *records.notes]
+    return [f"{source}: {line}" for line in lines]
+
+
+def _pair_lines(pairs: Pairs, common: Conversion, missing: str) -> list[str]:
+    rest = "are those between places" if missing == "metric" else "mean that nobody can go there"
+    told = [*pairs.guesses, *pairs.notes, f"{len(pairs.rows)} distances; those left out {rest}"]
+    if (pairs.source, "distance") in common.words:
+        told.append(f"distances{common.words[pairs.source, 'distance']}")
+    return [f"{pairs.source}: {line}" for line in told]
+
+
+def _unplaced(first: Records, second: Records) -> list[str]:
+    """Return a line where one table gives places and the other does not."""
+    without = [records for records in (first, second) if records.geographic is None]
+    if len(without) != 1 or "start_task" in without[0].match.columns:
+        return []
+    what = "agents" if without[0] is first else "tasks"
+    return [f"{without[0].table.source}: no column gives the places of the {what}, so that all distances are 0"]
+
+
+def _unmet(arguments: Arguments) -> list[str]:
+    """Return a line for each skill that a task needs and no agent has."""
+    held = {name for names in arguments.get("skills") or [] for name in names}
+    needed = dict.fromkeys(name for names in arguments.get("needs") or [] for name in names)
+    return [f"no agent has the skill {name!r}, which tasks need" for name in needed if name not in held]

@@ -1,0 +1,207 @@
+"""One table of agents or tasks, field by field."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from alloc.problems.arguments import shown
+from alloc.problems.errors import InputError
+from alloc.problems.fields import FloatArray
+from alloc.problems.tables.conversion import DIMENSIONS, Found
+from alloc.problems.tables.grid import as_name
+from alloc.problems.tables.language.digits import Mark
+from alloc.problems.tables.language.measures import proportion
+from alloc.problems.tables.layout import Table
+from alloc.problems.tables.matching import Match
+from alloc.problems.tables.numeric import Numbers, require_numbers
+from alloc.problems.tables.values import coordinates, flag, names_in
+
+NUMERIC = frozenset(
+    ("ability", "workload", "battery", "range", "speed", "energy_per_distance", "priority", "x", "y", "z", "lat", "lon")
+)
+REQUIRED = {"agents": "ability", "tasks": "workload"}
+EXAMPLES = {
+    "agents": "ability=Capacity, or ability=1 for all alike",
+    "tasks": "workload=Demand, or workload=1 for all alike",
+}
+
+
+@dataclass
+class Records:
+    """The rows of one table.
+
+    Attributes
+    ----------
+    match : Match
+    ids : list of str, or None
+        None where there is no column of them.
+    numbers : dict of str to ndarray
+        By field, NaN where a cell is empty, in the units of the table.
+    found : list of Found
+        The units of the columns.
+    geographic : bool or None
+        Whether places are latitude and longitude; None where there are none.
+    notes : list of str
+        What became of rows without id.
+    conversions : dict of str to str
+        What became of the units of some fields.
+    """
+
+    match: Match
+    ids: list[str] | None
+    numbers: dict[str, FloatArray]
+    found: list[Found]
+    geographic: bool | None
+    notes: list[str] = field(default_factory=list)
+    conversions: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def table(self) -> Table:
+        """The table that the rows are of."""
+        return self.match.table
+
+    def flags(self, name: str) -> list[bool] | None:
+        """Return the yes and no of a field, None where there is no such column."""
+        if name not in self.match.columns:
+            return None
+        return [flag(self.table, row, self.match.columns[name]) for row in range(len(self.table.rows))]
+
+    def lists(self, name: str, marks: str) -> list[list[str]] | None:
+        """Return the lists of names of a field, None where there is no such column."""
+        if name not in self.match.columns:
+            return None
+        return [names_in(cell, marks) for cell in self.match.cells(name)]
+
+    def positions(self) -> FloatArray | None:
+        """Return places, shape (count, 3), in the order of an instance: longitude before latitude."""
+        if self.geographic is None:
+            return None
+        first, second = ("lon", "lat") if self.geographic else ("x", "y")
+        height = self.numbers.get("z", np.zeros(len(self.table.rows)))
+        place = np.column_stack([self.numbers[first], self.numbers[second], np.nan_to_num(height)])
+        self._check_places(place)
+        place[np.isnan(place[:, 0])] = np.nan
+        return place
+
+    def _check_places(self, place: FloatArray) -> None:
+        half = np.isnan(place[:, 0]) != np.isnan(place[:, 1])
+        if half.any():
+            raise self.table.error("has one coordinate without the other; fill in both or none", int(np.argmax(half)))
+        wrong = (np.abs(place[:, 1]) > 90) | (np.abs(place[:, 0]) > 180) if self.geographic else np.zeros(1, dtype=bool)
+        if wrong.any():
+            row = int(np.argmax(wrong))
+            raise self.table.error(
+                f"latitude {place[row, 1]:g} and longitude {place[row, 0]:g} are no place on earth; are they swapped, "
+                "or x and y?",
+                row,
+            )
+
+
+def records_of(match: Match, decimal: Mark | None) -> Records:
+    """Return the rows of a table of agents or tasks.
+
+    Raises
+    ------
+    InputError
+        If a cell cannot be read, an id is there twice, or what every row must have is absent.
+    """
+    table, required = match.table, REQUIRED[match.kind]
+    if required not in match.columns and required not in match.constants:
+        names = ", ".join(repr(header.text) for header in table.headers if header.text)
+        names += f"; say which by --map {EXAMPLES[match.kind]}"
+        raise table.error(f"no column is known as the {required}; the columns are {names}")
+    columns = {name: column for name, column in match.columns.items() if name in NUMERIC}
+    reader, numbers, found = Numbers(table, columns, decimal), dict[str, FloatArray](), list[Found]()
+    for name, column in columns.items():
+        numbers[name], measure = reader.read(name)
+        if name in DIMENSIONS:
+            found.append(Found(table.source, table.headers[column].text, name, measure))
+    for name, value in match.constants.items():
+        numbers[name] = np.full(len(table.rows), value)
+    require_numbers(table, match.columns.get(required), required, numbers[required])
+    numbers |= _combined(match)
+    found += _unit_of_position(match)
+    records = Records(match, None, numbers, found, _is_geographic(numbers))
+    records.ids = _ids(match, numbers[required], records.notes)
+    _metres(records)
+    return records
+
+
+def _is_geographic(numbers: dict[str, FloatArray]) -> bool | None:
+    return True if "lat" in numbers else False if "x" in numbers else None
+
+
+def _metres(records: Records) -> None:
+    """Turn altitudes above places on earth into metres, and let them decide on no unit of distance."""
+    if not records.geographic:
+        return
+    for one in [one for one in records.found if one.field == "z"]:
+        records.found.remove(one)
+        factor = 1.0 if one.measure is None else proportion(one.measure.top, "m")
+        if factor is None or (one.measure is not None and one.measure.bottom):
+            raise InputError(f"is in {one.measure}, which is no height", f"column {one.header!r}", one.source)
+        if factor != 1:
+            records.numbers["z"] = records.numbers["z"] * factor
+            records.conversions["z"] = f" in m, times {factor:g}"
+
+
+def _combined(match: Match) -> dict[str, FloatArray]:
+    """Return the coordinates of a column that holds all of them."""
+    name = next((name for name in ("gps", "lonlat", "position") if name in match.columns), None)
+    if name is None:
+        return {}
+    column, table = match.columns[name], match.table
+    values = np.full((len(table.rows), 3), np.nan)
+    for row, cell in enumerate(match.cells(name)):
+        place = None if cell is None else coordinates(cell)
+        if cell is not None and place is None:
+            raise table.error(f"must be two or three coordinates, got {shown(cell)}", row, column)
+        if place is not None:
+            values[row] = [*place, 0.0][:3]
+    order = {"gps": ("lat", "lon"), "lonlat": ("lon", "lat"), "position": ("x", "y")}[name]
+    return {order[0]: values[:, 0], order[1]: values[:, 1], "z": np.nan_to_num(values[:, 2])}
+
+
+def _unit_of_position(match: Match) -> list[Found]:
+    """Return the unit of x, y and z that one column holds."""
+    if "position" not in match.columns:
+        return []
+    header = match.table.headers[match.columns["position"]]
+    return [Found(match.table.source, header.text, axis, header.measure) for axis in "xyz"]
+
+
+def _ids(match: Match, required: FloatArray, notes: list[str]) -> list[str] | None:
+    """Return the ids of the rows; those without get a number, and `notes` says so."""
+    table = match.table
+    letter = match.kind[0]
+    if "id" not in match.columns:
+        notes.append(f"there is no column of ids: the {match.kind} are {letter}1 to {letter}{len(table.rows)}")
+        return None
+    column = match.columns["id"]
+    ids = [as_name(cell) for cell in match.cells("id")]
+    _refuse_unnamed_sum(table, ids, required)
+    first: dict[str, int] = {}
+    for row, name in enumerate(ids):
+        if name and name in first:
+            raise table.error(f"{name!r} is the id in {table.places[first[name]]} too; rename one", row, column)
+        first[name] = row
+    for row, name in enumerate(ids):
+        if not name:
+            ids[row] = _free(f"{letter}{row + 1}", first)
+            first[ids[row]] = row
+            notes.append(f"{table.places[row]} has no id and is called {ids[row]}")
+    return ids
+
+
+def _free(name: str, taken: dict[str, int]) -> str:
+    while name in taken:
+        name += "'"
+    return name
+
+
+def _refuse_unnamed_sum(table: Table, ids: list[str], required: FloatArray) -> None:
+    """Refuse a last row without id whose number is the sum of those above: nobody can tell whether it is a total."""
+    if len(ids) > 2 and not ids[-1] and all(ids[:-1]) and np.isclose(required[-1], required[:-1].sum(), rtol=1e-9):
+        raise table.error(
+            "has no id and looks like the sum of the rows above; call it 'Total', or give it an id", len(ids) - 1
+        )

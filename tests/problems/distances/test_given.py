@@ -1,0 +1,45 @@
+"""Tables of distances, by rows and by columns."""
+
+import numpy as np
+import pytest
+
+from alloc.problems import DistanceTable, InputError
+
+AGENTS, TASKS = ("a1", "a2", "x"), ("t1", "t2", "x")
+ROWS = [("a1", "t1", 3.0), ("t1", "a1", 4.0), ("t2", "t1", 0.5)]
+
+
+def test_rows_and_columns_make_the_same_table() -> None:
+    """Agents have the nodes from 0 on and tasks those after them, however the table is given; arrays are read-only."""
+    source, target, distance = zip(*ROWS, strict=True)
+    for table in (
+        DistanceTable.of(ROWS, AGENTS, TASKS, "unreachable"),
+        DistanceTable.from_columns(source, target, np.array(distance), AGENTS, TASKS, "unreachable"),
+    ):
+        assert (table.n, table.m, table.missing) == (3, 3, "unreachable")
+        assert (table.source.tolist(), table.target.tolist()) == ([0, 3, 4], [3, 0, 3])
+        assert table.distance.tolist() == [3, 4, 0.5]
+        assert not any(array.flags.writeable for array in (table.source, table.target, table.distance))
+
+
+def test_an_empty_table_is_one() -> None:
+    """A table without rows is a table, by which nobody can go anywhere if that is what it says."""
+    table = DistanceTable.from_columns([], [], np.zeros(0), AGENTS, TASKS, "unreachable")
+    assert (len(table.source), len(table.target), len(table.distance)) == (0, 0, 0)
+
+
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [
+        ([*ROWS, ("a3", "t1", 1)], r"distances\.rows\[3\]\[0\]: there is no agent or task 'a3'"),
+        ([*ROWS, ("a2", "x", 1)], r"distances\.rows\[3\]\[1\]: 'x' is the id of an agent and of a task"),
+        ([*ROWS, ("a2", "a1", 1)], r"distances\.rows\[3\]: joins two agents"),
+        ([*ROWS, ("t2", "t1", 1)], r"distances\.rows\[3\]: gives a pair that an earlier row gives"),
+        ([*ROWS, ("a2", "t1", -1)], r"distances\.rows\[3\]: must have a distance that is a finite number >= 0"),
+        ([*ROWS, ("a2", "t1")], r"distances\.rows\[3\]: must be \[from, to, distance\] with two ids"),
+    ],
+)
+def test_rows_that_break_a_rule(rows: list[tuple[str, str, float]], message: str) -> None:
+    """The first row that breaks a rule is told with its number and, where one id is wrong, that of the id."""
+    with pytest.raises(InputError, match=message):
+        DistanceTable.of(rows, AGENTS, TASKS)
