@@ -30,7 +30,12 @@ def to_geojson(result: "Result") -> str:
         if agent.task is not None and not agent.violation:
             features += _move(agent, starts[agent.agent], tasks[agent.task])
     units = {name: label for name, label in asdict(instance.units).items() if label}
-    document = {"type": "FeatureCollection", "name": instance.name, "units": units, "features": features}
+    document: dict[str, object] = {
+        "type": "FeatureCollection",
+        "name": instance.name,
+        "units": units,
+        "features": features,
+    }
     return json_text.lines(document)
 
 

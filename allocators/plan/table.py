@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import starmap
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
@@ -111,21 +112,10 @@ def agent_rows(result: "Result", agents: IntArray | None = None) -> list[AgentRo
     with np.errstate(invalid="ignore"):
         left = np.maximum(battery - energy, 0.0)
     ids: list[str | None] = [*instance.task_ids, None]
-    return [
-        AgentRow(instance.agent_ids[i], ids[j], *figures, reasons.get(i, ""))
-        for i, j, *figures in zip(
-            chosen.tolist(),
-            task.tolist(),
-            instance.ability[chosen].tolist(),
-            _known(arrival),
-            _known(done),
-            distance.tolist(),
-            energy.tolist(),
-            _known(battery),
-            _known(left),
-            strict=True,
-        )
-    ]
+    figures = (arrival, done, distance, energy, battery, left)
+    columns = (instance.ability[chosen].tolist(), *map(_known, figures), [reasons.get(i, "") for i in chosen.tolist()])
+    names = [instance.agent_ids[i] for i in chosen.tolist()], [ids[j] for j in task.tolist()]
+    return list(starmap(AgentRow, zip(*names, *columns, strict=True)))
 
 
 def _flights(instance: Instance, agents: IntArray, tasks: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:

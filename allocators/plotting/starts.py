@@ -33,12 +33,10 @@ def draw_starts(axes: "Axes", result: "Result", begin: list[Base]) -> "FloatArra
     place, idle = np.array([base.place for base in begin]), np.array([is_idle(result, base) for base in begin])
     single = np.array([len(base.agents) == 1 for base in begin])
     for shape, kind in (("o", single), ("s", ~single)):
-        busy, free = kind & ~idle, kind & idle
-        axes.scatter(
-            *place[busy].T, s=size[busy] ** 2, color=MOVE, marker=shape, zorder=2, edgecolors="white", linewidths=0.7
-        )
-        hollow = {"facecolors": "none", "edgecolors": MOVE, "linewidths": 0.8}
-        axes.scatter(*place[free].T, s=size[free] ** 2, marker=shape, zorder=2, **hollow)
+        for marked, face, edge in ((kind & ~idle, MOVE, "white"), (kind & idle, "none", MOVE)):
+            x, y = place[marked].T
+            area = size[marked] ** 2
+            axes.scatter(x, y, s=area, marker=shape, facecolors=face, edgecolors=edge, linewidths=0.7, zorder=2)
     return size
 
 

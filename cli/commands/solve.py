@@ -8,8 +8,8 @@ import typer
 
 from alloc.cli import options
 from alloc.cli.options import examples
-from alloc.cli.output.console import note, say, to_json
-from alloc.cli.output.files import STANDARD, check_outputs, check_picture, check_result, save
+from alloc.cli.output.console import STANDARD, note, say, to_json
+from alloc.cli.output.files import check_outputs, check_picture, check_result, save
 from alloc.cli.output.plan import plan_tables
 from alloc.problems.vocabulary import Objective
 
