@@ -30,13 +30,8 @@ def to_geojson(result: "Result") -> str:
         if agent.task is not None and not agent.violation:
             features += _move(agent, starts[agent.agent], tasks[agent.task])
     units = {name: label for name, label in asdict(instance.units).items() if label}
-    document: dict[str, object] = {
-        "type": "FeatureCollection",
-        "name": instance.name,
-        "units": units,
-        "features": features,
-    }
-    return json_text.lines(document)
+    document: dict[str, object] = {"type": "FeatureCollection", "name": instance.name, "units": units}
+    return json_text.lines({**document, "features": features})
 
 
 def _point(kind: str, row: AgentRow | TaskRow, place: Position) -> list[Feature]:
