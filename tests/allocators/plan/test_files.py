@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from openpyxl import load_workbook
+from schema_checks import faults
 
 from alloc.allocators import read_result, write_result
 from alloc.allocators.plan.table import agent_rows
@@ -79,7 +80,9 @@ def test_json_is_read_back(tmp_path: Path) -> None:
     """The document is that of the result, with the units that the instance names."""
     result = planned(earth(), [0, 1, 1])
     write_result(result, tmp_path / "plan.json")
-    assert json.loads((tmp_path / "plan.json").read_text())["units"] == {"time": "min"}
+    document = json.loads((tmp_path / "plan.json").read_text())
+    assert document["units"] == {"time": "min"}
+    assert faults(document) == []
     assert read_result(tmp_path / "plan.json", result.instance).to_dict() == result.to_dict()
 
 
