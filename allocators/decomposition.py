@@ -80,6 +80,7 @@ class Decomposition:
             return notes
         hours, unit = best.evaluation.served_makespan, self._whole.instance.units.time
         taken, least = labelled(f"{hours:.6g}", unit), labelled(f"{bound:.6g}", unit)
+        as_much = "as many tasks" if self.shortage.precedence is None else "as many and as urgent tasks"
         if relative_gap(hours, bound) <= PROVEN:
-            return [*notes, f"no plan that serves as many tasks is done sooner than this one, in {taken}"]
-        return [*notes, f"every plan that serves as many tasks takes {least} or more, this one {taken}"]
+            return [*notes, f"no plan that serves {as_much} is done sooner than this one, in {taken}"]
+        return [*notes, f"every plan that serves {as_much} takes {least} or more, this one {taken}"]

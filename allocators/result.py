@@ -12,16 +12,8 @@ from alloc.allocators.plan.table import AgentRow, agent_rows
 from alloc.allocators.replanning.moves import Moves
 from alloc.allocators.result_document import moves_document, read_document, result_fields
 from alloc.allocators.summary import summary
-from alloc.problems import (
-    Allocation,
-    Evaluation,
-    InputError,
-    Instance,
-    MissingPackageError,
-    Objective,
-    evaluate,
-    makespan_lower_bound,
-)
+from alloc.problems import Allocation, Evaluation, InputError, Instance, MissingPackageError, Objective
+from alloc.problems.diagnosis.unserved import Unserved, why_unserved
 from alloc.problems.evaluation import RELATIVE_TOLERANCE
 from alloc.problems.formats.allocation_file import RESULT_FORMAT
 from alloc.problems.formats.files import PathLike, named
@@ -87,6 +79,13 @@ class Result:
     def makespan(self) -> float | None:
         """Hours until the last task is done; None while a task is unserved."""
         return None if self.evaluation is None else self.evaluation.makespan
+
+    @property
+    def unserved(self) -> tuple[Unserved, ...]:
+        """Why tasks are unserved: the ten most urgent ones."""
+        if self.allocation is None or self.evaluation is None or not self.evaluation.unserved_tasks:
+            return ()
+        return why_unserved(self.instance, self.allocation)
 
     @property
     def energy(self) -> float | None:
@@ -161,6 +160,7 @@ class Result:
             "battery_remaining_percent": None if score is None else score.battery_remaining_percent,
             "reward": None if score is None else score.reward,
             "unserved_tasks": [] if score is None else [ids.task_ids[j] for j in score.unserved_tasks],
+            **self._reasons(),
             "violations": []
             if score is None
             else [
@@ -175,6 +175,22 @@ class Result:
                 {"time_s": point.time_s, "makespan": point.makespan, "energy": point.energy} for point in self.trace
             ],
         }
+
+    def _reasons(self) -> dict[str, object]:
+        """Return the field on why tasks are unserved; none where all are served."""
+        agents, found = self.instance.agent_ids, self.unserved
+        fields = [
+            {
+                "task": self.instance.task_ids[one.task],
+                "priority": one.priority,
+                "able": one.able,
+                "able_agents": [agents[i] for i in one.able_agents],
+                "nearest_agent": None if one.nearest is None else agents[one.nearest],
+                "reason": one.reason,
+            }
+            for one in found
+        ]
+        return {"unserved_reasons": fields} if fields else {}
 
     @classmethod
     def from_dict(cls, document: Mapping[str, object], instance: Instance) -> "Result":
@@ -226,37 +242,6 @@ class Result:
             raise MissingPackageError("to_frame needs pandas; install with: pip install pandas") from error
         columns = [field.name for field in fields(AgentRow)]
         return pandas.DataFrame(map(vars, agent_rows(self)), columns=columns)
-
-
-def scored_result(instance: Instance, allocation: Allocation, method: str = "given") -> Result:
-    """Return the scores of an allocation, wherever it comes from, as a result, with a bound that is cheap to compute.
-
-    Parameters
-    ----------
-    instance : Instance
-    allocation : Allocation
-    method : str
-        What the result calls the method.
-
-    Raises
-    ------
-    InputError
-        If the allocation does not belong to the instance.
-    """
-    score = evaluate(instance, allocation)
-    return Result(
-        instance=instance,
-        method=method,
-        objective=Objective.MAKESPAN,
-        seed=0,
-        allocation=allocation,
-        evaluation=score,
-        lower_bound=None if score.unserved_tasks else makespan_lower_bound(instance),
-        energy_lower_bound=None,
-        stop_reason=StopReason.FINISHED,
-        runtime_s=0.0,
-        trace=(),
-    )
 
 
 def read_result(path: PathLike, instance: Instance) -> Result:

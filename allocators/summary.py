@@ -25,6 +25,9 @@ STOPS = {
     StopReason.INTERRUPTED: "it was interrupted",
 }
 
+MOST_REASONS = 5
+"""Unserved tasks whose reason is given."""
+
 LESS = {
     Objective.MAKESPAN: "less energy",
     Objective.MAKESPAN_ENERGY: "less energy",
@@ -150,11 +153,21 @@ def bottleneck_lines(result: "Result") -> list[str]:
         return []
     if result.evaluation.unserved_tasks:
         ids = [result.instance.task_ids[j] for j in result.evaluation.unserved_tasks]
-        return [f"Unserved: {_list(ids)}."]
+        return [f"Unserved: {_list(ids)}.", *_reasons(result)]
     found = explain(result.instance, result.allocation)
     if found is None:
         return ["There is no work to do."]
     return [_last_tasks(result.instance, found), _gain(result.instance, found), _room(result, found)]
+
+
+def _reasons(result: "Result") -> list[str]:
+    """Return why the most urgent of the unserved tasks are, a line each."""
+    weights = result.instance.priority
+    return [
+        f"  {result.instance.task_ids[one.task]}"
+        f"{f' (priority {number(one.priority)})' if weights.max() > weights.min() else ''}: {one.reason}"
+        for one in result.unserved[:MOST_REASONS]
+    ]
 
 
 def _last_tasks(instance: Instance, found: Bottleneck) -> str:

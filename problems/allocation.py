@@ -111,6 +111,9 @@ class Allocation(ReadOnly):
         InputError
             If the plan has no agent of `instance`, or a task is no string.
         """
+        for name, task in assignment.items():
+            if not isinstance(task, str | None):
+                raise InputError(f"must be the id of a task, or None, got {task!r}", f"assignment.{name}")
         here = {name: task for name, task in assignment.items() if name in instance.agent_index}
         if assignment and not here:
             raise InputError(f"names no agent of instance {instance.name!r}", "assignment")

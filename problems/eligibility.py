@@ -26,20 +26,26 @@ def name_sets(
     entries = listed(lists, field_name, "lists of strings, or None")
     if len(entries) != count:
         raise InputError(f"needs {count} entries, got {len(entries)}", field_name)
-    named = tuple(_names(entry, f"{kind}s[{row}].{field_name}") for row, entry in enumerate(entries))
+    known: dict[tuple[str, ...], Names] = {}  # one tuple for all that have the same names
+    named = tuple(_names(entry, f"{kind}s[{row}].{field_name}", known) for row, entry in enumerate(entries))
     return named if any(named) else None
 
 
-def _names(entry: Iterable[str] | None, place: str) -> Names:
+def _names(entry: Iterable[str] | None, place: str, known: dict[tuple[str, ...], Names]) -> Names:
     if entry is None or (isinstance(entry, float) and np.isnan(entry)):
         return ()
     if isinstance(entry, str):
         raise InputError(f"must be a list of strings, got {shown(entry)}", place)
-    names = list(entry)
+    names = tuple(entry)
+    try:
+        return known[names]
+    except (KeyError, TypeError):  # new, or no strings
+        pass
     for name in names:
         if not isinstance(name, str) or not name:
             raise InputError(f"must be non-empty strings, got {shown(name)}", place)
-    return tuple(sorted(set(names)))
+    known[names] = tuple(sorted(set(names)))
+    return known[names]
 
 
 def eligible_tasks(

@@ -60,6 +60,8 @@ class Evaluation(ReadOnly):
         Whether a term of (3) was too large for a float: `reward` then is the most negative finite float.
     unserved_tasks : tuple of int
         Tasks with workload and without an agent.
+    unserved_priorities : tuple of float
+        Their priorities, the highest first.
     violations : tuple of Violation
         Agents sent where they cannot go.
     """
@@ -77,15 +79,23 @@ class Evaluation(ReadOnly):
     reward: float
     reward_saturated: bool
     unserved_tasks: tuple[int, ...]
+    unserved_priorities: tuple[float, ...]
     violations: tuple[Violation, ...]
 
+    @property
+    def unserved_rank(self) -> tuple[float, ...]:
+        """What is compared first, smaller is better: how many tasks are unserved, then how urgent these are."""
+        return float(len(self.unserved_tasks)), *self.unserved_priorities
+
     def key(self, objective: Objective) -> tuple[float, ...]:
-        """Return what is compared first, second and third; smaller is better."""
-        first = (float(len(self.unserved_tasks)), self.served_makespan)
+        """Return what is compared, in this order; smaller is better."""
+        first = (*self.unserved_rank, self.served_makespan)
         return first if objective is Objective.MAKESPAN else (*first, self.cost)
 
     def is_better_than(self, other: "Evaluation", objective: Objective) -> bool:
         """Whether this scores better than `other`, with values within 1e-9 relative counted as equal."""
+        if self.unserved_rank != other.unserved_rank:
+            return self.unserved_rank < other.unserved_rank
         for mine, theirs in zip(self.key(objective), other.key(objective), strict=True):
             if abs(mine - theirs) > RELATIVE_TOLERANCE * max(abs(mine), abs(theirs)):
                 return mine < theirs
@@ -153,6 +163,7 @@ def evaluate(instance: Instance, allocation: Allocation) -> Evaluation:
         reward=reward,
         reward_saturated=saturated,
         unserved_tasks=tuple(np.flatnonzero(unserved).tolist()),
+        unserved_priorities=tuple(np.sort(instance.priority[unserved])[::-1].tolist()),
         violations=tuple(_violations(instance, sent[~allowed], task)),
     )
 

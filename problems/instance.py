@@ -56,7 +56,7 @@ class Instance(fields.ReadOnly):
     allowed_tasks : sequence of (sequence of int, or None), optional
         Task indices that each agent may do; None for all. No matrix of who may do what.
     priority : array_like, shape (m,), optional
-        Weight of each task in the game and in missions, >= 0; no part of the objective.
+        Weight of each task in the game and in missions, >= 0; where not all can be served, the most urgent are.
     tau : float
         Base of the reward (3), 0 < tau < 1.
     energy_per_distance : float

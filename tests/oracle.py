@@ -16,42 +16,49 @@ CHUNK = 20_000
 
 @dataclass(frozen=True)
 class Optimum:
-    """Scores of the best plan: fewest tasks unserved, then the least makespan, then the least energy.
+    """Scores of the best plan: fewest tasks unserved, most priority served, least makespan, least energy.
 
-    `energy` is the least among the plans with that makespan (within 1e-9 relative); `plan` is one of them.
+    `lost` is the sum of the priorities of the unserved tasks. `energy` is the least among the plans with that makespan
+    (within 1e-9 relative); `plan` is one of them.
     """
 
     unserved: int
     makespan: float
     energy: float
     plan: tuple[int, ...]
+    lost: float
 
 
 def brute_force(instance: Instance) -> Optimum:
     """Try all (m + 1)^n allocations; those that send an agent where it cannot go are left out."""
-    plans, unserved, makespan, energy = _scored_plans(instance)
+    plans, unserved, lost, makespan, energy = _scored_plans(instance)
     few = unserved == unserved.min()
+    few &= lost <= lost[few].min() * (1 + 1e-12)
     least = makespan[few].min()
     fast = few & (makespan <= least * (1 + 1e-9))
     best = int(np.flatnonzero(fast)[energy[fast].argmin()])
-    return Optimum(int(unserved[best]), float(least), float(energy[best]), tuple(plans[best].tolist()))
+    return Optimum(
+        int(unserved[best]), float(least), float(energy[best]), tuple(plans[best].tolist()), float(lost[best])
+    )
 
 
 def least_energy_within(instance: Instance, makespan: float) -> float:
     """Return the least energy of all allocations that serve all tasks within `makespan` hours."""
-    _, unserved, hours, energy = _scored_plans(instance)
+    _, unserved, _, hours, energy = _scored_plans(instance)
     return float(energy[(unserved == 0) & (hours <= makespan * (1 + 1e-9))].min())
 
 
-def _scored_plans(instance: Instance) -> tuple[NDArray[np.int64], NDArray[np.int64], FloatArray, FloatArray]:
-    """Return all plans that send nobody astray, with their unserved tasks, makespans and energies."""
+def _scored_plans(
+    instance: Instance,
+) -> tuple[NDArray[np.int64], NDArray[np.int64], FloatArray, FloatArray, FloatArray]:
+    """Return all plans that send nobody astray: unserved tasks, the priority of these, makespan, and energy of each."""
     distance, able = reachable(instance)
     energy_of = flight_energies(instance, distance)
     options = [[-1, *np.flatnonzero(row).tolist()] for row in able]
     plans = np.array(np.meshgrid(*options, indexing="ij"), dtype=np.int64).reshape(instance.n, -1).T
     scores = [_score(instance, distance, energy_of, plans[row : row + CHUNK]) for row in range(0, len(plans), CHUNK)]
-    unserved, makespan, energy = (np.concatenate(part) for part in zip(*scores, strict=True))
-    return plans, unserved, makespan, energy
+    unserved, lost, makespan, energy = (np.concatenate(part) for part in zip(*scores, strict=True))
+    return plans, unserved, lost, makespan, energy
 
 
 def reachable(instance: Instance) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
@@ -111,17 +118,18 @@ def _distance(instance: Instance, i: int, j: int, *, back: bool = False) -> tupl
 
 def _score(
     instance: Instance, distance: FloatArray, energy_of: FloatArray, plans: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-    """Unserved tasks, makespan of the served ones and energy of each plan, each of shape (len(plans),)."""
-    unserved, makespan = np.zeros(len(plans), dtype=np.int64), np.zeros(len(plans))
+) -> tuple[NDArray[np.int64], FloatArray, FloatArray, FloatArray]:
+    """Unserved tasks, their priority, makespan of the served ones and energy, each of shape (len(plans),)."""
+    unserved, lost, makespan = np.zeros(len(plans), dtype=np.int64), np.zeros(len(plans)), np.zeros(len(plans))
     for j in np.flatnonzero(instance.workload > 0).tolist():
         there = plans == j
         served = there.any(axis=1)
         unserved += ~served
+        lost += ~served * instance.priority[j]
         time = _finished(instance.workload[j], instance.ability, distance[:, j] / instance.speed, there)
         makespan = np.maximum(makespan, np.where(served, time, 0.0))
     energy = np.where(plans >= 0, energy_of[np.arange(instance.n), plans], 0.0).sum(axis=1)
-    return unserved, makespan, energy
+    return unserved, lost, makespan, energy
 
 
 def _finished(

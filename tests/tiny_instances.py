@@ -37,6 +37,34 @@ def tiny_instance(seed: int) -> Instance:
     )
 
 
+def scarce_instance(seed: int) -> Instance:
+    """Return instance number `seed`: up to 5 agents, and up to 6 tasks of unequal priority, too many to serve."""
+    for attempt in count():
+        instance = _drawn_scarce(np.random.default_rng([2027, seed, attempt]), f"scarce-{seed}")
+        if fewest_unserved(instance) and np.ptp(instance.priority[instance.workload > 0]) > 0:
+            return instance
+    raise AssertionError
+
+
+def _drawn_scarce(rng: np.random.Generator, name: str) -> Instance:
+    n, m = int(rng.integers(1, 6)), int(rng.integers(2, 7))
+    coin = rng.random(6) < (0.5, 0.5, 0.5, 0.3, 0.3, 0.5)
+    lists = [rng.permutation(m)[: rng.integers(1, 4)].tolist() if rng.random() < 0.5 else None for _ in range(n)]
+    return Instance(
+        name=name,
+        ability=rng.choice([0.5, 1, 2, 20], n),
+        workload=rng.choice([0, 1, 3, 30, 200], m, p=[0.1, 0.3, 0.2, 0.2, 0.2]),
+        priority=rng.choice([0, 1, 2, 3, 5], m) if coin[0] else rng.random(m),
+        agent_position=rng.random((n, 2)),
+        task_position=rng.random((m, 2)),
+        communication_range=rng.uniform(0.2, 1.2, n) if coin[1] else None,
+        allowed_tasks=lists if coin[2] else None,
+        battery=rng.uniform(0.2, 2, n) if coin[3] else None,
+        speed=rng.choice([0.3, 2.0, np.inf], n) if coin[4] else None,
+        agent_energy_per_distance=rng.choice([0.5, 1, 2], n) if coin[5] else None,
+    )
+
+
 FIELDS = ("metric", "distances", "rates", "returns", "skills", "speeds", "limits")
 """What `varied_instance` can give an instance beyond abilities, workloads and places."""
 

@@ -47,7 +47,7 @@ class AnswerChecks(Runner):
     @every_case
     @every_objective
     def test_answer_is_sound(self, subject: Allocator, case: str, objective: Objective) -> None:
-        """Scores are those of the allocation, every agent can do its task, and as few tasks as can be are unserved."""
+        """Scores are those of the allocation, agents can do their tasks, and the fewest, least urgent are unserved."""
         instance = CASES[case]
         result = self.answer(subject, case, objective)
         assert result.allocation is not None, "no allocation, though any would do"
@@ -58,6 +58,7 @@ class AnswerChecks(Runner):
         assert result.evaluation.violations == ()
         assert len(again.unserved_tasks) == fewest_unserved(instance)
         best = optimum(case, objective)
+        assert again.unserved_rank == best.unserved_rank, "more urgent tasks could be served"
         assert not again.is_better_than(best, objective), "better than the optimum; the suite or `evaluate` is wrong"
 
     @every_case

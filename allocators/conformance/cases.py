@@ -38,6 +38,14 @@ CASES: dict[str, Instance] = {
         _case("zero workloads", workload=(0, 4, 0)),
         _bare("nothing to do", ability=(2, 1), workload=(0, 0)),
         _bare("fewer agents than tasks", ability=(3, 1), workload=(2, 5, 1, 4)),
+        _bare("priorities", ability=(3, 1), workload=(2, 5, 1, 4), priority=(1, 3, 0, 3)),
+        _bare(
+            "urgent tasks compete",
+            ability=(3, 2, 2),
+            workload=(4, 1, 2, 5),
+            priority=(1, 2, 5, 4),
+            allowed_tasks=([0, 1], [2, 3], [2, 3]),
+        ),
         _case("unreachable task", task_position=((0, 0), (4, 0), (99, 99)), communication_range=(9,) * 5),
         _bare("competing tasks", ability=(3, 2, 2), workload=(4, 1, 2), allowed_tasks=([0, 1], [2], [2])),
         _bare("one way to serve all", ability=(9, 1, 1), workload=(1, 5, 5), allowed_tasks=(None, [0], [0, 2])),
@@ -92,12 +100,12 @@ def _scattered(name: str, n: int, m: int) -> Instance:
 
 @cache
 def every_evaluation(case: str) -> tuple[Evaluation, ...]:
-    """Return the scores of all allocations of a case that leave as few tasks unserved as can be."""
+    """Return the scores of all allocations of a case that leave the fewest and least urgent tasks unserved."""
     instance = CASES[case]
     options = [[IDLE, *np.flatnonzero(row).tolist()] for row in instance.reach.mask[instance.reach.origin]]
     scores = [evaluate(instance, Allocation(choice)) for choice in product(*options)]
-    fewest = min(len(score.unserved_tasks) for score in scores)
-    return tuple(score for score in scores if len(score.unserved_tasks) == fewest)
+    fewest = min(score.unserved_rank for score in scores)
+    return tuple(score for score in scores if score.unserved_rank == fewest)
 
 
 @cache

@@ -57,8 +57,8 @@ class Search:
     best : Improvement or None
         The best submitted so far.
     fastest : Improvement or None
-        The one with the least makespan among those with the fewest unserved tasks; differs from `best` only where
-        energy counts.
+        The one with the least makespan among those that leave the fewest and least urgent tasks unserved; differs from
+        `best` only where energy counts.
     tolerance : MakespanTolerance
         How much slower than the fastest the best may be.
     iteration : int
@@ -178,7 +178,7 @@ class Search:
 
     def _is_better(self, one: Evaluation, other: Evaluation) -> bool:
         """Whether `one` is better, where makespans up to the limit are equal if energy counts."""
-        if self.objective is Objective.MAKESPAN or len(one.unserved_tasks) != len(other.unserved_tasks):
+        if self.objective is Objective.MAKESPAN or one.unserved_rank != other.unserved_rank:
             return one.is_better_than(other, self.objective)
         limit = last_equal(self.makespan_limit)
         in_time = [score.served_makespan <= limit for score in (one, other)]
@@ -228,10 +228,10 @@ class Search:
 def _undominated(found: list[Improvement], limit: float) -> list[Improvement]:
     """Keep those within `limit` hours that have less energy than all faster ones, the fastest first."""
     kept: list[Improvement] = []
-    fewest = min(len(one.evaluation.unserved_tasks) for one in found)
+    fewest = min(one.evaluation.unserved_rank for one in found)
     for one in sorted(found, key=lambda one: (one.evaluation.served_makespan, one.evaluation.cost)):
         score = one.evaluation
         in_time = score.served_makespan <= last_equal(limit)
-        if in_time and len(score.unserved_tasks) == fewest and (not kept or score.cost < kept[-1].evaluation.cost):
+        if in_time and score.unserved_rank == fewest and (not kept or score.cost < kept[-1].evaluation.cost):
             kept.append(one)
     return kept

@@ -36,6 +36,7 @@ SCORES = (
     "battery_remaining_percent",
     "reward",
     "unserved_tasks",
+    "unserved_reasons",
     "violations",
     "assignment",
 )
@@ -71,7 +72,7 @@ def evaluate_command(
     json: options.JsonOption = False,
 ) -> None:
     """Score an allocation, wherever it comes from."""
-    from alloc.allocators.result import scored_result
+    from alloc.allocators.conclusion import scored_result
 
     problem, answer, claims = read_pair(instance, allocation)
     assert answer is not None

@@ -48,7 +48,7 @@ def plot_command(
 def _read(path: str, instance: "Instance") -> "Result":
     """Read a result, or score an allocation."""
     from alloc.allocators import Result
-    from alloc.allocators.result import scored_result
+    from alloc.allocators.conclusion import scored_result
     from alloc.allocators.result_document import read_document
     from alloc.problems import InputError
     from alloc.problems.formats import allocation_from_document

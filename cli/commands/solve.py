@@ -185,5 +185,16 @@ def _tell(result: "Result", *, summary: bool) -> None:
         say(str(result))
     for line in result.notes:
         note(line)
+    _doubt(result)
     if result.evaluation is not None and result.evaluation.reward_saturated:
         note("the reward (3) is too large for a float and stands at its most negative value")
+
+
+def _doubt(result: "Result") -> None:
+    """Tell the first of what may not be meant in the instance."""
+    from alloc.problems.diagnosis.plausibility import findings
+
+    found = findings(result.instance)
+    if found:
+        more = f"; `alloc validate` tells {len(found) - 1} more" if len(found) > 1 else ""
+        note(f"{found[0].field}: {found[0].message}{more}")

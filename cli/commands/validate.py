@@ -6,7 +6,7 @@ import typer
 
 from alloc.cli import options
 from alloc.cli.options import examples
-from alloc.cli.output.console import complain, say, write_json
+from alloc.cli.output.console import complain, note, say, write_json
 from alloc.problems.text import counted, labelled, number, percent
 
 if TYPE_CHECKING:
@@ -33,6 +33,7 @@ class Facts(TypedDict):
     travel_time: bool
     fewest_unserved: int
     lower_bound: float | None
+    findings: list[dict[str, str]]
 
 
 def register(app: typer.Typer) -> None:
@@ -44,7 +45,7 @@ def validate_command(
     instances: options.InstancesArgument,
     json: options.JsonOption = False,
 ) -> None:
-    """Check instances, and print a summary of each."""
+    """Check instances, and print a summary of each, and what may not be meant."""
     from alloc.problems import InputError
     from alloc.problems.formats import read_instance
 
@@ -60,15 +61,22 @@ def validate_command(
             continue
         if not json:
             say(_words(facts[-1], instance.units.time))
+            for finding in facts[-1]["findings"]:
+                note(f"{name}: {finding['field']}: {finding['message']}")
     if json and facts:
         write_json(facts)
     raise typer.Exit(2 if wrong else 0)
 
 
 def _facts(file: str, instance: "Instance") -> Facts:
+    from dataclasses import asdict
+
     from alloc.problems import fewest_unserved, makespan_lower_bound
+    from alloc.problems.diagnosis.plausibility import findings, priority_without_effect
 
     unserved = fewest_unserved(instance)
+    doubts = [*findings(instance)]
+    idle = None if unserved else priority_without_effect(instance)
     return {
         "file": file,
         "name": instance.name,
@@ -80,6 +88,7 @@ def _facts(file: str, instance: "Instance") -> Facts:
         "travel_time": instance.has_travel_time,
         "fewest_unserved": unserved,
         "lower_bound": makespan_lower_bound(instance) if unserved == 0 else None,
+        "findings": [asdict(one) for one in doubts + ([] if idle is None else [idle])],
     }
 
 

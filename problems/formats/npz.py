@@ -1,6 +1,7 @@
 """An instance as a columnar .npz file: one array per field, for up to millions of agents."""
 
 from collections.abc import Mapping, Sequence
+from itertools import accumulate
 
 import numpy as np
 from numpy.typing import NDArray
@@ -214,15 +215,10 @@ def _lists(arrays: Arrays, name: str) -> list[list[str] | None] | None:
         null = "all tasks" if name == "agent_tasks" else "none"
         raise InputError(f"must be at least 0, or -1 for {null}, got {counts[wrong]}", f"{name}_count[{wrong}]")
     names = arrays[name].tolist()
-    total = sum(max(0, count) for count in counts)
-    if total != len(names):
-        raise InputError(f"sums up to {total}, but {name} has {len(names)} entries", f"array {name}_count")
-    lists: list[list[str] | None] = []
-    begin = 0
-    for count in counts:
-        lists.append(None if count < 0 else names[begin : begin + count])
-        begin += max(0, count)
-    return lists
+    ends = list(accumulate((count if count > 0 else 0 for count in counts), initial=0))
+    if ends[-1] != len(names):
+        raise InputError(f"sums up to {ends[-1]}, but {name} has {len(names)} entries", f"array {name}_count")
+    return [None if count < 0 else names[end - count : end] for count, end in zip(counts, ends[1:], strict=True)]
 
 
 def _translated(place: str) -> str:

@@ -22,7 +22,7 @@ SLOWER = (4.0, 16.0, np.inf)
 
 
 class AgentMatching:
-    """A matching of agents with `tasks`, as large as time allows.
+    """A matching of agents with `tasks`, as large as time allows, which serves all that `start` serves.
 
     Attributes
     ----------
@@ -36,14 +36,11 @@ class AgentMatching:
         The tasks within reach of these: every largest matching serves them, by these agents.
     """
 
-    def __init__(self, instance: Instance, tasks: IntArray, time_left: Clock) -> None:
+    def __init__(self, instance: Instance, tasks: IntArray, time_left: Clock, start: IntArray | None = None) -> None:
         self._reach = instance.reach
         self._wanted = np.zeros(instance.m, dtype=np.bool_)
         self._wanted[tasks] = True
-        everyone = np.arange(instance.n)
-        seconds = max(SHORTEST_S, min(LONGEST_S, SAMPLE_SHARE * time_left()))
-        pairs, _ = sampled_pairs(instance, everyone, tasks, None, seconds, unlimited)
-        self.task_of_agent = _fast_matching(pairs, bound_by_size(instance, everyone, tasks), time_left)
+        self.task_of_agent = _of_sample(instance, tasks, time_left) if start is None else start.copy()
         self.replaceable = np.zeros(instance.n, dtype=np.bool_)
         self.their_tasks = np.zeros(instance.m, dtype=np.bool_)
         self._holder = np.full(instance.m, IDLE, dtype=np.intp)
@@ -84,6 +81,14 @@ class AgentMatching:
             if before == IDLE:
                 return
             task, agent = before, wanted_by[before]
+
+
+def _of_sample(instance: Instance, tasks: IntArray, time_left: Clock) -> IntArray:
+    """Return a large matching by a sample of the pairs."""
+    everyone = np.arange(instance.n)
+    seconds = max(SHORTEST_S, min(LONGEST_S, SAMPLE_SHARE * time_left()))
+    pairs, _ = sampled_pairs(instance, everyone, tasks, None, seconds, unlimited)
+    return _fast_matching(pairs, bound_by_size(instance, everyone, tasks), time_left)
 
 
 def _fast_matching(pairs: Pairs, bound: float, time_left: Clock) -> IntArray:

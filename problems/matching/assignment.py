@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from alloc.problems.fields import BoolArray
 from alloc.problems.instance import FloatArray, IntArray
 from alloc.problems.matching.clock import GATHERED_PER_SECOND, MATCHED_PER_SECOND, Clock
 from alloc.problems.matching.hopcroft_karp import largest_matching
@@ -24,13 +25,14 @@ class Pairs:
     task : ndarray of int, shape (p,)
     hours : ndarray, shape (p,)
         When the agent has done the task alone.
-    distance : ndarray, shape (p,)
+    cost : ndarray, shape (p,)
+        Of the flight, see `Reach.costs`.
     """
 
     first: IntArray
     task: IntArray
     hours: FloatArray
-    distance: FloatArray
+    cost: FloatArray
 
     def within(self, hours: float) -> "Pairs":
         """Return the pairs that take at most so many hours."""
@@ -39,7 +41,7 @@ class Pairs:
     def chosen(self, which: NDArray[np.bool_]) -> "Pairs":
         """Return the pairs marked in `which`, shape (p,)."""
         first = np.concatenate([[0], np.cumsum(which)])[self.first]
-        return Pairs(first, self.task[which], self.hours[which], self.distance[which])
+        return Pairs(first, self.task[which], self.hours[which], self.cost[which])
 
     @property
     def row(self) -> IntArray:
@@ -47,23 +49,54 @@ class Pairs:
         return np.repeat(np.arange(len(self.first) - 1), np.diff(self.first))
 
 
-def match_in_time(pairs: Pairs, known: IntArray, time_left: Clock) -> IntArray | None:
+def match_in_time(
+    pairs: Pairs, known: IntArray, time_left: Clock, required: BoolArray | None = None
+) -> IntArray | None:
     """Return a largest matching of agents with tasks, begun with what `pairs` holds of another; None if time runs out.
 
     Parameters
     ----------
     known : ndarray of int, shape (k,)
         The other matching.
+    required : ndarray of bool, shape (m,), optional
+        Tasks that must have an agent; where that cannot be, no agent has a task in the answer.
     """
     row = pairs.row
     kept = pairs.task == known[row]
     start = np.full(len(known), IDLE, dtype=np.intp)
     start[row[kept]] = pairs.task[kept]
+    if required is not None:
+        covering = _covering(pairs, start, required, time_left)
+        if covering is None or (required.any() and (covering == IDLE).all()):
+            return covering
+        start = covering  # paths from further agents leave no task that has one
     found, is_largest = largest_matching(pairs.first, pairs.task, start, time_left)
     return found if is_largest else None
 
 
-def bottleneck(pairs: Pairs, known: IntArray, latest: float, time_left: Clock) -> tuple[IntArray, float]:
+def _covering(pairs: Pairs, start: IntArray, required: BoolArray, time_left: Clock) -> IntArray | None:
+    """Return a matching of the required tasks, with what `start` adds; idle if there is none, None if time runs out."""
+    needed, is_needed = np.flatnonzero(required), required[pairs.task]
+    place, row = np.searchsorted(needed, pairs.task[is_needed]), pairs.row[is_needed]
+    order = np.argsort(place, kind="stable")
+    held = np.full(len(needed), IDLE, dtype=np.intp)
+    working = np.flatnonzero(start != IDLE)
+    working = working[required[start[working]]]
+    held[np.searchsorted(needed, start[working])] = working
+    first = np.searchsorted(place[order], np.arange(len(needed) + 1))
+    agent, is_largest = largest_matching(first, row[order], held, time_left)
+    covering = np.full(len(start), IDLE, dtype=np.intp)
+    if (agent == IDLE).any():
+        return covering if is_largest else None
+    optional = np.flatnonzero((start != IDLE) & ~required[start])
+    covering[optional] = start[optional]
+    covering[agent] = needed
+    return covering
+
+
+def bottleneck(
+    pairs: Pairs, known: IntArray, latest: float, time_left: Clock, required: BoolArray | None = None
+) -> tuple[IntArray, float]:
     """Return a task for each agent so that the last is done as early as can be, and a bound on when that is.
 
     By halving the hours in question, with a matching for each; the bound falls short where time runs out.
@@ -78,6 +111,8 @@ def bottleneck(pairs: Pairs, known: IntArray, latest: float, time_left: Clock) -
         When the last agent is done in it.
     time_left : callable
         Seconds.
+    required : ndarray of bool, shape (m,), optional
+        Tasks that must have an agent, as they have in `known`.
     """
     best, least = known, 0.0
     bound = float(np.minimum.reduceat(pairs.hours, pairs.first[:-1]).max())  # each takes its fastest
@@ -89,7 +124,7 @@ def bottleneck(pairs: Pairs, known: IntArray, latest: float, time_left: Clock) -
         half = (len(in_range) - 1) // 2
         middle = float(np.partition(in_range, half)[half])
         within = pairs.within(middle)
-        found = match_in_time(within, best, time_left)
+        found = match_in_time(within, best, time_left, required)
         if found is None:
             break
         if (found == IDLE).any():
@@ -102,8 +137,12 @@ def bottleneck(pairs: Pairs, known: IntArray, latest: float, time_left: Clock) -
     return best, max(bound, least)
 
 
-def cheapest(pairs: Pairs, known: IntArray, cost: FloatArray, time_left: Clock) -> IntArray:
+def cheapest(
+    pairs: Pairs, known: IntArray, cost: FloatArray, time_left: Clock, required: BoolArray | None = None
+) -> IntArray:
     """Return the assignment with the least sum of `cost`, shape (p,) and >= 0; `known` where time does not allow it.
+
+    All tasks that are `required`, shape (m,), have an agent, as they have in `known`.
 
     By shortest augmenting paths (Jonker and Volgenant 1987, doi:10.1007/BF02278710), among the cheapest pairs of each
     agent where all would take too long.
@@ -127,6 +166,8 @@ def cheapest(pairs: Pairs, known: IntArray, cost: FloatArray, time_left: Clock) 
         pairs, cost = pairs.chosen(few), cost[few]
     scale = float(cost.max())
     weight = 1.0 + (cost / scale if scale > 0 else cost)  # a sparse matrix has no pairs of weight 0
+    if required is not None:
+        weight += np.where(required[pairs.task], 0.0, 2.0 * k)  # as many as can be have an agent, whatever the cost
     tasks, column = np.unique(pairs.task, return_inverse=True)
     graph = csr_matrix((weight, column, pairs.first), shape=(k, len(tasks)))
     chosen: IntArray = tasks[min_weight_full_bipartite_matching(graph)[1]]

@@ -9,6 +9,7 @@ from alloc.problems.evaluation import last_equal
 from alloc.problems.instance import FloatArray, Instance, IntArray
 from alloc.problems.matching.assignment import Pairs
 from alloc.problems.matching.clock import EVALUATED_PER_SECOND, SAMPLED_PER_SECOND, Clock
+from alloc.problems.matching.precedence import Precedence
 
 BLOCK_OF_AGENTS = 64
 """Agents that share a sample of tasks, so that their distances are worked out together."""
@@ -49,12 +50,14 @@ def all_pairs(
     latest: float,
     time_left: Clock,
     *,
-    by_distance: bool = False,
+    by_cost: bool = False,
+    precedence: Precedence | None = None,
 ) -> Pairs | None:
     """Return for each of k agents the k best pairs with `tasks` that it does by `latest`; None if time runs out.
 
-    The best are the fastest, or the nearest. No more are needed: whoever has the choice of k tasks finds one of them
-    free, whatever the other k - 1 agents do.
+    The best are the fastest, or the cheapest. No more are needed: whoever has the choice of k tasks finds one of them
+    free, whatever the other k - 1 agents do. Pairs with tasks that `precedence` requires come in addition, and pairs
+    that it forbids are left out.
     """
     reach, wanted = instance.reach, np.zeros(instance.m, dtype=np.bool_)
     wanted[tasks] = True
@@ -65,13 +68,19 @@ def all_pairs(
             return None
         distance, mask = (table[0] for table in reach.rows(reach.origin[agent : agent + 1]))
         task = np.flatnonzero(mask & wanted)
+        if precedence is not None:
+            task = task[precedence.allows(np.full(len(task), row), task)]
         away = distance[task]
         time = hours_alone(instance, np.full(len(task), agent), task, away)
         keep = np.flatnonzero(time <= last)
-        if len(keep) > k:
-            key = (away if by_distance else time)[keep]
-            keep = np.sort(keep[np.argpartition(key, k - 1)[:k]])
-        parts.append((task[keep], time[keep], away[keep]))
+        cost = reach.costs(np.full(len(task), reach.origin[agent]), task, away)
+        required = 0 if precedence is None else int(precedence.required[task[keep]].sum())
+        if len(keep) > k + required:
+            key = (cost if by_cost else time)[keep]
+            if required and precedence is not None:
+                key[precedence.required[task[keep]]] = -1.0
+            keep = np.sort(keep[np.argpartition(key, k + required - 1)[: k + required]])
+        parts.append((task[keep], time[keep], cost[keep]))
         first[row + 1] = first[row] + len(keep)
     columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
     return Pairs(first, columns[0], columns[1], columns[2])
@@ -86,7 +95,7 @@ def sampled_pairs(
     time_left: Clock,
     *,
     latest: float = np.inf,
-    by_distance: bool = False,
+    by_cost: bool = False,
 ) -> tuple[Pairs, bool]:
     """Return some pairs of `agents` with `tasks`, and whether they are as good as all pairs.
 
@@ -101,16 +110,16 @@ def sampled_pairs(
         How long that may take, and each matching of the pairs, about.
     latest : float
         Hours by which a pair must be done.
-    by_distance : bool
-        Whether the nearest pairs are wanted, not the fastest.
+    by_cost : bool
+        Whether the cheapest pairs are wanted, not the fastest.
     """
-    found = _Found(instance, agents, latest, by_distance=by_distance)
+    found = _Found(instance, agents, latest, by_cost=by_cost)
     list_of = instance.reach.list_of[instance.reach.origin[agents]]
     _add_listed(found, list_of, tasks)
     free = np.flatnonzero(list_of < 0)
     free = free[np.argsort(instance.ability[agents[free]], kind="stable")]
     complete = _add_sampled(found, free, tasks, seconds, time_left)
-    if by_distance and not complete and len(free):
+    if by_cost and not complete and len(free):
         _add_nearest(found, free, tasks)
     if known is not None:
         found.add_pairs(np.arange(len(agents)), known)
@@ -164,9 +173,9 @@ def _share_within_reach(found: "_Found", rows: IntArray, tasks: IntArray, rng: n
 class _Found:
     """Pairs found so far, block by block."""
 
-    def __init__(self, instance: Instance, agents: IntArray, latest: float, *, by_distance: bool) -> None:
+    def __init__(self, instance: Instance, agents: IntArray, latest: float, *, by_cost: bool) -> None:
         self.instance, self.agents = instance, agents
-        self.last, self.by_distance = last_equal(latest), by_distance
+        self.last, self.by_cost = last_equal(latest), by_cost
         self.most = min(len(agents), max(NEAREST, MOST_PAIRS // len(agents)))
         self.is_cut = False
         none, nothing = np.zeros(0, dtype=np.intp), np.zeros(0)
@@ -189,18 +198,19 @@ class _Found:
 
     def _keep(self, row: IntArray, task: IntArray, distance: FloatArray) -> None:
         hours = hours_alone(self.instance, self.agents[row], task, distance)
+        cost = self.instance.reach.costs(self.instance.reach.origin[self.agents[row]], task, distance)
         keep = np.flatnonzero(hours <= self.last)
         if np.bincount(row[keep]).max(initial=0) > self.most:
-            best = _first_of_each(row[keep], (distance if self.by_distance else hours)[keep], self.most)
+            best = _first_of_each(row[keep], (cost if self.by_cost else hours)[keep], self.most)
             keep, self.is_cut = keep[best], self.is_cut or self.most < len(self.agents)
-        self.parts.append((row[keep], task[keep], hours[keep], distance[keep]))
+        self.parts.append((row[keep], task[keep], hours[keep], cost[keep]))
 
     def pairs(self) -> Pairs:
         """Return the pairs, each once, agent by agent."""
-        row, task, hours, distance = (np.concatenate(column) for column in zip(*self.parts, strict=True))
+        row, task, hours, cost = (np.concatenate(column) for column in zip(*self.parts, strict=True))
         _, once = np.unique(row * self.instance.m + task, return_index=True)
         first = np.searchsorted(row[once], np.arange(len(self.agents) + 1))
-        return Pairs(first, task[once], hours[once], distance[once])
+        return Pairs(first, task[once], hours[once], cost[once])
 
 
 def _first_of_each(row: IntArray, key: FloatArray, most: int) -> IntArray:

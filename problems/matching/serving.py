@@ -111,6 +111,12 @@ def needs_agent(instance: Instance) -> IntArray:
     return np.flatnonzero(of_type(instance, Instance, "instance").workload > 0)
 
 
+def _most_urgent_first(instance: Instance) -> IntArray:
+    """Return the tasks with workload in the order of descending priority."""
+    tasks = needs_agent(instance)
+    return tasks[np.argsort(-instance.priority[tasks], kind="stable")]
+
+
 def only_allowed(instance: Instance, allocation: Allocation) -> Allocation:
     """Return `allocation` with the agents idle that are sent where they cannot go.
 
@@ -135,7 +141,7 @@ def _allowed(instance: Instance, allocation: Allocation) -> IntArray:
 
 
 def serve_all(instance: Instance, allocation: Allocation, time_left: Clock = unlimited) -> Allocation:
-    """Change `allocation` so that as few tasks as possible are unserved.
+    """Change `allocation` so that as few tasks as possible are unserved, the most urgent first.
 
     Agents sent where they cannot go are idle in the answer. A task that is served stays served. Agents change places
     along augmenting paths alone, each with the fewest moves, at whose end an idle agent is preferred, then the nearest.
@@ -155,7 +161,7 @@ def serve_all(instance: Instance, allocation: Allocation, time_left: Clock = unl
     task = _allowed(instance, allocation)
     served = np.zeros(instance.m, dtype=bool)
     served[task[task != IDLE]] = True
-    unserved = [j for j in needs_agent(instance).tolist() if not served[j]]
+    unserved = [j for j in _most_urgent_first(instance).tolist() if not served[j]]
     if not unserved:
         return Allocation(task)
     if instance.reach.is_complete and instance.n * len(unserved) > MANY:

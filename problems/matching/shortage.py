@@ -16,7 +16,8 @@ from alloc.problems.instance import FloatArray, Instance, IntArray
 from alloc.problems.matching.assignment import Pairs, bottleneck, cheapest
 from alloc.problems.matching.clock import Clock, unlimited
 from alloc.problems.matching.pairs import all_pairs, bound_by_size, hours_alone, sampled_pairs
-from alloc.problems.matching.unservable import competing_part
+from alloc.problems.matching.precedence import Precedence
+from alloc.problems.matching.unservable import CompetingPart, competing_part
 from alloc.problems.vocabulary import IDLE
 
 SAMPLE_SHARE = 0.3
@@ -45,7 +46,9 @@ class Shortage:
     unservable : ndarray of int
         Competing tasks that fewer agents can reach: a set as small as is at hand.
     is_proven : bool
-        Whether no allocation serves more tasks; False where time ran out.
+        Whether no allocation serves more tasks, or as many with more priority; False where time ran out.
+    precedence : Precedence or None
+        Which matchings of `agents` with `tasks` serve the most priority; None where all serve the same.
     """
 
     instance: Instance
@@ -58,6 +61,7 @@ class Shortage:
     rest_tasks: IntArray
     unservable: IntArray
     is_proven: bool = True
+    precedence: Precedence | None = None
 
     @property
     def rest(self) -> Instance | None:
@@ -83,19 +87,21 @@ class Shortage:
         """Return the same with the least energy within `hours`, as far as time allows."""
         if not len(self.agents):
             return self
-        args = (self.instance, self.agents, self.tasks)
-        pairs, _ = _pairs(*args, self.task_of_agent, hours, time_left, by_distance=True)
+        order = self.precedence
+        args = (self.instance, self.agents, self.tasks if order is None else order.tasks, order)
+        pairs, _ = _pairs(*args, self.task_of_agent, hours, time_left, by_cost=True)
         if pairs is None:
             return self
-        chosen = cheapest(pairs, self.task_of_agent, pairs.distance, time_left)
+        chosen = cheapest(pairs, self.task_of_agent, pairs.cost, time_left, None if order is None else order.required)
         return replace(self, task_of_agent=chosen, hours=float(_hours(self.instance, self.agents, chosen).max()))
 
 
 def find_shortage(instance: Instance, time_left: Clock = unlimited) -> Shortage | None:
-    """Return who serves which of the competing tasks at the least makespan, or None if all tasks can be served.
+    """Return who serves which of the competing tasks, or None if all tasks can be served.
 
-    Of the allocations with that makespan, one with little work is taken. Where `time_left` runs out, the makespan may
-    be more, some task may be unserved that could be served, and None may be returned although some task cannot.
+    The most priority is served, at the least makespan that this takes, and, of the allocations with that makespan, one
+    with little work is taken. Where `time_left` runs out, the makespan may be more, the priority less, some task may be
+    unserved that could be served, and None may be returned although some task cannot.
 
     Parameters
     ----------
@@ -114,7 +120,7 @@ def find_shortage(instance: Instance, time_left: Clock = unlimited) -> Shortage 
     if len(agents) and instance.reach.is_complete and not instance.has_travel_time:
         bound = float(_hours(instance, agents, chosen).max())  # the least work by the least able: none is faster
     elif len(agents):
-        chosen, bound = _fastest(instance, agents, tasks, chosen, time_left)
+        chosen, bound = _fastest(part, instance, time_left)
     needed = instance.workload > 0
     needed[tasks] = False
     others = np.ones(instance.n, dtype=np.bool_)
@@ -130,26 +136,27 @@ def find_shortage(instance: Instance, time_left: Clock = unlimited) -> Shortage 
         np.flatnonzero(needed),
         part.unservable,
         part.is_proven,
+        part.precedence,
     )
 
 
-def _fastest(
-    instance: Instance, agents: IntArray, tasks: IntArray, chosen: IntArray, time_left: Clock
-) -> tuple[IntArray, float]:
+def _fastest(part: CompetingPart, instance: Instance, time_left: Clock) -> tuple[IntArray, float]:
     """Return a matching with the least makespan and, of these, one with little work; and a bound on that makespan."""
+    agents, chosen, order = part.agents, part.task_of_agent, part.precedence
+    tasks, required = (part.tasks, None) if order is None else (order.tasks, order.required)
     latest, bound = float(_hours(instance, agents, chosen).max()), 0.0
-    pairs, complete = _pairs(instance, agents, tasks, chosen, latest, time_left)
+    pairs, complete = _pairs(instance, agents, tasks, order, chosen, latest, time_left)
     while pairs is not None:
-        chosen, least = bottleneck(pairs, chosen, latest, time_left)
+        chosen, least = bottleneck(pairs, chosen, latest, time_left, required)
         before, latest = latest, float(_hours(instance, agents, chosen).max())
         bound = least if complete else bound_by_size(instance, agents, tasks)
         if complete or latest >= before:
             break
-        pairs, complete = _pairs(instance, agents, tasks, chosen, latest, time_left)
+        pairs, complete = _pairs(instance, agents, tasks, order, chosen, latest, time_left)
     if pairs is not None and complete:
         within = pairs.within(last_equal(latest))
         _, rank = np.unique(instance.workload[within.task], return_inverse=True)
-        chosen = cheapest(within, chosen, rank.astype(np.float64), time_left)
+        chosen = cheapest(within, chosen, rank.astype(np.float64), time_left, required)
     return chosen, bound
 
 
@@ -157,20 +164,22 @@ def _pairs(
     instance: Instance,
     agents: IntArray,
     tasks: IntArray,
+    order: Precedence | None,
     known: IntArray,
     latest: float,
     time_left: Clock,
     *,
-    by_distance: bool = False,
+    by_cost: bool = False,
 ) -> tuple[Pairs | None, bool]:
     """Return pairs that are done by `latest`, None if time runs out, and whether they are as good as all pairs."""
     if instance.reach.has_table:
-        return all_pairs(instance, agents, tasks, latest, time_left, by_distance=by_distance), True
+        return all_pairs(instance, agents, tasks, latest, time_left, by_cost=by_cost, precedence=order), True
     seconds = time_left()
     if seconds <= 0:
         return None, False
     seconds *= SAMPLE_SHARE
-    return sampled_pairs(instance, agents, tasks, known, seconds, time_left, latest=latest, by_distance=by_distance)
+    pairs, complete = sampled_pairs(instance, agents, tasks, known, seconds, time_left, latest=latest, by_cost=by_cost)
+    return (pairs, complete) if order is None else (pairs.chosen(order.allows(pairs.row, pairs.task)), False)
 
 
 def _hours(instance: Instance, agents: IntArray, tasks: IntArray) -> FloatArray:

@@ -1,6 +1,6 @@
 """The fewest unserved tasks, and which tasks compete for too few agents."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -9,6 +9,8 @@ from alloc.problems.instance import Instance, IntArray
 from alloc.problems.matching.agent_matching import AgentMatching
 from alloc.problems.matching.clock import GATHERED_PER_SECOND, Clock, at_least, share_of, unlimited
 from alloc.problems.matching.hopcroft_karp import match
+from alloc.problems.matching.precedence import Precedence, differs, of_first, urgent_first
+from alloc.problems.matching.priority import entries, most_priority, sampled_matching
 from alloc.problems.matching.serving import needs_agent, serve_in_turn
 from alloc.problems.vocabulary import IDLE
 
@@ -37,7 +39,9 @@ class CompetingPart:
     unservable : ndarray of int
         Tasks, among `tasks`, that fewer agents can reach.
     is_proven : bool
-        Whether no allocation serves more tasks; False where time ran out.
+        Whether no allocation serves more tasks, or as many with more priority; False where time ran out.
+    precedence : Precedence or None
+        Which matchings serve the most priority; None where all serve the same.
     """
 
     agents: IntArray
@@ -45,6 +49,7 @@ class CompetingPart:
     task_of_agent: IntArray
     unservable: IntArray
     is_proven: bool = True
+    precedence: Precedence | None = None
 
 
 def fewest_unserved(instance: Instance) -> int:
@@ -110,11 +115,50 @@ def competing_part(instance: Instance, time_left: Clock = unlimited) -> Competin
     if reach.is_complete:
         if instance.n >= len(tasks):
             return None
-        everyone, least = np.arange(instance.n), tasks[np.argsort(instance.workload[tasks], kind="stable")]
-        chosen = _by_size(instance, everyone, least[: instance.n])
-        return CompetingPart(everyone, tasks, chosen, tasks[: instance.n + 1])
+        everyone = np.arange(instance.n)
+        chosen = _by_size(instance, everyone, urgent_first(instance, tasks)[: instance.n])
+        order = of_first(instance, tasks, instance.n) if differs(instance, tasks) else None
+        return CompetingPart(everyone, tasks, chosen, tasks[: instance.n + 1], precedence=order)
     if len(tasks) > instance.n and not reach.has_table:
+        return _of_urgent_tasks(instance, tasks, time_left)
+    part = _of_table_or_neighbours(instance, tasks, time_left)
+    return None if part is None else _by_priority(instance, part, time_left)
+
+
+def _of_urgent_tasks(instance: Instance, tasks: IntArray, time_left: Clock) -> CompetingPart:
+    """The same for more tasks than agents: if all agents can serve the most urgent tasks, by a sample of the pairs."""
+    if not differs(instance, tasks):
         return _of_scarce_agents(instance, tasks, time_left)
+    everyone = np.arange(instance.n)
+    chosen = sampled_matching(instance, everyone, tasks, time_left)
+    if (chosen != IDLE).all():
+        order = of_first(instance, tasks, instance.n)
+        return CompetingPart(everyone, tasks, chosen, tasks[: instance.n + 1], precedence=order)
+    in_time, part, reach = share_of(PROOF_SHARE, time_left), None, instance.reach
+    if estimated_pairs(reach) <= GATHERED_PER_SECOND * in_time() and reach.neighbours is not None:
+        part = _of_neighbours(instance, tasks, reach.neighbours, in_time)
+    part = part or _of_scarce_agents(instance, tasks, in_time, chosen)
+    return _by_priority(instance, part, time_left, chosen)
+
+
+def _by_priority(
+    instance: Instance, part: CompetingPart, time_left: Clock, sampled: IntArray | None = None
+) -> CompetingPart:
+    """Return the same with a matching that serves the most priority."""
+    if not len(part.agents) or not differs(instance, part.tasks):
+        return part
+    if instance.reach.has_table:
+        time_left = at_least(SHORTEST_S, time_left)
+    if sampled is not None:
+        sampled = np.where(np.isin(sampled[part.agents], part.tasks), sampled[part.agents], IDLE)
+    args = (instance, part.agents, part.tasks, part.task_of_agent, time_left)
+    found, chosen, is_proven = most_priority(*args, sampled)
+    return replace(part, task_of_agent=chosen, precedence=found, is_proven=part.is_proven and is_proven)
+
+
+def _of_table_or_neighbours(instance: Instance, tasks: IntArray, time_left: Clock) -> CompetingPart | None:
+    """The same where agents may be enough, or all pairs fit a table."""
+    reach = instance.reach
     time_left = share_of(PROOF_SHARE, time_left)
     if reach.has_table:
         time_left = at_least(SHORTEST_S, time_left)
@@ -125,9 +169,11 @@ def competing_part(instance: Instance, time_left: Clock = unlimited) -> Competin
     return None if reach.neighbours is None else _of_neighbours(instance, tasks, reach.neighbours, time_left)
 
 
-def _of_scarce_agents(instance: Instance, tasks: IntArray, time_left: Clock) -> CompetingPart:
+def _of_scarce_agents(
+    instance: Instance, tasks: IntArray, time_left: Clock, start: IntArray | None = None
+) -> CompetingPart:
     """The same for more tasks than agents, without looking at all pairs, as a rule."""
-    matching = AgentMatching(instance, tasks, time_left)
+    matching = AgentMatching(instance, tasks, time_left, start)
     if matching.is_largest:
         agents, left = np.flatnonzero(~matching.replaceable), tasks[~matching.their_tasks[tasks]]
     else:
@@ -179,20 +225,12 @@ def _rivals(near: Neighbours, origin: IntArray, tasks: IntArray, m: int) -> tupl
     is_rival, met = np.zeros(m, dtype=np.bool_), np.zeros(len(near.first) - 1, dtype=np.bool_)
     while len(tasks):
         is_rival[tasks] = True
-        able = np.unique(_entries(first, by_task, tasks))
+        able = np.unique(entries(first, by_task, tasks))
         able = able[~met[able]]
         met[able] = True
-        tasks = _entries(bounds, held, able)
+        tasks = entries(bounds, held, able)
         tasks = tasks[~is_rival[tasks]]
     return np.flatnonzero(is_rival), np.flatnonzero(met)
-
-
-def _entries(first: IntArray, values: IntArray, rows: IntArray) -> IntArray:
-    """Return the values of these rows of compressed rows, one row after the other."""
-    length = first[rows + 1] - first[rows]
-    offset = np.arange(length.sum()) - np.repeat(np.cumsum(length) - length, length)
-    found: IntArray = values[np.repeat(first[rows], length) + offset]
-    return found
 
 
 def _are_served_simply(instance: Instance, tasks: IntArray, time_left: Clock) -> bool:

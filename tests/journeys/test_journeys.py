@@ -1,4 +1,4 @@
-"""What people come for, by following the documents alone: each journey is a folder with a script and what must come out."""
+"""What people come for, by the documents alone: a folder for each, with a script and what must come out."""
 
 import os
 import shlex

@@ -8,9 +8,9 @@ import pytest
 from openpyxl import load_workbook
 from schema_checks import faults
 
-from alloc.allocators import read_result, write_result
+from alloc.allocators import Result, read_result, write_result
+from alloc.allocators.conclusion import scored_result
 from alloc.allocators.plan.table import agent_rows
-from alloc.allocators.result import Result, scored_result
 from alloc.problems import Allocation, InputError, Instance, MissingPackageError, Units
 
 

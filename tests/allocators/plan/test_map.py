@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from alloc.allocators import write_result
+from alloc.allocators import Result, write_result
+from alloc.allocators.conclusion import scored_result
 from alloc.allocators.plan.map import document
-from alloc.allocators.result import Result, scored_result
 from alloc.problems import Allocation, Instance
 
 BROWSER = shutil.which("chromium") or shutil.which("google-chrome")

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from tiny_instances import varied_instance
 
+from alloc.allocators import Result
+from alloc.allocators.conclusion import scored_result
 from alloc.allocators.plan.table import agent_columns, agent_rows, task_columns, task_rows
-from alloc.allocators.result import Result, scored_result
 from alloc.problems import Allocation, Instance, Units
 
 

@@ -2,13 +2,13 @@ import numpy as np
 import pytest
 
 from alloc.allocators import Result, solve
+from alloc.allocators.conclusion import scored_result
 from alloc.allocators.pareto import pareto
 from alloc.allocators.plan.places import places, two_axes
 from alloc.allocators.plotting import plot, plot_convergence, plot_front
 from alloc.allocators.plotting.labels import place_labels, visible
 from alloc.allocators.plotting.moves import flows, wedges
 from alloc.allocators.plotting.times import listed
-from alloc.allocators.result import scored_result
 from alloc.problems import Allocation, Family, InputError, Instance, Units, random_instance
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from alloc.allocators.result import scored_result
+from alloc.allocators.conclusion import scored_result
 from alloc.cli.output.plan import plan_tables
 from alloc.problems import Allocation, Instance, Units
 

@@ -1,0 +1,94 @@
+"""What may not be meant in an instance: each finding where it belongs, and none where all is well."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from alloc.problems import DistanceTable, Family, Instance, paper, random_instance, read_instance
+from alloc.problems.diagnosis.plausibility import findings, priority_without_effect
+
+EARTHQUAKES = Path(__file__).parents[3] / "examples" / "earthquakes"
+
+
+def fleet(**changes: Any) -> Instance:
+    """Return three agents and two tasks about which there is nothing to say, but for `changes`."""
+    fields: dict[str, Any] = {
+        "ability": (2, 3, 4),
+        "workload": (6, 7),
+        "agent_position": ((0, 0), (1, 2), (3, 1)),
+        "task_position": ((1.5, 1), (0, 2)),
+    }
+    return Instance(**fields | changes)
+
+
+BERLIN = {
+    "agent_position": ((13.4, 52.5), (13.41, 52.52), (13.3, 52.4)),
+    "task_position": ((13.5, 52.51), (13.2, 52.6)),
+}
+NOWHERE = {"agent_position": None, "task_position": None}
+
+DOUBTFUL = [
+    (BERLIN, "position", "looks like degrees"),
+    ({key: np.flip(places, 1) for key, places in BERLIN.items()}, "position", "looks like degrees"),
+    (
+        {"agent_position": ((0, 0), (np.nan, np.nan), (3, 1))},
+        "position",
+        "agent a2 has no place: the way there counts as 0",
+    ),
+    ({"task_position": ((0, 0), (np.nan, np.nan))}, "position", "task t2 has no place"),
+    ({"battery": (9, 9, 0.5)}, "battery", "a3 reaches no task; to t1, its nearest, energy 1.5 exceeds the battery 0.5"),
+    ({"communication_range": (0.1, 0.1, 9)}, "range", "a1 and 1 other reach no task; to t1"),
+    ({"speed": 3 * [5], **NOWHERE}, "speed", "has no effect"),
+    ({"battery": 3 * [5], **NOWHERE}, "battery", "has no effect"),
+    ({"ability": (2, 3, 5000)}, "ability", "that of a3 is 2e+03 times the median of the others, 2.5"),
+    ({"ability": (2, 2, 2), "workload": (5, 5), **NOWHERE}, "agents", "all are alike"),
+    ({"workload": (1, 2, 3, 4), "task_position": None}, "agents", "3 agents for 4 tasks, and each agent does one task"),
+]
+
+
+@pytest.mark.parametrize(("changes", "field", "words"), DOUBTFUL)
+def test_what_may_not_be_meant_is_found(changes: dict[str, Any], field: str, words: str) -> None:
+    """One finding, with the field as files call it, and what is the matter."""
+    found = findings(fleet(**changes))
+    assert [one.field for one in found] == [field]
+    assert words in found[0].message
+    assert "\n" not in found[0].message
+
+
+def test_distances_of_ones_own_need_no_places() -> None:
+    """An agent without a place is no finding where a table says how far it has to go."""
+    table = DistanceTable.of([("a2", "t1", 3.0), ("a2", "t2", 4.0)], ("a1", "a2", "a3"), ("t1", "t2"))
+    assert findings(fleet(agent_position=((0, 0), (np.nan, np.nan), (3, 1)), distances=table)) == ()
+
+
+def test_degrees_that_are_meant_are_no_finding() -> None:
+    """With the geographic metric degrees are right."""
+    assert findings(fleet(**BERLIN, metric="geographic")) == ()
+
+
+def test_priority_without_effect() -> None:
+    """Priorities that differ change nothing where all is served; equal ones are not worth a word."""
+    assert priority_without_effect(fleet()) is None
+    found = priority_without_effect(fleet(priority=(1, 2)))
+    assert found is not None
+    assert "changes no plan" in found.message
+
+
+@pytest.mark.parametrize("scenario", [1, 2, 3, 4])
+def test_no_false_alarm_on_the_scenarios_of_the_paper(scenario: int) -> None:
+    """There is nothing to say about them."""
+    for seed in range(3):
+        assert findings(paper(scenario, seed)) == ()
+
+
+def test_no_false_alarm_on_random_instances() -> None:
+    """Nor about what `alloc generate random` draws where agents are enough and reach something."""
+    for seed in range(20):
+        assert findings(random_instance(Family(agents=40, tasks=8, speed=(0.5, 2.0)), seed)) == ()
+
+
+def test_no_false_alarm_on_the_example() -> None:
+    """Nor about the drones and earthquakes of Alaska, whose kilometres are no degrees."""
+    assert findings(read_instance(EARTHQUAKES / "alaska.json")) == ()
