@@ -1,6 +1,6 @@
 """Methods that allocate, behind one contract; `solve` runs and scores any of them.
 
-The classes of the methods, `plot` and `train` are imported on first use, as they take large libraries.
+The classes of the methods, `plot`, `train` and the like are imported on first use, as they take large libraries.
 """
 
 import importlib
@@ -35,7 +35,8 @@ if TYPE_CHECKING:
     from alloc.allocators.heuristic.lp_rounding.allocator import LpRound
     from alloc.allocators.learned.policy import A2c, Ddpg, Dqn, Gappo, GappoLs, Ppo
     from alloc.allocators.learned.training import train
-    from alloc.allocators.plotting import plot
+    from alloc.allocators.plan.files import write_result
+    from alloc.allocators.plotting import plot, plot_convergence
 
 __all__ = [
     "A2c",
@@ -83,17 +84,21 @@ __all__ = [
     "names",
     "pareto",
     "plot",
+    "plot_convergence",
     "read_result",
     "reasons_of_moves",
     "solve",
     "train",
     "whatif",
+    "write_result",
 ]
 
 _LAZY = {
     **{target.partition(":")[2]: target.partition(":")[0] for target in TARGETS.values()},
     "plot": "alloc.allocators.plotting",
+    "plot_convergence": "alloc.allocators.plotting",
     "train": "alloc.allocators.learned.training",
+    "write_result": "alloc.allocators.plan.files",
 }
 """Module of each public name that is imported on first use."""
 

@@ -9,7 +9,14 @@ from alloc.allocators.contract.search import Search
 from alloc.allocators.contract.tolerance import EXACT, PROVEN, relative_gap
 from alloc.allocators.decomposition import Decomposition
 from alloc.allocators.result import Result
-from alloc.problems import Objective, minimal_unservable_set
+from alloc.problems import (
+    Allocation,
+    Instance,
+    Objective,
+    evaluate,
+    makespan_lower_bound,
+    minimal_unservable_set,
+)
 from alloc.problems.instance import IntArray
 
 MOST_NAMES = 10
@@ -111,3 +118,34 @@ def _contention(search: Search, decomposition: Decomposition | None) -> str:
         return f"no agent can take task {ids[0]}"
     agents = "only 1 agent" if able == 1 else f"only {able} agents"
     return f"{agents} can take any of the {len(tasks)} tasks {', '.join(ids)}{more}"
+
+
+def scored_result(instance: Instance, allocation: Allocation, method: str = "given") -> Result:
+    """Return the scores of an allocation, wherever it comes from, as a result, with a bound that is cheap to compute.
+
+    Parameters
+    ----------
+    instance : Instance
+    allocation : Allocation
+    method : str
+        What the result calls the method.
+
+    Raises
+    ------
+    InputError
+        If the allocation does not belong to the instance.
+    """
+    score = evaluate(instance, allocation)
+    return Result(
+        instance=instance,
+        method=method,
+        objective=Objective.MAKESPAN,
+        seed=0,
+        allocation=allocation,
+        evaluation=score,
+        lower_bound=None if score.unserved_tasks else makespan_lower_bound(instance),
+        energy_lower_bound=None,
+        stop_reason=StopReason.FINISHED,
+        runtime_s=0.0,
+        trace=(),
+    )

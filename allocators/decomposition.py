@@ -6,6 +6,7 @@ from alloc.allocators.contract.search import Search
 from alloc.allocators.contract.tolerance import PROVEN, MakespanTolerance, relative_gap
 from alloc.allocators.request import Request
 from alloc.problems import Allocation, Objective, Shortage, only_allowed
+from alloc.problems.text import labelled
 
 
 class Decomposition:
@@ -77,8 +78,9 @@ class Decomposition:
             bound, notes = max(bound, self.rest.lower_bound), self.rest.notes
         if best is None or bound <= 0:
             return notes
-        hours = best.evaluation.served_makespan
+        hours, unit = best.evaluation.served_makespan, self._whole.instance.units.time
+        taken, least = labelled(f"{hours:.6g}", unit), labelled(f"{bound:.6g}", unit)
         as_much = "as many tasks" if self.shortage.precedence is None else "as many and as urgent tasks"
         if relative_gap(hours, bound) <= PROVEN:
-            return [*notes, f"no plan that serves {as_much} is done sooner than in these {hours:.6g} h"]
-        return [*notes, f"every plan that serves {as_much} takes {bound:.6g} h or more, this one {hours:.6g} h"]
+            return [*notes, f"no plan that serves {as_much} is done sooner than this one, in {taken}"]
+        return [*notes, f"every plan that serves {as_much} takes {least} or more, this one {taken}"]

@@ -1,4 +1,4 @@
-"""The Pareto front of makespan and energy: how much energy each hour saved costs."""
+"""The Pareto front of makespan and energy: how much energy saving time costs."""
 
 import math
 import sys

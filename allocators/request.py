@@ -65,7 +65,7 @@ def checked_tolerance(slack: float, limit: float | None, objective: Objective) -
     """
     tolerance = MakespanTolerance(
         real(slack, "makespan_slack"),
-        None if limit is None else real(limit, "makespan_limit", above=True, unit="of hours "),
+        None if limit is None else real(limit, "makespan_limit", above=True),
     )
     if objective is Objective.MAKESPAN and tolerance != EXACT:
         name = "makespan_slack" if slack else "makespan_limit"

@@ -1,19 +1,18 @@
 """The answer of `solve`: an allocation with its scores, how good it is proven to be, and why the run stopped."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, fields
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from alloc.allocators.contract.budget import StopReason
 from alloc.allocators.contract.improvement import TracePoint
 from alloc.allocators.contract.status import Status
 from alloc.allocators.contract.tolerance import EXACT, PROVEN, MakespanTolerance, relative_gap
+from alloc.allocators.plan.table import AgentRow, agent_rows
 from alloc.allocators.replanning.moves import Moves
 from alloc.allocators.result_document import moves_document, read_document, result_fields
 from alloc.allocators.summary import summary
-from alloc.problems import IDLE, Allocation, Evaluation, InputError, Instance, MissingPackageError, Objective
+from alloc.problems import Allocation, Evaluation, InputError, Instance, MissingPackageError, Objective
 from alloc.problems.diagnosis.unserved import Unserved, why_unserved
 from alloc.problems.evaluation import RELATIVE_TOLERANCE
 from alloc.problems.formats.allocation_file import RESULT_FORMAT
@@ -140,6 +139,7 @@ class Result:
         """
         ids, score = self.instance, self.evaluation
         limit = {} if self.makespan_limit is None else {"makespan_limit": self.makespan_limit}
+        units = {name: label for name, label in asdict(ids.units).items() if label}
         return {
             "format": RESULT_FORMAT,
             "method": self.method,
@@ -169,6 +169,7 @@ class Result:
             ],
             **({} if self.moves is None else {"moves": moves_document(self.moves, ids)}),
             "runtime_s": self.runtime_s,
+            **({"units": units} if units else {}),
             "assignment": {} if self.allocation is None else self.allocation.to_ids(ids),
             "trace": [
                 {"time_s": point.time_s, "makespan": point.makespan, "energy": point.energy} for point in self.trace
@@ -225,8 +226,10 @@ class Result:
         Returns
         -------
         pandas.DataFrame
-            Columns `agent`, `task` (None for idle agents), `ability`, `distance` (to the task), `completion_time` (of
-            the task, in hours; NaN for idle agents). Empty if there is no allocation.
+            Its columns are `agent`, `task` (None for idle agents), `ability`, `arrival` (at the task),
+            `completion_time` (of the task), `distance` (back again where the agent returns), `energy`, `battery`,
+            `battery_left` and `violation` (why the agent cannot take its task); NaN where a figure is not known. Empty
+            if there is no allocation.
 
         Raises
         ------
@@ -237,16 +240,8 @@ class Result:
             import pandas
         except ImportError as error:
             raise MissingPackageError("to_frame needs pandas; install with: pip install pandas") from error
-        if self.allocation is None or self.evaluation is None:
-            return pandas.DataFrame(columns=["agent", "task", "ability", "distance", "completion_time"])
-        instance, task = self.instance, self.allocation.task_of_agent
-        assigned = np.flatnonzero(task != IDLE)
-        distance, time = np.zeros(instance.n), np.full(instance.n, np.nan)
-        distance[assigned] = instance.reach.distance_of(assigned, task[assigned])
-        time[assigned] = self.evaluation.completion_time[task[assigned]]
-        assignment = self.allocation.to_ids(instance)
-        columns = {"agent": list(assignment), "task": list(assignment.values()), "ability": instance.ability}
-        return pandas.DataFrame({**columns, "distance": distance, "completion_time": time})
+        columns = [field.name for field in fields(AgentRow)]
+        return pandas.DataFrame(map(vars, agent_rows(self)), columns=columns)
 
 
 def read_result(path: PathLike, instance: Instance) -> Result:

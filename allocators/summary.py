@@ -9,7 +9,8 @@ from alloc.allocators.contract.tolerance import PROVEN
 from alloc.allocators.explain import Bottleneck, explain
 from alloc.problems import Instance, Objective
 from alloc.problems.evaluation import RELATIVE_TOLERANCE
-from alloc.problems.text import counted, number, percent
+from alloc.problems.text import counted, labelled, number, percent
+from alloc.problems.units import labels
 
 if TYPE_CHECKING:
     from alloc.allocators.replanning.moves import Moves
@@ -66,7 +67,7 @@ def _status(result: "Result") -> str:
     if result.status is Status.OPTIMAL:
         less = LESS[result.objective]
         if result.makespan_limit is not None:
-            return f"optimal, no allocation within {number(result.makespan_limit)} h has {less}"
+            return f"optimal, no allocation within {_time(result.instance, result.makespan_limit)} has {less}"
         better = "is sooner" if result.objective is Objective.MAKESPAN else f"is sooner, or as soon with {less}"
         return f"optimal, no allocation {better}"
     if result.status is Status.FEASIBLE:
@@ -92,16 +93,18 @@ def figures(result: "Result") -> list[str]:
         return []
     lines = []
     if result.makespan is None:
-        lines.append(f"  makespan  {number(score.served_makespan)} h over the served tasks")
+        lines.append(f"  makespan  {_time(result.instance, score.served_makespan)} over the served tasks")
     else:
-        bound = f"at least {number(result.lower_bound)} h, gap {percent(result.gap)}"
-        lines.append(f"  makespan  {number(result.makespan)} h ({bound})")
-    energy = f"  energy    {number(score.energy)}"
+        bound = f"at least {_time(result.instance, result.lower_bound)}, gap {percent(result.gap)}"
+        lines.append(f"  makespan  {_time(result.instance, result.makespan)} ({bound})")
+    units = labels(result.instance)
+    energy = f"  energy    {labelled(number(score.energy), units.energy)}"
     if result.energy_lower_bound is not None:
         limit = result.makespan_limit
-        when = "at this makespan" if limit is None else f"within {number(limit)} h"
-        energy += f" (at least {number(result.energy_lower_bound)} {when}, gap {percent(result.energy_gap)})"
-    lines.append(f"{energy}, distance {number(score.distance)}")
+        when = "at this makespan" if limit is None else f"within {_time(result.instance, limit)}"
+        least = labelled(number(result.energy_lower_bound), units.energy)
+        energy += f" (at least {least} {when}, gap {percent(result.energy_gap)})"
+    lines.append(f"{energy}, distance {labelled(number(score.distance), units.distance)}")
     if result.moves is not None:
         lines.append(f"  moves     {moves_line(result.moves, result.instance)}")
     if score.battery_remaining_percent is not None:
@@ -170,17 +173,18 @@ def _reasons(result: "Result") -> list[str]:
 def _last_tasks(instance: Instance, found: Bottleneck) -> str:
     ids = [instance.task_ids[j] for j in found.last]
     if len(ids) > 1:
-        return f"Last: {len(ids)} of {instance.m} tasks together, at {number(found.makespan)} h: {_list(ids)}."
+        return f"Last: {len(ids)} of {instance.m} tasks together, at {_time(instance, found.makespan)}: {_list(ids)}."
     j = found.last[0]
     group = [instance.agent_ids[i] for i in found.agents]
     ability = float(instance.ability[list(found.agents)].sum())
+    work = labelled(number(float(instance.workload[j])), instance.units.work)
     text = (
-        f"Last: task {ids[0]} at {number(found.makespan)} h, workload {number(float(instance.workload[j]))}"
+        f"Last: task {ids[0]} at {_time(instance, found.makespan)}, workload {work}"
         f" on {'agent' if len(group) == 1 else f'{len(group)} agents:'} {_list(group)} (ability {number(ability)})"
     )
     if found.next_task is None:
         return f"{text}."
-    return f"{text}; next is {instance.task_ids[found.next_task]} at {number(found.next_time)} h."
+    return f"{text}; next is {instance.task_ids[found.next_task]} at {_time(instance, found.next_time)}."
 
 
 def _gain(instance: Instance, found: Bottleneck) -> str:
@@ -192,13 +196,13 @@ def _gain(instance: Instance, found: Bottleneck) -> str:
         share = 1 - found.typical.makespan / found.makespan
         return (
             f"One more agent there{at_once} of ability {number(found.typical.ability)}, the median, gains"
-            f" {percent(share)}: {number(found.typical.makespan)} h."
+            f" {percent(share)}: {_time(instance, found.typical.makespan)}."
         )
     share = 1 - found.enough.makespan / found.makespan
     ability = rounded_up(found.enough.ability, whole=bool((instance.ability == instance.ability.round()).all()))
     return (
         f"One more agent there{at_once} gains {percent(share)} at most: with ability {ability} or more"
-        f" {instance.task_ids[found.next_task]} is the last, at {number(found.enough.makespan)} h."
+        f" {instance.task_ids[found.next_task]} is the last, at {_time(instance, found.enough.makespan)}."
     )
 
 
@@ -215,6 +219,11 @@ def rounded_up(ability: float, *, whole: bool) -> str:
         return f"{math.ceil(ability * (1 - 1e-12))}"
     unit = 10.0 ** (math.floor(math.log10(ability)) - 2)
     return f"{math.ceil(ability / unit * (1 - 1e-12)) * unit:.3g}"
+
+
+def _time(instance: Instance, value: float | None) -> str:
+    """Return a time in the unit of the instance, if it names one."""
+    return labelled(number(value), instance.units.time)
 
 
 def _list(ids: list[str]) -> str:

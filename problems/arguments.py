@@ -27,9 +27,7 @@ def whole(value: object, name: str, low: int = 0, high: int | None = None) -> in
     raise InputError(f"must be a whole number {ends}, got {shown(value)}", name)
 
 
-def real(
-    value: object, name: str, low: float = 0.0, high: float = math.inf, *, above: bool = False, unit: str = ""
-) -> float:
+def real(value: object, name: str, low: float = 0.0, high: float = math.inf, *, above: bool = False) -> float:
     """Return a finite number from `low` to `high`, as Python's own; `above`: `low` itself is out."""
     if isinstance(value, Real) and not isinstance(value, bool | np.bool_):
         plain: Real = value.item() if isinstance(value, np.generic) else value
@@ -37,7 +35,7 @@ def real(
         if (low < number if above else low <= number) and number <= high and number < math.inf:
             return number
     ends = f"{'>' if above else '>='} {low:g}" + (f" and at most {high:g}" if high < math.inf else "")
-    raise InputError(f"must be a finite number {unit}{ends}, got {shown(value)}", name)
+    raise InputError(f"must be a finite number {ends}, got {shown(value)}", name)
 
 
 def flag(value: object, name: str) -> bool:

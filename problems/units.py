@@ -1,10 +1,15 @@
 """Labels of the units that an instance is in, for text, tables and pictures; only speeds can be in others."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from fractions import Fraction
+from typing import TYPE_CHECKING
 
 from alloc.problems.arguments import shown
 from alloc.problems.errors import InputError
+from alloc.problems.vocabulary import GEOGRAPHIC
+
+if TYPE_CHECKING:
+    from alloc.problems.instance import Instance
 
 
 @dataclass(frozen=True)
@@ -36,9 +41,10 @@ LONGEST_LABEL = 20
 """Characters of a label."""
 
 
-def labelled(value: str, unit: str) -> str:
-    """Return a number with its unit behind it, if it has one."""
-    return f"{value} {unit}" if unit else value
+def labels(instance: "Instance") -> Units:
+    """Return what the units of an instance are called: as it says, and km for distances on the earth."""
+    units = instance.units
+    return replace(units, distance=instance.distance_unit) if instance.metric == GEOGRAPHIC else units
 
 
 METRES = {name: Fraction(length) for name, length in (

@@ -13,8 +13,8 @@ import alloc.problems
 
 PACKAGES = (alloc.problems, alloc.allocators)
 VERBS = {
-    "compare", "describe", "explain", "load", "method_parameters", "names", "pareto", "plot", "read_result", "solve",
-    "train", "whatif",
+    "compare", "describe", "explain", "load", "method_parameters", "names", "pareto", "plot", "plot_convergence",
+    "read_result", "solve", "train", "whatif", "write_result",
 }  # fmt: skip
 METHODS = {
     "A2c", "Auction", "CpSat", "Ddpg", "Dqn", "Gappo", "GappoLs", "GeneticAlgorithm", "Greedy", "Hedonic",

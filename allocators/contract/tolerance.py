@@ -27,7 +27,7 @@ class MakespanTolerance:
     def __post_init__(self) -> None:
         object.__setattr__(self, "slack", real(self.slack, "slack"))
         if self.limit is not None:
-            object.__setattr__(self, "limit", real(self.limit, "limit", above=True, unit="of hours "))
+            object.__setattr__(self, "limit", real(self.limit, "limit", above=True))
 
     def hours(self, fastest: float) -> float:
         """Return the makespan up to which allocations are equally fast, where the fastest takes `fastest` hours."""

@@ -15,6 +15,12 @@ UNSERVED, MAKESPAN, LIMIT = "#d55e00", "#d55e00", "#56b4e9"
 """From the palette of Okabe and Ito."""
 MOVE = "#56606b"
 
+SERIES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
+"""Colours of lines, from the same palette."""
+
+NEGLIGIBLE = 1e-3
+"""Relative difference of completion times that no colours show."""
+
 
 def scale() -> "ListedColormap":
     """Return the colour map of completion times, dark is late: cividis without its two ends."""
@@ -26,13 +32,21 @@ def scale() -> "ListedColormap":
 
 def colour_range(result: "Result") -> tuple[float, float]:
     """Return the earliest and the latest completion time, at least a tenth of the makespan apart."""
-    if result.evaluation is None:
-        return 0.0, 1.0
-    time = result.evaluation.completion_time
-    busy = time[np.isfinite(time) & (time > 0)]
-    if not len(busy):
-        return 0.0, 1.0
-    return float(min(busy.min(), 0.9 * busy.max())), float(busy.max())
+    low, high = _busy_range(result)
+    return (min(low, 0.9 * high), high) if high else (0.0, 1.0)
+
+
+def _busy_range(result: "Result") -> tuple[float, float]:
+    """Return the earliest and the latest completion time of tasks with work; zeros if there is none."""
+    time = finite_times(result)
+    busy = time[time > 0]
+    return (float(busy.min()), float(busy.max())) if len(busy) else (0.0, 0.0)
+
+
+def is_late_coloured(result: "Result") -> bool:
+    """Return whether completion times differ so much that colours say something: by more than 0.1 %."""
+    low, high = _busy_range(result)
+    return high - low > NEGLIGIBLE * high
 
 
 def shades(result: "Result") -> "FloatArray":
@@ -49,7 +63,7 @@ def colours(result: "Result") -> "FloatArray":
 
 
 def finite_times(result: "Result") -> "FloatArray":
-    """Return completion times in hours, 0 where unserved, shape (m,)."""
+    """Return completion times, 0 where unserved, shape (m,)."""
     if result.evaluation is None:
         return np.zeros(result.instance.m)
     time = result.evaluation.completion_time

@@ -4,10 +4,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from alloc.allocators.plotting.sites import draw_sites, name_sites, plain_text, shortened
+from alloc.allocators.plotting.sites import draw_sites, name_sites, plain_text
 from alloc.allocators.plotting.style import drawn, new_figure
 from alloc.allocators.plotting.times import MAX_ROWS, draw_times
-from alloc.problems.text import counted, number, percent
+from alloc.problems.text import counted, labelled, number, percent, shortened
+from alloc.problems.units import labels
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -22,7 +23,7 @@ def plot(result: "Result", path: str | None = None) -> "Figure":
     ----------
     result : Result
     path : str, optional
-        A .png or .svg file to write as well, whole or not at all.
+        A .png, .svg or .pdf file to write as well, whole or not at all.
 
     Returns
     -------
@@ -44,13 +45,13 @@ def _draw(result: "Result") -> "Figure":
         draw_times(figure.subplots(), result)
         figure.suptitle(_title(result), fontsize=12)
         return figure
-    figure = new_figure(13, 6.2)
+    figure = new_figure(13, 6.6)
     figure.suptitle(_title(result), fontsize=12)
     left, right = figure.subplots(1, 2, width_ratios=[1.25, 1])
-    sites, radius = draw_sites(left, result)
+    sites = draw_sites(left, result)
     draw_times(right, result)
     figure.draw_without_rendering()  # fixes the layout, on which the places of names depend
-    name_sites(left, result, sites, radius)
+    name_sites(left, result, sites)
     return figure
 
 
@@ -59,7 +60,8 @@ def _title(result: "Result") -> str:
     text = f"{name}: {counted(result.instance.n, 'agent')}, {counted(result.instance.m, 'task')}, {result.method}"
     if result.evaluation is None:
         return f"{text}\nno allocation found"
-    energy = f"energy {number(result.energy, 4)}"
+    units = labels(result.instance)
+    energy = f"energy {labelled(number(result.energy, 6), units.energy)}"
     if result.makespan is None:
         return f"{text}\n{counted(len(result.evaluation.unserved_tasks), 'task')} unserved, {energy}"
-    return f"{text}\nT = {number(result.makespan, 4)} h, gap {percent(result.gap)}, {energy}"
+    return f"{text}\nT = {labelled(number(result.makespan, 4), units.time)}, gap {percent(result.gap)}, {energy}"

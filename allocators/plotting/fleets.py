@@ -5,9 +5,9 @@ from textwrap import wrap
 from typing import TYPE_CHECKING
 
 from alloc.allocators.plotting.colours import LIMIT, MAKESPAN
-from alloc.allocators.plotting.sites import plain_text, shortened
+from alloc.allocators.plotting.sites import plain_text
 from alloc.allocators.plotting.style import drawn, new_figure
-from alloc.problems.text import counted
+from alloc.problems.text import counted, heading, shortened
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,7 +26,7 @@ def plot_whatif(found: "WhatIf", path: str | None = None) -> "Figure":
     ----------
     found : WhatIf
     path : str, optional
-        A .png or .svg file to write as well, whole or not at all.
+        A .png, .svg or .pdf file to write as well, whole or not at all.
 
     Returns
     -------
@@ -47,12 +47,12 @@ def _draw(found: "WhatIf") -> "Figure":
     axes = figure.subplots(1 + has_energy, 1, sharex=True, squeeze=False)[:, 0]
     units, results = found.instance.units, [fleet.result for fleet in found.fleets]
     _bars(axes[0], [result.makespan for result in results], [result.lower_bound for result in results])
-    axes[0].set_ylabel(_axis("makespan", units.time))
+    axes[0].set_ylabel(plain_text(heading("makespan", units.time)))
     axes[0].legend(frameon=False, loc="upper right", ncols=3, fontsize=9)
     if has_energy:
         energy = [result.energy if result.makespan is not None else None for result in results]
         _bars(axes[1], energy, [result.energy_lower_bound for result in results])
-        axes[1].set_ylabel(_axis("energy", units.energy))
+        axes[1].set_ylabel(plain_text(heading("energy", units.energy)))
     _name(axes[-1], found.fleets)
     axes[0].set_title(_title(found), fontsize=10)
     return figure
@@ -87,10 +87,6 @@ def _changed(fleet: "Fleet") -> str:
     if not less:
         return more or "now"
     return f"−{plain_text(shortened(less[0], 12)) if len(less) == 1 else len(less)}{' ' + more if more else ''}"
-
-
-def _axis(name: str, unit: str) -> str:
-    return plain_text(f"{name} ({unit})" if unit else name)
 
 
 def _title(found: "WhatIf") -> str:

@@ -3,14 +3,15 @@
 from typing import TYPE_CHECKING
 
 from alloc.allocators.plotting.colours import LIMIT, MAKESPAN
-from alloc.allocators.plotting.sites import plain_text, shortened
+from alloc.allocators.plotting.sites import plain_text
 from alloc.allocators.plotting.style import drawn, new_figure
-from alloc.problems.text import counted, number
+from alloc.problems.text import counted, heading, labelled, number, shortened
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from alloc.allocators import Result
     from alloc.allocators.pareto import Front
 
 WIDE = 3.0
@@ -24,7 +25,7 @@ def plot_front(front: "Front", path: str | None = None) -> "Figure":
     ----------
     front : Front
     path : str, optional
-        A .png or .svg file to write as well, whole or not at all.
+        A .png, .svg or .pdf file to write as well, whole or not at all.
 
     Returns
     -------
@@ -54,8 +55,8 @@ def _draw(front: "Front") -> "Figure":
         _logarithmic(axes)
     axes.set_xlim(hours[0] / 1.1 if wide else hours[0] - 0.08 * span, end)
     axes.set_ylim(0, max(energy) * 1.08 or 1.0)
-    axes.set_xlabel("makespan (h)")
-    axes.set_ylabel("energy")
+    axes.set_xlabel(heading("makespan", front.instance.units.time))
+    axes.set_ylabel(heading("energy", front.instance.units.energy))
     axes.spines[["top", "right"]].set_visible(False)
     axes.legend(frameon=False)
     axes.set_title(_title(front), fontsize=12)
@@ -88,9 +89,12 @@ def _logarithmic(axes: "Axes") -> None:
 def _title(front: "Front") -> str:
     instance = front.instance
     name = plain_text(shortened(instance.name, 60))
-    fastest, cheapest = front.points[0], front.points[-1]
-    ends = (
-        f"from T = {number(fastest.makespan, 4)} h, energy {number(fastest.energy, 4)}"
-        f" to T = {number(cheapest.makespan, 4)} h, energy {number(cheapest.energy, 4)}"
-    )
+    fastest, cheapest = _figures(front.points[0]), _figures(front.points[-1])
+    ends = fastest if fastest == cheapest else f"from {fastest} to {cheapest}"
     return f"{name}: {counted(instance.n, 'agent')}, {counted(instance.m, 'task')}\n{ends}"
+
+
+def _figures(result: "Result") -> str:
+    units = result.instance.units
+    makespan = labelled(number(result.makespan, 4), units.time)
+    return f"T = {makespan}, energy {labelled(number(result.energy, 6), units.energy)}"

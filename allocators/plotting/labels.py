@@ -1,5 +1,7 @@
 """Positions of labels beside circles, without overlaps."""
 
+from itertools import product
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -7,8 +9,11 @@ from alloc.problems.instance import FloatArray
 
 Box = tuple[float, float, float, float]
 
-SIDES = ((0, 1), (0, -1), (1, 0), (-1, 0))
-"""Above, below, right, left."""
+SIDES = ((0, 1), (0, -1), (1, 0), (-1, 0), (0.75, 0.75), (-0.75, 0.75), (0.75, -0.75), (-0.75, -0.75))
+"""Above, below, right, left, and between."""
+
+GAPS = (0.0, 9.0)
+"""Points between a circle and its label."""
 
 
 def place_labels(centre: FloatArray, radius: FloatArray, width: FloatArray, height: float) -> FloatArray:
@@ -28,8 +33,8 @@ def place_labels(centre: FloatArray, radius: FloatArray, width: FloatArray, heig
     for j in np.argsort(-radius, kind="stable"):
         if np.isnan(centre[j]).any():
             continue
-        for across, up in SIDES:
-            offset = np.array([across * (radius[j] + width[j] / 2 + 2), up * (radius[j] + height / 2 + 1)])
+        for gap, (across, up) in product(GAPS, SIDES):
+            offset = np.array([across * (radius[j] + width[j] / 2 + 2 + gap), up * (radius[j] + height / 2 + 1 + gap)])
             box = _box(centre[j] + offset, width[j], height)
             if not any(_overlap(box, other) for other in taken) and not _touches(box, centre, radius).any():
                 middle[j] = centre[j] + offset

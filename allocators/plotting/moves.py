@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from alloc.problems import IDLE, Allocation, Instance
+from alloc.allocators.plan.places import Places
+from alloc.problems import IDLE, Allocation
 from alloc.problems.instance import FloatArray, IntArray
 
 
@@ -14,8 +15,8 @@ class Flows:
 
     Attributes
     ----------
-    begin, end : ndarray, shape (k, 3)
-        Positions of the start and of the task.
+    begin, end : ndarray, shape (k, 2)
+        Places of the start and of the task.
     count : ndarray of int, shape (k,)
         Number of agents.
     """
@@ -25,41 +26,30 @@ class Flows:
     count: IntArray
 
 
-def two_axes(instance: Instance) -> tuple[int, int]:
-    """Return the two axes with the largest spread of positions, in the order x, y, z."""
-    places = np.vstack([instance.task_position, instance.start_position])
-    spread = np.ptp(places[~np.isnan(places[:, 0])], axis=0)
-    first, second = sorted(np.argsort(-spread, kind="stable")[:2].tolist())
-    return first, second
-
-
-def flows(instance: Instance, allocation: Allocation, agents: IntArray | None = None) -> Flows:
+def flows(where: Places, allocation: Allocation, agents: IntArray | None = None) -> Flows:
     """Group the agents that move, or those of `agents` that do, by start and task."""
     chosen = slice(None) if agents is None else agents
     task = allocation.task_of_agent[chosen]
-    begin = instance.start_position[chosen]
-    target = instance.task_position[np.maximum(task, 0)]
+    begin = where.starts[chosen]
+    target = where.tasks[np.maximum(task, 0)]
     moves = (task != IDLE) & ~np.isnan(begin[:, 0]) & ~np.isnan(target[:, 0]) & (begin != target).any(axis=1)
     pairs, count = np.unique(np.hstack([begin[moves], target[moves]]), axis=0, return_counts=True)
-    return Flows(pairs[:, :3], pairs[:, 3:], count)
+    return Flows(pairs[:, :2], pairs[:, 2:], count)
 
 
-def wedges(moves: Flows, plane: tuple[int, int], extent: float) -> list[FloatArray]:
+def wedges(moves: Flows, extent: float, aspect: float = 1.0) -> list[FloatArray]:
     """Return one triangle per flow, shape (3, 2): its base at the start, its tip at the task.
 
     Parameters
     ----------
-    plane : (int, int)
-        The two axes that are drawn.
     extent : float
-        Size of the drawing in units of distance; the width of a wedge is a fraction of it that grows with the square
-        root of the number of agents.
+        Size of the drawing in units of its horizontal axis; the width of a wedge is a fraction of it that grows with
+        the square root of the number of agents.
+    aspect : float
+        How long a unit of the vertical axis is drawn, over one of the horizontal axis.
     """
-    begin, end = moves.begin[:, list(plane)], moves.end[:, list(plane)]
-    along = end - begin
-    length = np.hypot(along[:, 0], along[:, 1])
-    seen = length > 0
-    begin, end, along, length = begin[seen], end[seen], along[seen], length[seen]
-    across = np.column_stack([-along[:, 1], along[:, 0]]) / length[:, None]
-    half = np.minimum(0.004 * extent * np.sqrt(moves.count[seen]), 0.02 * extent)[:, None]
-    return list(np.stack([begin + half * across, end, begin - half * across], axis=1))
+    stretch = np.array([1.0, aspect])
+    along = (moves.end - moves.begin) * stretch
+    across = np.column_stack([-along[:, 1], along[:, 0]]) / np.hypot(along[:, 0], along[:, 1])[:, None]
+    half = np.minimum(0.004 * extent * np.sqrt(moves.count), 0.02 * extent)[:, None] * across / stretch
+    return list(np.stack([moves.begin + half, moves.end, moves.begin - half], axis=1))

@@ -1,13 +1,26 @@
-"""The left half of a drawing: tasks, groups and moves, projected along the axis with the least spread."""
+"""The left half of a drawing: a map of tasks, groups, bases and moves."""
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from alloc.allocators.plotting.colours import MOVE, UNSERVED, colour_range, colours, scale, shades, unserved_tasks
+from alloc.allocators.plan.places import Base, Places, bases, places
+from alloc.allocators.plotting.colours import (
+    MOVE,
+    UNSERVED,
+    colour_range,
+    colours,
+    is_late_coloured,
+    scale,
+    shades,
+    unserved_tasks,
+)
 from alloc.allocators.plotting.labels import place_labels, visible
-from alloc.allocators.plotting.moves import flows, two_axes, wedges
-from alloc.problems.text import one_line
+from alloc.allocators.plotting.legend import draw_legend
+from alloc.allocators.plotting.moves import flows, wedges
+from alloc.allocators.plotting.starts import draw_starts, start_names
+from alloc.problems.text import heading, short_names
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,33 +32,54 @@ MAX_LABELS = 60
 """Number of tasks above which they are not labelled."""
 
 MAX_AGENTS = 20_000
-"""Number of agents above which a sample is drawn: more dots and wedges would only overlap."""
+"""Number of agents above which the moves of a sample are drawn: more wedges would only overlap."""
 
-Plane = tuple[int, int]
+WIDTH = 1.25
+"""Width of the map over its height."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sites:
+    """What is drawn where.
+
+    Attributes
+    ----------
+    where : Places
+    bases : list of Base
+        Where agents begin, but for those at tasks.
+    radius : ndarray, shape (m + bases,)
+        Of the marks of tasks and bases, in points.
+    """
+
+    where: Places
+    bases: list[Base]
+    radius: "FloatArray"
 
 
 def drawn_agents(result: "Result") -> "IntArray":
-    """Return the agents whose starts and moves are drawn: all, or evenly spaced ones of many."""
+    """Return the agents whose moves are drawn: all, or evenly spaced ones of many."""
     n = result.instance.n
     return np.unique(np.linspace(0, n - 1, min(n, MAX_AGENTS)).astype(np.intp))
 
 
-def draw_sites(axes: "Axes", result: "Result") -> "tuple[FloatArray, FloatArray]":
-    """Draw circles, starts and moves; return places and radii (in points) of the circles for `name_sites`."""
-    plane = two_axes(result.instance)
-    sites = result.instance.task_position[:, list(plane)]
-    area = _areas(result, sites)
-    _draw_starts(axes, result, plane)
-    _draw_moves(axes, result, plane)
-    _draw_tasks(axes, result, sites, area)
-    _finish(axes, result, plane)
-    return sites, np.sqrt(area / np.pi)
+def draw_sites(axes: "Axes", result: "Result") -> Sites:
+    """Draw tasks, bases and moves; return what `name_sites` needs."""
+    where = places(result.instance)
+    begin = [base for base in bases(result.instance, where) if base.task is None]
+    area = _areas(result, where)
+    low, high = _window(where)
+    size = draw_starts(axes, result, begin)
+    moves = _draw_moves(axes, result, where, float(high[0] - low[0]))
+    _draw_tasks(axes, result, where.tasks, area)
+    _finish(axes, result, where)
+    draw_legend(axes, result, begin, counts=result.instance.m <= MAX_LABELS, moves=moves)
+    return Sites(where, begin, np.concatenate([np.sqrt(area / np.pi), size / 2]))
 
 
-def _areas(result: "Result", sites: "FloatArray") -> "FloatArray":
+def _areas(result: "Result", where: Places) -> "FloatArray":
     """Return the areas of the circles in square points: proportional to the workloads, within limits."""
     work = result.instance.workload
-    known = sites[~np.isnan(sites[:, 0])]
+    known = where.tasks[~np.isnan(where.tasks[:, 0])] * [1.0, where.aspect]
     largest = float(np.clip(15_000 / len(work), 80, 700))
     if 2 < len(known) <= 2_000:
         distance = np.hypot(*(known[:, None, :] - known[None, :, :]).transpose(2, 0, 1))
@@ -55,32 +89,21 @@ def _areas(result: "Result", sites: "FloatArray") -> "FloatArray":
     return np.maximum(12.0, largest * work / max(float(work.max()), 1e-300))
 
 
-def _draw_starts(axes: "Axes", result: "Result", plane: Plane) -> None:
-    """Draw agents that do not start at a task as dots, hollow for idle ones."""
-    instance, agents = result.instance, drawn_agents(result)
-    start = instance.start_position[agents]
-    place = start[:, list(plane)]
-    idle = np.ones(len(agents), dtype=bool)
-    if result.allocation is not None:
-        idle = result.allocation.task_of_agent[agents] < 0
-    at_task = {tuple(row) for row in instance.task_position.tolist()}
-    own = np.array([tuple(row) not in at_task for row in start.tolist()]) & ~np.isnan(place[:, 0])
-    size = float(np.clip(3_000 / instance.n, 4, 28))
-    busy, free = own & ~idle, own & idle
-    axes.scatter(place[busy, 0], place[busy, 1], s=size, color=MOVE, linewidths=0, zorder=2)
-    axes.scatter(place[free, 0], place[free, 1], s=size, facecolors="none", edgecolors=MOVE, linewidths=0.8, zorder=2)
-
-
-def _draw_moves(axes: "Axes", result: "Result", plane: Plane) -> None:
+def _draw_moves(axes: "Axes", result: "Result", where: Places, extent: float) -> bool:
+    """Draw a wedge for each group that moves; return whether there is one."""
     from matplotlib.collections import PolyCollection
 
     if result.allocation is None:
-        return
-    places = np.vstack([result.instance.task_position, result.instance.start_position])[:, list(plane)]
-    extent = float(np.ptp(places[~np.isnan(places[:, 0])], axis=0).max()) or 1.0
-    shapes = wedges(flows(result.instance, result.allocation, drawn_agents(result)), plane, extent)
-    alpha = float(np.clip(40 / max(len(shapes), 1), 0.12, 0.55))
+        return False
+    shapes = wedges(flows(where, result.allocation, drawn_agents(result)), 0.8 * extent, where.aspect)
+    if not shapes:
+        return False
+    corner = np.array(shapes) / extent
+    across, along = corner[:, 2] - corner[:, 0], corner[:, 1] - corner[:, 0]
+    covered = float(np.abs(across[:, 0] * along[:, 1] - across[:, 1] * along[:, 0]).sum()) / 2 * where.aspect
+    alpha = float(np.clip(min(max(40 / len(shapes), 0.2), 0.3 / max(covered, 0.01)), 0.015, 0.55))
     axes.add_collection(PolyCollection(shapes, facecolors=MOVE, alpha=alpha, linewidths=0, zorder=1))
+    return True
 
 
 def _draw_tasks(axes: "Axes", result: "Result", sites: "FloatArray", area: "FloatArray") -> None:
@@ -103,54 +126,73 @@ def _draw_tasks(axes: "Axes", result: "Result", sites: "FloatArray", area: "Floa
     axes.scatter(x, y, s=area[left] / 3, marker="x", color=UNSERVED, linewidths=1.4, zorder=3.2)
 
 
-def _window(result: "Result", plane: Plane) -> "tuple[FloatArray, FloatArray]":
+def _window(where: Places) -> "tuple[FloatArray, FloatArray]":
     """Return the limits of both axes: a quarter wider than high, with a margin for circles and labels."""
-    places = np.vstack([result.instance.task_position, result.instance.start_position])[:, list(plane)]
-    places = places[~np.isnan(places[:, 0])]
-    low, high = places.min(axis=0), places.max(axis=0)
-    size = max(float((high - low)[0]) / 1.25, float((high - low)[1])) or 1.0
-    half = 0.58 * size * np.array([1.25, 1.0])
+    known = np.vstack([where.tasks, where.starts])
+    known = known[~np.isnan(known[:, 0])]
+    low, high = known.min(axis=0), known.max(axis=0)
+    size = max(float((high - low)[0]) / WIDTH, float((high - low)[1]) * where.aspect) or 1.0
+    half = 0.62 * size * np.array([WIDTH, 1 / where.aspect])
     return (low + high) / 2 - half, (low + high) / 2 + half
 
 
-def _finish(axes: "Axes", result: "Result", plane: Plane) -> None:
+def _finish(axes: "Axes", result: "Result", where: Places) -> None:
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
+    from matplotlib.ticker import FuncFormatter
 
-    low, high = _window(result, plane)
+    low, high = _window(where)
     axes.set_xlim(low[0], high[0])
     axes.set_ylim(low[1], high[1])
-    axes.set_aspect("equal", adjustable="box")
-    axes.set_xlabel("xyz"[plane[0]])
-    axes.set_ylabel("xyz"[plane[1]])
-    counts = ", number = agents" if result.instance.m <= MAX_LABELS else ""
-    sample = f"; {MAX_AGENTS} of the agents are drawn" if result.instance.n > MAX_AGENTS else ""
-    axes.set_title(f"circle = task (area = workload{counts}); wedge = move, thin end at the task{sample}", fontsize=9)
+    axes.set_aspect(where.aspect, adjustable="box")
+    axes.set_xlabel(plain_text(where.axes[0]))
+    axes.set_ylabel(plain_text(where.axes[1]))
+    if high[0] > 180 and result.instance.metric == "geographic":
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{(value + 180) % 360 - 180:g}"))
+    if result.instance.n > MAX_AGENTS:
+        axes.set_title(f"moves of {MAX_AGENTS} of the agents are drawn", fontsize=9)
     axes.grid(color="0.92", linewidth=0.6)
     axes.set_axisbelow(True)
-    bar = ScalarMappable(Normalize(*colour_range(result)), scale())
-    axes.figure.colorbar(bar, ax=axes, label="completion time (h)", shrink=0.8, pad=0.02)
+    if is_late_coloured(result):
+        bar = ScalarMappable(Normalize(*colour_range(result)), scale())
+        label = plain_text(heading("completion time", result.instance.units.time))
+        axes.figure.colorbar(bar, cax=axes.inset_axes((1.03, 0.1, 0.035, 0.8)), label=label)
 
 
-def name_sites(axes: "Axes", result: "Result", sites: "FloatArray", radius: "FloatArray") -> None:
-    """Write ids beside the circles and numbers of agents into them, where there is room.
+def name_sites(axes: "Axes", result: "Result", sites: Sites) -> None:
+    """Write names beside tasks and bases, and numbers of agents into the circles, where there is room.
 
     The layout must be final, since labels are placed by distances on paper.
     """
-    if result.instance.m > MAX_LABELS:
+    instance, m = result.instance, result.instance.m
+    is_named = m <= MAX_LABELS
+    starts = start_names(result, sites.bases)
+    names = [*(short_names(instance.task_ids, 18) if is_named else [""] * m), *starts]
+    if not any(names):
         return
-    size = 8.0 if result.instance.m <= MAX_LABELS // 2 else 6.5
-    names = [shortened(name, 12) for name in result.instance.task_ids]
-    centre = axes.transData.transform(sites) * 72 / axes.figure.dpi
+    size = 8.0 if len([name for name in names if name]) <= MAX_LABELS // 2 else 6.5
+    place = np.vstack([sites.where.tasks, *(base.place for base in sites.bases[: len(starts)])])
+    radius = sites.radius[: len(place)].copy()
+    radius[: 0 if is_named else m] = 0.0  # many small circles may be written over
+    centre = axes.transData.transform(place) * 72 / axes.figure.dpi
     width = np.array([0.62 * size * len(name) for name in names])
     middle = place_labels(centre, radius, width, 1.1 * size)
     for j in np.flatnonzero(~np.isnan(middle[:, 0])):
-        _write(axes, plain_text(names[j]), sites[j], middle[j] - centre[j], size, "black")
+        if names[j]:
+            colour = "black" if j < m else "#3a4450"
+            _write(axes, plain_text(names[j]), place[j], middle[j] - centre[j], size, colour, italic=bool(j >= m))
+    if is_named:
+        _write_counts(axes, result, centre[:m], radius[:m], size, place[:m])
+
+
+def _write_counts(
+    axes: "Axes", result: "Result", centre: "FloatArray", radius: "FloatArray", size: float, place: "FloatArray"
+) -> None:
     counts, dark = _group_sizes(result), shades(result) > 0.5
     room = visible(centre, radius, 0.5 * size) & ~unserved_tasks(result)
     for j in np.flatnonzero(room & (radius >= 0.65 * size) & ~np.isnan(centre[:, 0])):
-        if 0.31 * size * len(str(counts[j])) < radius[j]:
-            _write(axes, str(counts[j]), sites[j], np.zeros(2), size, "white" if dark[j] else "black")
+        if 0.42 * size * len(str(counts[j])) < radius[j]:
+            _write(axes, str(counts[j]), place[j], np.zeros(2), size, "white" if dark[j] else "black")
 
 
 def _group_sizes(result: "Result") -> "IntArray":
@@ -161,10 +203,11 @@ def _group_sizes(result: "Result") -> "IntArray":
     return np.bincount(task[task >= 0], minlength=result.instance.m)
 
 
-def _write(axes: "Axes", text: str, site: "FloatArray", offset: "FloatArray", size: float, colour: str) -> None:
+def _write(
+    axes: "Axes", text: str, site: "FloatArray", offset: "FloatArray", size: float, colour: str, *, italic: bool = False
+) -> None:
     from matplotlib.patheffects import withStroke
 
-    outline = [withStroke(linewidth=2, foreground="white")] if colour == "black" and offset.any() else []
     axes.annotate(
         text,
         (float(site[0]), float(site[1])),
@@ -173,17 +216,12 @@ def _write(axes: "Axes", text: str, site: "FloatArray", offset: "FloatArray", si
         ha="center",
         va="center",
         fontsize=size,
+        fontstyle="italic" if italic else "normal",
         color=colour,
         zorder=5,
         annotation_clip=False,
-        path_effects=outline,
+        path_effects=[withStroke(linewidth=2, foreground="white")] if offset.any() else [],
     )
-
-
-def shortened(name: str, longest: int) -> str:
-    """Return `name` on one line, cut to `longest` characters."""
-    name = one_line(name)
-    return name if len(name) <= longest else name[: longest - 1] + "…"
 
 
 def plain_text(name: str) -> str:

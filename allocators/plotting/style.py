@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SUFFIXES = (".png", ".svg")
+SUFFIXES = (".png", ".svg", ".pdf")
 
 FONTS = (
     "DejaVu Sans",
@@ -28,6 +28,9 @@ FONTS = (
 )
 """Font fallbacks: a glyph comes from the first installed one that has it; the first is shipped with matplotlib."""
 
+DATES = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
+"""Left out of files, so that the same drawing gives the same file."""
+
 SUPPRESSED = r"Glyph .* missing|Matplotlib currently does not support|constrained_layout not applied"
 """Warnings that a user can do nothing about: a missing glyph is drawn as a box, a crowded layout stays crowded."""
 
@@ -37,7 +40,8 @@ def check_plot(path: str) -> None:
     from alloc.problems import InputError
 
     if Path(path).suffix.lower() not in SUFFIXES:
-        raise InputError(f"must end in {' or '.join(SUFFIXES)}", source=path)
+        *most, last = SUFFIXES
+        raise InputError(f"must end in {', '.join(most)} or {last}", source=path)
 
 
 def drawn(draw: Callable[[], "Figure"], path: str | None) -> "Figure":
@@ -85,5 +89,5 @@ def _save(figure: "Figure", path: str) -> None:
 
     kind = Path(path).suffix.lower().removeprefix(".")
     picture = io.BytesIO()
-    figure.savefig(picture, format=kind, dpi=150, metadata={"Date": None} if kind == "svg" else None)
+    figure.savefig(picture, format=kind, dpi=150, metadata=DATES.get(kind))
     write_bytes_atomically(path, picture.getvalue())

@@ -1,12 +1,14 @@
 """The right half of a drawing: the completion time of each task."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from alloc.allocators.plotting.colours import LIMIT, MAKESPAN, UNSERVED, colours, finite_times, unserved_tasks
-from alloc.allocators.plotting.sites import plain_text, shortened
-from alloc.problems.text import number
+from alloc.allocators.plan.table import task_rows
+from alloc.allocators.plotting.colours import LIMIT, MAKESPAN, UNSERVED, colours, finite_times, shades, unserved_tasks
+from alloc.allocators.plotting.sites import plain_text
+from alloc.problems.text import heading, labelled, number, short_names
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -18,6 +20,9 @@ if TYPE_CHECKING:
 
 MAX_ROWS = 40
 """Number of tasks above which bars are vertical and without labels."""
+
+MOST_LETTERS = 70
+"""Letters of 7 points that a bar over the whole axis has room for."""
 
 MAX_BARS = 1_000
 """Number of tasks above which bars are single lines."""
@@ -62,7 +67,7 @@ def _lines(axes: "Axes", result: "Result", rows: bool) -> "list[Line2D]":
             color=colour,
             linestyle=style,
             linewidth=1.8,
-            label=f"{label} {number(value, 4)} h",
+            label=f"{label} {labelled(number(value, 4), result.instance.units.time)}",
             path_effects=[withStroke(linewidth=3.2, foreground="white")],
         )
         for label, value, colour, style in wanted
@@ -72,21 +77,46 @@ def _lines(axes: "Axes", result: "Result", rows: bool) -> "list[Line2D]":
 
 def _name_rows(axes: "Axes", result: "Result", order: "IntArray", top: float) -> None:
     m = result.instance.m
-    names = [plain_text(shortened(result.instance.task_ids[j], 14)) for j in order]
+    short = short_names(result.instance.task_ids, 18)
+    names = [plain_text(short[j]) for j in order]
     axes.set_yticks(range(m), names, fontsize=8 if m <= 25 else 6.5)
     axes.set_ylim(m - 0.4, -0.6)
     axes.set_xlim(0, top * 1.06)
-    axes.set_xlabel("completion time (h)")
+    axes.set_xlabel(heading("completion time", result.instance.units.time))
     for row, j in enumerate(order):
         if result.instance.workload[j] == 0:
             axes.text(0.01 * top, row, "no work", va="center", fontsize=7, color="0.4")
+    _name_groups(axes, result, order, top)
+
+
+def _name_groups(axes: "Axes", result: "Result", order: "IntArray", top: float) -> None:
+    """Write into each bar who is on the task, as many as it has room for."""
+    size = 7.0 if result.instance.m <= 25 else 6.0
+    room = MOST_LETTERS * 7.0 / size * finite_times(result) / top
+    dark = shades(result) > 0.5
+    for place, row in enumerate(task_rows(result, order)):
+        text = listed(row.agents, int(room[order[place]])) if row.completion_time else ""
+        if text:
+            colour = "white" if dark[order[place]] else "black"
+            axes.text(0.012 * top, place, plain_text(text), va="center", fontsize=size, color=colour)
+
+
+def listed(names: Sequence[str], longest: int) -> str:
+    """Return as many names as fit into this many characters, and how many there are; nothing if none fits."""
+    short = short_names(names, 18)
+    for count in range(len(short), 0, -1):
+        more = f" and {len(short) - count} more" if count < len(short) else ""
+        text = ", ".join(short[:count]) + more
+        if len(text) <= longest:
+            return text
+    return f"{len(short)} agents" if short and longest >= 11 else ""
 
 
 def _name_columns(axes: "Axes", result: "Result", top: float) -> None:
     axes.set_xlim(-0.6, result.instance.m - 0.4)
     axes.set_ylim(0, top * 1.06)
     axes.set_xlabel("tasks, the last one first")
-    axes.set_ylabel("completion time (h)")
+    axes.set_ylabel(heading("completion time", result.instance.units.time))
 
 
 def _legend(axes: "Axes", lines: "list[Line2D]", *, any_unserved: bool) -> None:

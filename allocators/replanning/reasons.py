@@ -5,8 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from alloc.problems import Allocation, Instance, evaluate
-from alloc.problems.text import number
-from alloc.problems.units import labelled
+from alloc.problems.text import labelled, number
 from alloc.problems.vocabulary import IDLE
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from alloc.cli import options
 from alloc.cli.options import examples
 from alloc.cli.output.console import is_terminal, note, say, table, to_json
 from alloc.cli.output.files import check_outputs, save
-from alloc.problems.text import number, percent
+from alloc.problems.text import heading, labelled, number, percent
 from alloc.problems.vocabulary import Objective
 
 if TYPE_CHECKING:
@@ -75,6 +75,8 @@ def compare_command(
     limit = options.time_limit(time_limit, iterations)
     Budget(limit, iterations, target_gap)
     problems = [read_instance(instance) for instance in instances]
+    units = {problem.units.time for problem in problems}
+    unit = units.pop() if len(units) == 1 else ""
     stop, rows, total = threading.Event(), [], len(problems) * len(wanted)
     with signals_set(stop):
         for row in compare(
@@ -89,8 +91,8 @@ def compare_command(
             stop=stop,
         ):
             rows.append(row)
-            _show_done(row, len(rows), total)
-    _print(share_bounds(rows), csv, json=json)
+            _show_done(row, len(rows), total, unit)
+    _print(share_bounds(rows), csv, unit, json=json)
     if stop.is_set():
         note(f"interrupted after {len(rows)} of {total} rows")
     complete = len(rows) == total and all(row.reason or row.runs == len(numbers) for row in rows)
@@ -128,25 +130,26 @@ def _seeds(text: str) -> list[int]:
     return list(range(int(text)))
 
 
-def _show_done(row: "Row", count: int, total: int) -> None:
+def _show_done(row: "Row", count: int, total: int, unit: str) -> None:
     """On a terminal, print each row as soon as it is known; the table follows at the end."""
     if is_terminal(sys.stderr):
-        outcome = row.reason or f"T {number(row.makespan_mean)} h, gap {percent(row.gap_mean)}"
+        outcome = row.reason or f"T {labelled(number(row.makespan_mean), unit)}, gap {percent(row.gap_mean)}"
         say(f"[{count}/{total}] {row.instance}, {row.method}: {outcome}")
 
 
-def _print(rows: "list[Row]", csv: str | None, *, json: bool) -> None:
+def _print(rows: "list[Row]", csv: str | None, unit: str, *, json: bool) -> None:
     from alloc.problems.formats import is_standard_output
 
     def document() -> str:
         return to_json({"format": "alloc-comparison/1", "rows": [row.to_dict() for row in rows]})
 
     is_table_wanted = not json and not (csv is not None and is_standard_output(csv))
-    save(lambda: _csv(rows), csv, document if json else None, [lambda: _tell(rows)] if is_table_wanted else [])
+    save(lambda: _csv(rows), csv, document if json else None, [lambda: _tell(rows, unit)] if is_table_wanted else [])
 
 
-def _tell(rows: "list[Row]") -> None:
-    header = ["instance", "method", "T (h)", "worst", "gap", "worst", "energy", "time (s)", "worst", "runs", "status"]
+def _tell(rows: "list[Row]", unit: str) -> None:
+    header = ["instance", "method", heading("T", unit), "worst", "gap", "worst", "energy"]
+    header += ["time (s)", "worst", "runs", "status"]
     say(table(header, [_cells(row) for row in rows], left=2))
     for row in rows:
         if row.reason:

@@ -12,7 +12,6 @@ from alloc.cli.output.files import read_pair
 
 if TYPE_CHECKING:
     from alloc.allocators import Result
-    from alloc.problems import Allocation, Instance
 
 EXAMPLES = examples(
     "alloc evaluate demo.json best.json",
@@ -73,9 +72,11 @@ def evaluate_command(
     json: options.JsonOption = False,
 ) -> None:
     """Score an allocation, wherever it comes from."""
+    from alloc.allocators.conclusion import scored_result
+
     problem, answer, claims = read_pair(instance, allocation)
     assert answer is not None
-    result = _scored(problem, answer)
+    result = scored_result(problem, answer, "evaluate")
     if claims:
         result, lines = with_claims(result, claims)
         for line in lines:
@@ -89,27 +90,6 @@ def evaluate_command(
     if score.reward_saturated:
         note("the reward (3) is too large for a float and stands at its most negative value")
     raise typer.Exit(1 if score.unserved_tasks or score.violations else 0)
-
-
-def _scored(problem: "Instance", allocation: "Allocation") -> "Result":
-    """Return the scores of an allocation as a result."""
-    from alloc.allocators import Result, StopReason
-    from alloc.problems import Objective, evaluate, makespan_lower_bound
-
-    score = evaluate(problem, allocation)
-    return Result(
-        instance=problem,
-        method="evaluate",
-        objective=Objective.MAKESPAN,
-        seed=0,
-        allocation=allocation,
-        evaluation=score,
-        lower_bound=None if score.unserved_tasks else makespan_lower_bound(problem),
-        energy_lower_bound=None,
-        stop_reason=StopReason.FINISHED,
-        runtime_s=0.0,
-        trace=(),
-    )
 
 
 def _scores(result: "Result") -> dict[str, object]:
@@ -143,7 +123,7 @@ def _tasks(result: "Result") -> list[TaskScore]:
 def _tell(result: "Result") -> None:
     from alloc.allocators.summary import bottleneck_lines, figures
     from alloc.cli.output.console import table
-    from alloc.problems.text import number
+    from alloc.problems.text import heading, number
 
     score = result.evaluation
     assert score is not None
@@ -158,7 +138,9 @@ def _tell(result: "Result") -> None:
         ]
         for entry in _tasks(result)
     ]
-    say(table(["task", "workload", "agents", "ability W", "W - h", "done at (h)"], rows))
+    units = result.instance.units
+    header = ["task", heading("workload", units.work), "agents", "ability W", "W - h", heading("done at", units.time)]
+    say(table(header, rows))
     say("\n".join(["", f"{result.instance.name}:", *figures(result), *bottleneck_lines(result)]))
     for violation in score.violations:
         agent, task = result.instance.agent_ids[violation.agent], result.instance.task_ids[violation.task]

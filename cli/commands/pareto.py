@@ -11,7 +11,7 @@ from alloc.cli import options
 from alloc.cli.options import examples
 from alloc.cli.output.console import is_terminal, note, say, table, to_json
 from alloc.cli.output.files import check_outputs, check_picture, read_known, save
-from alloc.problems.text import number, percent
+from alloc.problems.text import heading, labelled, number, percent
 
 if TYPE_CHECKING:
     from alloc.allocators import Result
@@ -55,7 +55,7 @@ def pareto_command(
     json: options.JsonOption = False,
     quiet: options.QuietOption = False,
 ) -> None:
-    """Trace the Pareto front of makespan and energy: how much energy each hour saved costs."""
+    """Trace the Pareto front of makespan and energy: how much energy saving time costs."""
     from alloc.allocators.pareto import pareto
 
     check_outputs(("--output", output), ("--plot", plot), read=[("INSTANCE", instance)])
@@ -92,11 +92,15 @@ def _tell(front: "Front", *, with_table: bool) -> None:
 def _show_point(result: "Result") -> None:
     """On a terminal, print each point as soon as it is known; the table follows at the end."""
     if is_terminal(sys.stderr):
-        say(f"T {number(result.makespan)} h, energy {number(result.energy)}, gap {percent(result.energy_gap)}")
+        makespan = labelled(number(result.makespan), result.instance.units.time)
+        energy = labelled(number(result.energy), result.instance.units.energy)
+        say(f"T {makespan}, energy {energy}, gap {percent(result.energy_gap)}")
 
 
 def _table(front: "Front") -> str:
-    header = ["T (h)", "slower", "energy", "saved", "at least", "gap", "time (s)", "method", "status"]
+    units = front.instance.units
+    header = [heading("T", units.time), "slower", heading("energy", units.energy), "saved", "at least", "gap"]
+    header += ["time (s)", "method", "status"]
     fastest = front.points[0]
     rows = [
         [

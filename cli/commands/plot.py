@@ -1,6 +1,6 @@
 """``alloc plot``."""
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -9,8 +9,13 @@ from alloc.cli.options import examples
 from alloc.cli.output.console import STANDARD
 from alloc.cli.output.files import check_outputs, check_picture
 
+if TYPE_CHECKING:
+    from alloc.allocators import Result
+    from alloc.problems import Instance
+
 EXAMPLES = examples(
     "alloc plot demo.json best.json --output best.png",
+    "alloc plot demo.json best.json --output best.pdf",
     "alloc solve demo.json --json | alloc plot demo.json - --output demo.svg",
 )
 
@@ -23,12 +28,13 @@ def register(app: typer.Typer) -> None:
 def plot_command(
     instance: options.InstanceArgument,
     result: Annotated[
-        str, typer.Argument(metavar="RESULT", help="A result of `alloc solve` on it; - is standard input.")
+        str,
+        typer.Argument(metavar="RESULT", help="A result of `alloc solve`, or an allocation; - is standard input."),
     ],
-    output: Annotated[str, typer.Option(metavar="FILE", help="Drawing to write: .png or .svg.")],
+    output: Annotated[str, typer.Option(metavar="FILE", help="Drawing to write: .png, .svg or .pdf.")],
 ) -> None:
-    """Draw a result: sites and moves, and when each task is done."""
-    from alloc.allocators import plot, read_result
+    """Draw a stored result or allocation: sites and moves, and when each task is done."""
+    from alloc.allocators import plot
     from alloc.problems import InputError
     from alloc.problems.formats import read_instance
 
@@ -36,4 +42,25 @@ def plot_command(
     check_picture(output)
     if instance == result == STANDARD:
         raise InputError("cannot be the instance and the result at once", source="standard input")
-    plot(read_result(result, read_instance(instance)), output)
+    plot(_read(result, read_instance(instance)), output)
+
+
+def _read(path: str, instance: "Instance") -> "Result":
+    """Read a result, or score an allocation."""
+    from alloc.allocators import Result
+    from alloc.allocators.conclusion import scored_result
+    from alloc.allocators.result_document import read_document
+    from alloc.problems import InputError
+    from alloc.problems.formats import allocation_from_document
+    from alloc.problems.formats.allocation_file import ALLOCATION_FORMAT
+    from alloc.problems.formats.files import named
+    from alloc.problems.formats.messages import told
+
+    document = read_document(path)
+    try:
+        if document.get("format") != ALLOCATION_FORMAT:
+            return Result.from_dict(document, instance)
+        allocation, _ = allocation_from_document(document, instance)
+        return scored_result(instance, allocation)
+    except InputError as error:
+        raise told(error, named(path)) from error.__cause__

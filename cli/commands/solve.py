@@ -8,8 +8,9 @@ import typer
 
 from alloc.cli import options
 from alloc.cli.options import examples
-from alloc.cli.output.console import note, say, to_json
-from alloc.cli.output.files import STANDARD, check_outputs, check_picture, save
+from alloc.cli.output.console import STANDARD, note, say, to_json
+from alloc.cli.output.files import check_outputs, check_picture, check_result, save
+from alloc.cli.output.plan import plan_tables
 from alloc.problems.vocabulary import Objective
 
 if TYPE_CHECKING:
@@ -19,6 +20,7 @@ EXAMPLES = examples(
     "alloc solve demo.json",
     "alloc solve demo.json --method ga --time-limit 30 --seed 1 --output best.json",
     "alloc solve demo.json --method ga --set population=200",
+    "alloc solve demo.json --output plan.html",
     "alloc solve demo.json --objective makespan-energy --plot demo.png",
     "alloc solve demo.json --objective makespan-energy --makespan-slack 0.05",
     "alloc solve demo.json --start best.json --target-gap 0.01",
@@ -37,7 +39,7 @@ SlackOption = Annotated[
 ]
 LimitOption = Annotated[
     float | None,
-    typer.Option(metavar="HOURS", help="With energy: accept makespans up to this one.", show_default=False),
+    typer.Option(metavar="TIME", help="With energy: accept makespans up to this one.", show_default=False),
 ]
 StartOption = Annotated[
     str | None,
@@ -59,7 +61,11 @@ DeviceOption = Annotated[
     str | None, typer.Option(help="Where a learned method computes: cpu or cuda.", show_default="cpu")
 ]
 OutputOption = Annotated[
-    str | None, typer.Option(metavar="FILE", help="Write the result here as JSON; - is standard output.")
+    str | None,
+    typer.Option(
+        metavar="FILE",
+        help="Write the result here: .json, .csv, .xlsx, .geojson or .html (a map); - is JSON on standard output.",
+    ),
 ]
 
 
@@ -100,10 +106,12 @@ def solve_command(
     read = [("INSTANCE", instance), ("--policy", policy), ("--pin-file", pin_file)]
     check_outputs(("--output", output), ("--plot", plot), read=read)
     check_picture(plot)
+    check_result(output)
     if [instance, start, pin_file].count(STANDARD) > 1:
         raise InputError("can be only one of instance, --start and --pin-file", source="standard input")
     problem = read_instance(instance)
-    with Progress(wanted=not quiet) as progress:
+    check_result(output, problem)
+    with Progress(not quiet, problem.units.time, problem.units.energy) as progress:
         result = solve(
             problem,
             method,
@@ -159,11 +167,21 @@ def _save(result: "Result", output: str | None, plot: str | None, *, json: bool,
 
         then.append(lambda: plotting.plot(result, plot))
     text = cache(lambda: to_json(result.to_dict()))
-    save(text, output, text if json else None, then)
+    save(text, output, text if json else None, then, None if output is None else _content(result, output))
+
+
+def _content(result: "Result", output: str) -> Callable[[], bytes] | None:
+    """Return what makes the content of a file of this name; None for the JSON that is printed too."""
+    from alloc.allocators.plan.files import JSON, content, suffix_of
+
+    suffix = suffix_of(output)
+    return None if suffix == JSON else lambda: content(result, suffix)
 
 
 def _tell(result: "Result", *, summary: bool) -> None:
     if summary:
+        for part in plan_tables(result):
+            say(f"{part}\n")
         say(str(result))
     for line in result.notes:
         note(line)

@@ -7,7 +7,7 @@ import typer
 from alloc.cli import options
 from alloc.cli.options import examples
 from alloc.cli.output.console import complain, note, say, write_json
-from alloc.problems.text import counted, number, percent
+from alloc.problems.text import counted, labelled, number, percent
 
 if TYPE_CHECKING:
     from alloc.problems import Instance
@@ -53,13 +53,14 @@ def validate_command(
     wrong = 0
     for name in instances:
         try:
-            facts.append(_facts(name, read_instance(name)))
+            instance = read_instance(name)
+            facts.append(_facts(name, instance))
         except InputError as error:
             wrong += 1
             complain(str(error))
             continue
         if not json:
-            say(_words(facts[-1]))
+            say(_words(facts[-1], instance.units.time))
             for finding in facts[-1]["findings"]:
                 note(f"{name}: {finding['field']}: {finding['message']}")
     if json and facts:
@@ -91,11 +92,11 @@ def _facts(file: str, instance: "Instance") -> Facts:
     }
 
 
-def _words(fact: Facts) -> str:
+def _words(fact: Facts, unit: str) -> str:
     served = "every task can be served"
     if fact["fewest_unserved"]:
         served = f"at least {fact['fewest_unserved']} of the tasks cannot be served"
-    bound = "" if fact["lower_bound"] is None else f", makespan at least {number(fact['lower_bound'])} h"
+    bound = "" if fact["lower_bound"] is None else f", makespan at least {labelled(number(fact['lower_bound']), unit)}"
     return (
         f"{fact['file']}: ok, {counted(fact['agents'], 'agent')} with ability {number(fact['total_ability'])} in all,"
         f" {counted(fact['tasks'], 'task')} with workload {number(fact['total_workload'])},"

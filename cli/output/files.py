@@ -67,6 +67,7 @@ def save(
     output: str | None,
     shown: Callable[[], str] | None = None,
     then: Iterable[Callable[[], object]] = (),
+    content: Callable[[], bytes] | None = None,
 ) -> None:
     """Write the answer of a run to a file and to standard output, then take further steps such as drawing it.
 
@@ -81,18 +82,23 @@ def save(
         A file, or ``-``.
     then : iterable of callable
         Further steps, such as printing a summary and drawing.
+    content : callable, optional
+        Return what the file holds, where that is not the text.
 
     Raises
     ------
     InputError, OSError
         The first failure, after all other steps.
     """
-    from alloc.problems.formats import is_standard_output, write_text_atomically
+    from alloc.problems.formats import is_standard_output, write_bytes_atomically, write_text_atomically
 
     to_standard_output = output is not None and is_standard_output(output)
     steps: list[Callable[[], None]] = []
     if output is not None and not to_standard_output:
-        steps.append(lambda: write_text_atomically(output, found()))
+        if content is None:
+            steps.append(lambda: write_text_atomically(output, found()))
+        else:
+            steps.append(lambda: write_bytes_atomically(output, content()))
     printed = found if to_standard_output else shown
     if printed is not None:
         steps.append(lambda: write_out(printed()))
@@ -145,6 +151,17 @@ def _parts(name: str) -> list[str]:
 def _may_be_replaced(name: str) -> bool:
     """Return whether it is a regular file, or will be: a device such as /dev/null may be written twice."""
     return os.path.isfile(name) or not os.path.exists(name)
+
+
+def check_result(path: str | None, instance: "Instance | None" = None) -> None:
+    """Raise an error if there is a result to write, and the suffix is unknown or does not go with the instance."""
+    if path is not None:
+        from alloc.allocators.plan.files import check_result_file, suffix_of
+
+        if instance is None:
+            suffix_of(path)
+        else:
+            check_result_file(path, instance)
 
 
 def check_picture(path: str | None) -> None:

@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING
 
 from alloc.cli.output.console import flush, is_terminal
-from alloc.problems.text import counted, number, percent
+from alloc.problems.text import counted, labelled, number, percent
 
 if TYPE_CHECKING:
     from alloc.allocators import Improvement
@@ -26,9 +26,12 @@ class Progress:
     ----------
     wanted : bool
         Nothing is shown if False, or if standard error is no terminal or cannot clear a line (``TERM=dumb``).
+    time_unit, energy_unit : str
+        Labels behind the figures.
     """
 
-    def __init__(self, wanted: bool = True) -> None:
+    def __init__(self, wanted: bool = True, time_unit: str = "", energy_unit: str = "") -> None:
+        self._units = time_unit, energy_unit
         self._wanted = wanted and is_terminal(sys.stderr) and os.environ.get("TERM") not in ("dumb", "unknown")
         self._best: Improvement | None = None
         self._end = threading.Event()
@@ -56,22 +59,24 @@ class Progress:
             return
         while True:
             width = shutil.get_terminal_size().columns - 1
-            _put(CLEAR + progress_line(time.monotonic() - self._begin, self._best)[:width])
+            _put(CLEAR + progress_line(time.monotonic() - self._begin, self._best, *self._units)[:width])
             if self._end.wait(EVERY_S):
                 break
         _put(CLEAR)
 
 
-def progress_line(elapsed_s: float, best: "Improvement | None") -> str:
+def progress_line(elapsed_s: float, best: "Improvement | None", time_unit: str = "", energy_unit: str = "") -> str:
     """Return the text of the line."""
     if best is None:
         return f"{elapsed_s:6.1f} s  no allocation yet; the first run of some methods compiles them"
     score = best.evaluation
+    energy = labelled(number(score.energy), energy_unit)
     if score.makespan is None:
         unserved = counted(len(score.unserved_tasks), "task")
-        return f"{elapsed_s:6.1f} s  {unserved} unserved  energy {number(score.energy)}"
+        return f"{elapsed_s:6.1f} s  {unserved} unserved  energy {energy}"
     gap = max(0.0, 1 - best.lower_bound / score.makespan) if score.makespan else 0.0
-    return f"{elapsed_s:6.1f} s  T {number(score.makespan)} h  gap {percent(gap)}  energy {number(score.energy)}"
+    makespan = labelled(number(score.makespan), time_unit)
+    return f"{elapsed_s:6.1f} s  T {makespan}  gap {percent(gap)}  energy {energy}"
 
 
 def _put(text: str) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from alloc.problems import Instance
+from alloc.problems import Instance, Units
 from alloc.problems.formats import write_instance
 
 HERE = Path(__file__).parent
@@ -59,6 +59,7 @@ def build() -> Instance:
         task_position=np.round([[*project(site[0]), 0.0] for site in sites], 3),
         priority=[float(site[0]["magnitude"]) for site in sites],
         energy_per_distance=KWH_PER_KM,
+        units=Units(time="h", distance="km", energy="kWh", work="km2"),
     )
 
 

@@ -28,7 +28,7 @@ def test_abilities_are_rounded_up(ability, whole, text):
 def test_ties_gain_nothing():
     """Tasks that are last together are named, and one more agent on one of them gains nothing."""
     lines = bottleneck_lines(solve(Instance(ability=[2, 2], workload=[2, 2]), "greedy", handle_signals=False))
-    assert lines[0].startswith("Last: 2 of 2 tasks together, at 1 h: t1, t2")
+    assert lines[0].startswith("Last: 2 of 2 tasks together, at 1: t1, t2")
     assert "gains nothing" in lines[1]
     assert "100 % of all ability is at work" in lines[2]
 
@@ -36,7 +36,7 @@ def test_ties_gain_nothing():
 def test_single_task_says_what_a_median_agent_gains():
     """Without a next task there is no ability that is enough; the median agent stands in."""
     lines = bottleneck_lines(solve(Instance(ability=[3], workload=[6]), "greedy", handle_signals=False))
-    assert "of ability 3, the median, gains 50 %: 1 h" in lines[1]
+    assert "of ability 3, the median, gains 50 %: 1." in lines[1]
 
 
 def test_finite_speeds_say_so():

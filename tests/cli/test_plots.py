@@ -1,8 +1,10 @@
 """`alloc plot` and `--plot` write a drawing, and print nothing beside it."""
 
+import json
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from matplotlib.testing.compare import compare_images
@@ -39,11 +41,19 @@ def test_plot_draws_what_solve_drew(alloc, small):
     assert compare_images("one.png", "three.png", 0) is None
 
 
+def test_an_allocation_is_drawn(alloc, small):
+    """An allocation alone, as another program writes it, is scored and drawn, as .pdf too."""
+    document = {"format": "alloc-allocation/1", "instance": "small", "assignment": {"a1": "t1", "a4": "t2"}}
+    Path("plan.json").write_text(json.dumps(document))
+    assert alloc("plot", "small.json", "plan.json", "--output", "plan.pdf") == type(alloc("--version"))(0, "", "")
+    assert Path("plan.pdf").read_bytes().startswith(b"%PDF")
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         (("small.json", "small.json", "--output", "p.png"), "small.json: format: "),
-        (("small.json", "r.json", "--output", "p.gif"), "p.gif: must end in .png or .svg"),
+        (("small.json", "r.json", "--output", "p.gif"), "p.gif: must end in .png, .svg or .pdf"),
         (("-", "-", "--output", "p.png"), "standard input: cannot be the instance and the result at once"),
         (("small.json", "r.json", "--output", "small.json"), "small.json: is INSTANCE and --output at once"),
     ],

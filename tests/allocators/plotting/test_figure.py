@@ -1,12 +1,20 @@
 import numpy as np
 import pytest
 
-from alloc.allocators import solve
+from alloc.allocators import Result, solve
+from alloc.allocators.conclusion import scored_result
 from alloc.allocators.pareto import pareto
-from alloc.allocators.plotting import plot, plot_front
+from alloc.allocators.plan.places import places, two_axes
+from alloc.allocators.plotting import plot, plot_convergence, plot_front
 from alloc.allocators.plotting.labels import place_labels, visible
-from alloc.allocators.plotting.moves import flows, two_axes, wedges
-from alloc.problems import Allocation, Family, InputError, Instance, random_instance
+from alloc.allocators.plotting.moves import flows, wedges
+from alloc.allocators.plotting.times import listed
+from alloc.problems import Allocation, Family, InputError, Instance, Units, random_instance
+
+
+def planned(instance: Instance, plan: list[int]) -> Result:
+    """Return the result with one plan."""
+    return scored_result(instance, Allocation(plan))
 
 
 def axes_of(instance: Instance):
@@ -14,9 +22,9 @@ def axes_of(instance: Instance):
 
 
 def test_sites_and_times_are_drawn(small):
-    """With positions there are sites, times and a colour scale; bars are as long as the tasks take, the last first."""
+    """With positions there are a map and times; bars are as long as the tasks take, the last first."""
     result = solve(small, "greedy", handle_signals=False)
-    sites, times, _ = plot(result).axes
+    sites, times = plot(result).axes
     widths = [bar.get_width() for bar in times.patches]
     assert widths == sorted(result.evaluation.completion_time.tolist(), reverse=True)
     assert {text.get_text() for text in sites.texts} >= {"t1", "t2", "t3"}
@@ -26,7 +34,7 @@ def test_without_positions_times_alone_are_drawn():
     """An instance that knows no places has bars only."""
     (times,) = axes_of(Instance(ability=[1, 2], workload=[1, 0]))
     assert len(times.patches) == 2
-    assert [text.get_text() for text in times.texts] == ["no work"]
+    assert [text.get_text() for text in times.texts] == ["no work", "a1, a2"]
 
 
 def test_unserved_tasks_are_hatched(unservable):
@@ -56,7 +64,7 @@ def test_odd_instances_are_drawn(more):
 def test_many_tasks_are_drawn_upright_without_names():
     """Beyond 40 tasks the bars stand, and beyond 60 nothing is named."""
     rng = np.random.default_rng(0)
-    sites, times, _ = axes_of(Instance(ability=np.ones(300), workload=np.ones(200), task_position=rng.random((200, 3))))
+    sites, times = axes_of(Instance(ability=np.ones(300), workload=np.ones(200), task_position=rng.random((200, 3))))
     assert len(times.patches) == 200
     assert len(sites.texts) == 0
 
@@ -69,11 +77,11 @@ def test_flows_are_gathered_by_place_and_task():
         task_position=[[0, 0], [1, 0]],
         start_task=[0, 0, 0, 1, -1],
     )
-    moves = flows(instance, Allocation([1, 1, 0, -1, 0]))
+    moves = flows(places(instance), Allocation([1, 1, 0, -1, 0]))
     assert moves.count.tolist() == [2]
-    assert moves.begin.tolist() == [[0, 0, 0]]
-    assert moves.end.tolist() == [[1, 0, 0]]
-    (shape,) = wedges(moves, (0, 1), 1.0)
+    assert moves.begin.tolist() == [[0, 0]]
+    assert moves.end.tolist() == [[1, 0]]
+    (shape,) = wedges(moves, 1.0)
     assert shape[1].tolist() == [1, 0]
     assert shape[0, 1] == -shape[2, 1] > 0
 
@@ -112,7 +120,7 @@ def test_very_many_agents_and_tasks_are_drawn_by_a_sample():
     assert not times.patches
 
 
-@pytest.mark.parametrize("suffix", ["png", "svg"])
+@pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
 def test_plot_writes_the_figure_that_it_returns(small, tmp_path, suffix):
     """With a path the drawing is written too, and figures made by pyplot stay as they are."""
     from matplotlib import pyplot
@@ -120,14 +128,14 @@ def test_plot_writes_the_figure_that_it_returns(small, tmp_path, suffix):
     before = pyplot.get_fignums()
     path = tmp_path / f"picture.{suffix}"
     figure = plot(solve(small, "greedy", handle_signals=False), str(path))
-    assert len(figure.axes) == 3
+    assert len(figure.axes) == 2
     assert path.stat().st_size > 5_000
     assert pyplot.get_fignums() == before
 
 
 def test_other_suffixes_are_refused_before_drawing(small, tmp_path):
-    """Only .png and .svg are written; the error names the file, and nothing is left behind."""
-    with pytest.raises(InputError, match=r"picture\.gif: must end in \.png or \.svg"):
+    """Only pictures are written; the error names the file, and nothing is left behind."""
+    with pytest.raises(InputError, match=r"picture\.gif: must end in \.png, \.svg or \.pdf"):
         plot(solve(small, "greedy", handle_signals=False), str(tmp_path / "picture.gif"))
     assert not (tmp_path / "picture.gif").exists()
 
@@ -138,3 +146,122 @@ def test_a_front_is_drawn_as_steps_with_its_bounds(small):
     (axes,) = plot_front(front).axes
     assert axes.lines[1].get_xdata().tolist() == [result.makespan for result in front.points]
     assert {"best found", "proven impossible"} == {text.get_text() for text in axes.get_legend().get_texts()}
+
+
+def legend(axes):
+    return [text.get_text() for text in axes.get_legend().get_texts()]
+
+
+def fleet(**more):
+    """Three agents at a base, one at another place, and two tasks, one of them long."""
+    fields = {
+        "name": "fleet",
+        "agent_ids": ["north-1", "north-2", "north-3", "west"],
+        "ability": [1, 1, 1, 1],
+        "agent_position": [[0, 4], [0, 4], [0, 4], [-3, 0]],
+        "task_ids": ["bridge", "dam"],
+        "workload": [2, 4],
+        "task_position": [[0, 0], [3, 2]],
+    }
+    return Instance(**{**fields, **more})
+
+
+def test_bases_are_named_with_counts():
+    """Agents that begin together are one square, named by what their ids share; a single agent has its own name."""
+    sites, _ = axes_of(fleet())
+    names = {text.get_text() for text in sites.texts}
+    assert {"north (3)", "west", "bridge", "dam"} <= names
+    assert legend(sites) == [
+        "task; area: workload, number: agents",
+        "base (number of agents)",
+        "start of one agent",
+        "move, thin end at the task",
+    ]
+
+
+def test_nameless_bases_list_few_agents():
+    """Where ids share nothing, a base of a small fleet has the names of its agents, in a large one a number."""
+    sites, _ = axes_of(fleet(agent_ids=["ann", "ben", "cid", "dan"]))
+    assert "ann, ben, cid" in {text.get_text() for text in sites.texts}
+    many = Instance(
+        ability=np.ones(40),
+        workload=[1, 2],
+        agent_position=[[0, 0]] * 20 + [[5, 5]] * 20,
+        task_position=[[0, 5], [5, 0]],
+    )
+    assert {"base 1 (20)", "base 2 (20)"} <= {text.get_text() for text in axes_of(many)[0].texts}
+
+
+def test_bars_name_their_groups():
+    """Each bar says who is on the task."""
+    _, times = plot(planned(fleet(), [0, 1, 1, 0])).axes
+    assert {text.get_text() for text in times.texts} == {"north-1, west", "north-2, north-3"}
+
+
+@pytest.mark.parametrize(
+    ("longest", "text"), [(30, "ann, ben, cid, dora"), (15, "ann and 3 more"), (12, "4 agents"), (5, "")]
+)
+def test_groups_are_cut_to_their_bars(longest, text):
+    """A bar holds as many names as fit, else the number of agents, else nothing."""
+    assert listed(["ann", "ben", "cid", "dora"], longest) == text
+
+
+def test_units_are_on_the_axes():
+    """Labels of units stand on axes and in the title, and there are none where the instance has none."""
+    sites, times = axes_of(fleet(units=Units(time="min", distance="km", energy="kWh")))
+    assert (sites.get_xlabel(), sites.get_ylabel()) == ("x (km)", "y (km)")
+    assert times.get_xlabel() == "completion time (min)"
+    assert " min, gap" in sites.figure.get_suptitle()
+    assert " kWh" in sites.figure.get_suptitle()
+    sites, times = axes_of(fleet())
+    assert (sites.get_xlabel(), times.get_xlabel()) == ("x", "completion time")
+
+
+def test_colours_have_a_scale_where_they_differ():
+    """The colour bar is there if tasks are done at different times, and not where all are done together."""
+    scales = [plot(planned(fleet(), plan)).axes[0].child_axes for plan in ([0, 1, 1, 1], [0, 1, 1, -1])]
+    assert [len(found) for found in scales] == [1, 0]
+
+
+def test_the_earth_keeps_its_shape():
+    """Near 60 degrees north a degree of latitude is drawn twice as long as one of longitude, also at the date line."""
+    instance = fleet(
+        metric="geographic",
+        agent_position=[[179, 60]] * 3 + [[-179, 59.5]],
+        task_position=[[179.5, 60.5], [-179.5, 60]],
+    )
+    sites, _ = axes_of(instance)
+    assert sites.get_aspect() == pytest.approx(2, rel=0.02)
+    assert sites.get_xlabel() == "longitude (°)"
+    low, high = sites.get_xlim()
+    assert 178 < low < high < 182.5
+    assert sites.xaxis.get_major_formatter()(181) == "-179"
+
+
+def test_long_names_stay_different():
+    """Names that begin alike are not shortened to the same label."""
+    ids = [f"inspection of the southern pylon {number}" for number in (1, 2)]
+    _, times = axes_of(fleet(task_ids=ids))
+    labels = [label.get_text() for label in times.get_yticklabels()]
+    assert len(set(labels)) == 2
+    assert all(len(label) <= 18 for label in labels)
+
+
+def test_runs_are_drawn_over_time(small):
+    """Each run is a line that falls to its makespan, below the best bound of all; energy has a panel if it counts."""
+    runs = [solve(small, "ga", seed=seed, iterations=5, handle_signals=False) for seed in (0, 1)]
+    (axes,) = plot_convergence(runs).axes
+    assert legend(axes) == ["ga, seed 0", "ga, seed 1", "best lower bound"]
+    assert axes.lines[0].get_ydata()[-1] == runs[0].makespan
+    both = solve(small, "greedy", objective="makespan-energy", handle_signals=False)
+    assert [axes.get_ylabel() for axes in plot_convergence([*runs, both]).axes] == ["makespan", "energy"]
+    assert len(plot_convergence(both).axes) == 2
+
+
+def test_runs_on_several_instances_are_refused(small):
+    """There is one axis of makespans, so that runs of other instances, or none, are an error."""
+    other = solve(fleet(), "greedy", handle_signals=False)
+    with pytest.raises(InputError, match="results: must be of one instance"):
+        plot_convergence([other, solve(small, "greedy", handle_signals=False)])
+    with pytest.raises(InputError, match="results: must hold"):
+        plot_convergence([])

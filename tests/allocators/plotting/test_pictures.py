@@ -13,10 +13,10 @@ import pytest
 from matplotlib.testing.compare import compare_images
 from PIL import Image
 
-from alloc.allocators import Fleet, Result, StopReason, WhatIf
+from alloc.allocators import Fleet, Result, StopReason, TracePoint, WhatIf
 from alloc.allocators.pareto import Front
-from alloc.allocators.plotting import plot, plot_front, plot_whatif
-from alloc.problems import Allocation, Instance, Objective, evaluate
+from alloc.allocators.plotting import plot, plot_convergence, plot_front, plot_whatif
+from alloc.problems import Allocation, Instance, Objective, Units, evaluate
 
 KEPT = Path(__file__).parent / "pictures"
 
@@ -86,6 +86,51 @@ def lines() -> Result:
     return planned(instance, np.where(j < 1000, j, 0).tolist())
 
 
+def bases() -> Result:
+    """Bases with names, units, all tasks done together: no colour bar, and groups named in the bars."""
+    instance = Instance(
+        name="bases",
+        agent_ids=["Alta-1", "Alta-2", "Alta-3", "Bodø-1", "Bodø-2"],
+        ability=[1, 1, 1, 1, 1],
+        agent_position=[[0, 0]] * 3 + [[4, 1]] * 2,
+        task_ids=["north", "south"],
+        workload=[4, 6],
+        task_position=[[1, 3], [3, -1]],
+        units=Units(time="h", distance="km", energy="kWh"),
+    )
+    return planned(instance, [0, 0, 1, 1, 1], lower_bound=2.0)
+
+
+def earth() -> Result:
+    """Longitudes and latitudes on both sides of the date line, far north: degrees are not as long as wide."""
+    instance = Instance(
+        name="earth",
+        ability=[1, 2, 3],
+        workload=[3, 5, 8],
+        agent_position=[[176, 68], [-178, 71], [-175, 66]],
+        task_position=[[179, 70], [-179, 67], [-176, 69]],
+        metric="geographic",
+    )
+    return planned(instance, [0, 1, 2], lower_bound=1.0)
+
+
+def runs() -> list[Result]:
+    """Two runs of one method and one of another, with energy."""
+    traces = [(0.01, 4.0, 9.0), (0.1, 2.0, 10.0), (2.0, 1.5, 8.0)], [(0.02, 3.0, 7.0), (1.0, 1.25, 6.0)]
+    seeds = [
+        planned(
+            two_sites(),
+            [0, 1, 1],
+            seed=seed,
+            runtime_s=4.0,
+            trace=tuple(TracePoint(*point) for point in trace),
+            lower_bound=1.0,
+        )
+        for seed, trace in enumerate(traces)
+    ]
+    return [*seeds, replace(seeds[0], method="other", trace=(TracePoint(0.05, 2.5, 9.5), TracePoint(3.0, 1.1, 9.0)))]
+
+
 def two_sites() -> Instance:
     return Instance(
         name="front",
@@ -132,6 +177,9 @@ DRAWN: dict[str, Callable[[str], object]] = {
     "times": lambda path: plot(times(), path),
     "many": lambda path: plot(many(), path),
     "lines": lambda path: plot(lines(), path),
+    "bases": lambda path: plot(bases(), path),
+    "earth": lambda path: plot(earth(), path),
+    "runs": lambda path: plot_convergence(runs(), path),
     "nothing": lambda path: plot(replace(moves(), allocation=None, evaluation=None), path),
     "front": lambda path: plot_front(front(1.3, 2.0), path),
     "wide-front": lambda path: plot_front(front(2.0, 5.0, 20.0), path),
@@ -175,6 +223,16 @@ def one_elsewhere(result: Result, agent: int, task: int) -> Result:
     return replace(result, allocation=allocation, evaluation=evaluate(result.instance, allocation))
 
 
+def together(instance: Instance) -> Instance:
+    """Put all agents at one base."""
+    return replace(instance, agent_position=[[0, 0]] * 5)
+
+
+def flat(instance: Instance) -> Instance:
+    """Take degrees for lengths."""
+    return replace(instance, metric="euclidean")
+
+
 WRONG: dict[str, tuple[str, Callable[[str], object]]] = {
     "one agent goes elsewhere": ("moves", lambda path: plot(one_elsewhere(moves(), 4, 3), path)),
     "the idle one goes too": ("moves", lambda path: plot(one_elsewhere(moves(), 5, 2), path)),
@@ -185,6 +243,12 @@ WRONG: dict[str, tuple[str, Callable[[str], object]]] = {
         lambda path: plot(planned(many().instance, ((np.arange(80) + 1) % 80).tolist(), lower_bound=2.0), path),
     ),
     "all on one task": ("lines", lambda path: plot(planned(lines().instance, [0] * 1200), path)),
+    "all at one base": (
+        "bases",
+        lambda path: plot(planned(together(bases().instance), [0, 0, 1, 1, 1], lower_bound=2.0), path),
+    ),
+    "a plane": ("earth", lambda path: plot(planned(flat(earth().instance), [0, 1, 2], lower_bound=1.0), path)),
+    "a run is missing": ("runs", lambda path: plot_convergence(runs()[:2], path)),
     "a plan after all": ("nothing", lambda path: plot(moves(), path)),
     "a point is missing": ("front", lambda path: plot_front(front(2.0), path)),
     "a point elsewhere": ("front", lambda path: plot_front(front(1.5, 2.0), path)),

@@ -43,7 +43,7 @@ def test_violations_give_exit_code_1(alloc, unservable):
     assert alloc("evaluate", "unservable.json", "answer.json", "--json").json["tasks"][1]["agents"] == 0
 
 
-@pytest.mark.parametrize("words", ["task", "t2", "workload", "done at (h)", "Last: task"])
+@pytest.mark.parametrize("words", ["task", "t2", "workload", "done at", "Last: task"])
 def test_table_names_tasks(alloc, small, words):
     """People get a table with a row per task, and what holds the makespan up."""
     write({"a1": "t1", "a4": "t2", "a5": "t3"})
@@ -69,7 +69,7 @@ def test_the_bound_of_a_result_is_that_of_its_run(alloc, small):
         assert shown[field] == result[field]
     ran = alloc("evaluate", "small.json", "r.json")
     for line in solved.err.splitlines():
-        if "makespan" in line or "energy  " in line or "at work until then" in line:
+        if line.startswith(("  makespan", "  energy")) or "at work until then" in line:
             assert line in ran.err
 
 

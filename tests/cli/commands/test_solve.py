@@ -116,7 +116,7 @@ def test_a_drawing_in_svg_names_all(alloc, small):
     result = solve(small, "greedy", handle_signals=False)
     written = [words.strip() for words in re.findall("<!--(.*?)-->", content, re.DOTALL)]
     assert [written.count(name) for name in small.task_ids] == [1, 1, 1]  # at their bars
-    assert any(f"T = {number(result.makespan, 4)} h" in words for words in written)
+    assert any(f"T = {number(result.makespan, 4)}," in words for words in written)
 
 
 def test_the_saved_result_is_that_of_stdout(alloc, small):
@@ -150,7 +150,7 @@ def test_slack_buys_energy(alloc, small):
     assert loose.json["energy"] < strict["energy"]
     assert loose.json["status"] == "optimal"
     shown = alloc("solve", "small.json", "--objective", "makespan-energy", "--makespan-limit", "9").err
-    assert "optimal, no allocation within 9 h has less energy" in shown
+    assert "optimal, no allocation within 9 has less energy" in shown
 
 
 @pytest.mark.parametrize(
@@ -158,7 +158,7 @@ def test_slack_buys_energy(alloc, small):
     [
         (["--makespan-slack", "0.1"], "it is for the objective makespan-energy"),
         (["--makespan-slack", "inf", "--objective", "makespan-energy"], "must be a finite number"),
-        (["--makespan-limit", "0", "--objective", "makespan-energy"], "hours > 0"),
+        (["--makespan-limit", "0", "--objective", "makespan-energy"], "must be a finite number > 0"),
         (
             ["--makespan-limit", "3", "--objective", "makespan-energy", "--method", "ga"],
             "makes no use of slack for the makespan; use ",

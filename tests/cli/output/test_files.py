@@ -57,11 +57,12 @@ def test_standard_output_holds_one_thing(alloc, small):
 
 
 RUNS = [
-    ("solve", "small.json", "--method", "greedy", "-q", "--output"),
-    ("solve", "small.json", "--method", "greedy", "-q", "--plot"),
-    ("pareto", "small.json", "--points", "1", "--iterations", "1", "-q", "--output"),
-    ("pareto", "small.json", "--points", "1", "--iterations", "1", "-q", "--plot"),
-    ("compare", "small.json", "--methods", "greedy", "--csv"),
+    ("solve", "small.json", "--method", "greedy", "-q", "--output", "found.html"),
+    ("solve", "small.json", "--method", "greedy", "-q", "--output", "found.json"),
+    ("solve", "small.json", "--method", "greedy", "-q", "--plot", "found.png"),
+    ("pareto", "small.json", "--points", "1", "--iterations", "1", "-q", "--output", "found.json"),
+    ("pareto", "small.json", "--points", "1", "--iterations", "1", "-q", "--plot", "found.png"),
+    ("compare", "small.json", "--methods", "greedy", "--csv", "found.csv"),
 ]
 
 
@@ -78,9 +79,9 @@ def full_disk(monkeypatch):
 @pytest.mark.parametrize("arguments", RUNS)
 def test_what_cannot_be_written_after_a_run_is_printed(alloc, small, full_disk, arguments):
     """A disk that is full by the end of a run loses nothing: what was found is on standard output, with exit code 2."""
-    ran = alloc(*arguments, "found.png")
+    ran = alloc(*arguments)
     assert ran.code == 2
-    assert ran.err.splitlines()[-1] == "alloc: found.png: cannot be written: no space left on device"
+    assert ran.err.splitlines()[-1] == f"alloc: {arguments[-1]}: cannot be written: no space left on device"
     if arguments[0] == "compare":
         assert ran.out.startswith("instance,method,")
         assert ran.out.count("\n") == 2
@@ -91,7 +92,7 @@ def test_what_cannot_be_written_after_a_run_is_printed(alloc, small, full_disk, 
 @pytest.mark.parametrize("arguments", RUNS)
 def test_what_is_printed_anyway_is_printed_once(alloc, small, full_disk, arguments):
     """With --json standard output holds one document, whatever fails beside it."""
-    ran = alloc(*arguments, "found.png", "--json")
+    ran = alloc(*arguments, "--json")
     assert (ran.code, ran.json["format"].split("-")[0]) == (2, "alloc")
 
 
@@ -157,9 +158,9 @@ def test_file_names_that_are_no_utf_8(small, tmp_path):
     save_policy(tmp_path / f"{old}.safetensors", [ActorCritic(NetworkSize(4, 4, 1))], "ppo")
     solve = ("solve", f"{old}.json", "--seed", "1", "--iterations", "1")
     commands = (
-        (*solve, "--method", "greedy", "--output", f"{old}.out", "--plot", f"{old}.png"),
+        (*solve, "--method", "greedy", "--output", f"{old}-result.json", "--plot", f"{old}.png"),
         (*solve, "--method", "ppo", "--policy", f"{old}.safetensors"),
-        ("evaluate", f"{old}.json", f"{old}.out"),
+        ("evaluate", f"{old}.json", f"{old}-result.json"),
         ("convert", f"{old}.json", old),
         ("convert", old, f"{old}.npz"),
         ("validate", f"{old}.json", f"{old}.npz", old),
@@ -169,4 +170,4 @@ def test_file_names_that_are_no_utf_8(small, tmp_path):
     command = [sys.executable, "-c", program, *map("|".join, commands)]
     ran = subprocess.run(command, capture_output=True, cwd=tmp_path)
     assert ran.returncode == 0, ran.stderr
-    assert json.loads((tmp_path / f"{old}.out").read_text())["instance"] == "caf\N{REPLACEMENT CHARACTER}"
+    assert json.loads((tmp_path / f"{old}-result.json").read_text())["instance"] == "caf\N{REPLACEMENT CHARACTER}"

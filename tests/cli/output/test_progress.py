@@ -25,7 +25,7 @@ def test_line_tells_seconds_makespan_gap_and_energy(small):
     assert progress_line(2.0, None).startswith("   2.0 s  no allocation yet; ")
     assert "  1 task unserved" in progress_line(2.0, improvement(small, [0, 1, -1, -1, -1]))
     assert "2 tasks unserved" in progress_line(2.0, improvement(small, [0, -1, -1, -1, -1]))
-    assert "T 1.625 h  gap 38.5 %  energy 6" in progress_line(2.0, improvement(small, [0, 0, 0, 1, 2]))
+    assert "T 1.625  gap 38.5 %  energy 6" in progress_line(2.0, improvement(small, [0, 0, 0, 1, 2]))
 
 
 def test_shown_on_terminals_and_cleared(small, monkeypatch):
@@ -38,7 +38,7 @@ def test_shown_on_terminals_and_cleared(small, monkeypatch):
         shown.update(improvement(small, [0, 0, 0, 1, 2]))
         time.sleep(0.2)
     text = sys.stderr.getvalue()  # type: ignore[attr-defined]
-    assert "T 1.625 h" in text
+    assert "T 1.625 " in text
     assert text.endswith(CLEAR)
 
 

@@ -1,0 +1,65 @@
+"""A plan as GeoJSON (RFC 7946): points of tasks and agents, and a line for each move."""
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from alloc.allocators.plan.table import AgentRow, TaskRow, agent_rows, task_rows
+from alloc.problems.formats import json_text
+
+if TYPE_CHECKING:
+    from alloc.allocators.result import Result
+
+Position = list[float]
+Feature = dict[str, object]
+
+
+def to_geojson(result: "Result") -> str:
+    """Return a collection of features; the property `kind` is task, agent or move."""
+    instance = result.instance
+    tasks = dict(zip(instance.task_ids, instance.task_position.tolist(), strict=True))
+    starts = dict(zip(instance.agent_ids, instance.start_position.tolist(), strict=True))
+    features: list[Feature] = []
+    agents = agent_rows(result)
+    for task in task_rows(result):
+        features += _point("task", task, tasks[task.task])
+    for agent in agents:
+        features += _point("agent", agent, starts[agent.agent])
+    for agent in agents:
+        if agent.task is not None and not agent.violation:
+            features += _move(agent, starts[agent.agent], tasks[agent.task])
+    units = {name: label for name, label in asdict(instance.units).items() if label}
+    document: dict[str, object] = {"type": "FeatureCollection", "name": instance.name, "units": units}
+    return json_text.lines({**document, "features": features})
+
+
+def _point(kind: str, row: AgentRow | TaskRow, place: Position) -> list[Feature]:
+    """Return a point; none where the place is unknown."""
+    if np.isnan(place[0]):
+        return []
+    return [_feature(kind, row, {"type": "Point", "coordinates": _position(place)})]
+
+
+def _move(row: AgentRow, start: Position, goal: Position) -> list[Feature]:
+    """Return a line, in two parts where it crosses the date line; none where nothing is known, or nobody moves."""
+    if np.isnan(start[0]) or np.isnan(goal[0]) or start == goal:
+        return []
+    first, second = _position(start), _position(goal)
+    if abs(goal[0] - start[0]) <= 180:
+        return [_feature("move", row, {"type": "LineString", "coordinates": [first, second]})]
+    edge = 180.0 if start[0] > 0 else -180.0
+    before, after = abs(edge - start[0]), abs(edge + goal[0])
+    share = before / (before + after) if before + after else 0.5
+    latitude = start[1] + share * (goal[1] - start[1])
+    parts = [[first, [edge, latitude]], [[-edge, latitude], second]]
+    return [_feature("move", row, {"type": "MultiLineString", "coordinates": parts})]
+
+
+def _position(place: Position) -> Position:
+    """Return longitude, latitude and, unless it is 0, altitude."""
+    return place if place[2] else place[:2]
+
+
+def _feature(kind: str, row: AgentRow | TaskRow, geometry: dict[str, object]) -> Feature:
+    return {"type": "Feature", "geometry": geometry, "properties": {"kind": kind, **asdict(row)}}

@@ -1,0 +1,69 @@
+"""Who does what, as tables for the terminal."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from alloc.cli.output.console import table
+from alloc.problems.text import number, short_names
+
+if TYPE_CHECKING:
+    from alloc.allocators import Result
+    from alloc.allocators.plan.table import Column, Row, Value
+
+MOST_ROWS = 50
+"""Rows of a table before it is cut."""
+
+MOST_NAMES = 6
+"""Agents of a group that are named."""
+
+LONGEST_NAME = 24
+"""Characters of a name before it is shortened."""
+
+
+def plan_tables(result: "Result") -> list[str]:
+    """Return a table by task and one by agent, each of up to 50 rows; none where there is no allocation."""
+    import numpy as np
+
+    from alloc.allocators.plan.table import agent_columns, agent_rows, task_columns, task_rows
+
+    instance = result.instance
+    if result.allocation is None:
+        return []
+    agents = agent_rows(result, np.arange(min(instance.n, MOST_ROWS)))
+    tasks = task_rows(result, np.arange(min(instance.m, MOST_ROWS)))
+    return [
+        _table(task_columns(instance), tasks, instance.m, "tasks"),
+        _table(agent_columns(instance), agents, instance.n, "agents"),
+    ]
+
+
+def _table(columns: "Sequence[Column[Row]]", rows: "Sequence[Row]", count: int, what: str) -> str:
+    values = [[column.value(row) for row in rows] for column in columns]
+    cells = [_cells(column) for column in values]
+    lines = table([column.heading for column in columns], list(zip(*cells, strict=True)), left=_left(values))
+    if count > len(rows):
+        lines += f"\n... and {count - len(rows)} more {what}; --output with .csv, .xlsx or .html has all"
+    return lines
+
+
+def _cells(values: "list[Value]") -> list[str]:
+    """Return the cells of a column, in which no two names are shortened to the same."""
+    names = [value for value in values if isinstance(value, str)]
+    short = dict(zip(names, short_names(names, LONGEST_NAME), strict=True))
+    cells = [short[value] if isinstance(value, str) else _cell(value) for value in values]
+    if not any(isinstance(value, tuple) for value in values):
+        return cells
+    width = max(map(len, cells))
+    return [cell.ljust(width) for cell in cells]
+
+
+def _cell(value: "float | tuple[str, ...] | None") -> str:
+    if not isinstance(value, tuple):
+        return number(value, 5)
+    more = f" and {len(value) - MOST_NAMES} more" if len(value) > MOST_NAMES else ""
+    return (", ".join(short_names(value[:MOST_NAMES], LONGEST_NAME)) + more) or "-"
+
+
+def _left(values: "list[list[Value]]") -> int:
+    """Return how many of the first columns are names."""
+    return next((place for place, column in enumerate(values) if any(isinstance(one, float) for one in column)), 1)

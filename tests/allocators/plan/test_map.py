@@ -1,0 +1,114 @@
+"""The page with the map: what it holds, and what a browser makes of it."""
+
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from alloc.allocators import Result, write_result
+from alloc.allocators.conclusion import scored_result
+from alloc.allocators.plan.map import document
+from alloc.problems import Allocation, Instance
+
+BROWSER = shutil.which("chromium") or shutil.which("google-chrome")
+
+
+def harbour(**more: object) -> Instance:
+    """Four agents, two of them at one base and one at a task, and three tasks, one of which is not served."""
+    fields: dict[str, object] = {
+        "name": "harbour </script><b>$PLAN",
+        "agent_ids": ["pier-1", "pier-2", "tug", "<img src=x>"],
+        "ability": [1, 2, 1, 1],
+        "workload": [2, 4, 1],
+        "agent_position": [[0, 0], [0, 0], [np.nan, np.nan], [4, 4]],
+        "start_task": [-1, -1, 1, -1],
+        "task_position": [[1, 0], [0, 3], [4, 0]],
+    }
+    return Instance(**{**fields, **more})  # type: ignore[arg-type]
+
+
+def planned(instance: Instance, plan: list[int]) -> Result:
+    return scored_result(instance, Allocation(plan))
+
+
+@pytest.fixture
+def page(tmp_path: Path) -> Path:
+    write_result(planned(harbour(), [0, 1, 1, -1]), tmp_path / "plan.html")
+    return tmp_path / "plan.html"
+
+
+def test_the_page_needs_nothing_else(page: Path) -> None:
+    """There is one file without links, whose policy forbids to load anything, and names are data, never markup."""
+    text = page.read_text(encoding="utf-8")
+    assert re.findall(r"""(?:src|href)=["']?([^"'>\\s]+)""", text.replace("src=x", "")) == ["data:,"]
+    assert "default-src 'none'" in text
+    assert text.count("<script") == text.count("</script>") == 2
+    assert "<img" not in text
+    embedded = re.search(r'<script type="application/json" id="plan">(.*?)</script>', text, re.DOTALL)
+    assert embedded is not None
+    assert json.loads(embedded[1]) == json.loads(json.dumps(document(planned(harbour(), [0, 1, 1, -1]))))
+
+
+def test_the_plan_in_the_page() -> None:
+    """Places lie from 0 to 1000, south below; bases have names, and figures are text under their headings."""
+    plan = document(planned(harbour(), [0, 1, 1, -1]))
+    tasks, agents, bases = (plan[name] for name in ("tasks", "agents", "bases"))
+    assert [task["place"] for task in tasks] == [[250, 1000], [0, 250], [1000, 1000]]
+    assert [(base["name"], base["task"]) for base in bases] == [("pier", None), ("t2", 1), ("<img src=x>", None)]
+    assert [agent["task"] for agent in agents] == [0, 1, 1, -1]
+    assert [agent["base"] for agent in agents] == [0, 0, 1, 2]
+    assert [task["unserved"] for task in tasks] == [False, False, True]
+    assert plan["taskHeadings"] == ["task", "workload", "finish", "agents"]
+    assert tasks[1]["cells"] == ["t2", "4", "1.333", "2"]
+
+
+def test_equal_times_have_no_shades() -> None:
+    """Where all tasks are done together no task is drawn as late."""
+    plan = document(planned(harbour(workload=[1, 3, 1]), [0, 1, 1, 2]))
+    assert [task["late"] for task in plan["tasks"]] == [None] * 3
+
+
+SCRIPT = """
+<script>
+const out = [];
+const count = (what) => document.querySelectorAll(what).length;
+const shown = () => count("#moves path:not(.hidden)");
+out.push(count("#moves path"), count("#starts g"), count("#sites g"), count("#tasks li"));
+const before = document.getElementById("moving").getAttribute("transform");
+document.getElementById("in").click();
+out.push(before !== document.getElementById("moving").getAttribute("transform"));
+document.getElementById("none").click();
+out.push(shown(), count("#agents tbody tr"));
+document.querySelector("#tasks input").click();
+out.push(shown(), count("#agents tbody tr"));
+document.getElementById("all").click();
+const search = document.getElementById("search");
+search.value = "tug";
+search.dispatchEvent(new Event("input"));
+out.push(shown(), count("#agents tbody tr"));
+search.value = "";
+search.dispatchEvent(new Event("input"));
+document.getElementById("fit").click();
+document.querySelector("#sites g").dispatchEvent(new PointerEvent("pointerenter", { clientX: 9, clientY: 9 }));
+out.push(document.getElementById("hover").textContent.split("\\n")[0], count("#labels text"), count("img"));
+document.body.replaceChildren(JSON.stringify(out));
+</script>
+"""
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no browser is installed")
+def test_a_browser_zooms_filters_and_names(page: Path, tmp_path: Path) -> None:
+    """Two moves, two bases, three tasks; zooming moves them, filters and the search hide them, hovering names them."""
+    assert BROWSER is not None
+    page.write_text(page.read_text(encoding="utf-8").replace("</body>", f"{SCRIPT}</body>"), encoding="utf-8")
+    command = [BROWSER, "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path / 'profile'}"]
+    command += ["--enable-logging=stderr", "--window-size=1200,800", "--dump-dom", page.as_uri()]
+    ran = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert "CONSOLE" not in ran.stderr
+    found = re.search(r"<body>(.*?)</body>", ran.stdout, re.DOTALL)
+    assert found is not None, ran.stderr[-2000:]
+    assert json.loads(found[1]) == [2, 2, 3, 3, True, 0, 1, 1, 2, 0, 1, "task: t2", 5, 0]

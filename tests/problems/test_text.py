@@ -1,0 +1,34 @@
+"""Names and numbers as text."""
+
+import pytest
+
+from alloc.problems.text import heading, labelled, short_names
+
+
+@pytest.mark.parametrize(
+    ("names", "short"),
+    [
+        (["abc", "abcdefghij"], ["abc", "abcdefghij"]),
+        (["abcdefghijk"], ["abcdefghi…"]),
+        (["pylon number 1", "pylon number 2"], ["pylon…er 1", "pylon…er 2"]),
+        (["a\nb"], ["a b"]),
+        (["same name twice", "same name twice"], ["same name…", "same name…"]),
+    ],
+)
+def test_names_are_cut_where_they_stay_different(names: list[str], short: list[str]) -> None:
+    """At the end, or in the middle where the ends would be equal; equal names stay equal."""
+    assert short_names(names, 10) == short
+
+
+def test_names_that_differ_nowhere_else_are_numbered() -> None:
+    """Where neither end tells names apart, they get numbers, and stay as short as the others."""
+    names = [f"{'x' * 30}{letter}{'x' * 30}" for letter in "abc"]
+    short = short_names(names, 10)
+    assert len(set(short)) == 3
+    assert all(len(name) <= 10 for name in short)
+
+
+def test_units_are_left_out_where_there_are_none() -> None:
+    """A number or a heading alone, or with the unit."""
+    assert (labelled("1", ""), labelled("1", "h")) == ("1", "1 h")
+    assert (heading("finish", ""), heading("finish", "h")) == ("finish", "finish (h)")
