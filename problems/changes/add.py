@@ -1,14 +1,13 @@
 """The same problem with more agents or tasks."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from alloc.problems.arguments import listed, shown
-from alloc.problems.changes.move import index_of, position, set_place
-from alloc.problems.changes.remove import AGENT_ARRAYS, with_rows
+from alloc.problems.changes.move import index_of, position, set_place, without_own
+from alloc.problems.changes.remove import AGENT_ARRAYS, replaced, with_rows
 from alloc.problems.distances.given import DistanceTable
 from alloc.problems.errors import InputError, nearest
 from alloc.problems.fields import IntArray
@@ -54,18 +53,25 @@ def with_agents(instance: "Instance", added: Iterable[Mapping[str, object]]) -> 
     source = np.concatenate([np.arange(instance.n), np.array(models, dtype=np.intp)])
     grown = with_rows(instance, source, np.arange(instance.m), names=[str(row.get("id")) for row in rows])
     fields: dict[str, object] = {name: np.array(getattr(grown, name)) for name in AGENT_ARRAYS}
-    lists = [None] * grown.n if grown.allowed_tasks is None else list(grown.allowed_tasks)
-    skills = [()] * grown.n if grown.skills is None else list(grown.skills)
+    lists: list[IntArray | None] = [None] * grown.n if grown.allowed_tasks is None else list(grown.allowed_tasks)
+    skills: list[object] = [()] * grown.n if grown.skills is None else list(grown.skills)
     for index, row in enumerate(rows, start=instance.n):
         blank = row.get("like") is None
         _set_numbers(fields, row, index, blank=blank)
         if blank or "tasks" in row:
             lists[index] = _task_indices(instance, row.get("tasks"), index)
         if blank or "skills" in row:
-            skills[index] = tuple(row.get("skills") or ())  # type: ignore[call-overload]
+            skills[index] = row.get("skills")
         if blank or "position" in row or "start_task" in row:
             set_place(fields, instance, row, index)
-    return replace(grown, **fields, allowed_tasks=lists, skills=skills)
+    blank_agents = np.array([row.get("like") is None for row in rows])
+    return replaced(
+        grown,
+        **fields,
+        allowed_tasks=lists,
+        skills=skills,
+        distances=without_own(grown.distances, np.append(np.zeros(instance.n, dtype=np.bool_), blank_agents)),
+    )
 
 
 def with_tasks(instance: "Instance", added: Iterable[Mapping[str, object]]) -> "Instance":
@@ -87,7 +93,7 @@ def with_tasks(instance: "Instance", added: Iterable[Mapping[str, object]]) -> "
         return instance
     table, needs = instance.distances, [()] * instance.m if instance.needs is None else list(instance.needs)
     place = [position(row.get("position")) for row in rows]
-    return replace(
+    return replaced(
         instance,
         task_ids=(*instance.task_ids, *(str(row.get("id")) for row in rows)),
         workload=[*instance.workload.tolist(), *(row.get("workload") for row in rows)],
@@ -127,7 +133,8 @@ def _task_indices(instance: "Instance", names: object, index: int) -> IntArray |
     if names is None:
         return None
     place = f"agents[{index}].tasks"
-    for name in listed(names, place, "ids of tasks"):  # type: ignore[arg-type]
+    wanted: list[object] = listed(cast("Iterable[object]", names), place, "ids of tasks")
+    for name in wanted:
         if name not in instance.task_index:
             raise InputError(f"there is no task {shown(name)}{nearest(str(name), instance.task_ids)}", place)
-    return np.array(sorted({instance.task_index[name] for name in names}), dtype=np.intp)  # type: ignore[attr-defined]
+    return np.array(sorted({instance.task_index[str(name)] for name in wanted}), dtype=np.intp)

@@ -1,13 +1,16 @@
 """The same problem with agents at other places."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from alloc.problems.arguments import listed, shown
+from alloc.problems.changes.remove import replaced
+from alloc.problems.distances.given import DistanceTable
 from alloc.problems.errors import InputError, nearest
+from alloc.problems.fields import BoolArray
 from alloc.problems.vocabulary import IDLE
 
 if TYPE_CHECKING:
@@ -36,12 +39,16 @@ def moved_to(instance: "Instance", places: Mapping[str, str | Sequence[float]]) 
         moved[index] = True
         key = "start_task" if isinstance(place, str) else "position"
         set_place(fields, instance, {key: place}, index)
-    table = instance.distances
-    if table is not None:
-        of_moved = np.append(moved, np.zeros(table.m, dtype=np.bool_))
-        kept = ~(of_moved[table.source] | of_moved[table.target])
-        table = replace(table, source=table.source[kept], target=table.target[kept], distance=table.distance[kept])
-    return replace(instance, **fields, distances=table)
+    return replaced(instance, **fields, distances=without_own(instance.distances, moved))
+
+
+def without_own(table: DistanceTable | None, agents: BoolArray) -> DistanceTable | None:
+    """Return a table without the distances that are given for the agents marked in `agents`, shape (n,)."""
+    if table is None:
+        return None
+    dropped = np.append(agents, np.zeros(table.m, dtype=np.bool_))
+    kept = ~(dropped[table.source] | dropped[table.target])
+    return replace(table, source=table.source[kept], target=table.target[kept], distance=table.distance[kept])
 
 
 def index_of(instance: "Instance", name: object) -> int:
@@ -69,7 +76,7 @@ def position(given: object) -> list[float]:
     """Return three coordinates, NaN for None."""
     if given is None:
         return [np.nan] * 3
-    place = listed(given, "position", "2 or 3 numbers")  # type: ignore[arg-type]
+    place: list[float] = listed(cast("Iterable[float]", given), "position", "2 or 3 numbers")
     if len(place) not in (2, 3) or not all(isinstance(x, int | float | np.number) for x in place):
         raise InputError(f"must be 2 or 3 numbers, got {shown(given)}", "position")
     return [float(x) for x in (*place, 0.0)[:3]]

@@ -1,15 +1,15 @@
 """The same problem with fewer agents or tasks."""
 
-from collections.abc import Iterable, Sequence, Set
-from dataclasses import replace
-from typing import TYPE_CHECKING, TypedDict
+from collections.abc import Callable, Iterable, Sequence, Set
+from dataclasses import fields
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from alloc.problems.arguments import listed, shown
 from alloc.problems.distances.build import restricted_reach
 from alloc.problems.errors import InputError, nearest
-from alloc.problems.fields import FloatArray, IntArray
+from alloc.problems.fields import IntArray
 from alloc.problems.vocabulary import IDLE
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ def restricted(instance: "Instance", agents: IntArray, tasks: IntArray) -> "Inst
     rows = agent_rows(instance, agents)
     rows |= {"agent_position": position, "start_task": start}
     rows["allowed_tasks"] = None if lists is None else tuple(_renamed(lists[i], number) for i in agents.tolist())
-    part = replace(
+    part = replaced(
         instance,
         **rows,
         task_ids=tuple(instance.task_ids[j] for j in tasks.tolist()),
@@ -101,23 +101,13 @@ def without_tasks(instance: "Instance", gone: Iterable[str]) -> "Instance":
     return restricted(instance, np.arange(instance.n), left)
 
 
-class AgentRows(TypedDict, total=False):
-    """Fields of an instance that belong to agents, for `replace`."""
-
-    agent_ids: tuple[str, ...]
-    allowed_tasks: tuple[IntArray | None, ...] | None
-    skills: tuple[tuple[str, ...], ...] | None
-    ability: FloatArray
-    agent_position: FloatArray
-    start_task: IntArray
-    battery: FloatArray
-    communication_range: FloatArray
-    speed: FloatArray
-    agent_energy_per_distance: FloatArray
-    returns: FloatArray
+def replaced(instance: "Instance", **changed: object) -> "Instance":
+    """Return the instance with other values of some fields, which its constructor checks."""
+    make = cast("Callable[..., Instance]", type(instance))
+    return make(**{field.name: getattr(instance, field.name) for field in fields(instance)} | changed)
 
 
-def agent_rows(instance: "Instance", agents: IntArray, names: Sequence[str] = ()) -> AgentRows:
+def agent_rows(instance: "Instance", agents: IntArray, names: Sequence[str] = ()) -> dict[str, object]:
     """Return the fields of some agents, by their indices; the last are called `names`."""
     kept = agents.tolist()
     rows: dict[str, object] = {name: getattr(instance, name)[agents] for name in AGENT_ARRAYS}
@@ -126,13 +116,13 @@ def agent_rows(instance: "Instance", agents: IntArray, names: Sequence[str] = ()
     rows["skills"] = None if instance.skills is None else tuple(instance.skills[i] for i in kept)
     lists = instance.allowed_tasks
     rows["allowed_tasks"] = None if lists is None else tuple(lists[i] for i in kept)
-    return rows  # type: ignore[return-value]
+    return rows
 
 
 def with_rows(instance: "Instance", agents: IntArray, tasks: IntArray, names: Sequence[str] = ()) -> "Instance":
     """Return the instance with some agents, copies of others among them."""
     table = instance.distances
-    return replace(
+    return replaced(
         instance,
         **agent_rows(instance, agents, names),
         distances=None if table is None else table.restricted(agents, tasks),

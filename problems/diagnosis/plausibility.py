@@ -107,7 +107,8 @@ def _unreaching(instance: Instance) -> Iterator[Finding]:
     limited = np.isfinite(instance.battery) | np.isfinite(instance.communication_range)
     if not limited.any() or not reach.has_table:
         return
-    reaches_none = ~reach.mask.any(axis=1)[reach.origin] & limited
+    reaches_some: BoolArray = np.asarray(reach.mask.any(axis=1))
+    reaches_none = ~reaches_some[reach.origin] & limited
     if reaches_none.mean() < FEW:
         return
     eligible = instance.eligible_tasks

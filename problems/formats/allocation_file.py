@@ -7,8 +7,8 @@ from alloc.problems.arguments import of_type
 from alloc.problems.errors import InputError
 from alloc.problems.formats import json_text
 from alloc.problems.formats.columns import check_names, require_format
-from alloc.problems.formats.document import require_known
 from alloc.problems.formats.files import PathLike, named, read_text, write_text_atomically
+from alloc.problems.formats.json_columns import require_known
 from alloc.problems.formats.messages import described, quoted, told
 from alloc.problems.instance import Instance
 from alloc.problems.models.solution import is_solution, solution_allocation

@@ -3,7 +3,7 @@
 import csv
 import io
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import compress
 from pathlib import Path
@@ -138,7 +138,7 @@ def _is_number(cell: str) -> bool:
         return False
 
 
-def table_text(columns: dict[str, Sequence[object]]) -> str:
+def table_text(columns: Mapping[str, Sequence[object]]) -> str:
     """Return a table, given by columns, as CSV."""
     cells = [_cells(values) for values in columns.values()]
     return "\n".join([",".join(columns), *map(",".join, zip(*cells, strict=True)), ""])

@@ -218,8 +218,8 @@ def _distances(given: object) -> DistanceColumns | None:
             row = next(row for row, value in enumerate(values) if not isinstance(value, str))
             message = f"must be the id of an agent or a task, got {described(values[row])}"
             raise InputError(message, f"distances.rows[{row}][{column}]")
-    values = columns_of.required_numbers(distance, "distances.rows[{}][2]")
-    return DistanceColumns(source=source, target=target, distance=values, missing=missing_rule(table))
+    numbers = columns_of.required_numbers(distance, "distances.rows[{}][2]")
+    return DistanceColumns(source=source, target=target, distance=numbers, missing=missing_rule(table))
 
 
 def _text(fields: Row, name: str, place: str, default: str) -> str:

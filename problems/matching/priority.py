@@ -89,8 +89,8 @@ def _all_within_reach(
     length = near.first[origin + 1] - near.first[origin]
     if length.sum() > most:
         return None
-    row, task = np.repeat(np.arange(len(agents)), length), entries(near.first, near.task, origin)
-    return row[wanted[task]], task[wanted[task]].astype(np.intp)
+    row, task = np.repeat(np.arange(len(agents)), length), entries(near.first, near.task.astype(np.intp), origin)
+    return row[wanted[task]], task[wanted[task]]
 
 
 def _completed(

@@ -106,7 +106,7 @@ def _lists(reach: Reach) -> tuple[NDArray[np.int64], Int32Array, FloatArray, Flo
         return (*_task_lists(reach), none, none)
     near = reach.neighbours
     assert near is not None, "an instance with too many pairs is refused"
-    cost = reach.costs(near.origin, near.task, near.distance)
+    cost = reach.costs(near.origin.astype(np.intp), near.task.astype(np.intp), near.distance)
     rows = np.diff(near.first)
     if (rows > 0).all():
         return near.first.astype(np.int64), near.task, near.distance, cost

@@ -1,0 +1,76 @@
+"""Agents and tasks come, go and move: the changed instance is that of the changed fields."""
+
+import numpy as np
+import pytest
+from oracle import flight_energies, reachable
+from tiny_instances import varied_instance
+
+from alloc.problems import DistanceTable, InputError, Instance
+
+SEEDS = range(60)
+
+
+def same_reach(instance: Instance) -> None:
+    """Whether the reach is that of the definitions."""
+    distance, able = reachable(instance)
+    agents, tasks = np.indices((instance.n, instance.m)).reshape(2, -1)
+    np.testing.assert_array_equal(instance.reach.allows(agents, tasks), able.ravel())
+    np.testing.assert_allclose(instance.reach.distance_of(agents, tasks), distance.ravel(), rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_changes_against_the_definitions(seed: int) -> None:
+    """After each change, who can go where, and how far, is what the fields say; copies equal their models."""
+    instance = varied_instance(seed)
+    more = instance.with_agents([{"id": "copy", "like": "a1"}, {"id": "blank", "ability": 2}])
+    same_reach(more)
+    distance, able = reachable(more)
+    np.testing.assert_array_equal(distance[instance.n], distance[0])
+    np.testing.assert_array_equal(able[instance.n], able[0])
+    np.testing.assert_array_equal(flight_energies(more, distance)[instance.n], flight_energies(more, distance)[0])
+    assert np.isnan(more.start_position[-1]).all()
+    same_reach(more.with_tasks([{"id": "new", "workload": 3, "position": instance.task_position[0][:2]}]))
+    same_reach(more.moved_to({"a1": "t2", "copy": instance.task_position[0].tolist()}))
+    same_reach(more.without_agents(["a1"]))
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_without_tasks_nobody_moves(seed: int) -> None:
+    """Agents that start at a task that goes keep their place, and the distances that are given for it."""
+    instance = varied_instance(seed)
+    fewer = instance.without_tasks(["t1"])
+    distance, able = reachable(instance)
+    agents, tasks = np.indices((fewer.n, fewer.m)).reshape(2, -1)
+    np.testing.assert_array_equal(fewer.reach.allows(agents, tasks), able[:, 1:].ravel())
+    np.testing.assert_allclose(fewer.reach.distance_of(agents, tasks), distance[:, 1:].ravel(), rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda one: one.with_agents([{"id": "x", "abilty": 3}]), "unknown field 'abilty' .did you mean 'ability'"),
+        (lambda one: one.with_agents([{"id": "x", "like": "a9"}]), "no agent 'a9'"),
+        (lambda one: one.with_agents([{"id": "a1", "ability": 1}]), "used twice"),
+        (lambda one: one.with_agents([{"id": "x"}]), "ability"),
+        (lambda one: one.with_tasks([{"id": "x"}]), "workload"),
+        (lambda one: one.with_tasks([{"id": "t1", "workload": 1}]), "used twice"),
+        (lambda one: one.without_tasks(["t1", "t2"]), "at least one task"),
+        (lambda one: one.without_agents(["a1", "a2"]), "at least one agent"),
+        (lambda one: one.moved_to({"a1": "t9"}), "no task 't9'"),
+        (lambda one: one.moved_to({"a1": [1.0]}), "must be 2 or 3 numbers"),
+    ],
+)
+def test_errors_say_what_to_mend(change, message: str) -> None:
+    """What cannot be meant is refused."""
+    instance = Instance(ability=[1, 2], workload=[3, 4], task_position=[[0, 0], [1, 1]], start_task=[0, 1])
+    with pytest.raises(InputError, match=message):
+        change(instance)
+
+
+def test_rows_of_a_copy() -> None:
+    """Distances that are given for an agent hold for its copies, in both directions; a blank agent has none."""
+    table = DistanceTable.of([("a1", "t1", 5.0), ("t2", "a1", 7.0)], ["a1"], ["t1", "t2"], missing="unreachable")
+    instance = Instance(ability=[1], workload=[1, 1], distances=table)
+    more = instance.with_agents([{"id": "c", "like": "a1"}, {"id": "b", "ability": 1}])
+    assert more.reach.distance[more.reach.origin].tolist() == [[5, 7], [5, 7], [0, 0]]
+    assert more.reach.mask[more.reach.origin].tolist() == [[True, True], [True, True], [False, False]]
