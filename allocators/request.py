@@ -10,7 +10,8 @@ from alloc.allocators.contract.tolerance import EXACT, MakespanTolerance
 from alloc.allocators.result import Result
 from alloc.problems import Allocation, InputError, Instance, Objective
 from alloc.problems.allocation import CarriedOver, require_fit
-from alloc.problems.arguments import of_type, real, whole
+from alloc.problems.arguments import choice, of_type, real, whole
+from alloc.problems.vocabulary import OBJECTIVES
 
 LARGEST_SEED = 2**63 - 1
 MOST_THREADS = 1024
@@ -81,6 +82,20 @@ def checked_seed(seed: int, name: str = "seed") -> int:
 def checked_threads(threads: int | None) -> int | None:
     """Return the number of threads, or None if none is given."""
     return None if threads is None else whole(threads, "threads", 1, MOST_THREADS)
+
+
+def checked_objective(objective: Objective | str) -> Objective:
+    """Return an objective for runs without a plan in force.
+
+    Raises
+    ------
+    InputError
+        If it is none, or counts moves from a plan.
+    """
+    goal = choice(Objective, objective, "objective")
+    if goal is Objective.MAKESPAN_MOVES:
+        raise InputError(f"must be {' or '.join(OBJECTIVES)}; moves are counted by solve, from a start", "objective")
+    return goal
 
 
 def checked_pins(pins: object) -> dict[str, str | None]:

@@ -95,7 +95,7 @@ DOORS = [
     (partial(pareto, SMALL), "starts", (Allocation([0, 1, 2]), [5], 5)),
     (partial(compare, [SMALL]), "methods", ("greedy", 5, [5])),
     (partial(compare, [SMALL], ["greedy"]), "seeds", (3, "3", [1.5], [None])),
-    (partial(compare, [SMALL], ["greedy"]), "objective", ("energy",)),
+    (partial(compare, [SMALL], ["greedy"]), "objective", ("energy", "makespan-moves")),
     (partial(compare, methods=["greedy"]), "instances", (5, "x.json")),
     (read_instance, "path", (None, 5, b"x.json")),
 ]  # fmt: skip

@@ -12,11 +12,11 @@ from alloc.allocators.contract.base import Allocator
 from alloc.allocators.contract.budget import Budget, StopReason
 from alloc.allocators.contract.tolerance import relative_gap
 from alloc.allocators.registry import load
-from alloc.allocators.request import checked_seed, checked_threads
+from alloc.allocators.request import checked_objective, checked_seed, checked_threads
 from alloc.allocators.result import Result
 from alloc.allocators.solve import solve
 from alloc.problems import InputError, Instance, Objective, RefusedError
-from alloc.problems.arguments import choice, event, listed, of_type
+from alloc.problems.arguments import event, listed, of_type
 
 LOG = logging.getLogger("alloc.compare")
 
@@ -132,7 +132,7 @@ def compare(
     stop = event(stop, "stop") or threading.Event()
     run = partial(
         solve,
-        objective=choice(Objective, objective, "objective"),
+        objective=checked_objective(objective),
         time_limit_s=time_limit_s,
         iterations=iterations,
         target_gap=target_gap,

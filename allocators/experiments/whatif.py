@@ -11,11 +11,12 @@ from alloc.allocators.contract.base import Allocator
 from alloc.allocators.contract.budget import Budget
 from alloc.allocators.experiments.whatif_answer import answer
 from alloc.allocators.registry import load
+from alloc.allocators.request import checked_objective
 from alloc.allocators.result import Result
 from alloc.allocators.runtime.interrupts import signals_set
 from alloc.allocators.solve import solve
 from alloc.problems import Allocation, InputError, Instance, Objective
-from alloc.problems.arguments import choice, event, flag, function, listed, of_type, shown, whole
+from alloc.problems.arguments import event, flag, function, listed, of_type, shown, whole
 from alloc.problems.errors import nearest
 
 WHATIF_FORMAT = "alloc-whatif/1"
@@ -163,7 +164,7 @@ def whatif(
     run = partial(
         run,
         method=method,
-        objective=choice(Objective, objective, "objective"),
+        objective=checked_objective(objective),
         time_limit_s=time_limit_s,
         iterations=iterations,
         seed=seed,
