@@ -234,7 +234,8 @@ def _farthest(instance: Instance) -> float:
         places = places[~np.isnan(places).any(axis=1)]
         return float(np.linalg.norm(np.ptp(places, axis=0))) if len(places) else 0.0
     near = reach.neighbours
-    return 0.0 if near is None else float(near.distance.max(initial=0.0))
+    assert near is not None, "an instance with too many pairs is refused"
+    return float(near.distance.max(initial=0.0))
 
 
 def _best_within(known: Sequence[tuple[Allocation, Evaluation]], limit: float) -> Allocation | None:

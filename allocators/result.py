@@ -1,7 +1,7 @@
 """The answer of `solve`: an allocation with its scores, how good it is proven to be, and why the run stopped."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, field, fields
 from typing import TYPE_CHECKING
 
 from alloc.allocators.contract.budget import StopReason
@@ -55,6 +55,8 @@ class Result:
         can reach.
     moves : Moves or None
         How the allocation differs from the plan in force, where there is one.
+    pins : mapping
+        Task id of each agent id that had to do one task, None for idle; what is proven holds for them alone.
     tolerance : MakespanTolerance
         The slack and the limit that were given for the makespan.
     """
@@ -74,6 +76,7 @@ class Result:
     makespan_limit: float | None = None
     tolerance: MakespanTolerance = EXACT
     moves: Moves | None = None
+    pins: Mapping[str, str | None] = field(default_factory=dict)
 
     @property
     def makespan(self) -> float | None:
@@ -168,6 +171,7 @@ class Result:
                 for v in score.violations
             ],
             **({} if self.moves is None else {"moves": moves_document(self.moves, ids)}),
+            **({"pins": dict(self.pins)} if self.pins else {}),
             "runtime_s": self.runtime_s,
             **({"units": units} if units else {}),
             "assignment": {} if self.allocation is None else self.allocation.to_ids(ids),

@@ -42,6 +42,7 @@ class ResultFields(TypedDict):
     makespan_limit: float | None
     tolerance: MakespanTolerance
     moves: Moves | None
+    pins: dict[str, str | None]
 
 
 def read_document(path: PathLike) -> dict[str, object]:
@@ -105,8 +106,17 @@ def result_fields(document: Mapping[str, object], instance: Instance) -> ResultF
         "makespan_limit": limit,
         # the slack is not in the document; that there was one matters only where it was needed for the proof
         "tolerance": MakespanTolerance(limit=limit) if limit and status is Status.OPTIMAL else EXACT,
+        "pins": _pins(of_type(fields.get("pins", {}), dict, "pins"), instance),
         "moves": None if fields.get("moves") is None else _moves(of_type(fields["moves"], dict, "moves"), instance),
     }
+
+
+def _pins(pins: Mapping[str, object], instance: Instance) -> dict[str, str | None]:
+    """Return the task of each agent that is pinned."""
+    for agent, task in pins.items():
+        if agent not in instance.agent_index or not (task is None or task in instance.task_index):
+            raise InputError(f"pins {shown(agent)} to {shown(task)}, but instance {instance.name!r} lacks one", "pins")
+    return {agent: None if task is None else str(task) for agent, task in pins.items()}
 
 
 def moves_document(moves: Moves, instance: Instance) -> dict[str, object]:

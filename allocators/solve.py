@@ -121,6 +121,7 @@ def solve(
     goal = choice(Objective, objective, "objective")
     plan, carried = (None, CarriedOver()) if start is None else as_start(instance, start)
     price = float(real(move_price, "move_price"))
+    tell = function(on_improvement, "on_improvement")
     plan_in_force = replanning(instance, goal, plan, carried, price, checked_pins(pins))
     request = Request(
         instance=plan_in_force.priced_instance,
@@ -130,7 +131,7 @@ def solve(
         seed=checked_seed(seed),
         start=None if plan is None else plan_in_force.completed(plan),
         threads=checked_threads(threads) or available_threads(),
-        on_improvement=function(on_improvement, "on_improvement"),
+        on_improvement=None if tell is None else lambda improvement: tell(plan_in_force.told(improvement)),
         stop=event(stop, "stop") or threading.Event(),
     )
     handle_signals = flag(handle_signals, "handle_signals")
@@ -166,6 +167,10 @@ def _prepared(
         given = ", ".join(settings) or "parameters"
         raise InputError(f"is an allocator with its own parameters; set {given} where it is made", "method")
     allocator = load(method, parameters, **settings) if isinstance(method, str) else method
+    if request.instance.reach.move is not None:
+        from alloc.allocators.heuristic.local_search.annealing_state import compile_loops
+
+        compile_loops()  # for the repair; loading is not part of the run
     begin = time.monotonic()
     refuse(allocator, request.instance, request.objective, request.budget, request.tolerance)
     is_matched = _is_matched(request.instance)
@@ -228,7 +233,8 @@ def _propose(allocator: Allocator, search: Search) -> tuple[Proposal, StopReason
         end = time.monotonic() + max(REPAIR_S, search.remaining_s)
         search.submit(serve_all(search.instance, search.best.allocation, lambda: end - time.monotonic()))
     search.raise_bound(proposal.makespan_lower_bound or 0.0)
-    if search.best is not None and search.instance.reach.move is not None:
+    move = search.instance.reach.move
+    if search.best is not None and move is not None and move.price.any():
         from alloc.allocators.heuristic.local_search.improve import repair
 
         limit = search.budget.time_limit_s

@@ -59,7 +59,8 @@ def summary(result: "Result") -> str:
 
 def _headline(result: "Result") -> str:
     size = f"{counted(result.instance.n, 'agent')}, {counted(result.instance.m, 'task')}"
-    return f"{result.instance.name} ({size}), {result.method}: {_status(result)}"
+    pinned = f" with {counted(len(result.pins), 'agent')} pinned" if result.pins else ""
+    return f"{result.instance.name} ({size}), {result.method}{pinned}: {_status(result)}"
 
 
 def _status(result: "Result") -> str:
@@ -209,8 +210,12 @@ def _gain(instance: Instance, found: Bottleneck) -> str:
 def _room(result: "Result", found: Bottleneck) -> str:
     used = f"{percent(found.use)} of all ability is at work until then"
     if result.gap is None or result.gap <= CLOSED_GAP:
-        return f"{used}; the same agents cannot be done sooner."
-    return f"{used}; the same agents, allocated otherwise, gain {percent(result.gap)} at most."
+        return f"{used}; the same agents cannot be done sooner{_while_pinned(result)}."
+    return f"{used}; the same agents, allocated otherwise{_while_pinned(result)}, gain {percent(result.gap)} at most."
+
+
+def _while_pinned(result: "Result") -> str:
+    return " while some are pinned" if result.pins else ""
 
 
 def rounded_up(ability: float, *, whole: bool) -> str:

@@ -34,7 +34,7 @@ def name_sets(
 def _names(entry: Iterable[str] | None, place: str, known: dict[tuple[str, ...], Names]) -> Names:
     if entry is None or (isinstance(entry, float) and np.isnan(entry)):
         return ()
-    if isinstance(entry, str):
+    if isinstance(entry, str) or not isinstance(entry, Iterable):
         raise InputError(f"must be a list of strings, got {shown(entry)}", place)
     names = tuple(entry)
     try:

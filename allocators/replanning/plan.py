@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from alloc.allocators.contract.improvement import Improvement
 from alloc.allocators.replanning.moves import Moves
 from alloc.problems import IDLE, Allocation, InputError, Instance, Objective, evaluate
 from alloc.problems.allocation import CarriedOver
@@ -39,6 +40,8 @@ class Replanning:
         As it was asked for.
     plan, target : ndarray of int, shape (n,)
         The task that each agent has, -1 where it is idle; and the same, but for agents that are pinned to another one.
+    has_plan : bool
+        Whether there is a plan in force.
     has_place : ndarray of bool, shape (n,)
         Whether the agent was in the plan, and its task is still there; else it moves at no price.
     pinned : ndarray of bool, shape (n,)
@@ -49,6 +52,7 @@ class Replanning:
     objective: Objective
     plan: IntArray
     target: IntArray
+    has_plan: bool
     has_place: Flags
     pinned: Flags
     price: float
@@ -67,7 +71,12 @@ class Replanning:
         price: FloatArray = np.where(self.has_place, 1.0 if only_moves else self.price, 0.0)
         priced = replace(self.instance)
         priced.__dict__["reach"] = replanned(
-            self.instance.reach, self.target, price, self.pinned, energy_counts=not only_moves
+            self.instance.reach,
+            self.target,
+            price,
+            self.pinned,
+            energy_counts=not only_moves,
+            cost_counts=self.objective is not Objective.MAKESPAN,
         )
         return priced
 
@@ -79,6 +88,19 @@ class Replanning:
     def completed(self, allocation: Allocation) -> Allocation:
         """Return an allocation in which all pinned agents are at their tasks."""
         return Allocation(np.where(self.pinned, self.target, allocation.task_of_agent))
+
+    def told(self, improvement: Improvement) -> Improvement:
+        """Return an improvement on `priced_instance` as one on the instance itself."""
+        if not self.changes_costs:
+            return improvement
+        allocation = self.completed(improvement.allocation)
+        return replace(improvement, allocation=allocation, evaluation=evaluate(self.instance, allocation))
+
+    @property
+    def pins(self) -> dict[str, str | None]:
+        """Task id of each agent id that is pinned, None for idle."""
+        tasks: list[str | None] = [*self.instance.task_ids, None]
+        return {self.instance.agent_ids[i]: tasks[self.target[i]] for i in np.flatnonzero(self.pinned).tolist()}
 
     def moves(self, allocation: Allocation, bound: float | None) -> Moves:
         """Return how an allocation differs from the plan, and what that costs.
@@ -128,8 +150,7 @@ def concluded(result: "Result", plan: Replanning) -> "Result":
     if result.allocation is None:
         return replace(result, instance=plan.instance, objective=plan.objective)
     if not plan.changes_costs:
-        moves = plan.moves(result.allocation, None) if plan.has_place.any() else None
-        return replace(result, moves=moves)
+        return replace(result, moves=plan.moves(result.allocation, None) if plan.has_plan else None)
     allocation = plan.completed(result.allocation)
     bound = result.energy_lower_bound
     energy_bound = bound
@@ -144,7 +165,9 @@ def concluded(result: "Result", plan: Replanning) -> "Result":
         allocation=allocation,
         evaluation=evaluate(plan.instance, allocation),
         energy_lower_bound=energy_bound,
-        moves=plan.moves(allocation, bound) if plan.has_place.any() else None,
+        trace=tuple(replace(point, energy=point.energy + plan.energy_of_pinned) for point in result.trace),
+        moves=plan.moves(allocation, bound) if plan.has_plan else None,
+        pins=plan.pins,
     )
 
 
@@ -192,7 +215,7 @@ def replanning(
     for name, goal in pins.items():
         agent = _agent(instance, name)
         pinned[agent], target[agent] = True, _task(instance, agent, goal)
-    return Replanning(instance, objective, task, target, has_place, pinned, price)
+    return Replanning(instance, objective, task, target, plan is not None, has_place, pinned, price)
 
 
 def _agent(instance: Instance, name: str) -> int:

@@ -4,9 +4,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from alloc.problems import Allocation, Instance, evaluate
+from alloc.problems import Allocation, Instance
+from alloc.problems.evaluation import completion_time
 from alloc.problems.text import labelled, number
-from alloc.problems.vocabulary import IDLE
 
 if TYPE_CHECKING:
     from alloc.allocators.result import Result
@@ -39,10 +39,12 @@ def reasons_of_moves(result: "Result") -> list[str]:
 
 def _time_without(instance: Instance, allocation: Allocation, agent: int, task: int) -> float | None:
     """Return when a task is done without one of its agents, None where it has no other."""
-    others = np.where(allocation.task_of_agent == task, task, IDLE)
-    others[agent] = IDLE
-    score = evaluate(instance, Allocation(others))
-    return None if task in score.unserved_tasks else float(score.completion_time[task])
+    others = np.flatnonzero(allocation.task_of_agent == task)
+    others = others[others != agent]
+    if not len(others):
+        return None
+    arrival = instance.reach.distance_of(others, np.full(len(others), task)) / instance.speed[others]
+    return completion_time(float(instance.workload[task]), instance.ability[others], arrival)
 
 
 def _hours(instance: Instance, value: float) -> str:

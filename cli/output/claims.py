@@ -53,8 +53,10 @@ def with_claims(result: "Result", claims: Mapping[str, object]) -> "tuple[Result
             bounds[name] = bound
         elif stated is not None:
             lines.append(f"its {name} {_shown(stated)} is no bound on the {value}, {number(score)}, and is left out")
-    if "lower_bound" in bounds:
+    if "lower_bound" in bounds and not claims.get("pins"):
         result = replace(result, lower_bound=max(bounds["lower_bound"], result.lower_bound or 0.0))
+    if claims.get("pins"):
+        return result, [*lines, "what it states as proven holds for its pins alone, and is left out"]
     limit = _number(claims.get("makespan_limit"))
     result = replace(result, energy_lower_bound=bounds.get("energy_lower_bound"), makespan_limit=limit)
     return _with_moves(result, claims), lines

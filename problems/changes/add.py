@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from alloc.problems.arguments import listed, shown
+from alloc.problems.arguments import flag, listed, real, shown
 from alloc.problems.changes.move import index_of, position, set_place, without_own
 from alloc.problems.changes.remove import AGENT_ARRAYS, replaced, with_rows
 from alloc.problems.distances.given import DistanceTable
@@ -37,7 +37,7 @@ def with_agents(instance: "Instance", added: Iterable[Mapping[str, object]]) -> 
     instance : Instance
     added : iterable of mappings
         Fields of each as in a file: ``id`` and ``ability`` at least; ``like`` is the id of an agent that it equals in
-        all that is not given, distances of its own included.
+        all that is not given, distances of its own included where no other place is given.
 
     Raises
     ------
@@ -51,7 +51,7 @@ def with_agents(instance: "Instance", added: Iterable[Mapping[str, object]]) -> 
         return instance
     models = [index_of(instance, row["like"]) if row.get("like") is not None else 0 for row in rows]
     source = np.concatenate([np.arange(instance.n), np.array(models, dtype=np.intp)])
-    grown = with_rows(instance, source, np.arange(instance.m), names=[str(row.get("id")) for row in rows])
+    grown = with_rows(instance, source, np.arange(instance.m), names=[_id(row, "agent") for row in rows])
     fields: dict[str, object] = {name: np.array(getattr(grown, name)) for name in AGENT_ARRAYS}
     lists: list[IntArray | None] = [None] * grown.n if grown.allowed_tasks is None else list(grown.allowed_tasks)
     skills: list[object] = [()] * grown.n if grown.skills is None else list(grown.skills)
@@ -64,13 +64,13 @@ def with_agents(instance: "Instance", added: Iterable[Mapping[str, object]]) -> 
             skills[index] = row.get("skills")
         if blank or "position" in row or "start_task" in row:
             set_place(fields, instance, row, index)
-    blank_agents = np.array([row.get("like") is None for row in rows])
+    elsewhere = np.array([row.get("like") is None or "position" in row or "start_task" in row for row in rows])
     return replaced(
         grown,
         **fields,
         allowed_tasks=lists,
         skills=skills,
-        distances=without_own(grown.distances, np.append(np.zeros(instance.n, dtype=np.bool_), blank_agents)),
+        distances=without_own(grown.distances, np.append(np.zeros(instance.n, dtype=np.bool_), elsewhere)),
     )
 
 
@@ -95,7 +95,7 @@ def with_tasks(instance: "Instance", added: Iterable[Mapping[str, object]]) -> "
     place = [position(row.get("position")) for row in rows]
     return replaced(
         instance,
-        task_ids=(*instance.task_ids, *(str(row.get("id")) for row in rows)),
+        task_ids=(*instance.task_ids, *(_id(row, "task") for row in rows)),
         workload=[*instance.workload.tolist(), *(row.get("workload") for row in rows)],
         priority=[
             *instance.priority.tolist(),
@@ -116,17 +116,23 @@ def _known(row: Mapping[str, object], fields: Sequence[str], place: str) -> Mapp
     return row
 
 
+def _id(row: Mapping[str, object], kind: str) -> str:
+    if not isinstance(row.get("id"), str):
+        raise InputError(f"must be a string, got {shown(row.get('id'))}", f"{kind}s.id")
+    return str(row["id"])
+
+
 def _set_numbers(fields: dict[str, object], row: Mapping[str, object], index: int, *, blank: bool) -> None:
     for field, name in NUMBERS_OF_AGENT.items():
         array = fields[name]
         assert isinstance(array, np.ndarray)
         if blank or field in row:
             value = row.get(field)
-            array[index] = np.nan if value is None else value
+            array[index] = np.nan if value is None else real(value, f"agents[{index}].{field}")
     returns = fields["returns"]
     assert isinstance(returns, np.ndarray)
     if blank or "returns" in row:
-        returns[index] = bool(row.get("returns"))
+        returns[index] = row.get("returns") is not None and flag(row["returns"], f"agents[{index}].returns")
 
 
 def _task_indices(instance: "Instance", names: object, index: int) -> IntArray | None:

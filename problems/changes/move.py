@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from alloc.problems.arguments import listed, shown
+from alloc.problems.arguments import listed, of_type, shown
 from alloc.problems.changes.remove import replaced
 from alloc.problems.distances.given import DistanceTable
 from alloc.problems.errors import InputError, nearest
@@ -34,7 +34,7 @@ def moved_to(instance: "Instance", places: Mapping[str, str | Sequence[float]]) 
     """
     fields: dict[str, object] = {name: np.array(getattr(instance, name)) for name in ("agent_position", "start_task")}
     moved = np.zeros(instance.n, dtype=np.bool_)
-    for name, place in places.items():
+    for name, place in of_type(places, Mapping, "places").items():
         index = index_of(instance, name)
         moved[index] = True
         key = "start_task" if isinstance(place, str) else "position"
@@ -66,7 +66,7 @@ def set_place(fields: dict[str, object], instance: "Instance", row: Mapping[str,
     assert isinstance(place, np.ndarray)
     assert isinstance(start, np.ndarray)
     task = row.get("start_task")
-    if task is not None and task not in instance.task_index:
+    if task is not None and (not isinstance(task, str) or task not in instance.task_index):
         raise InputError(f"no task {shown(task)} in instance {instance.name!r}{nearest(str(task), instance.task_ids)}")
     start[index] = IDLE if task is None else instance.task_index[str(task)]
     place[index] = position(row.get("position"))

@@ -41,9 +41,11 @@ def restricted(instance: "Instance", agents: IntArray, tasks: IntArray) -> "Inst
     number[tasks] = np.arange(len(tasks))
     start = number[instance.start_task[agents]]
     position = instance.agent_position[agents].copy()
-    left = (instance.start_task[agents] != IDLE) & (start == IDLE)
+    left = (instance.start_task[agents] != IDLE) & (start == IDLE) & np.isnan(position[:, 0])
     position[left] = instance.start_position[agents[left]]
-    lists = instance.allowed_tasks
+    lists, table = instance.allowed_tasks, instance.distances
+    if table is not None:  # distances from a start that goes stay those of the agent
+        table = table.with_rows_of_starts(agents[left], instance.start_task[agents[left]])
     rows = agent_rows(instance, agents)
     rows |= {"agent_position": position, "start_task": start}
     rows["allowed_tasks"] = None if lists is None else tuple(_renamed(lists[i], number) for i in agents.tolist())
@@ -55,11 +57,10 @@ def restricted(instance: "Instance", agents: IntArray, tasks: IntArray) -> "Inst
         task_position=instance.task_position[tasks],
         priority=instance.priority[tasks],
         needs=None if instance.needs is None else tuple(instance.needs[j] for j in tasks.tolist()),
-        distances=None if instance.distances is None else instance.distances.restricted(agents, tasks),
+        distances=None if table is None else table.restricted(agents, tasks),
     )
-    part.__dict__["reach"] = restricted_reach(
-        instance.reach, agents, tasks
-    )  # what a start outside the part gives, stays
+    if instance.reach.move is not None:  # which the fields do not say
+        part.__dict__["reach"] = restricted_reach(instance.reach, agents, tasks)
     return part
 
 

@@ -63,7 +63,9 @@ def build_reach(instance: "Instance") -> Reach:
     return reach
 
 
-def replanned(reach: Reach, task_of_agent: Indices, price: Floats, pinned: Flags, *, energy_counts: bool) -> Reach:
+def replanned(
+    reach: Reach, task_of_agent: Indices, price: Floats, pinned: Flags, *, energy_counts: bool, cost_counts: bool
+) -> Reach:
     """Return a reach in which agents pay for another task than they have, and some keep theirs.
 
     Parameters
@@ -77,6 +79,8 @@ def replanned(reach: Reach, task_of_agent: Indices, price: Floats, pinned: Flags
         Agents that can do nothing but the task that they have, at no cost.
     energy_counts : bool
         Whether the energy of flights is part of the cost.
+    cost_counts : bool
+        Whether there is a cost at all; else costs stay as they are, and only pins count.
     """
     first, origin = group_rows([part.astype(np.float64) for part in (reach.origin, task_of_agent, price, pinned)])
     old, task, fixed = reach.origin[first], task_of_agent[first], pinned[first]
@@ -89,17 +93,18 @@ def replanned(reach: Reach, task_of_agent: Indices, price: Floats, pinned: Flags
     list_of, lists = number_lists(own, len(own))
     given = reach.geometry.given
     start = reach.geometry.start[old]
+    pinned_free = Move(task, np.where(fixed, 0.0, price[first] / unit), float(energy_counts))
     return Reach(
         origin=origin,
         geometry=replace(reach.geometry, start=start, given=None if given is None else given.chosen(old)),
         communication_range=np.where(fixed, np.inf, reach.communication_range[old]),
         battery=np.where(fixed, np.inf, reach.battery[old]),
-        energy_per_distance=unit,
-        factor=factor,
+        energy_per_distance=unit if cost_counts else reach.energy_per_distance,
+        factor=factor if cost_counts else None if reach.factor is None else reach.factor[old],
         returns=None if reach.returns is None else reach.returns[old],
         list_of=list_of,
         lists=lists,
-        move=Move(task, np.where(fixed, 0.0, price[first] / unit), float(energy_counts)),
+        move=pinned_free if cost_counts else None,
     )
 
 
@@ -138,7 +143,7 @@ def _rows_of(table: DistanceTable, start: Indices) -> Indices:
     nodes[table.source] = nodes[table.target] = True
     agents = np.arange(len(start))
     by_task = np.where(start >= 0, table.n + start, table.n + table.m)
-    return np.where(nodes[agents], agents, np.where(nodes[by_task] | (start >= 0), by_task, -1))
+    return np.where(nodes[agents], agents, np.where(start >= 0, by_task, -1))
 
 
 def _bound_to(given: GivenRows, list_of: Indices, lists: Sequence[Indices]) -> tuple[Indices, tuple[Indices, ...]]:

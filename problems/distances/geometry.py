@@ -134,8 +134,10 @@ class Geometry(ReadOnly):
         if self.metric == MANHATTAN:
             return manhattan_distances(self.place, corner)
         if self.metric == GEOGRAPHIC:
-            climb = np.ptp(np.concatenate([self.start[:, 2], self.task_position[:, 2]]))
-            return np.full(len(self.start), (LONGEST_GEODESIC_M + np.nan_to_num(climb)) / METRES[self.unit])
+            height = np.concatenate([self.start[:, 2], self.task_position[:, 2]])
+            height = height[~np.isnan(height)]
+            climb = float(np.ptp(height)) if len(height) else 0.0
+            return np.full(len(self.start), (LONGEST_GEODESIC_M + climb) / METRES[self.unit])
         return distances(self.place, corner)
 
     def _by_metric(self, place: Floats, goal: Floats) -> Floats:

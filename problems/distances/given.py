@@ -1,7 +1,7 @@
 """Distances that the user gives: roads, corridors, no-fly zones."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import repeat
 from typing import Literal, cast
 
@@ -140,6 +140,25 @@ class DistanceTable(ReadOnly):
         if twice.any():
             row = order[int(np.argmax(twice)) + 1]
             raise InputError("gives a pair that an earlier row gives; keep one of them", f"distances.rows[{row}]")
+
+    def with_rows_of_starts(self, agents: IntArray, start_task: IntArray) -> "DistanceTable":
+        """Return the table in which some agents have for their own what is given for the task where they start.
+
+        Parameters
+        ----------
+        agents, start_task : ndarray of int, shape (k,)
+        """
+        parts = [(self.source, self.target, self.distance)]
+        size = self.n + self.m
+        known = set(np.concatenate([self.source * size + self.target, self.target * size + self.source]).tolist())
+        for agent, task in zip(agents.tolist(), start_task.tolist(), strict=True):
+            for ends, others in ((self.source, self.target), (self.target, self.source)):
+                row = np.flatnonzero((ends == self.n + task) & (others >= self.n))
+                row = row[[agent * size + other not in known for other in others[row].tolist()]]
+                pair = (np.full(len(row), agent), others[row])
+                parts.append((*(pair if ends is self.source else pair[::-1]), self.distance[row]))
+        source, target, distance = (np.concatenate([part[column] for part in parts]) for column in range(3))
+        return replace(self, source=source, target=target, distance=distance)
 
     def restricted(self, agents: IntArray, tasks: IntArray) -> "DistanceTable":
         """Return what the table says of some agents and tasks, numbered anew in this order; agents may be repeated."""

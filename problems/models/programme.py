@@ -35,7 +35,7 @@ from alloc.problems.instance import FloatArray, Instance, IntArray
 from alloc.problems.matching.unservable import fewest_unserved
 from alloc.problems.models.grouping import Grouping, grouped
 from alloc.problems.models.names import SEPARATOR, plain_names
-from alloc.problems.vocabulary import Objective
+from alloc.problems.vocabulary import OBJECTIVES, Objective
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array
@@ -158,6 +158,8 @@ def build_programme(
     RefusedError
         If there is no work, not every task can be served, or the model would be too large.
     """
+    if objective not in OBJECTIVES:
+        raise InputError(f"must be {' or '.join(OBJECTIVES)}", "objective")
     with_energy, travels = objective is Objective.MAKESPAN_ENERGY, instance.has_travel_time
     if makespan is None and (with_energy or travels):
         why = "the least energy is that at a makespan" if with_energy else "what an agent adds depends on its arrival"

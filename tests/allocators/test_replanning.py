@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tiny_instances import tiny_instance, varied_instance
 
-from alloc.allocators import load, solve
+from alloc.allocators import Improvement, Result, load, solve
 from alloc.allocators.registry import BUILT_IN
 from alloc.problems import IDLE, Allocation, InputError, Instance, Objective, evaluate
 
@@ -125,3 +125,64 @@ def test_errors(arguments: dict, message: str) -> None:
     )
     with pytest.raises(InputError, match=message):
         solve(instance, "greedy", **arguments)
+
+
+def test_what_is_proven_with_pins_is_said_to_hold_for_them() -> None:
+    """A bound with a pin is none without it: the result has its pins, and the summary says so."""
+    instance = Instance(ability=[5, 1], workload=[10, 1])
+    result = solve(instance, "cpsat", pins={"a1": "t2"})
+    assert (result.status, result.makespan, dict(result.pins)) == ("optimal", 10.0, {"a1": "t2"})
+    assert "with 1 agent pinned: optimal" in str(result)
+    assert "cannot be done sooner while some are pinned" in str(result)
+    assert Result.from_dict(result.to_dict(), instance).pins == result.pins
+    assert solve(instance, "cpsat").makespan == 2.0
+
+
+@pytest.mark.parametrize("method", EXACT)
+@pytest.mark.parametrize("seed", range(3))
+def test_the_energy_stage_counts_costs(method: str, seed: int) -> None:
+    """Flights back of all cost what twice the energy does: the same optimum, proven, with many pairs."""
+    rng = np.random.default_rng(seed)
+    fields = {
+        "ability": rng.integers(1, 10, 40),
+        "workload": rng.integers(10, 60, 8),
+        "agent_position": rng.random((40, 2)),
+        "task_position": rng.random((8, 2)),
+    }
+    back = solve(Instance(**fields, returns=[True] * 40), method, objective="makespan-energy", time_limit_s=20)
+    twice = solve(Instance(**fields, energy_per_distance=2), method, objective="makespan-energy", time_limit_s=20)
+    assert (back.status, twice.status) == ("optimal", "optimal")
+    assert back.energy == pytest.approx(twice.energy, rel=1e-6)
+
+
+def test_improvements_are_those_of_the_instance() -> None:
+    """Pinned agents are at their tasks in what the callback gets, and their flights count there and in the trace."""
+    instance = varied_instance(3, {"rates"})
+    agent, task = next(iter(np.argwhere(instance.reach.mask[instance.reach.origin]).tolist()))
+    told: list[Improvement] = []
+    result = solve(
+        instance,
+        "local-search",
+        objective="makespan-energy",
+        pins={instance.agent_ids[agent]: instance.task_ids[task]},
+        iterations=20,
+        time_limit_s=None,
+        on_improvement=told.append,
+    )
+    assert all(one.allocation.task_of_agent[agent] == task for one in told)
+    assert told[-1].evaluation.energy == pytest.approx(result.energy)
+    assert result.trace[-1].energy == pytest.approx(result.energy)
+
+
+def test_a_pin_alone_leaves_large_instances_to_greedy() -> None:
+    """Where no cost counts, a pin is a list of one task: nothing needs a table of all pairs."""
+    rng = np.random.default_rng(0)
+    instance = Instance(
+        ability=np.ones(60_000),
+        workload=np.full(400, 5.0),
+        agent_position=rng.random((60_000, 2)),
+        task_position=rng.random((400, 2)),
+    )
+    result = solve(instance, "greedy", pins={"a1": "t1"}, time_limit_s=20)
+    assert result.allocation.task_of_agent[0] == 0
+    assert result.makespan is not None

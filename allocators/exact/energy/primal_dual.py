@@ -68,17 +68,17 @@ class PrimalDual:
 
     def __init__(self, instance: Instance, model: Model, demand: Demand, plan: Allocation, seed: int) -> None:
         self._model, self._demand = model, demand
-        task_distance = pairwise_distance(instance.task_position[model.tasks])
+        task_distance = pairwise_distance(instance.reach.goal[model.tasks])
         self._pairs: IntArray = np.arange(len(demand.class_of_pair))
         self._dual = None if demand.partial else self._begin_dual(task_distance)
         self._primal = _begin_primal(instance, model, demand, plan, task_distance, seed)
-        self._reported = self._cost = _distance(instance, plan)
+        self._reported = self._cost = _cost_of_plan(instance, plan)
         self._primal_timer, self._dual_timer = Timer(), Timer()
         self._descended = self._primal is None
 
     @property
     def bound(self) -> float:
-        """Distance that every plan needs, as far as proven."""
+        """Cost that every plan needs, as far as proven."""
         return 0.0 if self._dual is None else min(self._dual.bound * (1 - ROUNDING), self._cost)
 
     @property
@@ -199,6 +199,7 @@ def _begin_primal(
     return PairwiseSearch(task, weight[agent_class], cost[agent_class], need, task_distance, seed)
 
 
-def _distance(instance: Instance, plan: Allocation) -> float:
+def _cost_of_plan(instance: Instance, plan: Allocation) -> float:
+    """Return what the flights of a plan cost, in units of distance."""
     sent = np.flatnonzero(plan.task_of_agent != IDLE)
-    return float(instance.reach.distance_of(sent, plan.task_of_agent[sent]).sum())
+    return float(instance.reach.cost_of(sent, plan.task_of_agent[sent]).sum())

@@ -6,6 +6,7 @@ from oracle import flight_energies, reachable
 from tiny_instances import varied_instance
 
 from alloc.problems import DistanceTable, InputError, Instance
+from alloc.problems.formats import from_document, to_document
 
 SEEDS = range(60)
 
@@ -43,6 +44,8 @@ def test_without_tasks_nobody_moves(seed: int) -> None:
     agents, tasks = np.indices((fewer.n, fewer.m)).reshape(2, -1)
     np.testing.assert_array_equal(fewer.reach.allows(agents, tasks), able[:, 1:].ravel())
     np.testing.assert_allclose(fewer.reach.distance_of(agents, tasks), distance[:, 1:].ravel(), rtol=1e-9, atol=1e-9)
+    same_reach(fewer)  # by its fields alone, as after another change, or from a file
+    same_reach(from_document(to_document(fewer)))
 
 
 @pytest.mark.parametrize(
@@ -52,6 +55,12 @@ def test_without_tasks_nobody_moves(seed: int) -> None:
         (lambda one: one.with_agents([{"id": "x", "like": "a9"}]), "no agent 'a9'"),
         (lambda one: one.with_agents([{"id": "a1", "ability": 1}]), "used twice"),
         (lambda one: one.with_agents([{"id": "x"}]), "ability"),
+        (lambda one: one.with_agents([{"ability": 1}]), "agents.id: must be a string"),
+        (lambda one: one.with_agents([{"id": "x", "ability": "3"}]), r"agents\[2\].ability: must be a finite number"),
+        (lambda one: one.with_agents([{"id": "x", "ability": 3, "returns": "no"}]), "must be True or False"),
+        (lambda one: one.with_agents([{"id": "x", "ability": 3, "skills": 5}]), "skills"),
+        (lambda one: one.with_agents([{"id": "x", "ability": 3, "start_task": ["t1"]}]), "no task"),
+        (lambda one: one.moved_to([("a1", "t1")]), "places"),
         (lambda one: one.with_tasks([{"id": "x"}]), "workload"),
         (lambda one: one.with_tasks([{"id": "t1", "workload": 1}]), "used twice"),
         (lambda one: one.without_tasks(["t1", "t2"]), "at least one task"),
