@@ -22,7 +22,7 @@ if sys.argv[1] == "gappo":
 def work():
     for _ in range(int(sys.argv[4])):
         result = solve(instance, method, objective="makespan-energy", time_limit_s=1.5, threads=2)
-        print(result.stop_reason, result.allocation is not None, flush=True)
+        print(f"{result.stop_reason} {result.allocation is not None}", flush=True)
 
 thread = threading.Thread(target=work, daemon=sys.argv[3] == "daemon")
 thread.start()
