@@ -20,8 +20,7 @@ from alloc.allocators.runtime.interrupts import signals_set
 from alloc.allocators.solve import solve
 from alloc.problems import Allocation, Evaluation, Instance, Objective, evaluate
 from alloc.problems.arguments import event, flag, function, listed, of_type, whole
-
-PARETO_FORMAT = "alloc-pareto/1"
+from alloc.problems.formats.allocation_file import FRONT_FORMAT
 
 CLOSE = 1e-3
 """Relative difference of two makespans up to which there is no run between them."""
@@ -52,7 +51,7 @@ class Front:
         dict
         """
         return {
-            "format": PARETO_FORMAT,
+            "format": FRONT_FORMAT,
             "instance": self.instance.name,
             "complete": self.complete,
             "points": [_point(result) for result in self.points],

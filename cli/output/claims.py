@@ -12,9 +12,6 @@ from alloc.problems.text import number
 if TYPE_CHECKING:
     from alloc.allocators import Result
 
-SCORES = ("makespan", "served_makespan", "energy", "distance", "battery_remaining_percent", "reward")
-"""Fields of a result file that follow from allocation and instance."""
-
 BOUNDS = {"lower_bound": "makespan", "energy_lower_bound": "energy"}
 """Bounds, and what they are bounds on."""
 
@@ -77,6 +74,8 @@ def _with_moves(result: "Result", claims: Mapping[str, object]) -> "Result":
 
 def _differences(result: "Result", claims: Mapping[str, object]) -> Iterator[str]:
     """Yield how the file and the result differ: in the name of the instance, in the agents, in the scores."""
+    from alloc.allocators.result_document import SCORES
+
     found = result.to_dict()
     if claims.get("instance") not in (None, found["instance"]):
         yield "it is for another instance"
