@@ -17,7 +17,9 @@ from alloc.problems import (
     makespan_lower_bound,
     minimal_unservable_set,
 )
+from alloc.problems.evaluation import last_equal
 from alloc.problems.instance import IntArray
+from alloc.problems.text import labelled, number
 
 MOST_NAMES = 10
 """Ids of competing tasks in a note before it is cut."""
@@ -58,6 +60,8 @@ def conclude(
     notes = [*notes, *proposal.notes]
     if infeasible:
         notes.append(_contention(search, decomposition))
+    elif best is not None and search.tolerance.limit is not None:
+        notes.extend(_unmet(search, search.tolerance.limit))
     if decomposition is not None:
         notes.extend(_concluded(decomposition, search))
     energy_bound = None
@@ -82,6 +86,16 @@ def conclude(
         makespan_limit=None if infeasible or search.tolerance == EXACT else search.makespan_limit,
         tolerance=search.tolerance,
     )
+
+
+def _unmet(search: Search, limit: float) -> list[str]:
+    """Return a note where no plan keeps to the makespan limit that was given."""
+    assert search.best is not None
+    units, makespan = search.instance.units, search.best.evaluation.served_makespan
+    if makespan <= last_equal(limit):
+        return []
+    most, least = (labelled(number(value), units.time) for value in (limit, search.lower_bound))
+    return [f"no plan was found within the makespan limit {most}; any takes {least} at least"]
 
 
 def _concluded(decomposition: Decomposition, search: Search) -> list[str]:

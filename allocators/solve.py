@@ -7,6 +7,8 @@ import time
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 
+import numpy as np
+
 from alloc.allocators.auto import choose
 from alloc.allocators.bounds import raise_bound_before
 from alloc.allocators.conclusion import conclude
@@ -184,8 +186,9 @@ def _prepared(
 
 
 def _is_matched(instance: Instance) -> bool:
-    """Whether matchings are likely to be sought, among so many pairs that loading takes little time beside that."""
-    return instance.reach.pairs > MATCHED_PAIRS and (instance.n < instance.m or not instance.reach.is_complete)
+    """Whether matchings are sought for sure, or likely, among so many pairs that loading takes little beside that."""
+    many = instance.reach.pairs > MATCHED_PAIRS and not instance.reach.is_complete
+    return many or instance.n < np.count_nonzero(instance.workload)
 
 
 def _require_none(parameters: object, settings: dict[str, object]) -> None:

@@ -81,6 +81,7 @@ OPTION_NAMES = {
     "high": "ability_max",
     "format": "file_format",
     "like": "add",
+    "pins": "pin",
 }
 """Options by the parameter of the library that they set, where the two have different names."""
 

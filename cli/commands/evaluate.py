@@ -139,7 +139,7 @@ def _tell(result: "Result") -> None:
         for entry in _tasks(result)
     ]
     units = result.instance.units
-    header = ["task", heading("workload", units.work), "agents", "ability W", "W - h", heading("done at", units.time)]
+    header = ["task", heading("workload", units.work), "agents", "ability", "coverage", heading("done at", units.time)]
     say(table(header, rows))
     say("\n".join(["", f"{result.instance.name}:", *figures(result), *bottleneck_lines(result)]))
     for violation in score.violations:

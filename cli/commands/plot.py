@@ -6,8 +6,9 @@ import typer
 
 from alloc.cli import options
 from alloc.cli.options import examples
-from alloc.cli.output.console import STANDARD
+from alloc.cli.output.console import STANDARD, note
 from alloc.cli.output.files import check_outputs, check_picture
+from alloc.problems.text import counted
 
 if TYPE_CHECKING:
     from alloc.allocators import Result
@@ -42,7 +43,11 @@ def plot_command(
     check_picture(output)
     if instance == result == STANDARD:
         raise InputError("cannot be the instance and the result at once", source="standard input")
-    plot(_read(result, read_instance(instance)), output)
+    drawn = _read(result, read_instance(instance))
+    plot(drawn, output)
+    if drawn.evaluation is not None and drawn.evaluation.violations:
+        count = counted(len(drawn.evaluation.violations), "agent")
+        note(f"{count} cannot take the task given, and drawn there all the same; `alloc evaluate` says why")
 
 
 def _read(path: str, instance: "Instance") -> "Result":

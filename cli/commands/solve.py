@@ -142,6 +142,8 @@ def _pins(pin: list[str] | None, file: str | None) -> dict[str, str | None]:
         agent, sign, task = pair.partition("=")
         if not sign or not agent:
             raise typer.BadParameter(f"must be AGENT=TASK, got {pair!r}", param_hint="'--pin'")
+        if found.get(agent, task or None) != (task or None) and file is None:
+            raise typer.BadParameter(f"{agent!r} is pinned to two tasks", param_hint="'--pin'")
         found[agent] = task or None
     return found
 
