@@ -188,7 +188,7 @@ def _prepared(
 def _is_matched(instance: Instance) -> bool:
     """Whether matchings are sought for sure, or likely, among so many pairs that loading takes little beside that."""
     many = instance.reach.pairs > MATCHED_PAIRS and not instance.reach.is_complete
-    return many or instance.n < np.count_nonzero(instance.workload)
+    return many or instance.n < int(np.count_nonzero(instance.workload))
 
 
 def _require_none(parameters: object, settings: dict[str, object]) -> None:
