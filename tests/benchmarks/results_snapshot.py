@@ -16,12 +16,13 @@ from pathlib import Path
 import numpy as np
 
 from alloc.allocators import RefusedError, load, names, solve
-from alloc.problems import Family, Instance, Objective, paper_like, random_instance
+from alloc.problems import Family, Instance, paper_like, random_instance
 
 ITERATIONS = {"ga": 10, "hedonic": 40, "auction": 200}
 """Of each method that is not run for `FEW_ITERATIONS`; the exact ones end when they have proven an optimum."""
 
 FEW_ITERATIONS = 4
+OBJECTIVES = ("makespan", "makespan-energy")
 SMALL = 12
 """Agents below which the exact methods run whatever the kind; beyond, for the makespan of whole abilities alone."""
 
@@ -88,7 +89,7 @@ def run(path: Path) -> None:
     with path.open("a") as file:
         for instance in instances():
             for name, allocator in loaded.items():
-                for objective in map(str, Objective):
+                for objective in OBJECTIVES:
                     endless = allocator.method.kind == "exact" and not ends_soon(instance, objective)
                     if not endless and (instance.name, name, objective) not in done:
                         row = {"instance": instance.name, "method": name, "objective": objective}
