@@ -18,9 +18,9 @@ from alloc.problems import (
     read_allocation,
     write_model,
 )
+from alloc.problems.vocabulary import OBJECTIVES
 
 SEEDS = [seed for seed in range(60) if all_can_be_served(varied_instance(seed))][:20]
-from alloc.problems.vocabulary import OBJECTIVES
 
 
 def solved_by_highs(path: Path, instance: Instance) -> Evaluation:
