@@ -1,6 +1,7 @@
 """alloc schema."""
 
 import json
+from importlib.resources import files
 
 import pytest
 
@@ -29,14 +30,15 @@ def test_unknown_formats_are_errors(alloc):
     assert ran.err == "alloc: NAME: there is no format 'alloc-instanze/1' (did you mean 'alloc-instance/1'?)\n"
 
 
-def test_metadata_of_policies_are_as_their_schema_says(request):
+def test_metadata_of_policies_are_as_their_schema_says():
     """The metadata of every policy that ships with the package are valid."""
     from jsonschema import Draft202012Validator
 
     validator = Draft202012Validator(schema("policy"))
-    files = sorted((request.config.rootpath / "allocators/learned/files/policies").glob("*.safetensors"))
-    assert files
-    for file in files:
+    policies = files("alloc.allocators.learned.files") / "policies"
+    shipped = sorted(path.name for path in policies.iterdir() if path.name.endswith(".safetensors"))
+    assert shipped
+    for file in (policies / name for name in shipped):
         with file.open("rb") as stream:
             metadata = json.loads(stream.read(int.from_bytes(stream.read(8), "little")))["__metadata__"]
         assert list(validator.iter_errors(metadata)) == []

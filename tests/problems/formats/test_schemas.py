@@ -11,6 +11,7 @@ import pytest
 from jsonschema import Draft202012Validator
 from schema_checks import faults
 
+import alloc.problems
 from alloc.allocators import pareto, solve
 from alloc.problems import InputError, Instance, read_instance
 from alloc.problems.formats import from_document, to_document
@@ -39,7 +40,8 @@ def test_schemas_are_schemas(name: str) -> None:
 
 def test_every_format_has_a_schema() -> None:
     """Each format that the code and the documents name has one; checkpoints are no JSON."""
-    sources = [*ROOT.glob("problems/**/*.py"), *ROOT.glob("allocators/**/*.py"), *ROOT.glob("cli/**/*.py")]
+    package = Path(alloc.problems.__file__).parents[1]  # of the working tree, or as installed
+    sources = [path for part in ("problems", "allocators", "cli") for path in (package / part).glob("**/*.py")]
     texts = [*TEXTS.values(), *(path.read_text("utf-8") for path in sources)]
     named = {name for text in texts for name in re.findall(r"\balloc-[a-z]+/\d+\b", text)}
     assert named - {"alloc-checkpoint/3"} == set(SCHEMAS)
