@@ -84,27 +84,26 @@ def replanned(
     """
     first, origin = group_rows([part.astype(np.float64) for part in (reach.origin, task_of_agent, price, pinned)])
     old, task, fixed = reach.origin[first], task_of_agent[first], pinned[first]
-    unit = reach.energy_per_distance or 1.0
-    rate = np.ones(len(first)) if reach.factor is None else reach.factor[old]
-    factor = np.where(fixed, 0.0, rate * (reach.energy_per_distance / unit))
     own = [reach.lists[number] if number >= 0 else None for number in reach.list_of[old].tolist()]
     for row in np.flatnonzero(fixed).tolist():
         own[row] = task[[row]] if task[row] >= 0 else task[:0]
     list_of, lists = number_lists(own, len(own))
-    given = reach.geometry.given
-    start = reach.geometry.start[old]
-    pinned_free = Move(task, np.where(fixed, 0.0, price[first] / unit), float(energy_counts))
-    return Reach(
-        origin=origin,
-        geometry=replace(reach.geometry, start=start, given=None if given is None else given.chosen(old)),
+    part = replace(
+        _chosen(reach, old, origin),
         communication_range=np.where(fixed, np.inf, reach.communication_range[old]),
         battery=np.where(fixed, np.inf, reach.battery[old]),
-        energy_per_distance=unit if cost_counts else reach.energy_per_distance,
-        factor=factor if cost_counts else None if reach.factor is None else reach.factor[old],
-        returns=None if reach.returns is None else reach.returns[old],
         list_of=list_of,
         lists=lists,
-        move=pinned_free if cost_counts else None,
+    )
+    if not cost_counts:
+        return part
+    unit = reach.energy_per_distance or 1.0
+    rate = np.ones(len(first)) if reach.factor is None else reach.factor[old]
+    return replace(
+        part,
+        energy_per_distance=unit,
+        factor=np.where(fixed, 0.0, rate * (reach.energy_per_distance / unit)),
+        move=Move(task, np.where(fixed, 0.0, price[first] / unit), float(energy_counts)),
     )
 
 
@@ -113,19 +112,29 @@ def restricted_reach(reach: Reach, agents: Indices, tasks: Indices) -> Reach:
     old, origin = np.unique(reach.origin[agents], return_inverse=True)
     number = np.full(len(reach.goal) + 1, -1, dtype=np.intp)
     number[tasks] = np.arange(len(tasks))
-    geometry, move = reach.geometry, reach.move
-    given = None if geometry.given is None else geometry.given.chosen(old).renumbered(number, len(tasks))
+    part, move = _chosen(reach, old, origin.astype(np.intp)), reach.move
+    geometry = part.geometry
+    given = None if geometry.given is None else geometry.given.renumbered(number, len(tasks))
+    return replace(
+        part,
+        geometry=replace(geometry, task_position=geometry.task_position[tasks], given=given),
+        lists=tuple(np.sort(number[named][number[named] >= 0]) for named in reach.lists),
+        move=None if move is None else Move(number[move.task[old]], move.price[old], move.energy_weight),
+    )
+
+
+def _chosen(reach: Reach, old: Indices, origin: Indices) -> Reach:
+    """Return the reach of some origins, without the price of moving; `origin` of each agent among them."""
     return Reach(
-        origin=origin.astype(np.intp),
-        geometry=replace(geometry, start=geometry.start[old], task_position=geometry.task_position[tasks], given=given),
+        origin=origin,
+        geometry=reach.geometry.chosen(old),
         communication_range=reach.communication_range[old],
         battery=reach.battery[old],
         energy_per_distance=reach.energy_per_distance,
         factor=None if reach.factor is None else reach.factor[old],
         returns=None if reach.returns is None else reach.returns[old],
         list_of=reach.list_of[old],
-        lists=tuple(np.sort(number[named][number[named] >= 0]) for named in reach.lists),
-        move=None if move is None else Move(number[move.task[old]], move.price[old], move.energy_weight),
+        lists=reach.lists,
     )
 
 

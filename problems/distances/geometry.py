@@ -1,6 +1,6 @@
 """How far origins are from tasks: by a metric, and as the user gives it for some pairs."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -13,6 +13,7 @@ from alloc.problems.distances.metric import (
     distances,
     manhattan_distances,
 )
+from alloc.problems.distances.origins import entries
 from alloc.problems.fields import IntArray, ReadOnly
 from alloc.problems.vocabulary import EUCLIDEAN, GEOGRAPHIC, MANHATTAN
 
@@ -43,8 +44,7 @@ class GivenRows(ReadOnly):
     @cached_property
     def _keys(self) -> IntArray:
         """Origin times m plus task of each pair, and an end that no key equals."""
-        origin = np.repeat(np.arange(len(self.first) - 1), np.diff(self.first))
-        return np.append(origin * self.m + self.task, (len(self.first) - 1) * self.m)
+        return np.append(self.origin * self.m + self.task, (len(self.first) - 1) * self.m)
 
     @property
     def origin(self) -> IntArray:
@@ -112,6 +112,11 @@ class Geometry(ReadOnly):
         """Cartesian coordinates of the tasks, as for `place`."""
         return embedded(self.task_position, self.unit) if self.metric == GEOGRAPHIC else self.task_position
 
+    def chosen(self, origins: IntArray) -> "Geometry":
+        """Return the geometry of some origins, in this order."""
+        given = None if self.given is None else self.given.chosen(origins)
+        return replace(self, start=self.start[origins], given=given)
+
     def between(self, origin: IntArray, task: IntArray) -> Floats:
         """Distance from each of these origins to the task beside it; both broadcast."""
         distance = self._by_metric(self.start[origin], self.task_position[task])
@@ -173,11 +178,3 @@ def given_rows(table: DistanceTable, agents: IntArray, start_task: IntArray) -> 
     for array in (rows.first, rows.task, rows.there, rows.back):
         array.setflags(write=False)
     return rows
-
-
-def entries(begin: IntArray, origins: IntArray, nodes: IntArray) -> tuple[IntArray, IntArray]:
-    """Return row and entry for all entries of compressed rows that begin at `begin`: those of `nodes`, as `origins`."""
-    length = begin[nodes + 1] - begin[nodes]
-    total = int(length.sum())
-    shift = np.repeat(begin[nodes] - (np.cumsum(length) - length), length)
-    return np.repeat(origins, length), np.arange(total) + shift

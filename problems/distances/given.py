@@ -9,6 +9,7 @@ import numpy as np
 
 from alloc.problems.arguments import listed, shown
 from alloc.problems.distances.metric import Floats
+from alloc.problems.distances.origins import entries
 from alloc.problems.errors import InputError, nearest
 from alloc.problems.fields import IntArray, ReadOnly, numbers
 
@@ -148,15 +149,20 @@ class DistanceTable(ReadOnly):
         ----------
         agents, start_task : ndarray of int, shape (k,)
         """
+        if not len(agents):
+            return self
+        size, begins = self.n + self.m, self.n + start_task
+        known = np.concatenate([self.source * size + self.target, self.target * size + self.source])
         parts = [(self.source, self.target, self.distance)]
-        size = self.n + self.m
-        known = set(np.concatenate([self.source * size + self.target, self.target * size + self.source]).tolist())
-        for agent, task in zip(agents.tolist(), start_task.tolist(), strict=True):
-            for ends, others in ((self.source, self.target), (self.target, self.source)):
-                row = np.flatnonzero((ends == self.n + task) & (others >= self.n))
-                row = row[[agent * size + other not in known for other in others[row].tolist()]]
-                pair = (np.full(len(row), agent), others[row])
-                parts.append((*(pair if ends is self.source else pair[::-1]), self.distance[row]))
+        for ends, others in ((self.source, self.target), (self.target, self.source)):
+            row = np.flatnonzero((ends >= self.n) & (others >= self.n))
+            row = row[np.argsort(ends[row], kind="stable")]
+            begin = np.searchsorted(ends[row], np.arange(size + 1))
+            agent, entry = entries(begin, agents, begins)
+            new = ~np.isin(agent * size + others[row[entry]], known)
+            agent, entry = agent[new], row[entry[new]]
+            pair = (agent, others[entry])
+            parts.append((*(pair if ends is self.source else pair[::-1]), self.distance[entry]))
         source, target, distance = (np.concatenate([part[column] for part in parts]) for column in range(3))
         return replace(self, source=source, target=target, distance=distance)
 
@@ -170,9 +176,8 @@ class DistanceTable(ReadOnly):
             row = np.flatnonzero((ends < self.n) & (number[others] >= 0))
             row = row[np.argsort(ends[row], kind="stable")]
             begin = np.searchsorted(ends[row], np.arange(self.n + 1))
-            length = begin[agents + 1] - begin[agents]
-            new = np.repeat(np.arange(len(agents)), length)
-            entry = row[np.arange(length.sum()) + np.repeat(begin[agents] - (np.cumsum(length) - length), length)]
+            new, entry = entries(begin, np.arange(len(agents)), agents)
+            entry = row[entry]
             pair = (new, number[others[entry]])
             parts.append((*(pair if ends is self.source else pair[::-1]), self.distance[entry]))
         source, target, distance = (np.concatenate([part[column] for part in parts]) for column in range(3))

@@ -7,7 +7,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from alloc.problems.distances.geometry import Geometry, entries
+from alloc.problems.distances.geometry import Geometry
+from alloc.problems.distances.origins import entries
 from alloc.problems.vocabulary import MANHATTAN
 
 CHUNK = 1 << 21

@@ -46,3 +46,11 @@ def number_lists(
             if number[agent] == len(distinct):
                 distinct.append(tasks)
     return number, tuple(distinct)
+
+
+def entries(begin: Indices, origins: Indices, nodes: Indices) -> tuple[Indices, Indices]:
+    """Return row and entry for all entries of compressed rows that begin at `begin`: those of `nodes`, as `origins`."""
+    length = begin[nodes + 1] - begin[nodes]
+    total = int(length.sum())
+    shift = np.repeat(begin[nodes] - (np.cumsum(length) - length), length)
+    return np.repeat(origins, length), np.arange(total) + shift
