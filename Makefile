@@ -2,7 +2,8 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-PIP := PYTHONWARNINGS=ignore $(BIN)/python -m pip --quiet --disable-pip-version-check
+# Python compiles modules when they are imported first: a fraction of all that are installed, and later.
+INSTALL := PYTHONWARNINGS=ignore $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 # A process of tests for each processor, each with one thread in torch, and most of a gigabyte of memory.
 PARALLEL := -n logical --maxprocesses 8 --dist worksteal
 CODE := pyproject.toml $(shell find problems allocators cli -name '*.py' -o -name '*.safetensors')
@@ -55,19 +56,19 @@ clean:  ## remove what the other targets made
 $(VENV)/bin/python:
 	$(PYTHON) -c 'import sys; sys.exit("alloc needs Python 3.11 or newer; call make PYTHON=...") if sys.version_info < (3, 11) else None'
 	$(PYTHON) -m venv $(VENV)
-	$(PIP) install --upgrade pip
+	$(INSTALL) --upgrade pip
 
 $(VENV)/.installed: $(VENV)/bin/python $(CODE)
-	$(PIP) install --editable .
+	$(INSTALL) --editable .
 	$(BIN)/alloc methods --prepare
 	@touch $@
 
 # An installation anew makes compiled loops stale: on a fresh machine, one for the tests is all that they need.
 $(VENV)/.tested: $(VENV)/bin/python $(CODE)
-	$(PIP) install --editable '.[test]'
+	$(INSTALL) --editable '.[test]'
 	$(BIN)/alloc methods --prepare
 	@touch $(VENV)/.installed $@
 
 $(VENV)/.checked: $(VENV)/.tested
-	$(PIP) install --editable '.[dev]'
+	$(INSTALL) --editable '.[dev]'
 	@touch $@

@@ -1,5 +1,6 @@
 """``alloc methods``."""
 
+from itertools import chain
 from typing import Annotated, TypedDict
 
 import typer
@@ -67,19 +68,41 @@ def methods_command(
 def _prepare() -> None:
     """Load each installed method, which compiles its loops; a plugin that fails gives a note.
 
-    `greedy` compiles its loops apart, as it needs none but on large instances.
+    Methods of one kind share loops, so each kind has a process of its own. The learned ones take longest, and begin.
     """
-    from alloc.allocators import describe, load, names
+    from alloc.allocators import describe, names
+    from alloc.allocators.parallel.processes import ProcessEngine
+    from alloc.problems import InputError
+
+    kinds: dict[str, list[str]] = {"learned": []}
+    for name in names():
+        try:
+            method = describe(name)
+        except InputError as error:
+            note(str(error))
+            continue
+        if not method.missing:
+            kinds.setdefault(str(method.kind), []).append(name)
+    with ProcessEngine() as engine:
+        for message in chain.from_iterable(engine.map(_load, list(kinds.values())) or ()):
+            note(message)
+
+
+def _load(methods: list[str]) -> list[str]:
+    """Load methods and return the messages of those that fail."""
+    from alloc.allocators import load
     from alloc.allocators.heuristic.greedy import tree_search
     from alloc.problems import InputError
 
-    for name in names():
+    failures = []
+    for name in methods:
         try:
-            if not describe(name).missing:
-                load(name)
+            load(name)
         except InputError as error:
-            note(str(error))
-    tree_search.compile_loops()
+            failures.append(str(error))
+    if "greedy" in methods:
+        tree_search.compile_loops()  # which `greedy` needs on large instances only, and loads then
+    return failures
 
 
 def _facts(name: str) -> Fact:

@@ -89,10 +89,13 @@ def test_methods_survives_a_broken_plugin(alloc, monkeypatch):
 def test_methods_are_prepared_once_for_all(alloc, monkeypatch):
     """Every method that is installed is loaded, what loading leaves out is compiled, and nothing is printed.
 
-    A broken plugin is a note.
+    A broken plugin is a note. Here everything runs in one process, where what is loaded can be seen.
     """
     from importlib.metadata import EntryPoint
 
+    from alloc.allocators.parallel.serial import SerialEngine
+
+    monkeypatch.setattr("alloc.allocators.parallel.processes.ProcessEngine", SerialEngine)
     broken = EntryPoint("broken", "no_such_module:Thing", "alloc.allocators")
     monkeypatch.setattr("alloc.allocators.registry.entry_points", lambda group: [broken])
     loaded = []
@@ -102,5 +105,5 @@ def test_methods_are_prepared_once_for_all(alloc, monkeypatch):
     )
     ran = alloc("methods", "--prepare")
     assert (ran.code, ran.out) == (0, "")
-    assert {"greedy", "cpsat", "local-search", "the tree of greedy"} <= set(loaded)
+    assert {"greedy", "cpsat", "local-search", "gappo", "the tree of greedy"} <= set(loaded)
     assert "plugin 'broken'" in ran.err
