@@ -5,11 +5,14 @@ import os
 import re
 import signal
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from alloc.cli.commands.compare import _methods, _seeds
+from alloc.problems import Units
+from alloc.problems.formats import write_instance
 
 
 def test_table_has_a_row_per_instance_and_method(alloc, small, unservable):
@@ -27,6 +30,14 @@ def test_table_has_a_row_per_instance_and_method(alloc, small, unservable):
     assert rows[1]["makespan_mean"] == pytest.approx(13 / 11)
     assert rows[2]["makespan_mean"] is None
     assert rows[2]["unserved"] == 1
+
+
+def test_headings_have_the_units_that_all_instances_share(alloc, small):
+    """T and energy stand with their units; where two instances disagree, numbers are bare."""
+    write_instance(replace(small, name="timed", units=Units(time="h", energy="kWh")), "timed.json")
+    assert re.search(r" T \(h\) .* energy \(kWh\) ", alloc("compare", "timed.json", "--methods", "greedy").err)
+    ran = alloc("compare", "small.json", "timed.json", "--methods", "greedy")
+    assert re.search(r" T +worst .* energy +time", ran.err)
 
 
 def test_table_for_people_and_csv(alloc, small):

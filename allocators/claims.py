@@ -5,12 +5,11 @@ import math
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
+from alloc.allocators.result import Result
+from alloc.allocators.result_document import SCORES
+from alloc.problems import InputError
 from alloc.problems.text import number
-
-if TYPE_CHECKING:
-    from alloc.allocators import Result
 
 BOUNDS = {"lower_bound": "makespan", "energy_lower_bound": "energy"}
 """Bounds, and what they are bounds on."""
@@ -19,7 +18,7 @@ CLOSE = 1e-9
 """Relative difference up to which two scores are one."""
 
 
-def with_claims(result: "Result", claims: Mapping[str, object]) -> "tuple[Result, list[str]]":
+def with_claims(result: Result, claims: Mapping[str, object]) -> tuple[Result, list[str]]:
     """Return the result with the bounds of a result file, where they hold, and a line for each that does not.
 
     Parameters
@@ -59,11 +58,8 @@ def with_claims(result: "Result", claims: Mapping[str, object]) -> "tuple[Result
     return _with_moves(result, claims), lines
 
 
-def _with_moves(result: "Result", claims: Mapping[str, object]) -> "Result":
+def _with_moves(result: Result, claims: Mapping[str, object]) -> Result:
     """Return the result with the moves against a plan in force, and the bound on their cost, if the file has them."""
-    from alloc.allocators import Result
-    from alloc.problems import InputError
-
     if claims.get("moves") is None:
         return result
     try:
@@ -72,10 +68,8 @@ def _with_moves(result: "Result", claims: Mapping[str, object]) -> "Result":
         return result
 
 
-def _differences(result: "Result", claims: Mapping[str, object]) -> Iterator[str]:
+def _differences(result: Result, claims: Mapping[str, object]) -> Iterator[str]:
     """Yield how the file and the result differ: in the name of the instance, in the agents, in the scores."""
-    from alloc.allocators.result_document import SCORES
-
     found = result.to_dict()
     if claims.get("instance") not in (None, found["instance"]):
         yield "it is for another instance"
