@@ -27,7 +27,7 @@ from alloc.cli.commands import (
 )
 from alloc.cli.commands.training import train, tune
 from alloc.cli.options import Parameter, examples, option_of
-from alloc.cli.output.console import complain, flush, interrupted, write_out
+from alloc.cli.output.console import INTERRUPTED, complain, flush, interrupted, write_out
 
 SERVED, UNSERVED, BAD_INPUT = 0, 1, 2
 """Exit codes: every task is served; a task is unserved; bad usage or bad input."""
@@ -109,6 +109,8 @@ def _run(arguments: Sequence[str] | None) -> int:
         if os.environ.get("ALLOC_TRACEBACK"):
             raise
         return _explain(error, sys.argv[1:] if arguments is None else arguments)
+    if code == INTERRUPTED:  # typer turns Ctrl-C within a command into it
+        return interrupted()
     return code if isinstance(code, int) else SERVED
 
 
