@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 
-from alloc.cli.commands.compare import _methods, _seeds
 from alloc.problems import Units
 from alloc.problems.formats import write_instance
 
@@ -70,10 +69,22 @@ def test_a_refusal_is_a_row(alloc):
     assert "refuses" in alloc("compare", "fast.json", "--methods", "ga,greedy").err
 
 
+@pytest.fixture
+def compared(monkeypatch):
+    """What `compare` is asked for, in place of runs: methods and seeds."""
+    asked = []
+    monkeypatch.setattr(
+        "alloc.allocators.experiments.compare.compare",
+        lambda instances, methods, seeds, **options: asked.append((methods, seeds)) or [],
+    )
+    return asked
+
+
 @pytest.mark.parametrize(("text", "seeds"), [("3", [0, 1, 2]), ("7,", [7]), ("4,2,4", [4, 2]), ("0, 5", [0, 5])])
-def test_seeds(text, seeds):
+def test_seeds(alloc, small, compared, text, seeds):
     """A number is a count, a list is a list."""
-    assert _seeds(text) == seeds
+    alloc("compare", "small.json", "--methods", "greedy", "--seeds", text)
+    assert compared == [({"greedy": "greedy"}, seeds)]
 
 
 def test_interrupted_comparison_prints_what_is_finished(alloc, small):
@@ -89,12 +100,14 @@ def test_interrupted_comparison_prints_what_is_finished(alloc, small):
     assert ("hard", "ga") not in done
 
 
-def test_methods_with_parameters_in_brackets(monkeypatch):
+def test_methods_with_parameters_in_brackets(alloc, small, compared, monkeypatch):
     """Commas within brackets separate parameters and parts of values; the rows carry the text as it is written."""
     loaded = []
     monkeypatch.setattr("alloc.allocators.load", lambda name, **settings: loaded.append((name, settings)) or name)
-    found = _methods("greedy, ga[population=40,rates=0.1,0.2,elite=true],auto,ga[population=400]")
-    assert list(found) == ["greedy", "ga[population=40,rates=0.1,0.2,elite=true]", "auto", "ga[population=400]"]
+    text = "greedy, ga[population=40,rates=0.1,0.2,elite=true],auto,ga[population=400]"
+    alloc("compare", "small.json", "--methods", text)
+    ((methods, _),) = compared
+    assert list(methods) == ["greedy", "ga[population=40,rates=0.1,0.2,elite=true]", "auto", "ga[population=400]"]
     assert loaded == [("ga", {"population": 40, "rates": (0.1, 0.2), "elite": True}), ("ga", {"population": 400})]
 
 
