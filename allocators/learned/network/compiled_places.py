@@ -1,6 +1,6 @@
 """The attention of `ActorCritic` over agents and places in compiled loops.
 
-The features are those of `problems.game.observation` in single precision, as in `compiled_scores`, which says why the formulas
+The features are those of `problems.game.observation` in single precision; `compiled_scores` says why their formulas
 stand twice.
 """
 
