@@ -70,8 +70,7 @@ def evaluate_command(
     json: options.JsonOption = False,
 ) -> None:
     """Score an allocation, wherever it comes from."""
-    from alloc.allocators.claims import with_claims
-    from alloc.allocators.conclusion import scored_result
+    from alloc.allocators.conclusion import scored_result, with_claims
 
     problem, answer, claims = read_pair(instance, allocation)
     result = scored_result(problem, answer, "evaluate")
