@@ -70,7 +70,8 @@ def checked_tolerance(slack: float, limit: float | None, objective: Objective) -
     )
     if objective is Objective.MAKESPAN and tolerance != EXACT:
         name = "makespan_slack" if slack else "makespan_limit"
-        raise InputError(f"leaves room for less energy; it is for the objective {Objective.MAKESPAN_ENERGY}", name)
+        goals = f"{Objective.MAKESPAN_ENERGY} or {Objective.MAKESPAN_MOVES}"
+        raise InputError(f"leaves room for less energy or fewer moves; it is for the objective {goals}", name)
     return tolerance
 
 

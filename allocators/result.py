@@ -10,13 +10,13 @@ from alloc.allocators.contract.status import Status
 from alloc.allocators.contract.tolerance import EXACT, PROVEN, MakespanTolerance, relative_gap
 from alloc.allocators.plan.table import AgentRow, agent_rows
 from alloc.allocators.replanning.moves import Moves
-from alloc.allocators.result_document import moves_document, read_document, result_fields
+from alloc.allocators.result_document import moves_document, result_fields
 from alloc.allocators.summary import summary
 from alloc.problems import Allocation, Evaluation, InputError, Instance, MissingPackageError, Objective
 from alloc.problems.diagnosis.unserved import Unserved, why_unserved
 from alloc.problems.evaluation import RELATIVE_TOLERANCE
-from alloc.problems.formats.allocation_file import RESULT_FORMAT
-from alloc.problems.formats.files import PathLike, named
+from alloc.problems.formats.allocation_file import RESULT_FORMAT, parse_result
+from alloc.problems.formats.files import PathLike, named, read_text
 from alloc.problems.formats.messages import told
 
 if TYPE_CHECKING:
@@ -267,8 +267,7 @@ def read_result(path: PathLike, instance: Instance) -> Result:
     InputError
         If the file cannot be read, or as `Result.from_dict` does.
     """
-    document = read_document(path)
     try:
-        return Result.from_dict(document, instance)
+        return Result.from_dict(parse_result(read_text(path)), instance)
     except InputError as error:
         raise told(error, named(path)) from error.__cause__

@@ -169,7 +169,7 @@ def _prepared(
         given = ", ".join(settings) or "parameters"
         raise InputError(f"is an allocator with its own parameters; set {given} where it is made", "method")
     allocator = load(method, parameters, **settings) if isinstance(method, str) else method
-    if request.instance.reach.move is not None:
+    if _is_repaired(request.instance):
         from alloc.allocators.heuristic.local_search.annealing_state import compile_loops
 
         compile_loops()  # for the repair; loading is not part of the run
@@ -183,6 +183,12 @@ def _prepared(
     if request.budget.target_gap is not None:
         importlib.import_module("scipy.optimize")  # for the bound before the run
     return allocator, notes, spent_s
+
+
+def _is_repaired(instance: Instance) -> bool:
+    """Whether moves have a price, so that the plan is repaired in the end: pins alone leave nothing to repair."""
+    move = instance.reach.move
+    return move is not None and bool(move.price.any())
 
 
 def _is_matched(instance: Instance) -> bool:
@@ -236,8 +242,7 @@ def _propose(allocator: Allocator, search: Search) -> tuple[Proposal, StopReason
         end = time.monotonic() + max(REPAIR_S, search.remaining_s)
         search.submit(serve_all(search.instance, search.best.allocation, lambda: end - time.monotonic()))
     search.raise_bound(proposal.makespan_lower_bound or 0.0)
-    move = search.instance.reach.move
-    if search.best is not None and move is not None and move.price.any():
+    if search.best is not None and _is_repaired(search.instance):
         from alloc.allocators.heuristic.local_search.improve import repair
 
         limit = search.budget.time_limit_s

@@ -16,9 +16,6 @@ if TYPE_CHECKING:
 P = TypeVar("P", bound="DataclassInstance")
 Value = TypeVar("Value")
 
-LARGEST_INTEGER = 2**53
-"""Beyond it, floats skip integers."""
-
 
 def with_settings(parameters_type: type[P], parameters: P | None, settings: Mapping[str, object]) -> P:
     """Return parameters with some fields replaced, all of them checked.
@@ -44,8 +41,9 @@ def with_settings(parameters_type: type[P], parameters: P | None, settings: Mapp
     for name in settings:
         if name not in names:
             raise InputError(f"is not a parameter of this method{nearest(name, names)}", name)
-    checked = {name: _converted(value, hints[name], name, infinite=True) for name, value in settings.items()}
-    return dataclasses.replace(start, **checked)
+    if not issubclass(parameters_type, CheckedParameters):  # which check themselves, and know their ranges
+        settings = {name: _converted(value, hints[name], name, infinite=True) for name, value in settings.items()}
+    return dataclasses.replace(start, **settings)
 
 
 def bounded(
@@ -101,7 +99,7 @@ def _converted(
     if kind is bool:
         return flag(value, name)
     if kind is int:
-        least = -LARGEST_INTEGER if low == -math.inf else int(low) + above
+        least = None if low == -math.inf else int(low) + above
         return whole(value, name, least, None if high == math.inf else int(high))
     if kind is float:
         if infinite and value == math.inf:

@@ -1,5 +1,6 @@
 """The drawing of a front of makespan against energy."""
 
+import math
 from typing import TYPE_CHECKING
 
 from alloc.allocators.plotting.colours import LIMIT, MAKESPAN
@@ -16,6 +17,12 @@ if TYPE_CHECKING:
 
 WIDE = 3.0
 """Ratio of the largest to the smallest makespan above which the axis is logarithmic."""
+
+MOST_TICKS = 9
+"""Numbers that a logarithmic axis has room for."""
+
+TENTHS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
+"""Factors of a power of ten at which a short axis has numbers."""
 
 
 def plot_front(front: "Front", path: str | None = None) -> "Figure":
@@ -51,9 +58,9 @@ def _draw(front: "Front") -> "Figure":
     axes.step([*hours, end], [*energy, energy[-1]], where="post", color=MAKESPAN, linewidth=1.6, zorder=3)
     axes.plot(hours, energy, "o", color=MAKESPAN, markersize=6, clip_on=False, zorder=4, label="best found")
     _draw_bounds(axes, front)
+    axes.set_xlim(hours[0] / 1.1 if wide else hours[0] - 0.08 * span, end)
     if wide:
         _logarithmic(axes)
-    axes.set_xlim(hours[0] / 1.1 if wide else hours[0] - 0.08 * span, end)
     axes.set_ylim(0, max(energy) * 1.08 or 1.0)
     axes.set_xlabel(heading("makespan", front.instance.units.time))
     axes.set_ylabel(heading("energy", front.instance.units.energy))
@@ -78,12 +85,24 @@ def _draw_bounds(axes: "Axes", front: "Front") -> None:
 
 
 def _logarithmic(axes: "Axes") -> None:
-    from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
+    from matplotlib.ticker import FixedLocator, FormatStrFormatter, NullFormatter
 
     axes.set_xscale("log")
-    axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axes.xaxis.set_major_locator(FixedLocator(log_ticks(*axes.get_xlim())))
     axes.xaxis.set_major_formatter(FormatStrFormatter("%g"))
     axes.xaxis.set_minor_formatter(NullFormatter())
+
+
+def log_ticks(low: float, high: float) -> list[float]:
+    """Return as many round numbers in a range as have room for their labels: close ones, or only powers of ten."""
+    decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    choices = [(TENTHS, 1), ((1.0, 2.0, 5.0), 1), *(((1.0,), step) for step in range(1, len(decades) + 1))]
+    for factors, step in choices:
+        ticks = [factor * 10.0**decade for decade in decades[::step] for factor in factors]
+        found = [tick for tick in ticks if low <= tick <= high]
+        if len(found) <= MOST_TICKS:
+            return found
+    return []
 
 
 def _title(front: "Front") -> str:

@@ -142,6 +142,7 @@ def _covering(
 def _write(instance: "Instance", output: str, *, into_folder: bool) -> None:
     from alloc.problems import InputError
     from alloc.problems.formats import write_instance
+    from alloc.problems.formats.messages import unwritable
 
     if not into_folder:
         write_instance(instance, output)
@@ -151,6 +152,8 @@ def _write(instance: "Instance", output: str, *, into_folder: bool) -> None:
         folder.mkdir(parents=True, exist_ok=True)
     except FileExistsError as error:
         raise InputError("is a file; several instances need a folder", source=output) from error
+    except OSError as error:
+        raise unwritable(error, folder, output) from error
     write_instance(instance, str(folder / f"{instance.name}.json"))
 
 

@@ -7,13 +7,19 @@ import typer
 
 from alloc.cli import options
 from alloc.cli.options import examples
-from alloc.cli.output.console import note, say, table, write_json
+from alloc.cli.output.console import note, table, write_json, write_out
+from alloc.problems.vocabulary import Objective
 
 EXAMPLES = examples(
     "alloc methods",
     "alloc methods --json",
     "alloc methods --prepare",
     closing="Some methods compile loops when first used; --prepare does this for all of them.",
+)
+
+MOVES = (
+    f"Every method with {Objective.MAKESPAN_ENERGY} takes {Objective.MAKESPAN_MOVES} as well: "
+    "`alloc solve` with the plan in force as --start."
 )
 
 
@@ -58,11 +64,9 @@ def methods_command(
         write_json(facts)
         return
     header = ["name", "kind", "objectives", "speeds", "slack", "proves", "state", "what it is"]
-    say(table(header, [_row(fact) for fact in facts], left=len(header)))
-    say("")
-    for fact in facts:
-        if fact["citation"]:
-            say(f"{fact['name']}: {fact['citation']}")
+    citations = [f"{fact['name']}: {fact['citation']}" for fact in facts if fact["citation"]]
+    lines = [table(header, [_row(fact) for fact in facts], left=len(header)), "", MOVES, "", *citations]
+    write_out("\n".join(lines) + "\n")
 
 
 def _prepare() -> None:

@@ -30,7 +30,7 @@ def plot_command(
     instance: options.InstanceArgument,
     result: Annotated[
         str,
-        typer.Argument(metavar="RESULT", help="A result of `alloc solve`, or an allocation; - is standard input."),
+        typer.Argument(metavar="RESULT", help=f"{options.PLAN}; - is standard input."),
     ],
     output: Annotated[str, typer.Option(metavar="FILE", help="Drawing to write: .png, .svg or .pdf.")],
 ) -> None:
@@ -51,21 +51,20 @@ def plot_command(
 
 
 def _read(path: str, instance: "Instance") -> "Result":
-    """Read a result, or score an allocation."""
+    """Read a result, or score a plan."""
     from alloc.allocators import Result
     from alloc.allocators.conclusion import scored_result
-    from alloc.allocators.result_document import read_document
     from alloc.problems import InputError
-    from alloc.problems.formats import allocation_from_document
-    from alloc.problems.formats.allocation_file import ALLOCATION_FORMAT
-    from alloc.problems.formats.files import named
+    from alloc.problems.formats import read_plan
     from alloc.problems.formats.messages import told
 
-    document = read_document(path)
-    try:
-        if document.get("format") != ALLOCATION_FORMAT:
-            return Result.from_dict(document, instance)
-        allocation, _ = allocation_from_document(document, instance)
+    plan = read_plan(path, instance)
+    if not plan.result:
+        allocation, warning = plan.allocation(instance)
+        if warning is not None:
+            note(warning)
         return scored_result(instance, allocation)
+    try:
+        return Result.from_dict(plan.result, instance)
     except InputError as error:
-        raise told(error, named(path)) from error.__cause__
+        raise told(error, plan.source) from error.__cause__

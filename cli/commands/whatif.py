@@ -12,7 +12,6 @@ from alloc.cli.options import examples
 from alloc.cli.output.console import is_terminal, note, say, table, to_json
 from alloc.cli.output.files import check_outputs, check_picture, save
 from alloc.problems.text import number, percent
-from alloc.problems.vocabulary import Objective
 
 if TYPE_CHECKING:
     from alloc.allocators import Fleet, WhatIf
@@ -51,10 +50,10 @@ def whatif_command(
         str,
         typer.Option(autocompletion=options.complete_methods, help="One of `alloc methods`, or auto, which picks one."),
     ] = "auto",
-    objective: options.ObjectiveOption = Objective.MAKESPAN,
+    objective: options.ObjectiveOption = options.PlainObjective.MAKESPAN,
     time_limit: Annotated[
         float | None,
-        typer.Option(min=0, help="Seconds for each fleet.", show_default="10; none where --iterations is given"),
+        typer.Option(help="Seconds for each fleet.", show_default="10; none where --iterations is given"),
     ] = None,
     iterations: Annotated[int | None, typer.Option(min=0, help="Iterations for each fleet.")] = None,
     seed: options.SeedOption = 0,
@@ -78,7 +77,7 @@ def whatif_command(
         up_to=up_to,
         remove=remove or (),
         method=method,
-        objective=objective,
+        objective=objective.value,
         time_limit_s=options.time_limit(time_limit, iterations),
         iterations=iterations,
         seed=seed,

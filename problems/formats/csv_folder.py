@@ -23,8 +23,9 @@ from alloc.problems.formats.document import (
     missing_rule,
     task_rows,
 )
-from alloc.problems.formats.files import read_text, reason, write_text_atomically
+from alloc.problems.formats.files import read_text, write_text_atomically
 from alloc.problems.formats.json_columns import Row, require_known
+from alloc.problems.formats.messages import reason, unwritable
 from alloc.problems.instance import Instance
 from alloc.problems.vocabulary import GEOGRAPHIC
 
@@ -116,7 +117,7 @@ def write_folder(instance: Instance, folder: Path) -> None:
     except InputError as error:
         raise InputError(error.message) from error  # without the name of the temporary file
     except (OSError, ValueError) as error:
-        raise InputError(f"cannot be written: {reason(error)}") from error
+        raise unwritable(error, folder) from error
     finally:
         shutil.rmtree(beside, ignore_errors=True)
 

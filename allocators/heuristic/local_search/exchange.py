@@ -43,7 +43,7 @@ def add_to_pool(
     origins, ability, hours_per_distance = arrays.origin, arrays.ability, arrays.hours_per_distance
     table, costs_of, starts, goals = arrays.distance, arrays.cost, arrays.origin_position, arrays.task_position
     longest, battery, rate = arrays.longest_distance, arrays.battery, arrays.energy_per_distance
-    list_begin, listed, unit = arrays.list_begin, arrays.listed_task, arrays.distance_unit
+    list_begin, listed = arrays.list_begin, arrays.listed_task
     agents, contribution, other_contribution = work.agent, work.ability, work.other_ability
     listed_distance, listed_cost = arrays.listed_distance, arrays.listed_cost
     extra, costs, logistic = work.extra_cost, work.cost, work.logistic
@@ -71,9 +71,9 @@ def add_to_pool(
                     continue
                 there, cost_there = listed_distance[entry], listed_cost[entry]
         else:
-            here = compute_distance(starts, goals, longest, battery, list_begin, listed, unit, rate, row, task)
+            here = compute_distance(starts, goals, longest, battery, list_begin, listed, rate, row, task)
             if other != idle:
-                there = compute_distance(starts, goals, longest, battery, list_begin, listed, unit, rate, row, other)
+                there = compute_distance(starts, goals, longest, battery, list_begin, listed, rate, row, other)
             cost_here, cost_there = here, there
         if here == np.inf or there == np.inf:
             continue

@@ -11,6 +11,7 @@ from alloc.allocators.learned.files.run_files import RunFiles
 from alloc.allocators.learned.training.families import check_families
 from alloc.allocators.parallel.engine import Engine, EngineError, never_stop
 from alloc.problems import InputError, Instance, TrainingError
+from alloc.problems.arguments import real
 
 if TYPE_CHECKING:
     from alloc.allocators.learned.training.limits import Limits
@@ -115,6 +116,7 @@ def train(
     """
     learner = _hyperparameters(method, parameters)
     check_families(families)
+    minutes = None if minutes is None else real(minutes, "minutes")
     if population is not None and method != "gappo":
         raise InputError(f"{method} trains one network; gappo breeds several", "population")
     if init is not None:

@@ -29,9 +29,7 @@ StepsOption = Annotated[
         show_default=f"{STEPS}; none where --minutes or --iterations is given",
     ),
 ]
-MinutesOption = Annotated[
-    float | None, typer.Option(min=0, help="Minutes of training, including those before --resume.")
-]
+MinutesOption = Annotated[float | None, typer.Option(help="Minutes of training, including those before --resume.")]
 GenerationsOption = Annotated[
     int | None, typer.Option("--iterations", min=0, help="Generations, including those before --resume.")
 ]

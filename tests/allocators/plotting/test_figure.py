@@ -38,8 +38,10 @@ def test_without_positions_times_alone_are_drawn():
 
 
 def test_unserved_tasks_are_hatched(unservable):
-    """An unserved task has a hatched bar, and the legend says what that means."""
+    """An unserved task has a hatched bar to the end of the axis, as it is never done, and is in the legend."""
     (times,) = axes_of(unservable)
+    never, done = (bar.get_width() for bar in times.patches)
+    assert never == times.get_xlim()[1] > done
     assert [bar.get_hatch() for bar in times.patches] == ["////", None]
     assert "unserved" in [text.get_text() for text in times.get_legend().get_texts()]
 

@@ -4,9 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from alloc.allocators import whatif
-from alloc.cli.commands.whatif import _table as table_of
 from alloc.problems import Instance, Units
+from alloc.problems.formats import write_instance
 
 
 def test_table_answer_and_files(alloc, small):
@@ -70,9 +69,10 @@ def test_ctrl_c_saves_the_fleets_so_far(alloc, small, monkeypatch):
     assert found["answer"] == "interrupted before a fleet was changed"
 
 
-def test_units_stand_in_the_table():
+def test_units_stand_in_the_table(alloc):
     """The units of the instance stand in the heading."""
     instance = Instance(ability=[1, 2], workload=[3], units=Units(time="min", energy="Wh"))
-    head = table_of(whatif(instance, "a1", method="milp")).splitlines()[0]
+    write_instance(instance, "timed.json")
+    head = alloc("whatif", "timed.json", "--add", "like a1", "--method", "greedy").err.splitlines()[0]
     assert "makespan (min)" in head
     assert "energy (Wh)" in head
