@@ -7,7 +7,7 @@ import typer
 
 from alloc.cli import options
 from alloc.cli.options import examples
-from alloc.cli.output.console import note, table, write_json, write_out
+from alloc.cli.output.console import note, say, table, write_json
 from alloc.problems.vocabulary import Objective
 
 EXAMPLES = examples(
@@ -66,7 +66,7 @@ def methods_command(
     header = ["name", "kind", "objectives", "speeds", "slack", "proves", "state", "what it is"]
     citations = [f"{fact['name']}: {fact['citation']}" for fact in facts if fact["citation"]]
     lines = [table(header, [_row(fact) for fact in facts], left=len(header)), "", MOVES, "", *citations]
-    write_out("\n".join(lines) + "\n")
+    say("\n".join(lines))
 
 
 def _prepare() -> None:

@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 from alloc.cli.options import examples
-from alloc.cli.output.console import table, write_out
+from alloc.cli.output.console import say, table, write_out
 
 EXAMPLES = examples(
     "alloc schema",
@@ -42,6 +42,6 @@ def schema_command(
     from alloc.problems.formats.schemas import SCHEMAS, schema_text
 
     if name is None:
-        write_out(table(["name", "what it is"], [[*item] for item in SCHEMAS.items()], left=2) + "\n")
+        say(table(["name", "what it is"], [[*item] for item in SCHEMAS.items()], left=2))
     else:
         write_out(schema_text(name))

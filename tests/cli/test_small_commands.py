@@ -54,16 +54,16 @@ def test_convert_to_standard_output(alloc, small):
 
 
 def test_methods_lists_all(alloc):
-    """Every method is listed with its capabilities on standard output, for people and as JSON."""
+    """Every method is listed with its capabilities, for people and as JSON."""
     facts = {fact["name"]: fact for fact in alloc("methods", "--json").json}
     assert {"greedy", "milp", "cpsat", "ga", "gappo"} <= set(facts)
     assert facts["cpsat"]["proves"]
     assert not facts["greedy"]["proves"]
     ran = alloc("methods")
-    assert (ran.code, ran.err) == (0, "")
-    assert all(name in ran.out for name in facts)
-    assert "doi:10.1137/0603019" in ran.out
-    assert "makespan-moves" in ran.out
+    assert (ran.code, ran.out) == (0, "")
+    assert all(name in ran.err for name in facts)
+    assert "doi:10.1137/0603019" in ran.err
+    assert "makespan-moves" in ran.err
 
 
 def test_methods_names_what_is_missing(alloc, monkeypatch):
@@ -73,7 +73,7 @@ def test_methods_names_what_is_missing(alloc, monkeypatch):
     )
     facts = {fact["name"]: fact for fact in alloc("methods", "--json").json}
     assert (facts["cpsat"]["installed"], facts["cpsat"]["missing"]) == (False, ["ortools"])
-    assert "pip install ortools" in alloc("methods").out
+    assert "pip install ortools" in alloc("methods").err
 
 
 def test_methods_survives_a_broken_plugin(alloc, monkeypatch):

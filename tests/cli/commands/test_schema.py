@@ -17,10 +17,10 @@ def test_a_schema_is_printed_as_json(alloc, name):
 
 
 def test_formats_are_listed(alloc):
-    """Without a name, all formats that have a schema are listed on standard output."""
+    """Without a name, all formats that have a schema are listed to standard error."""
     ran = alloc("schema")
-    assert (ran.code, ran.err) == (0, "")
-    assert all(name in ran.out for name in SCHEMAS)
+    assert (ran.code, ran.out) == (0, "")
+    assert all(name in ran.err for name in SCHEMAS)
 
 
 def test_unknown_formats_are_errors(alloc):
