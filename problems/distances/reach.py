@@ -46,7 +46,7 @@ class Reach(ReadOnly):
     factor : ndarray, shape (origins,), or None
         Energy per unit of distance of each origin over `energy_per_distance`; None where all are 1.
     returns : ndarray of bool, shape (origins,), or None
-        Whether the flight back counts; None where no agent returns.
+        Whether the flight back counts, see `Geometry.home`; None where no agent returns.
     list_of : ndarray of int, shape (origins,)
         Which of `lists` the origin is bound to; -1 where it may do all tasks.
     lists : tuple of ndarray of int
@@ -235,7 +235,9 @@ class Reach(ReadOnly):
 
     def flown(self, origin: Indices, task: Indices, distance: Floats) -> Floats:
         """Cost without the price of moving: energy over `energy_per_distance`."""
-        trips = self.trips(origin, task, distance)
+        return self._weighed(origin, self.trips(origin, task, distance))
+
+    def _weighed(self, origin: Indices, trips: Floats) -> Floats:
         return trips if self.factor is None else trips * self.factor[origin]
 
     def is_within(self, origin: Indices, task: Indices, distance: Floats) -> Flags:
@@ -246,11 +248,15 @@ class Reach(ReadOnly):
         return within
 
     def _is_near(self, origin: Indices, task: Indices, distance: Floats) -> Flags:
+        limited = bool(np.isfinite(self.battery).any())
+        with np.errstate(over="ignore"):
+            return self._is_enough(origin, distance, self.flown(origin, task, distance) if limited else None)
+
+    def _is_enough(self, origin: Indices, distance: Floats, flown: Floats | None) -> Flags:
+        """Whether range and battery are enough for flights of these lengths, `flown` as in `flown`, None for none."""
         near: Flags = distance <= self.communication_range[origin] + TOLERANCE
-        if np.isfinite(self.battery).any():
-            with np.errstate(over="ignore"):
-                flown = self.flown(origin, task, distance)
-                near &= self.energy_per_distance * flown <= self.battery[origin] + TOLERANCE
+        if flown is not None:
+            near &= self.energy_per_distance * flown <= self.battery[origin] + TOLERANCE
         return near
 
     def _is_allowed(self, number: Indices, task: Indices) -> Flags:
@@ -286,10 +292,11 @@ class Reach(ReadOnly):
         origins = np.arange(len(self.place))
         if self.geometry.given is None:
             low, high = known.min(axis=0), known.max(axis=0)
-            corner = np.where(self.place > low / 2 + high / 2, low, high)
             with np.errstate(over="ignore", invalid="ignore"):
-                farthest = self.geometry.farthest(corner) * (1 + 1e-12)
-                doubtful = np.flatnonzero(~self._is_near(origins, np.zeros_like(origins), farthest))
+                farthest = self.geometry.farthest(low, high) * (1 + 1e-12)
+                back = farthest if self.geometry.home is None else self.geometry.home.farthest(low, high) * (1 + 1e-12)
+                longest = farthest if self.returns is None else farthest + np.where(self.returns, back, 0.0)
+                doubtful = np.flatnonzero(~self._is_enough(origins, farthest, self._weighed(origins, longest)))
                 worst = doubtful[np.argsort((self.radius - farthest)[doubtful])]
         else:
             worst = origins

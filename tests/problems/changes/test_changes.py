@@ -57,7 +57,7 @@ def test_without_tasks_nobody_moves(seed: int) -> None:
         (lambda one: one.with_agents([{"id": "x"}]), "ability"),
         (lambda one: one.with_agents([{"ability": 1}]), "agents.id: must be a string"),
         (lambda one: one.with_agents([{"id": "x", "ability": "3"}]), r"agents\[2\].ability: must be a finite number"),
-        (lambda one: one.with_agents([{"id": "x", "ability": 3, "returns": "no"}]), "must be True or False"),
+        (lambda one: one.with_agents([{"id": "x", "ability": 3, "returns": "no"}]), "no base 'no'; give True"),
         (lambda one: one.with_agents([{"id": "x", "ability": 3, "skills": 5}]), "skills"),
         (lambda one: one.with_agents([{"id": "x", "ability": 3, "start_task": ["t1"]}]), "no task"),
         (lambda one: one.moved_to([("a1", "t1")]), "places"),
