@@ -190,7 +190,7 @@ class Instance(fields.ReadOnly):
     ) -> "Instance":
         """Return the instance that data frames, dicts of columns or lists of dicts describe.
 
-        Options are `columns`, `units`, `decimal`, `missing`, `name` and `report`; see `tables.reading.read_tables`.
+        Options are those of `tables.reading.read_tables`: `columns`, `units`, `decimal`, `missing`, `bases` and others.
         """
         return read_tables(agents, tasks, distances, **options).built(cls)
 
@@ -211,21 +211,13 @@ class Instance(fields.ReadOnly):
         if self.energy_per_distance and not fields.LEAST <= self.energy_per_distance <= fields.MOST:
             rule = f"0 or from {fields.LEAST:g} to {fields.MOST:g}"
             raise InputError(f"must be {rule}, got {self.energy_per_distance:g}", "energy_per_distance")
-        fields.require(
-            np.isfinite(self.agent_energy_per_distance) & (self.agent_energy_per_distance >= 0),
-            self.agent_energy_per_distance,
-            "energy_per_distance",
-            "a finite number >= 0",
-            agents,
-        )
-        fields.require_magnitude(self.agent_energy_per_distance, "energy_per_distance", agents)
+        rate, name = self.agent_energy_per_distance, "energy_per_distance"
+        fields.require(np.isfinite(rate) & (rate >= 0), rate, name, "a finite number >= 0", agents)
+        fields.require_magnitude(rate, name, agents)
         if self.metric == GEOGRAPHIC:
-            for kind, places in (
-                ("agent", self.agent_position),
-                ("task", self.task_position),
-                ("base", self.bases.position),
-            ):
-                fields.require_geographic(places, kind)
+            fields.require_geographic(self.agent_position, "agent")
+            fields.require_geographic(self.task_position, "task")
+            fields.require_geographic(self.bases.position, "base")
             if self.units.distance and self.units.distance not in METRES:
                 raise InputError(f"must be one of {', '.join(METRES)} with geographic positions", "units.distance")
 
@@ -270,11 +262,6 @@ class Instance(fields.ReadOnly):
     def distance_unit(self) -> str:
         """Unit of geographic distances."""
         return self.units.distance or "km"
-
-    def return_name(self, agent: int) -> str:
-        """Return what the place is called to which an agent returns."""
-        base = self.return_base[agent]
-        return self.bases.ids[base] if base >= 0 else "its start"
 
     @cached_property
     def agent_index(self) -> dict[str, int]:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from alloc.problems.distances.geometry import Geometry
 from alloc.problems.distances.move import Move
 from alloc.problems.distances.neighbours import Neighbours, estimated_pairs, find_neighbours
+from alloc.problems.distances.origins import list_keys
 from alloc.problems.fields import ReadOnly
 
 TOLERANCE = 1e-9
@@ -111,8 +112,7 @@ class Reach(ReadOnly):
         """What the flight from each origin to each task costs, see `costs`; shape (origins, m), like `distance`."""
         if self.cost_is_distance:
             return self.distance
-        origins, tasks = np.arange(len(self.place))[:, None], np.arange(len(self.goal))
-        cost = self.costs(origins, tasks, self.distance)
+        cost = self.costs(np.arange(len(self.place))[:, None], np.arange(len(self.goal)), self.distance)
         cost.setflags(write=False)
         return cost
 
@@ -210,11 +210,9 @@ class Reach(ReadOnly):
     def cost_of(self, agent: Indices, task: Indices) -> Floats:
         """Cost of each agent's flight to the task beside it; both of shape (k,), and so is the answer."""
         origin = self.origin[agent]
-        return (
-            self.cost[origin, task]
-            if self.has_table
-            else self.costs(origin, task, self.distances_between(origin, task))
-        )
+        if self.has_table:
+            return self.cost[origin, task]
+        return self.costs(origin, task, self.distances_between(origin, task))
 
     def costs(self, origin: Indices, task: Indices, distance: Floats) -> Floats:
         """Cost of the flight from each of these origins to the task, which is `distance` away, in units of distance.
@@ -235,9 +233,7 @@ class Reach(ReadOnly):
 
     def flown(self, origin: Indices, task: Indices, distance: Floats) -> Floats:
         """Cost without the price of moving: energy over `energy_per_distance`."""
-        return self._weighed(origin, self.trips(origin, task, distance))
-
-    def _weighed(self, origin: Indices, trips: Floats) -> Floats:
+        trips = self.trips(origin, task, distance)
         return trips if self.factor is None else trips * self.factor[origin]
 
     def is_within(self, origin: Indices, task: Indices, distance: Floats) -> Flags:
@@ -268,10 +264,7 @@ class Reach(ReadOnly):
 
     @cached_property
     def _list_keys(self) -> Indices:
-        """List times m plus task for every entry of every list, ascending, and an end that no key equals."""
-        m = len(self.goal)
-        keys = [number * m + tasks for number, tasks in enumerate(self.lists)]
-        return np.concatenate([*keys, [len(self.lists) * m]])
+        return list_keys(self.lists, len(self.goal))
 
     def _mask_of(self, origins: Indices, distance: Floats) -> Flags:
         mask = self._is_near(origins[:, None], np.arange(len(self.goal)), distance)
@@ -293,10 +286,11 @@ class Reach(ReadOnly):
         if self.geometry.given is None:
             low, high = known.min(axis=0), known.max(axis=0)
             with np.errstate(over="ignore", invalid="ignore"):
-                farthest = self.geometry.farthest(low, high) * (1 + 1e-12)
-                back = farthest if self.geometry.home is None else self.geometry.home.farthest(low, high) * (1 + 1e-12)
+                ways = (self.geometry, self.geometry.home or self.geometry)
+                farthest, back = (way.farthest(low, high) * (1 + 1e-12) for way in ways)
                 longest = farthest if self.returns is None else farthest + np.where(self.returns, back, 0.0)
-                doubtful = np.flatnonzero(~self._is_enough(origins, farthest, self._weighed(origins, longest)))
+                flown = longest if self.factor is None else longest * self.factor
+                doubtful = np.flatnonzero(~self._is_enough(origins, farthest, flown))
                 worst = doubtful[np.argsort((self.radius - farthest)[doubtful])]
         else:
             worst = origins
