@@ -92,6 +92,13 @@ class Result:
         return why_unserved(self.instance, self.allocation, pinned=pinned)
 
     @property
+    def served_makespan(self) -> float | None:
+        """Hours until the last of the tasks that are served is done; None where there is no allocation."""
+        if self.makespan is not None or self.evaluation is None:
+            return self.makespan
+        return self.evaluation.served_makespan
+
+    @property
     def unserved_count(self) -> int:
         """Number of tasks that are unserved, 0 where there is no allocation."""
         return 0 if self.evaluation is None else len(self.evaluation.unserved_tasks)

@@ -45,7 +45,7 @@ def plot_front(front: "Front", path: str | None = None) -> "Figure":
 def _draw(front: "Front") -> "Figure":
     figure = new_figure(8, 5.2)
     axes = figure.subplots()
-    hours = [0.0 if result.evaluation is None else result.evaluation.served_makespan for result in front.points]
+    hours = [result.served_makespan or 0.0 for result in front.points]
     energy = [result.energy or 0.0 for result in front.points]
     wide = hours[0] > 0 and hours[-1] > WIDE * hours[0]
     span = hours[-1] - hours[0] or hours[0] or 1.0  # also for a front of a single point

@@ -101,7 +101,7 @@ def _show_point(result: "Result") -> None:
 def _table(front: "Front") -> str:
     units = front.instance.units
     left = [result.unserved_count for result in front.points]
-    served = [None if result.evaluation is None else result.evaluation.served_makespan for result in front.points]
+    served = [result.served_makespan for result in front.points]
     header = [
         heading("T of the served" if any(left) else "T", units.time),
         "slower",

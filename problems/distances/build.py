@@ -195,9 +195,11 @@ def _rows_of(table: DistanceTable, node: Indices, start: Indices) -> Indices:
 
 def _bound_to(geometry: Geometry, list_of: Indices, lists: Sequence[Indices]) -> tuple[Indices, tuple[Indices, ...]]:
     """Return lists that allow each origin the tasks whose distance is given, there and back home, and no others."""
-    own: list[Indices | None] = [*_given_tasks(geometry)]
+    ways = _given_tasks(geometry)
     if geometry.home is not None:  # where nobody returns to a base, home is where one starts
-        own = [np.intersect1d(*pair, assume_unique=True) for pair in zip(own, _given_tasks(geometry.home), strict=True)]
+        home = _given_tasks(geometry.home)
+        ways = [np.intersect1d(*pair, assume_unique=True) for pair in zip(ways, home, strict=True)]
+    own: list[Indices | None] = [*ways]
     for origin in np.flatnonzero(list_of >= 0).tolist():
         tasks = own[origin]
         assert tasks is not None

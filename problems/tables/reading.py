@@ -148,7 +148,8 @@ def read_tables(
     arguments = arguments_of(first, second, third, common)
     arguments |= {"name": name, "metric": GEOGRAPHIC if geographic else EUCLIDEAN}
     lines = [line for records in placed for line in _lines(records, common)]
-    places = {records.match.kind: (records.table.source, records.table.places) for records in placed}
+    places: dict[str, tuple[str, list[str]]] = {}
+    places |= {str(records.match.kind): (records.table.source, records.table.places) for records in placed}
     reading = Reading(arguments, places)
     if pairs is None:
         lines += _unplaced(first, second)
