@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from alloc.problems import eligibility, fields
 from alloc.problems.arguments import of_type, real, text
 from alloc.problems.changes import add, move, remove
-from alloc.problems.distances.bases import Bases, require_returning
+from alloc.problems.distances.bases import Bases, returning
 from alloc.problems.distances.build import build_reach
 from alloc.problems.distances.geodesic import METRES
 from alloc.problems.distances.given import DistanceTable
@@ -151,7 +151,6 @@ class Instance(fields.ReadOnly):
             raise InputError("an instance needs at least one agent and one task", "tasks" if n else "agents")
         agents, tasks = fields.ids(agent_ids, n, "a", "agent"), fields.ids(task_ids, m, "t", "task")
         places = Bases.fitting(bases)
-        home = fields.references(return_base, "return_base", n, "base", len(places.ids))
         values: dict[str, object] = {
             "ability": w,
             "workload": h,
@@ -169,8 +168,7 @@ class Instance(fields.ReadOnly):
             "tau": fields.unit_share(tau),
             "energy_per_distance": float(real(energy_per_distance, "energy_per_distance")),
             "agent_energy_per_distance": fields.rates(agent_energy_per_distance, energy_per_distance, n),
-            "returns": home >= 0 if returns is None else fields.flags(returns, "returns", n),
-            "return_base": home,
+            **returning(returns, return_base, n, places),
             "skills": eligibility.name_sets(skills, n, "agent", "skills"),
             "needs": eligibility.name_sets(needs, m, "task", "needs"),
             "metric": fields.metric(metric),
@@ -178,10 +176,7 @@ class Instance(fields.ReadOnly):
             "bases": places,
             "units": Units() if units is None else of_type(units, Units, "units"),
         }
-        for key, value in values.items():
-            if isinstance(value, np.ndarray):
-                value.setflags(write=False)
-            object.__setattr__(self, key, value)
+        self._set(values)
         self._check()
 
     @classmethod
@@ -194,6 +189,12 @@ class Instance(fields.ReadOnly):
         """
         return read_tables(agents, tasks, distances, **options).built(cls)
 
+    def _set(self, values: Mapping[str, object]) -> None:
+        for key, value in values.items():
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)
+            object.__setattr__(self, key, value)
+
     def _check(self) -> None:
         agents, tasks = ("agent", self.agent_ids), ("task", self.task_ids)
         fields.require(
@@ -204,7 +205,6 @@ class Instance(fields.ReadOnly):
         for values, name in ((self.battery, "battery"), (self.communication_range, "range")):
             fields.require(values >= 0, values, name, "a number >= 0, or null", agents)
         fields.require(self.speed > 0, self.speed, "speed", "a number > 0, or null", agents)
-        require_returning(self.return_base, self.returns)
         fields.require_magnitude(self.ability, "ability", agents)
         fields.require_magnitude(self.workload, "workload", tasks)
         fields.require_magnitude(self.speed, "speed", agents, most=np.inf)

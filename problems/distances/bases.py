@@ -4,10 +4,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from alloc.problems.arguments import shown
 from alloc.problems.errors import InputError
-from alloc.problems.fields import BoolArray, FloatArray, IntArray, ReadOnly, positions
+from alloc.problems.fields import BoolArray, FloatArray, IntArray, ReadOnly, flags, positions, references
 
 NO_NAMES = ("", "true", "false")
 """What no base is called, but for blanks and capitals: tables say so whether an agent returns to its start."""
@@ -87,9 +88,23 @@ def _three(place: Sequence[float], row: int) -> list[float]:
         raise InputError(f"must be 2 or 3 numbers, got {shown(place)}", f"bases[{row}].position") from error
 
 
-def require_returning(base: IntArray, returns: BoolArray) -> None:
-    """Raise `InputError` for the first agent with a base to return to that does not return."""
-    wrong = (base >= 0) & ~returns
+def returning(
+    returns: ArrayLike | None, return_base: ArrayLike | None, n: int, bases: Bases
+) -> dict[str, BoolArray | IntArray]:
+    """Return the fields `returns` and `return_base` of an instance; by default, who has a base returns.
+
+    Raises
+    ------
+    InputError
+        If one of them is no such list, or an agent with a base to return to does not return.
+    """
+    base = references(return_base, "return_base", n, "base", len(bases.ids))
+    if returns is None:
+        return {"returns": base >= 0, "return_base": base}
+    given = flags(returns, "returns", n)
+    wrong = (base >= 0) & ~given
     if wrong.any():
         row = int(np.argmax(wrong))
-        raise InputError("is a base to return to, but `returns` says that the agent does not", f"agents[{row}].returns")
+        message = f"is False, but {bases.ids[base[row]]!r} is the base to which the agent returns"
+        raise InputError(message, f"agents[{row}].returns")
+    return {"returns": given, "return_base": base}

@@ -178,10 +178,9 @@ def grown(*energies: float) -> WhatIf:
     return WhatIf(instance, ("a2",), tuple(fleets), True)
 
 
-def short() -> WhatIf:
+def short(*plans: list[int]) -> WhatIf:
     """Return fleets of which none serves all tasks: there is no makespan to be drawn."""
     instance = two_sites()
-    plans = [[-1, -1, -1], [-1, 1, 1]]
     fleets = [Fleet(("a4",) * k, (), planned(instance, plan)) for k, plan in enumerate(plans)]
     return WhatIf(instance, ("a1",), tuple(fleets), True)
 
@@ -200,7 +199,7 @@ DRAWN: dict[str, Callable[[str], object]] = {
     "wide-front": lambda path: plot_front(front(2.0, 5.0, 20.0), path),
     "one-point": lambda path: plot_front(front(), path),
     "fleets": lambda path: plot_whatif(grown(6.0, 9.0), path),
-    "short-fleets": lambda path: plot_whatif(short(), path),
+    "short-fleets": lambda path: plot_whatif(short([-1, -1, -1], [-1, 1, 1]), path),
     "short-point": lambda path: plot_front(Front(two_sites(), (planned(two_sites(), [-1, 1, 1]),), True), path),
 }
 
@@ -276,7 +275,7 @@ WRONG: dict[str, tuple[str, Callable[[str], object]]] = {
         lambda path: plot(planned(bases().instance, [0, 0, 1, 1, 1], lower_bound=2.0), path),
     ),
     "all are served": ("short-point", lambda path: plot_front(front(), path)),
-    "another number unserved": ("fleets", lambda path: plot_whatif(short(), path)),
+    "another number unserved": ("short-fleets", lambda path: plot_whatif(short([-1, 1, 1], [-1, 1, 1]), path)),
     "more than one point": ("one-point", lambda path: plot_front(front(1.3), path)),
 }
 
