@@ -177,7 +177,6 @@ class Instance(fields.ReadOnly):
             "units": Units() if units is None else of_type(units, Units, "units"),
         }
         self._set(values)
-        self._check()
 
     @classmethod
     def from_tables(
@@ -194,6 +193,7 @@ class Instance(fields.ReadOnly):
             if isinstance(value, np.ndarray):
                 value.setflags(write=False)
             object.__setattr__(self, key, value)
+        self._check()
 
     def _check(self) -> None:
         agents, tasks = ("agent", self.agent_ids), ("task", self.task_ids)
