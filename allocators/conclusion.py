@@ -45,6 +45,8 @@ def conclude(
     proposal: Proposal,
     stop_reason: StopReason | None,
     notes: list[str],
+    *,
+    pinned: bool = False,
 ) -> Result:
     """Prove what can be proven of the best allocation, and return the result.
 
@@ -62,6 +64,8 @@ def conclude(
         Why it stopped before its own end.
     notes : list of str
         Messages for the user so far.
+    pinned : bool
+        Whether there are agents that are pinned.
 
     Returns
     -------
@@ -72,7 +76,7 @@ def conclude(
     infeasible = best is not None and bool(best.evaluation.unserved_tasks)
     notes = [*notes, *proposal.notes]
     if infeasible:
-        notes.append(_contention(search, decomposition))
+        notes.append(("besides the pinned agents, " if pinned else "") + _contention(search, decomposition))
     elif best is not None and search.tolerance.limit is not None:
         notes.extend(_unmet(search, search.tolerance.limit))
     if decomposition is not None:

@@ -35,6 +35,8 @@ class Request:
     threads : int
     on_improvement : callable or None
     stop : threading.Event
+    pinned : bool
+        Whether agents are pinned.
     """
 
     instance: Instance
@@ -46,6 +48,7 @@ class Request:
     threads: int
     on_improvement: Callable[[Improvement], None] | None
     stop: threading.Event
+    pinned: bool = False
 
 
 def checked_tolerance(slack: float, limit: float | None, objective: Objective) -> MakespanTolerance:

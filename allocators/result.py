@@ -88,7 +88,20 @@ class Result:
         """Why tasks are unserved: the ten most urgent ones."""
         if self.allocation is None or self.evaluation is None or not self.evaluation.unserved_tasks:
             return ()
-        return why_unserved(self.instance, self.allocation)
+        pinned = {self.instance.agent_index[name] for name in self.pins}
+        return why_unserved(self.instance, self.allocation, pinned=pinned)
+
+    @property
+    def served_makespan(self) -> float | None:
+        """Hours until the last of the tasks that are served is done; None where there is no allocation."""
+        if self.makespan is not None or self.evaluation is None:
+            return self.makespan
+        return self.evaluation.served_makespan
+
+    @property
+    def unserved_count(self) -> int:
+        """Number of tasks that are unserved, 0 where there is no allocation."""
+        return 0 if self.evaluation is None else len(self.evaluation.unserved_tasks)
 
     @property
     def energy(self) -> float | None:

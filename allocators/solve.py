@@ -135,6 +135,7 @@ def solve(
         threads=checked_threads(threads) or available_threads(),
         on_improvement=None if tell is None else lambda improvement: tell(plan_in_force.told(improvement)),
         stop=event(stop, "stop") or threading.Event(),
+        pinned=bool(plan_in_force.pinned.any()),
     )
     handle_signals = flag(handle_signals, "handle_signals")
     carried_notes = [f"since the plan was made, {carried}"] if str(carried) else []
@@ -227,7 +228,7 @@ def _run(allocator: Allocator, request: Request, notes: list[str], spent_s: floa
     proposal, stop_reason = (Proposal(), None) if part is None else _propose(allocator, part)
     if decomposition is not None:
         decomposition.conclude()
-    return conclude(search, decomposition, allocator.method.name, proposal, stop_reason, notes)
+    return conclude(search, decomposition, allocator.method.name, proposal, stop_reason, notes, pinned=request.pinned)
 
 
 def _propose(allocator: Allocator, search: Search) -> tuple[Proposal, StopReason | None]:

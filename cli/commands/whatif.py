@@ -11,7 +11,7 @@ from alloc.cli import options
 from alloc.cli.options import examples
 from alloc.cli.output.console import is_terminal, note, say, table, to_json
 from alloc.cli.output.files import check_outputs, check_picture, save
-from alloc.problems.text import number, percent
+from alloc.problems.text import counted, number, percent
 
 if TYPE_CHECKING:
     from alloc.allocators import Fleet, WhatIf
@@ -105,7 +105,9 @@ def _show_fleet(fleet: "Fleet") -> None:
     """On a terminal, print each fleet as soon as it is solved; the table follows at the end."""
     if is_terminal(sys.stderr):
         result = fleet.result
-        say(f"{result.instance.n} agents: makespan {number(result.makespan)}, gap {percent(result.gap)}")
+        left = result.unserved_count
+        makespan = f"{counted(left, 'task')} unserved" if left else f"makespan {number(result.makespan)}"
+        say(f"{result.instance.n} agents: {makespan}, gap {percent(result.gap)}")
 
 
 def _tell(found: "WhatIf", *, with_table: bool) -> None:
@@ -122,10 +124,14 @@ def _table(found: "WhatIf") -> str:
     header = ["agents", "change", _named("makespan", units.time), "change", "at least", "gap"]
     header += [_named("energy", units.energy), "at least", "time (s)", "status"]
     now = found.fleets[0].result.makespan
+    unserved = [fleet.result.unserved_count for fleet in found.fleets]
+    if any(unserved):
+        header.insert(2, "unserved")
     rows = [
         [
             str(fleet.result.instance.n),
             _changes(fleet),
+            *([str(left)] if any(unserved) else []),
             number(fleet.result.makespan, 5),
             _against(fleet.result.makespan, now),
             number(fleet.result.lower_bound, 5),
@@ -135,7 +141,7 @@ def _table(found: "WhatIf") -> str:
             number(fleet.result.runtime_s, 3),
             str(fleet.result.status),
         ]
-        for fleet in found.fleets
+        for fleet, left in zip(found.fleets, unserved, strict=True)
     ]
     return table(header, rows, left=0)
 

@@ -73,16 +73,12 @@ class Table:
         """Return a column of lists of strings, None where empty; None if the table does not have it."""
         return list(map(split_ids, self.cells[column])) if column in self.cells else None
 
-    def flags(self, column: str) -> list[bool] | None:
-        """Return a column of true and false, false where empty; None if the table does not have it."""
+    def returns(self, column: str) -> list[bool | str] | None:
+        """Return a column of true, false and ids of bases, false where empty; None if the table does not have it."""
         if column not in self.cells:
             return None
-        words = [cell.strip().lower() for cell in self.cells[column]]
-        wrong = next((row for row, word in enumerate(words) if word not in ("true", "false", "")), None)
-        if wrong is not None:
-            message = f"must be true or false, got {quoted(self.cells[column][wrong])}"
-            raise InputError(message, self.place(wrong, column))
-        return [word == "true" for word in words]
+        words = {"true": True, "false": False, "": False}
+        return [words.get(cell.strip().lower(), cell) for cell in self.cells[column]]
 
 
 def read_table(path: Path, known: Sequence[str], required: Sequence[str]) -> Table:

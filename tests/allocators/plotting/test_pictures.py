@@ -101,6 +101,12 @@ def bases() -> Result:
     return planned(instance, [0, 0, 1, 1, 1], lower_bound=2.0)
 
 
+def returns() -> Result:
+    """Agents that return elsewhere than to where they begin: dashed lines to diamonds, and to a base of others."""
+    fields = {"bases": {"Alta": (0, 0), "Harbour": (5, 3)}, "return_base": [-1, 1, 1, 0, -1], "returns": [True] * 5}
+    return planned(replace(bases().instance, **fields), [0, 0, 1, 1, 1], lower_bound=2.0)
+
+
 def earth() -> Result:
     """Longitudes and latitudes on both sides of the date line, far north: degrees are not as long as wide."""
     instance = Instance(
@@ -172,12 +178,20 @@ def grown(*energies: float) -> WhatIf:
     return WhatIf(instance, ("a2",), tuple(fleets), True)
 
 
+def short(*plans: list[int]) -> WhatIf:
+    """Return fleets of which none serves all tasks: there is no makespan to be drawn."""
+    instance = two_sites()
+    fleets = [Fleet(("a4",) * k, (), planned(instance, plan)) for k, plan in enumerate(plans)]
+    return WhatIf(instance, ("a1",), tuple(fleets), True)
+
+
 DRAWN: dict[str, Callable[[str], object]] = {
     "moves": lambda path: plot(moves(), path),
     "times": lambda path: plot(times(), path),
     "many": lambda path: plot(many(), path),
     "lines": lambda path: plot(lines(), path),
     "bases": lambda path: plot(bases(), path),
+    "returns": lambda path: plot(returns(), path),
     "earth": lambda path: plot(earth(), path),
     "runs": lambda path: plot_convergence(runs(), path),
     "nothing": lambda path: plot(replace(moves(), allocation=None, evaluation=None), path),
@@ -185,6 +199,8 @@ DRAWN: dict[str, Callable[[str], object]] = {
     "wide-front": lambda path: plot_front(front(2.0, 5.0, 20.0), path),
     "one-point": lambda path: plot_front(front(), path),
     "fleets": lambda path: plot_whatif(grown(6.0, 9.0), path),
+    "short-fleets": lambda path: plot_whatif(short([-1, -1, -1], [-1, 1, 1]), path),
+    "short-point": lambda path: plot_front(Front(two_sites(), (planned(two_sites(), [-1, 1, 1]),), True), path),
 }
 
 
@@ -254,6 +270,12 @@ WRONG: dict[str, tuple[str, Callable[[str], object]]] = {
     "a point elsewhere": ("front", lambda path: plot_front(front(1.5, 2.0), path)),
     "the scale": ("wide-front", lambda path: plot_front(front(1.3, 2.0), path)),
     "another energy": ("fleets", lambda path: plot_whatif(grown(9.0, 6.0), path)),
+    "home is another base": (
+        "returns",
+        lambda path: plot(planned(bases().instance, [0, 0, 1, 1, 1], lower_bound=2.0), path),
+    ),
+    "all are served": ("short-point", lambda path: plot_front(front(), path)),
+    "another number unserved": ("short-fleets", lambda path: plot_whatif(short([-1, 1, 1], [-1, 1, 1]), path)),
     "more than one point": ("one-point", lambda path: plot_front(front(1.3), path)),
 }
 

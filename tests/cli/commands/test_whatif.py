@@ -40,6 +40,9 @@ def test_unserved_tasks_give_exit_code_1(alloc, unservable):
     assert ran.code == 1
     assert "One more like a1: 1 task unserved as before." in ran.err
     assert "is new" not in ran.err
+    rows = [row.split() for row in ran.err.splitlines()]
+    column = rows[0].index("unserved")
+    assert [row[column + words] for row, words in zip(rows[2:4], (2, 0), strict=True)] == ["1", "1"]  # "as it is", "+1"
 
 
 @pytest.mark.parametrize(
