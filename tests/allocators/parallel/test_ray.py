@@ -116,6 +116,21 @@ def test_an_item_that_always_kills_is_given_up(cluster: Any, engine: Engine, tmp
         with pytest.raises(EngineError, match="Ray gave an item up"):
             second.map(jobs.die, [str(tmp_path / "tries")])
     assert (tmp_path / "tries").read_text().count("tried") == 2
+
+
+@pytest.mark.needs("ray")
+@pytest.mark.slow
+def test_a_broken_connection_is_an_error_of_the_engine(engine: Engine, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is told as one of Ray, after which a training can be resumed, not as one of a file."""
+
+    def reset(_: object) -> None:
+        raise ConnectionResetError("Connection reset by peer")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("ray.get", reset)
+        with pytest.raises(EngineError, match="Connection reset by peer"):
+            engine.map(jobs.square, [3])
+    assert engine.map(jobs.square, [3]) == [9]
     assert engine.map(jobs.square, [3]) == [9]
 
 
