@@ -25,8 +25,11 @@ from alloc.problems import InputError
 from alloc.problems.formats import write_instance
 from alloc.problems.generate import paper_like
 
-# Ray 2.40 leaves it to the garbage collector to close the logs of the processes that it starts
-pytestmark = pytest.mark.filterwarnings("ignore:unclosed file .*/ray/session_:ResourceWarning")
+# Ray 2.40 leaves the processes that it starts, and their logs, to the garbage collector
+pytestmark = [
+    pytest.mark.filterwarnings("ignore:unclosed file .*/ray/session_:ResourceWarning"),
+    pytest.mark.filterwarnings("ignore:subprocess .* is still running:ResourceWarning"),
+]
 
 
 def test_without_ray_the_mend_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
