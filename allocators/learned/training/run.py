@@ -130,15 +130,15 @@ def train(
 
     if tensorboard is not None:
         summary_writer()  # raises where TensorBoard is not installed; a writer would already purge its folder
+    if steps is None and minutes is None and iterations is None:
+        steps = DEFAULT_STEPS
+    limits = Limits(steps, iterations, minutes, patience)
     size = (population or DEFAULT_POPULATION) if method == "gappo" else 1
     trainer = new_trainer(
         method, learner, size, decisions, families, turn=turn, reward=reward, seed=seed, instances=instances, init=init
     )
     if resume:
         trainer.resume(files.checkpoint)
-    if steps is None and minutes is None and iterations is None:
-        steps = DEFAULT_STEPS
-    limits = Limits(steps, iterations, minutes, patience)
     on_start(trainer, limits)
     try:
         run_training(trainer, files, limits, engine=engine, should_stop=should_stop, on_report=on_report)

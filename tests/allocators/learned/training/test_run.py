@@ -77,6 +77,8 @@ def test_a_policy_begins_another(tmp_path: Path) -> None:
         ({"parameters": DqnParameters()}, "parameters: ppo has PpoParameters, got DqnParameters"),
         ({"population": 2}, "population: ppo trains one network"),
         ({"decisions": 0}, "decisions: must be"),
+        ({"steps": -1}, "steps: must be"),
+        ({"minutes": float("nan")}, "minutes: must be"),
         ({"init": "nowhere"}, "nowhere: no such policy file"),
         ({"resume": True}, "no such checkpoint"),
         ({"output": "p.pt"}, "has the suffix '.pt'"),
