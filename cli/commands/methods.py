@@ -1,6 +1,5 @@
 """``alloc methods``."""
 
-from itertools import chain
 from typing import Annotated, TypedDict
 
 import typer
@@ -88,8 +87,9 @@ def _prepare() -> None:
         if not method.missing:
             kinds.setdefault(str(method.kind), []).append(name)
     with ProcessEngine() as engine:
-        for message in chain.from_iterable(engine.map(_load, list(kinds.values())) or ()):
-            note(message)
+        for messages in engine.map(_load, list(kinds.values())) or ():
+            for message in messages:
+                note(message)
 
 
 def _load(methods: list[str]) -> list[str]:
