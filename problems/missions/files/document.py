@@ -185,10 +185,9 @@ def mission_to_document(mission: Mission) -> Row:
 
 
 def _owners(mission: Mission, kind: EventKind) -> dict[str, int]:
-    """Return the number of the event by which each agent joins, or each task appears; none if that would be all."""
-    found = {str(event.agent or event.task): number for number, event in enumerate(mission.events) if event.kind is kind}
-    total = mission.instance.n if kind is EventKind.AGENT_JOINS else mission.instance.m
-    return {} if len(found) == total else found
+    """Return the number of the event by which each agent joins, or each task appears."""
+    events = enumerate(mission.events)
+    return {str(event.agent or event.task): number for number, event in events if event.kind is kind}
 
 
 def _settings(mission: Mission) -> Row:

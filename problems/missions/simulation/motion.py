@@ -5,8 +5,9 @@ import math
 from alloc.problems.distances.reach import TOLERANCE
 from alloc.problems.missions.chance import PACE, uniform
 from alloc.problems.missions.radio import Pace
-from alloc.problems.missions.simulation.places import Distances, Place, Position
+from alloc.problems.missions.simulation.places import Distances, Place
 from alloc.problems.missions.simulation.state import (
+    ACTIVE,
     STAY,
     AgentFacts,
     AgentState,
@@ -40,12 +41,11 @@ def refusal(
         return "there is no way"
     if distance > agent.range + TOLERANCE:
         return f"it is {distance:g} away, range {agent.range:g}"
-    if battery < math.inf:
-        home = distances.between(goal, agent.start) if agent.returns else 0.0
-        energy = agent.energy_per_distance * (distance + home)
-        if not energy <= battery + TOLERANCE:
-            return f"the flight takes {energy:g} of energy, battery {battery:g}"
-    return None
+    home = distances.between(goal, agent.start) if agent.returns else 0.0
+    if home == math.inf:
+        return "there is no way back"
+    energy = agent.energy_per_distance * (distance + home)
+    return None if energy <= battery + TOLERANCE else f"the flight takes {energy:g} of energy, battery {battery:g}"
 
 
 def place_at(state: MissionState, agent: AgentState) -> Place:
@@ -71,15 +71,6 @@ def depart(state: MissionState, agent: AgentState, goal: Place, task: TaskState 
     hours = distance / agent.facts.speed
     agent.flight = Flight(agent.place, goal, task, distance, state.hour, state.hour + hours)
     agent.status = AgentStatus.FLYING
-
-
-def arrive(state: MissionState, agent: AgentState) -> None:
-    """End a flight at its goal, and begin to work if there is an open task."""
-    flight = agent.flight
-    assert flight is not None
-    _land(agent, flight, flight.distance, _reached(flight.source, flight.goal))
-    if flight.task is not None and flight.task.status is TaskStatus.OPEN:
-        begin_work(state, agent, flight.task)
 
 
 def break_off(state: MissionState, agent: AgentState) -> None:
@@ -203,17 +194,13 @@ def pace_factor(seed: int, task: int, period: int, pace: Pace) -> float:
     return pace.low + (pace.high - pace.low) * uniform(PACE, seed, task, period)
 
 
-def fly_home(state: MissionState) -> None:
-    """Let agents that return, and are still in the mission, fly back to their start after its end."""
+def end_flights(state: MissionState) -> None:
+    """Let agents in flight land at their goals after the end of the mission, and those that return fly home."""
     for agent in state.agents:
-        if agent.facts.returns and agent.status in (AgentStatus.IDLE, AgentStatus.WORKING, AgentStatus.FLYING):
-            break_off(state, agent)
+        if agent.flight is not None:
+            _land(agent, agent.flight, agent.flight.distance, _reached(agent.flight.source, agent.flight.goal))
+        if agent.facts.returns and agent.status in ACTIVE:
+            stop_work(state, agent)
             distance = state.distances.between(agent.place, agent.facts.start)
             flight = Flight(agent.place, agent.facts.start, None, distance, state.hour, state.hour)
             _land(agent, flight, distance, agent.facts.start)
-
-
-def as_position(values: tuple[float, ...]) -> Position:
-    """Return two or three coordinates as three."""
-    x, y, z = (*values, 0.0)[:3]
-    return x, y, z

@@ -108,5 +108,3 @@ def task_places(instance: Instance) -> list[Place]:
 
 def _positions(array: FloatArray) -> list[Position | None]:
     return [None if math.isnan(x) else (x, y, z) for x, y, z in array.tolist()]
-
-

@@ -231,9 +231,7 @@ class MissionState:
         )
         facts = [AgentFacts(*row) for row in rows]
         batteries = instance.battery.tolist()
-        self.agents = [
-            AgentState(i, fact, fact.start, batteries[i], batteries[i]) for i, fact in enumerate(facts)
-        ]
+        self.agents = [AgentState(i, fact, fact.start, batteries[i], batteries[i]) for i, fact in enumerate(facts)]
         columns = (instance.priority, mission.appears, mission.deadline, mission.growth)
         numbers = zip(*(column.tolist() for column in columns), strict=True)
         parts = zip(instance.task_ids, task_places(instance), numbers, map(frozenset, needs), strict=True)
