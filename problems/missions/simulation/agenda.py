@@ -3,7 +3,7 @@
 import heapq
 import math
 from dataclasses import dataclass
-from enum import IntEnum
+from enum import IntEnum, StrEnum
 
 from alloc.problems.missions.simulation import conservation
 from alloc.problems.missions.simulation.motion import bring_up_to_date, completion_hour
@@ -20,6 +20,30 @@ class Turn(IntEnum):
     ARRIVAL = 3
     DELIVERY = 4
     RADIO = 5
+
+
+class Wanted(StrEnum):
+    """What a simulation waits for: messages to be sent, or orders."""
+
+    MESSAGES = "messages"
+    ORDERS = "orders"
+
+
+@dataclass(frozen=True)
+class Request:
+    """An hour at which agents may send messages, or get orders.
+
+    Attributes
+    ----------
+    wanted : Wanted
+    hour : float
+    agents : tuple of str
+        Ids of those who may.
+    """
+
+    wanted: Wanted
+    hour: float
+    agents: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)

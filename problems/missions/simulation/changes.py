@@ -83,7 +83,8 @@ def goal_of(state: MissionState, order: Order) -> tuple[Place, TaskState | None]
 def obey(state: MissionState, agent: AgentState, order: Order) -> str | None:
     """Let an agent follow an order as far as it can now; return why it refuses, None if it does not.
 
-    An agent in flight on a way that a table of distances gives follows it from where that way ends.
+    It flies to a task that is over, too: it may not know that, and will see it there. An agent in flight on a way that
+    a table of distances gives follows the order from where that way ends.
     """
     if agent.status not in ACTIVE:
         return f"the agent is {agent.status}"
@@ -94,8 +95,8 @@ def obey(state: MissionState, agent: AgentState, order: Order) -> str | None:
         agent.order = order
         return None
     goal, task = goal_of(state, order)
-    if task is not None and task.status is not TaskStatus.OPEN:
-        return f"the task is {task.status}"
+    if task is not None and task.status is TaskStatus.TO_COME:
+        return "the task is to come"
     if task is not None and agent.task is task:
         agent.order = order
         return None

@@ -2,6 +2,9 @@
 
 import math
 
+import numpy as np
+
+from alloc.problems.fields import BoolArray
 from alloc.problems.missions.chance import BURST, LOSS, uniform
 from alloc.problems.missions.events import Event
 from alloc.problems.missions.simulation.motion import place_at
@@ -24,6 +27,9 @@ class Channel:
         self._state, self._radio = state, state.mission.radio
         self._seeds = state.mission.seed, seed
         self._silences: list[Event] = []
+        self._agents: list[AgentState] = []
+        self._row: dict[int, int] = {}
+        self._near: BoolArray = np.zeros((0, 0), dtype=np.bool_)
         self._links: dict[tuple[int, int], tuple[int, bool]] = {}
 
     def silence(self, event: Event) -> None:
@@ -46,23 +52,21 @@ class Channel:
         place = place_at(self._state, agent)
         return self._state.distances.by_metric(place.position, (x, y, z)) <= event.radius
 
+    def open(self) -> None:
+        """Take notice of who is where, before the messages of an hour are sent."""
+        self._agents = [agent for agent in self._state.agents if agent.status in ACTIVE]
+        self._row = {agent.index: row for row, agent in enumerate(self._agents)}
+        places = [place_at(self._state, agent).position for agent in self._agents]
+        self._near = self._state.distances.table(places, places) <= self._radio.radius
+
     def hearers(self, sender: AgentState, number: int) -> list[AgentState]:
         """Return who will hear message `number` of an agent that sends now.
 
         Hearers must be in the mission and within the radius when it is sent; whether they can hear when it comes is
         for `is_silent` to say.
         """
-        place = place_at(self._state, sender)
-        found = []
-        for agent in self._state.agents:
-            if agent is sender or agent.status not in ACTIVE or self._is_lost(sender.index, agent.index, number):
-                continue
-            there = place_at(self._state, agent)
-            if self._radio.radius == math.inf or (
-                self._state.distances.by_metric(place.position, there.position) <= self._radio.radius
-            ):
-                found.append(agent)
-        return found
+        near = [self._agents[row] for row in np.flatnonzero(self._near[self._row[sender.index]]).tolist()]
+        return [agent for agent in near if agent is not sender and not self._is_lost(sender.index, agent.index, number)]
 
     def _is_lost(self, sender: int, hearer: int, number: int) -> bool:
         radio = self._radio

@@ -3,8 +3,6 @@
 from alloc.problems.missions.events import Event
 from alloc.problems.missions.simulation.state import AgentState, MissionState, Order, TaskState, TaskStatus
 
-LOG_FORMAT = "alloc-mission-log/1"
-
 Record = dict[str, object]
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from alloc.problems.distances.geodesic import geodesic_distances
+from alloc.problems.distances.metric import distance_table, distances, manhattan_distances
 from alloc.problems.instance import FloatArray, Instance
 from alloc.problems.vocabulary import GEOGRAPHIC, IDLE, MANHATTAN
 
@@ -36,10 +37,16 @@ class Distances:
     Parameters
     ----------
     instance : Instance
+
+    Attributes
+    ----------
+    metric, unit : str
+        As in the instance.
+    has_table : bool
     """
 
     def __init__(self, instance: Instance) -> None:
-        self._metric, self._unit = instance.metric, instance.distance_unit
+        self.metric, self.unit = instance.metric, instance.distance_unit
         table = instance.distances
         self.has_table = table is not None
         self._missing = math.inf if table is not None and table.missing == "unreachable" else None
@@ -65,20 +72,34 @@ class Distances:
         """Return the distance of two positions by the metric alone, 0 where one is unknown (1)."""
         if source is None or goal is None:
             return 0.0
-        if self._metric == GEOGRAPHIC:
-            return float(geodesic_distances(np.array(source), np.array(goal), self._unit))
-        if self._metric == MANHATTAN:
+        if self.metric == GEOGRAPHIC:
+            return float(geodesic_distances(np.array(source), np.array(goal), self.unit))
+        if self.metric == MANHATTAN:
             return sum(abs(a - b) for a, b in zip(source, goal, strict=True))
         return math.dist(source, goal)
+
+    def table(self, sources: list[Position | None], goals: list[Position | None]) -> FloatArray:
+        """Return distances by the metric alone, shape (sources, goals)."""
+        if not sources or not goals:
+            return np.zeros((len(sources), len(goals)))
+        by_metric = {
+            GEOGRAPHIC: lambda place, goal: geodesic_distances(place, goal, self.unit),
+            MANHATTAN: manhattan_distances,
+        }
+        return distance_table(_array(sources), _array(goals), by_metric.get(self.metric, distances))
 
     def on_the_way(self, source: Position | None, goal: Position | None, share: float) -> Position | None:
         """Return where an agent is that has flown a share of the way, on a straight line or on a geodesic."""
         if source is None or goal is None:
             return source
-        if self._metric == GEOGRAPHIC:
+        if self.metric == GEOGRAPHIC:
             return _on_geodesic(source, goal, share)
         x, y, z = (a + share * (b - a) for a, b in zip(source, goal, strict=True))
         return x, y, z
+
+
+def _array(positions: list[Position | None]) -> FloatArray:
+    return np.array([(math.nan,) * 3 if position is None else position for position in positions])
 
 
 def _on_geodesic(source: Position, goal: Position, share: float) -> Position:

@@ -108,6 +108,21 @@ class View:
         self._distances = distances
 
     @property
+    def metric(self) -> str:
+        """How far places are apart; see `Instance`."""
+        return self._distances.metric
+
+    @property
+    def distance_unit(self) -> str:
+        """Unit of geographic distances."""
+        return self._distances.unit
+
+    @property
+    def has_table(self) -> bool:
+        """Whether distances are given by a table."""
+        return self._distances.has_table
+
+    @property
     def own(self) -> AgentReport:
         """The report of the agent whose view it is, as it is now."""
         if self.id is None:
@@ -121,6 +136,10 @@ class View:
     def hours(self, agent: AgentReport, task: TaskReport) -> float:
         """Return how long the flight of an agent to a task takes."""
         return self.distance(agent, task) / agent.facts.speed
+
+    def distance_to_place(self, agent: AgentReport, place: Place) -> float:
+        """Return how far an agent was from a place."""
+        return self._distances.between(agent.place, place)
 
     def between(self, one: TaskReport, other: TaskReport) -> float:
         """Return the distance from one task to another."""

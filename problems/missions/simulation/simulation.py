@@ -2,14 +2,21 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
-from enum import StrEnum
 
 from alloc.problems.arguments import choice, of_type, whole
 from alloc.problems.missions.events import Event, EventKind
 from alloc.problems.missions.mission import Mission
 from alloc.problems.missions.simulation import conservation
-from alloc.problems.missions.simulation.agenda import Agenda, Arrival, Changes, Completion, Delivery, Turn
+from alloc.problems.missions.simulation.agenda import (
+    Agenda,
+    Arrival,
+    Changes,
+    Completion,
+    Delivery,
+    Request,
+    Turn,
+    Wanted,
+)
 from alloc.problems.missions.simulation.awareness import Awareness, FullAwareness, LocalAwareness
 from alloc.problems.missions.simulation.changes import happen, land, obey
 from alloc.problems.missions.simulation.channel import Channel
@@ -34,30 +41,6 @@ from alloc.problems.missions.simulation.state import (
 from alloc.problems.vocabulary import Knowledge
 
 
-class Wanted(StrEnum):
-    """What a simulation waits for: messages to be sent, or orders."""
-
-    MESSAGES = "messages"
-    ORDERS = "orders"
-
-
-@dataclass(frozen=True)
-class Request:
-    """An hour at which agents may send messages, or get orders.
-
-    Attributes
-    ----------
-    wanted : Wanted
-    hour : float
-    agents : tuple of str
-        Ids of those who may.
-    """
-
-    wanted: Wanted
-    hour: float
-    agents: tuple[str, ...]
-
-
 class Simulation:
     """A mission as it goes on; it stops wherever agents may send messages or get orders.
 
@@ -78,6 +61,7 @@ class Simulation:
 
     Attributes
     ----------
+    mission : Mission
     state : MissionState
     knowledge : Knowledge
     log : Log
@@ -90,7 +74,7 @@ class Simulation:
     ) -> None:
         of_type(mission, Mission, "mission")
         self.knowledge = mission.knowledge if knowledge is None else choice(Knowledge, knowledge, "knowledge")
-        self.state = MissionState(mission)
+        self.mission, self.state = mission, MissionState(mission)
         self.log = Log(self.state)
         self.messages, self.bytes = [0] * mission.instance.n, [0] * mission.instance.n
         self._channel = Channel(self.state, whole(seed, "seed", 0, 2**63 - 1))
@@ -113,25 +97,22 @@ class Simulation:
             self._agenda.push(0.0, Turn.RADIO, None)
         self._requests = self._run()
 
-    @property
-    def mission(self) -> Mission:
-        """The mission that goes on."""
-        return self.state.mission
-
     def advance(self) -> Request | None:
         """Go on to where agents may send messages or get orders; None at the end of the mission."""
         return next(self._requests, None)
 
-    def view(self, agent: str | None) -> View:
+    def view(self, agent: str | None, *, is_glance: bool = False) -> View:
         """Return what an agent knows now, or, for None, who leads all agents.
 
         Parameters
         ----------
         agent : str or None
             Its id.
+        is_glance : bool
+            Whether the messages that it heard are to be handed over once more.
         """
         assert self._awareness is not None
-        return self._awareness.view(None if agent is None else self.state.agent(agent))
+        return self._awareness.view(None if agent is None else self.state.agent(agent), is_glance=is_glance)
 
     def send(self, agent: str, message: Message | int) -> None:
         """Let an agent send a message, in a request for messages.
@@ -166,21 +147,32 @@ class Simulation:
         receiver = self.state.agent(agent)
         if order == receiver.order:
             return None
-        if order.task is not None and not trusted and not self._knows(receiver, order.task):
-            problem: str | None = "the agent does not know the task"
-        else:
+        problem = None
+        if order.task is not None and not trusted and self._awareness is not None:
+            problem = self._awareness.objection(receiver, order.task)
+        if problem is None:
             left = receiver.task
             problem = obey(self.state, receiver, order)
-            self._changes.note_agent(receiver, left)
+            if problem is None:
+                self._changes.note_agent(receiver, left)
         self.log.order(receiver, order, problem)
         if problem is None and receiver.flight is None and order != STAY:  # it is there at once
             self.log.arrival(receiver, receiver.task)
         if problem is None and self._awareness is not None and not self._is_local:
-            self._awareness.look_around(receiver)
+            self._awareness.look_around([receiver])
         return problem
 
-    def _knows(self, agent: AgentState, task: str) -> bool:
-        return self._awareness is not None and self._awareness.knows(agent, task)
+    def refuse(self, agent: str, order: Order, reason: str) -> None:
+        """Record an order that is not followed, in a replay.
+
+        Parameters
+        ----------
+        agent : str
+            Its id.
+        order : Order
+        reason : str
+        """
+        self.log.order(self.state.agent(agent), order, reason)
 
     def _run(self) -> Iterator[Request]:
         state = self.state
@@ -196,8 +188,7 @@ class Simulation:
                 self._changes.balance()
             agents = self._who_decides()
             if agents and not self._is_over():
-                for agent in agents:
-                    self._look(agent)
+                self._look(agents)
                 if self._awareness is not None:
                     self._awareness.refresh()
                 yield Request(Wanted.ORDERS, state.hour, tuple(agent.facts.id for agent in agents))
@@ -270,19 +261,20 @@ class Simulation:
     def _talk(self) -> Iterator[Request]:
         """Let all agents that can look around and send a message, and then decide."""
         active = [agent for agent in self.state.agents if agent.status in ACTIVE]
-        for agent in active:
-            self._look(agent)
-            self._deciding[agent.index] = agent
+        self._look(active)
+        self._channel.open()
+        self._deciding.update((agent.index, agent) for agent in active)
         senders = tuple(agent.facts.id for agent in active if not self._channel.is_silent(agent))
         if senders:
             yield Request(Wanted.MESSAGES, self.state.hour, senders)
         self._tick += 1
         self._agenda.push(self._tick * self.mission.radio.period, Turn.RADIO, None)
 
-    def _look(self, agent: AgentState) -> None:
-        if self._is_local and self._awareness is not None and agent.index not in self._looked:
-            self._looked.add(agent.index)
-            self._awareness.look_around(agent)
+    def _look(self, agents: list[AgentState]) -> None:
+        """Let agents look around that have not done so at this hour."""
+        if self._is_local and self._awareness is not None:
+            self._awareness.look_around([agent for agent in agents if agent.index not in self._looked])
+            self._looked.update(agent.index for agent in agents)
 
     def _who_decides(self) -> list[AgentState]:
         """Return the agents that are to get orders now, in their order in the mission."""

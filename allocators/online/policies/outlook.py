@@ -1,0 +1,87 @@
+"""What an agent expects of tasks: who else will work there, and when they will be done."""
+
+import math
+from dataclasses import dataclass
+
+from alloc.problems.missions.simulation.reports import TaskReport, View
+from alloc.problems.missions.simulation.state import ACTIVE, AgentStatus
+
+Crew = list[tuple[float, float]]
+"""Hour of arrival and ability of each."""
+
+
+@dataclass(frozen=True)
+class Prospect:
+    """A task, as an agent expects it to go on.
+
+    Attributes
+    ----------
+    task : TaskReport
+    arrival : float
+        Hour at which the agent would be there.
+    without, with_me : float
+        Hour at which the task is done without the agent, and with it.
+    crew : int
+        Others that are there, or on their way.
+    """
+
+    task: TaskReport
+    arrival: float
+    without: float
+    with_me: float
+    crew: int
+
+    @property
+    def is_useful(self) -> bool:
+        """Whether the task is done earlier with the agent."""
+        return self.with_me < self.without
+
+
+def prospects(view: View, memory: float) -> list[Prospect]:
+    """Return what an agent expects of the tasks that it knows and can take.
+
+    Parameters
+    ----------
+    view : View
+    memory : float
+        Hours after which what was heard of others no longer counts.
+    """
+    own = view.own
+    crews = _crews(view, memory)
+    found = []
+    for task in view.open_tasks(own):
+        is_there = own.status is AgentStatus.WORKING and own.task == task.facts.id
+        arrival = view.hour + (0.0 if is_there else view.hours(own, task))
+        crew = crews.get(task.facts.id, [])
+        left = task.left if crew or is_there else task.left + task.facts.growth * (arrival - task.hour)
+        without = done_at(left, task.hour, crew)
+        with_me = done_at(left, task.hour, [*crew, (arrival, own.facts.ability)])
+        found.append(Prospect(task, arrival, without, with_me, len(crew)))
+    return found
+
+
+def _crews(view: View, memory: float) -> dict[str, Crew]:
+    """Return who else is at each task, or on its way there, as far as is known."""
+    crews: dict[str, Crew] = {}
+    for name, report in view.agents.items():
+        task = view.tasks.get(report.task or "")
+        if name == view.id or task is None or report.status not in ACTIVE or view.hour - report.hour > memory:
+            continue
+        is_there = report.status is AgentStatus.WORKING
+        arrival = -math.inf if is_there else report.hour + view.hours(report, task)
+        crews.setdefault(task.facts.id, []).append((arrival, report.facts.ability))
+    return crews
+
+
+def done_at(left: float, since: float, crew: Crew) -> float:
+    """Return the hour at which work is done that is left since an hour, by those who arrive; ``inf`` if nobody does."""
+    rate = work = 0.0
+    hour = math.inf
+    for arrival, ability in sorted(crew):
+        begin = max(arrival, since)
+        if begin >= hour:
+            break
+        rate += ability
+        work += ability * begin
+        hour = (left + work) / rate
+    return hour
