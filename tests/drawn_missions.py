@@ -78,7 +78,7 @@ def _instance(rng: np.random.Generator, n: int, m: int) -> Instance:
         priority=rng.integers(0, 3, m),
         allowed_tasks=[None if rng.random() < 0.7 else [0] for _ in range(n)],
         agent_energy_per_distance=rng.uniform(0, 2, n),
-        returns=rng.random(n) < 0.3,
+        returns=(rng.random(n) < 0.3) & (distances is None),
         skills=[["lift"] if rng.random() < 0.7 else [] for _ in range(n)],
         needs=[["lift"] if rng.random() < 0.3 else [] for _ in range(m)],
         metric=metric,
