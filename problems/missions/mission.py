@@ -127,7 +127,7 @@ class Mission(fields.ReadOnly):
         _require(self.deadline, late, "tasks[{}].deadline", "after the hour at which the task appears")
         if self.instance.distances is not None and self.instance.returns.any():
             row = int(np.argmax(self.instance.returns))
-            message = "cannot be combined with distances of one's own in a mission: who stops on the way has no way back"
+            message = "cannot be combined with distances of one's own: who stops on the way has no way back"
             raise InputError(message, f"agents[{row}].returns")
         check_sequence(self._numbered_timeline)
 
