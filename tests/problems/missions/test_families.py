@@ -21,7 +21,7 @@ def test_every_family_is_seeded(family):
 
 
 def test_families_have_what_they_are_called_by():
-    """Waves are few hours, hot spots near each other; tasks grow or have deadlines; agents fail, recharge, are silent."""
+    """Waves are few hours, hot spots near each other; tasks grow or have deadlines; agents fail or recharge."""
 
     def drawn(family):
         return random_mission(MissionParameters(family=family, agents=20, tasks=60), 3)
