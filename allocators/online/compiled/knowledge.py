@@ -1,0 +1,92 @@
+"""Who knows what, compiled: `simulation/awareness.py` and `simulation/channel.py`."""
+
+import numpy as np
+
+from alloc.allocators.online.compiled.arrays import HEARD, MESSAGES, TICK, TO_COME, Setting, State
+from alloc.allocators.online.compiled.motion import axis_at, is_active, uniform, work_left
+from alloc.allocators.runtime.compiled import compiled
+from alloc.problems.missions.chance import LOSS
+
+
+@compiled
+def report_agent(state: State, i: int, k: int) -> None:
+    """Let agent `i` know what is true of agent `k` now."""
+    report = state.met[i, k]
+    report[0], report[1], report[2] = state.now[0], state.status[k], state.order[k]
+    for axis in range(3):
+        report[3 + axis] = axis_at(state, k, axis)
+
+
+@compiled
+def report_task(state: State, setting: Setting, i: int, j: int) -> None:
+    """Let agent `i` know what is true of task `j` now."""
+    report = state.seen[i, j]
+    report[0], report[1], report[2] = state.now[0], work_left(state, setting, j), state.became[j]
+
+
+@compiled
+def look_around(state: State, setting: Setting, i: int) -> None:
+    """Let an agent see what lies within its sensing radius; with full knowledge, everything."""
+    n, m = setting.allowed.shape
+    square = setting.limits[1] * setting.limits[1] if setting.is_local else np.inf
+    x, y, z = axis_at(state, i, 0), axis_at(state, i, 1), axis_at(state, i, 2)
+    for k in range(n):
+        if k == i or (is_active(state, k) and _square(state, k, x, y, z) <= square):
+            report_agent(state, i, k)
+    for j in range(m):
+        if state.became[j] != TO_COME:
+            dx, dy, dz = x - setting.place[j, 0], y - setting.place[j, 1], z - setting.place[j, 2]
+            if dx * dx + dy * dy + dz * dz <= square:
+                report_task(state, setting, i, j)
+
+
+@compiled
+def _square(state: State, k: int, x: float, y: float, z: float) -> float:
+    dx, dy, dz = axis_at(state, k, 0) - x, axis_at(state, k, 1) - y, axis_at(state, k, 2) - z
+    return dx * dx + dy * dy + dz * dz
+
+
+@compiled
+def talk(state: State, setting: Setting) -> None:
+    """Let all agents in the mission tell those within the radius all that they know, at once."""
+    n = len(state.status)
+    square = setting.limits[2] * setting.limits[2]
+    state.seen_before[:] = state.seen
+    state.met_before[:] = state.met
+    for i in range(n):
+        if not is_active(state, i):
+            continue
+        state.counts[MESSAGES] += 1
+        x, y, z = axis_at(state, i, 0), axis_at(state, i, 1), axis_at(state, i, 2)
+        for k in range(n):
+            if (
+                k != i
+                and is_active(state, k)
+                and _square(state, k, x, y, z) <= square
+                and not _is_lost(state, setting, i, k)
+            ):
+                state.counts[HEARD] += 1
+                hear(state, k, i)
+    state.counts[TICK] += 1
+
+
+@compiled
+def _is_lost(state: State, setting: Setting, sender: int, hearer: int) -> bool:
+    if setting.limits[4] == 0:
+        return False
+    key = np.array([LOSS, 0, 0, sender, hearer, state.counts[TICK]], dtype=np.uint64)
+    key[1], key[2] = setting.seeds[0], setting.seeds[1]
+    return bool(uniform(key) < setting.limits[4])
+
+
+@compiled
+def hear(state: State, hearer: int, sender: int) -> None:
+    """Let an agent take over what is newer in the sender's knowledge, as it was before anybody spoke."""
+    told, known = state.seen_before[sender], state.seen[hearer]
+    for j in range(len(told)):
+        if told[j, 0] > known[j, 0]:
+            known[j, 0], known[j, 1], known[j, 2] = told[j, 0], told[j, 1], told[j, 2]
+    told, known = state.met_before[sender], state.met[hearer]
+    for k in range(len(told)):
+        if told[k, 0] > known[k, 0]:
+            known[k] = told[k]
