@@ -1,4 +1,4 @@
-"""The simulation of missions in compiled loops, for training: as `problems/missions/simulation`, but for what it refuses.
+"""The simulation of missions in compiled loops, for training: as `problems/missions/simulation`, with fewer features.
 
-To be read in the order `arrays`, `chance`, `motion`, `knowledge`, `policies`, `loop`, `run`.
+To be read in the order `arrays`, `motion`, `knowledge`, `policies`, `loop`, `run`.
 """

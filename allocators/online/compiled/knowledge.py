@@ -3,7 +3,7 @@
 import numpy as np
 
 from alloc.allocators.online.compiled.arrays import HEARD, MESSAGES, TICK, TO_COME, Setting, State
-from alloc.allocators.online.compiled.motion import axis_at, is_active, uniform, work_left
+from alloc.allocators.online.compiled.motion import is_active, uniform, work_left
 from alloc.allocators.runtime.compiled import compiled
 from alloc.problems.missions.chance import LOSS
 
@@ -12,16 +12,16 @@ from alloc.problems.missions.chance import LOSS
 def report_agent(state: State, i: int, k: int) -> None:
     """Let agent `i` know what is true of agent `k` now."""
     report = state.met[i, k]
-    report[0], report[1], report[2] = state.now[0], state.status[k], state.order[k]
+    report[0], report[1], report[2] = state.now[0], state.agent[k].status, state.agent[k].order
     for axis in range(3):
-        report[3 + axis] = axis_at(state, k, axis)
+        report[3 + axis] = state.here[k, axis]
 
 
 @compiled
 def report_task(state: State, setting: Setting, i: int, j: int) -> None:
     """Let agent `i` know what is true of task `j` now."""
     report = state.seen[i, j]
-    report[0], report[1], report[2] = state.now[0], work_left(state, setting, j), state.became[j]
+    report[0], report[1], report[2] = state.now[0], work_left(state, setting, j), state.task[j].became
 
 
 @compiled
@@ -29,27 +29,27 @@ def look_around(state: State, setting: Setting, i: int) -> None:
     """Let an agent see what lies within its sensing radius; with full knowledge, everything."""
     n, m = setting.allowed.shape
     square = setting.limits[1] * setting.limits[1] if setting.is_local else np.inf
-    x, y, z = axis_at(state, i, 0), axis_at(state, i, 1), axis_at(state, i, 2)
+    x, y, z = state.here[i, 0], state.here[i, 1], state.here[i, 2]
     for k in range(n):
         if k == i or (is_active(state, k) and _square(state, k, x, y, z) <= square):
             report_agent(state, i, k)
     for j in range(m):
-        if state.became[j] != TO_COME:
-            dx, dy, dz = x - setting.place[j, 0], y - setting.place[j, 1], z - setting.place[j, 2]
+        if state.task[j].became != TO_COME:
+            dx, dy, dz = x - setting.task[j].place[0], y - setting.task[j].place[1], z - setting.task[j].place[2]
             if dx * dx + dy * dy + dz * dz <= square:
                 report_task(state, setting, i, j)
 
 
 @compiled
 def _square(state: State, k: int, x: float, y: float, z: float) -> float:
-    dx, dy, dz = axis_at(state, k, 0) - x, axis_at(state, k, 1) - y, axis_at(state, k, 2) - z
+    dx, dy, dz = state.here[k, 0] - x, state.here[k, 1] - y, state.here[k, 2] - z
     return dx * dx + dy * dy + dz * dz
 
 
 @compiled
 def talk(state: State, setting: Setting) -> None:
     """Let all agents in the mission tell those within the radius all that they know, at once."""
-    n = len(state.status)
+    n = len(state.agent)
     square = setting.limits[2] * setting.limits[2]
     state.seen_before[:] = state.seen
     state.met_before[:] = state.met
@@ -57,7 +57,7 @@ def talk(state: State, setting: Setting) -> None:
         if not is_active(state, i):
             continue
         state.counts[MESSAGES] += 1
-        x, y, z = axis_at(state, i, 0), axis_at(state, i, 1), axis_at(state, i, 2)
+        x, y, z = state.here[i, 0], state.here[i, 1], state.here[i, 2]
         for k in range(n):
             if (
                 k != i
@@ -74,9 +74,8 @@ def talk(state: State, setting: Setting) -> None:
 def _is_lost(state: State, setting: Setting, sender: int, hearer: int) -> bool:
     if setting.limits[4] == 0:
         return False
-    key = np.array([LOSS, 0, 0, sender, hearer, state.counts[TICK]], dtype=np.uint64)
-    key[1], key[2] = setting.seeds[0], setting.seeds[1]
-    return bool(uniform(key) < setting.limits[4])
+    drawn = uniform(LOSS, setting.seeds[0], setting.seeds[1], sender, hearer, state.counts[TICK])
+    return bool(drawn < setting.limits[4])
 
 
 @compiled
