@@ -4,15 +4,13 @@ import numpy as np
 
 from alloc.allocators.online.compiled.arrays import FLYING, OPEN, PLACE, STAY, Setting, State
 from alloc.allocators.online.compiled.motion import battery_at, can_fly, distance_from, obey, uniform
+from alloc.allocators.online.policies.exploring import BATTERY_SHARE, TRIES
 from alloc.allocators.runtime.compiled import compiled
 from alloc.problems.fields import FloatArray
 from alloc.problems.missions.chance import EXPLORING
 
 NEAREST = 0
 """The policies there are."""
-
-TRIES, BATTERY_SHARE = 8, 0.25
-"""As in `policies/exploring.py`; a test compares them."""
 
 
 @compiled
