@@ -43,7 +43,7 @@ def look_around(state: State, setting: Setting, i: int) -> None:
 @compiled
 def _square(state: State, k: int, x: float, y: float, z: float) -> float:
     dx, dy, dz = state.here[k, 0] - x, state.here[k, 1] - y, state.here[k, 2] - z
-    return dx * dx + dy * dy + dz * dz
+    return float(dx * dx + dy * dy + dz * dz)
 
 
 @compiled

@@ -85,7 +85,7 @@ def write(state: State, kind: int, agent: int, task: int) -> None:
 @compiled
 def is_active(state: State, i: int) -> bool:
     """Whether an agent is in the mission."""
-    return IDLE <= state.agent[i].status <= WORKING
+    return bool(IDLE <= state.agent[i].status <= WORKING)
 
 
 @compiled
