@@ -102,9 +102,9 @@ class State(NamedTuple):
         numbers; `deciding` and `looked` say whose turn it is, and who has looked around at this hour.
     task : ndarray of TASK, shape (m,)
         `ability` is that of all who work there, `completes` when it will be done.
-    seen, seen_before : ndarray, shape (n, m, 3)
+    seen, seen_before : ndarray, shape (3, n, m)
         Hour, work left and status of each agent's report of each task; hour -1 where it has none.
-    met, met_before : ndarray, shape (n, n, 6)
+    met, met_before : ndarray, shape (6, n, n)
         Hour, status, task and position of each agent's report of each agent.
     here : ndarray, shape (n, 3)
         Where agents are at this hour.
@@ -215,7 +215,7 @@ def state_of(setting: Setting, rows: int) -> State:
     for name in ("position", "source", "goal", "way"):
         agent[name] = setting.agent["start"]
     task["completes"] = task["closed"] = np.inf
-    seen, met = np.zeros((n, m, 3)), np.zeros((n, n, 6))
-    seen[:, :, 0] = met[:, :, 0] = -1.0
+    seen, met = np.zeros((3, n, m)), np.zeros((6, n, n))
+    seen[0] = met[0] = -1.0
     counts, log = np.zeros(5, dtype=np.intp), np.zeros((rows, 4))
     return State(agent, task, seen, seen.copy(), met, met.copy(), np.zeros((n, 3)), np.zeros(1), counts, log)

@@ -11,17 +11,17 @@ from alloc.problems.missions.chance import LOSS
 @compiled
 def report_agent(state: State, i: int, k: int) -> None:
     """Let agent `i` know what is true of agent `k` now."""
-    report = state.met[i, k]
-    report[0], report[1], report[2] = state.now[0], state.agent[k].status, state.agent[k].order
+    state.met[0, i, k], state.met[1, i, k] = state.now[0], state.agent[k].status
+    state.met[2, i, k] = state.agent[k].order
     for axis in range(3):
-        report[3 + axis] = state.here[k, axis]
+        state.met[3 + axis, i, k] = state.here[k, axis]
 
 
 @compiled
 def report_task(state: State, setting: Setting, i: int, j: int) -> None:
     """Let agent `i` know what is true of task `j` now."""
-    report = state.seen[i, j]
-    report[0], report[1], report[2] = state.now[0], work_left(state, setting, j), state.task[j].became
+    state.seen[0, i, j], state.seen[1, i, j] = state.now[0], work_left(state, setting, j)
+    state.seen[2, i, j] = state.task[j].became
 
 
 @compiled
@@ -81,11 +81,13 @@ def _is_lost(state: State, setting: Setting, sender: int, hearer: int) -> bool:
 @compiled
 def hear(state: State, hearer: int, sender: int) -> None:
     """Let an agent take over what is newer in the sender's knowledge, as it was before anybody spoke."""
-    told, known = state.seen_before[sender], state.seen[hearer]
+    told, known = state.seen_before[0, sender], state.seen[0, hearer]
     for j in range(len(told)):
-        if told[j, 0] > known[j, 0]:
-            known[j, 0], known[j, 1], known[j, 2] = told[j, 0], told[j, 1], told[j, 2]
-    told, known = state.met_before[sender], state.met[hearer]
+        if told[j] > known[j]:
+            for part in range(3):
+                state.seen[part, hearer, j] = state.seen_before[part, sender, j]
+    told, known = state.met_before[0, sender], state.met[0, hearer]
     for k in range(len(told)):
-        if told[k, 0] > known[k, 0]:
-            known[k] = told[k]
+        if told[k] > known[k]:
+            for part in range(6):
+                state.met[part, hearer, k] = state.met_before[part, sender, k]

@@ -17,11 +17,11 @@ NEAREST = 0
 def decide(state: State, setting: Setting, i: int, policy: int, weights: FloatArray) -> None:
     """Give an agent the order of a policy; `weights` are for those that have some."""
     j = state.agent[i].order
-    if j >= 0 and state.seen[i, j, 0] >= 0 and state.seen[i, j, 2] == OPEN:
+    if j >= 0 and state.seen[0, i, j] >= 0 and state.seen[2, i, j] == OPEN:
         return
     best, least = -1, np.inf
     for j in range(len(state.task)):
-        if state.seen[i, j, 0] >= 0 and state.seen[i, j, 2] == OPEN and setting.allowed[i, j]:
+        if state.seen[0, i, j] >= 0 and state.seen[2, i, j] == OPEN and setting.allowed[i, j]:
             distance = distance_from(state, i, setting.task[j].place)
             if distance < least and can_fly(state, setting, i, setting.task[j].place):
                 best, least = j, distance
