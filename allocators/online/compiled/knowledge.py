@@ -4,11 +4,11 @@ import numpy as np
 
 from alloc.allocators.online.compiled.arrays import HEARD, MESSAGES, TICK, TO_COME, Setting, State
 from alloc.allocators.online.compiled.motion import is_active, uniform, work_left
-from alloc.allocators.runtime.compiled import compiled
+from alloc.allocators.runtime.compiled import compiled, inlined
 from alloc.problems.missions.chance import LOSS
 
 
-@compiled
+@inlined
 def report_agent(state: State, i: int, k: int) -> None:
     """Let agent `i` know what is true of agent `k` now."""
     state.met[0, i, k], state.met[1, i, k] = state.now[0], state.agent[k].status
@@ -17,7 +17,7 @@ def report_agent(state: State, i: int, k: int) -> None:
         state.met[3 + axis, i, k] = state.here[k, axis]
 
 
-@compiled
+@inlined
 def report_task(state: State, setting: Setting, i: int, j: int) -> None:
     """Let agent `i` know what is true of task `j` now."""
     state.seen[0, i, j], state.seen[1, i, j] = state.now[0], work_left(state, setting, j)
@@ -40,7 +40,7 @@ def look_around(state: State, setting: Setting, i: int) -> None:
                 report_task(state, setting, i, j)
 
 
-@compiled
+@inlined
 def _square(state: State, k: int, x: float, y: float, z: float) -> float:
     dx, dy, dz = state.here[k, 0] - x, state.here[k, 1] - y, state.here[k, 2] - z
     return float(dx * dx + dy * dy + dz * dz)
@@ -78,7 +78,7 @@ def _is_lost(state: State, setting: Setting, sender: int, hearer: int) -> bool:
     return bool(drawn < setting.limits[4])
 
 
-@compiled
+@inlined
 def hear(state: State, hearer: int, sender: int) -> None:
     """Let an agent take over what is newer in the sender's knowledge, as it was before anybody spoke."""
     told, known = state.seen_before[0, sender], state.seen[0, hearer]

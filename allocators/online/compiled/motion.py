@@ -23,7 +23,7 @@ from alloc.allocators.online.compiled.arrays import (
     Setting,
     State,
 )
-from alloc.allocators.runtime.compiled import compiled
+from alloc.allocators.runtime.compiled import compiled, inlined
 from alloc.problems.fields import FloatArray
 
 TOLERANCE = 1e-9
@@ -53,7 +53,7 @@ def uniform(purpose: int, first: np.uint64, second: np.uint64, one: int, two: in
     return float(state >> _11) * 2.0**-53
 
 
-@compiled
+@inlined
 def share_flown(state: State, i: int) -> float:
     """Return the share of its way that an agent in flight has flown."""
     hours = state.agent[i].arrives - state.agent[i].departs
@@ -82,7 +82,7 @@ def write(state: State, kind: int, agent: int, task: int) -> None:
     state.counts[LOGGED] += 1
 
 
-@compiled
+@inlined
 def is_active(state: State, i: int) -> bool:
     """Whether an agent is in the mission."""
     return bool(IDLE <= state.agent[i].status <= WORKING)
@@ -123,7 +123,7 @@ def update(state: State, setting: Setting, j: int) -> None:
     state.task[j].since = state.now[0]
 
 
-@compiled
+@inlined
 def work_left(state: State, setting: Setting, j: int) -> float:
     """Return the work left of a task now."""
     hours = state.now[0] - state.task[j].since
