@@ -2,7 +2,6 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-# Python compiles modules when they are imported first: a fraction of all that are installed, and later.
 INSTALL := PYTHONWARNINGS=ignore $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 # A process of tests for each processor, each with one thread in torch, and most of a gigabyte of memory.
 PARALLEL := -n logical --maxprocesses 8 --dist worksteal

@@ -73,3 +73,27 @@ class ModelKind(StrEnum):
 
     CLASS = "class"
     PLAIN = "plain"
+
+
+class Knowledge(StrEnum):
+    """What agents know in a mission: all that is so now, or what they sensed and heard."""
+
+    FULL = "full"
+    LOCAL = "local"
+
+
+class MissionFamily(StrEnum):
+    """What makes a generated mission hard."""
+
+    STEADY = "steady"
+    WAVES = "waves"
+    HOT_SPOTS = "hot-spots"
+    FAILURES = "failures"
+    RECHARGING = "recharging"
+    GROWTH = "growth"
+    DEADLINES = "deadlines"
+    SILENCE = "silence"
+    PAPER_1 = "paper-1"
+    PAPER_2 = "paper-2"
+    PAPER_3 = "paper-3"
+    PAPER_4 = "paper-4"

@@ -1,0 +1,1 @@
+"""Policies for missions, behind one contract, and what runs them."""

@@ -1,0 +1,177 @@
+"""Missions under a policy: it is asked for orders, and what it does not answer in time is the last order."""
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from alloc.allocators.online.contract import AgentDecider, Briefing, FleetDecider, Policy, PolicyError
+from alloc.allocators.online.registry import load_policy
+from alloc.problems import InputError, RefusedError
+from alloc.problems.arguments import choice, of_type, real, whole
+from alloc.problems.missions.files.log_file import MissionLog
+from alloc.problems.missions.mission import Mission
+from alloc.problems.missions.replay import log_of
+from alloc.problems.missions.simulation.agenda import Request, Wanted
+from alloc.problems.missions.simulation.measures import DecisionTimes, MissionResult, measured
+from alloc.problems.missions.simulation.reports import Message, View
+from alloc.problems.missions.simulation.simulation import Simulation
+from alloc.problems.missions.simulation.state import Order
+from alloc.problems.vocabulary import Knowledge
+
+
+@dataclass(frozen=True)
+class MissionRun:
+    """A mission that is over.
+
+    Attributes
+    ----------
+    result : MissionResult
+    log : MissionLog
+    """
+
+    result: MissionResult
+    log: MissionLog
+
+
+def simulate(
+    mission: Mission,
+    policy: str | Policy,
+    *,
+    knowledge: Knowledge | str | None = None,
+    seed: int = 0,
+    deadline_ms: float | None = None,
+    parameters: object = None,
+    **settings: object,
+) -> MissionRun:
+    """Let a policy lead the agents of a mission to its end.
+
+    Parameters
+    ----------
+    mission : Mission
+    policy : str or Policy
+        A name, or a policy with its own parameters.
+    knowledge : {"full", "local"}, optional
+        What agents know; as the mission says by default.
+    seed : int
+        Seed of the policy, and of the radio's chances beside that of the mission; from 0 to 2^63 - 1.
+    deadline_ms : float, optional
+        Milliseconds for each decision; a later answer is not followed, the last order stands.
+    parameters : object, optional
+        Parameters of a policy that is given by name.
+    **settings
+        Single parameters of a policy that is given by name.
+
+    Returns
+    -------
+    MissionRun
+
+    Raises
+    ------
+    InputError
+        If the policy or a parameter is unknown, or an argument is wrong; its place is the parameter.
+    RefusedError
+        If the policy needs full knowledge.
+    PolicyError
+        If the policy answers what is no order.
+    """
+    began = time.perf_counter()
+    of_type(mission, Mission, "mission")
+    of_type(policy, (str, Policy), "policy")
+    known = mission.knowledge if knowledge is None else choice(Knowledge, knowledge, "knowledge")
+    number = whole(seed, "seed", 0, 2**63 - 1)
+    deadline_s = None if deadline_ms is None else real(deadline_ms, "deadline_ms", above=True) / 1000
+    if isinstance(policy, Policy) and (settings or parameters is not None):
+        raise InputError("is an object with its own parameters; set them where it is made", "policy")
+    leader = load_policy(policy, parameters, **settings) if isinstance(policy, str) else policy
+    if leader.info.central and known is Knowledge.LOCAL:
+        raise RefusedError(f"policy {leader.info.name!r} leads all agents, and needs full knowledge (--knowledge full)")
+    simulation = Simulation(mission, known, number)
+    control = _Control(leader, simulation, number, deadline_s)
+    while (request := simulation.advance()) is not None:
+        control.answer(request)
+    times = DecisionTimes.of(control.seconds, control.late, time.perf_counter() - began)
+    result = measured(simulation, leader.info.name, number, times)
+    return MissionRun(result, log_of(simulation, result))
+
+
+class _Control:
+    """The link of a policy to a simulation: hands over what may be known, and passes on what is answered in time.
+
+    Attributes
+    ----------
+    seconds : list of float
+        How long each decision took.
+    late : int
+        Decisions that came after the deadline.
+    """
+
+    def __init__(self, policy: Policy, simulation: Simulation, seed: int, deadline_s: float | None) -> None:
+        self._simulation, self._deadline_s = simulation, deadline_s
+        self._name = policy.info.name
+        self.seconds: list[float] = []
+        self.late = 0
+        mission, known = simulation.mission, simulation.knowledge
+        self._fleet: FleetDecider | None = None
+        self._agents: dict[str, AgentDecider] = {}
+        if policy.info.central:
+            fleet = policy.begin(Briefing.of(mission, known, seed, deadline_s, None))
+            if not isinstance(fleet, FleetDecider):
+                raise PolicyError(f"policy {self._name!r} is central, but began with a {type(fleet).__name__}")
+            self._fleet = fleet
+            return
+        for name in mission.instance.agent_ids:
+            decider = policy.begin(Briefing.of(mission, known, seed, deadline_s, name))
+            if not isinstance(decider, AgentDecider):
+                raise PolicyError(f"policy {self._name!r} is not central, but began with a {type(decider).__name__}")
+            self._agents[name] = decider
+
+    def answer(self, request: Request) -> None:
+        """Send messages, or give orders, as the policy says."""
+        if request.wanted is Wanted.MESSAGES:
+            for name in () if self._fleet is not None else request.agents:
+                self._send(name)
+        elif self._fleet is not None:
+            self._lead(self._fleet, request)
+        else:
+            for name in request.agents:
+                self._order(name)
+
+    def _send(self, name: str) -> None:
+        message = self._agents[name].message(self._simulation.view(name, is_glance=True))
+        if message is None:
+            return
+        if not isinstance(message, Message) or message.sender != name:
+            raise PolicyError(f"policy {self._name!r} sent {message!r} as a message of {name!r}")
+        self._simulation.send(name, message)
+
+    def _lead(self, fleet: FleetDecider, request: Request) -> None:
+        view = self._simulation.view(None)
+        began = time.perf_counter()
+        orders = fleet.decide(view)
+        in_time = self._is_in_time(began)
+        if not isinstance(orders, Mapping):
+            raise PolicyError(f"policy {self._name!r} answered {type(orders).__name__}, not orders by agent")
+        for name, order in orders.items():
+            if name not in request.agents:
+                raise PolicyError(f"policy {self._name!r} has an order for {name!r}, who can take none now")
+            if in_time:
+                self._give(name, order)
+
+    def _order(self, name: str) -> None:
+        view: View = self._simulation.view(name)
+        began = time.perf_counter()
+        order = self._agents[name].decide(view)
+        if self._is_in_time(began) and order is not None:
+            self._give(name, order)
+
+    def _is_in_time(self, began: float) -> bool:
+        seconds = time.perf_counter() - began
+        self.seconds.append(seconds)
+        is_late = self._deadline_s is not None and seconds > self._deadline_s
+        self.late += is_late
+        return not is_late
+
+    def _give(self, name: str, order: Order) -> None:
+        if not isinstance(order, Order):
+            raise PolicyError(f"policy {self._name!r} answered {order!r}, which is no Order")
+        self._simulation.order(name, order)

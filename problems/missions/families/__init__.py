@@ -1,0 +1,1 @@
+"""Seeded random missions of many kinds."""

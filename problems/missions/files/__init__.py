@@ -1,0 +1,1 @@
+"""Missions as files: alloc-mission/1."""

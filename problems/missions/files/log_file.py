@@ -1,0 +1,107 @@
+"""Logs of missions as text: JSON lines, alloc-mission-log/1."""
+
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass
+from json import JSONDecodeError
+
+from alloc.problems.errors import InputError
+from alloc.problems.formats.columns import require_format
+from alloc.problems.formats.files import PathLike, named, read_text, write_text_atomically
+from alloc.problems.formats.json_columns import require_known
+from alloc.problems.formats.json_text import encode, require_object
+from alloc.problems.formats.messages import told
+
+LOG_FORMAT = "alloc-mission-log/1"
+HEADER_FIELDS = ("format", "mission", "policy", "knowledge", "seed", "version")
+
+Record = dict[str, object]
+
+
+@dataclass(frozen=True)
+class MissionLog:
+    """A log: what was simulated, what happened, and the result.
+
+    Attributes
+    ----------
+    header : dict
+        Format, mission, policy, knowledge, seed and version.
+    records : tuple of dict
+        In the order of time; see `simulation.log.Log`.
+    result : dict
+        As in ``alloc-mission-result/1``.
+    """
+
+    header: Record
+    records: tuple[Record, ...]
+    result: Record
+
+    def to_text(self) -> str:
+        """Return the log as JSON lines: the header, the records, the result."""
+        return "".join(f"{encode(line)}\n" for line in (self.header, *self.records, self.result))
+
+
+def write_log(log: MissionLog, path: PathLike) -> None:
+    """Write a log; ``-`` is standard output.
+
+    Parameters
+    ----------
+    log : MissionLog
+    path : str or path
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    """
+    write_text_atomically(path, log.to_text())
+
+
+def read_log(path: PathLike) -> MissionLog:
+    """Read a log; ``-`` is standard input.
+
+    Parameters
+    ----------
+    path : str or path
+
+    Returns
+    -------
+    MissionLog
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or is no log.
+    """
+    source = named(path)
+    try:
+        return _parsed(read_text(path).split("\n"))
+    except InputError as error:
+        raise told(error, source) from error.__cause__
+
+
+def _parsed(lines: Iterable[str]) -> MissionLog:
+    documents = [_line(text, number) for number, text in enumerate(lines, 1) if text.strip()]
+    if len(documents) < 2:
+        raise InputError("is no log of a mission: it needs a header, and a result as its last line; is it cut off?")
+    header, *records, result = documents
+    try:
+        require_format(header.get("format"), (LOG_FORMAT,))
+        require_known(header, HEADER_FIELDS, "")
+        for name in HEADER_FIELDS:
+            if name not in header:
+                raise InputError("is missing", name)
+    except InputError as error:
+        raise InputError(error.message, ": ".join(part for part in ("line 1", error.place) if part)) from error
+    if not str(result.get("format")).startswith("alloc-mission-result/"):
+        raise InputError("must be the result of the mission; is the log cut off?", f"line {len(documents)}")
+    return MissionLog(header, tuple(records), result)
+
+
+def _line(text: str, number: int) -> Record:
+    try:
+        return require_object(json.loads(text), f"line {number}")
+    except JSONDecodeError as error:
+        raise InputError(f"is not JSON: {error.msg[0].lower()}{error.msg[1:]}", f"line {number}") from error
+    except RecursionError as error:
+        raise InputError("is nested too deeply", f"line {number}") from error

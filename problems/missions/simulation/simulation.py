@@ -1,0 +1,298 @@
+"""From event to event: a mission, and the orders that agents get on the way."""
+
+import math
+from collections.abc import Iterator
+
+from alloc.problems.arguments import choice, of_type, whole
+from alloc.problems.missions.events import Event, EventKind
+from alloc.problems.missions.mission import Mission
+from alloc.problems.missions.simulation import conservation
+from alloc.problems.missions.simulation.agenda import (
+    Agenda,
+    Arrival,
+    Changes,
+    Completion,
+    Delivery,
+    Request,
+    Turn,
+    Wanted,
+)
+from alloc.problems.missions.simulation.awareness import Awareness, FullAwareness, LocalAwareness
+from alloc.problems.missions.simulation.changes import happen, land, obey
+from alloc.problems.missions.simulation.channel import Channel
+from alloc.problems.missions.simulation.log import Log
+from alloc.problems.missions.simulation.motion import (
+    CLOSE,
+    bring_up_to_date,
+    close,
+    end_flights,
+)
+from alloc.problems.missions.simulation.reports import Message, View
+from alloc.problems.missions.simulation.state import (
+    ACTIVE,
+    STAY,
+    AgentState,
+    AgentStatus,
+    MissionState,
+    Order,
+    TaskState,
+    TaskStatus,
+)
+from alloc.problems.vocabulary import Knowledge
+
+
+class Simulation:
+    """A mission as it goes on; it stops wherever agents may send messages or get orders.
+
+    At one hour tasks are completed first, then deadlines pass, events happen as the mission says, flights end, messages
+    are heard, and those of the hour sent. Then orders are given. With full knowledge that is whenever something
+    happened, for all agents; with local knowledge for each agent every `Radio.period`, and when its own task or flight
+    ends, it joins, returns or is recharged. Before that it looks around.
+
+    Parameters
+    ----------
+    mission : Mission
+    knowledge : {"full", "local"}, optional
+        That of the mission by default.
+    seed : int
+        Of the radio's chances, beside that of the mission.
+    aware : bool
+        Whether agents get to know anything; in a replay nobody asks what they know.
+
+    Attributes
+    ----------
+    mission : Mission
+    state : MissionState
+    knowledge : Knowledge
+    log : Log
+    messages, bytes : list of int
+        Sent so far by each agent.
+    """
+
+    def __init__(
+        self, mission: Mission, knowledge: Knowledge | str | None = None, seed: int = 0, *, aware: bool = True
+    ) -> None:
+        of_type(mission, Mission, "mission")
+        self.knowledge = mission.knowledge if knowledge is None else choice(Knowledge, knowledge, "knowledge")
+        self.mission, self.state = mission, MissionState(mission)
+        self.log = Log(self.state)
+        self.messages, self.bytes = [0] * mission.instance.n, [0] * mission.instance.n
+        self._channel = Channel(self.state, whole(seed, "seed", 0, 2**63 - 1))
+        self._is_local = self.knowledge is Knowledge.LOCAL
+        self._awareness: Awareness | None = None
+        if aware:
+            self._awareness = LocalAwareness(self.state) if self._is_local else FullAwareness(self.state)
+        self._agenda = Agenda()
+        self._tick = 0
+        self._changes = Changes(self.state, self._agenda)
+        self._deciding: dict[int, AgentState] = {}
+        self._looked: set[int] = set()
+        self._is_news = False
+        for event in mission.timeline:
+            self._agenda.push(event.hour, Turn.EVENT, event)
+        for task in self.state.tasks:
+            if task.facts.deadline < math.inf:
+                self._agenda.push(task.facts.deadline, Turn.DEADLINE, task)
+        if self._is_local:
+            self._agenda.push(0.0, Turn.RADIO, None)
+        self._requests = self._run()
+
+    def advance(self) -> Request | None:
+        """Go on to where agents may send messages or get orders; None at the end of the mission."""
+        return next(self._requests, None)
+
+    def view(self, agent: str | None, *, is_glance: bool = False) -> View:
+        """Return what an agent knows now, or, for None, who leads all agents.
+
+        Parameters
+        ----------
+        agent : str or None
+            Its id.
+        is_glance : bool
+            Whether the messages that it heard are to be handed over once more.
+        """
+        assert self._awareness is not None
+        return self._awareness.view(None if agent is None else self.state.agent(agent), is_glance=is_glance)
+
+    def send(self, agent: str, message: Message | int) -> None:
+        """Let an agent send a message, in a request for messages.
+
+        Parameters
+        ----------
+        agent : str
+            Its id.
+        message : Message or int
+            Or its bytes alone, in a replay.
+        """
+        sender, size = self.state.agent(agent), message if isinstance(message, int) else message.size
+        hearers = self._channel.hearers(sender, self._tick)
+        self.messages[sender.index] += 1
+        self.bytes[sender.index] += size
+        self.log.message(sender, size, [hearer.facts.id for hearer in hearers])
+        if isinstance(message, Message) and hearers:
+            self._agenda.push(self.state.hour + self.mission.radio.delay, Turn.DELIVERY, Delivery(message, hearers))
+
+    def order(self, agent: str, order: Order, *, trusted: bool = False) -> str | None:
+        """Give an agent an order, in a request for orders; return why it is not followed, None if it is.
+
+        Parameters
+        ----------
+        agent : str
+            Its id.
+        order : Order
+            Where it is to go; what it does already needs no order.
+        trusted : bool
+            Whether the agent is taken to know the task.
+        """
+        receiver = self.state.agent(agent)
+        if order == receiver.order:
+            return None
+        problem = None
+        if order.task is not None and not trusted and self._awareness is not None:
+            problem = self._awareness.objection(receiver, order.task)
+        if problem is None:
+            left = receiver.task
+            problem = obey(self.state, receiver, order)
+            if problem is None:
+                self._changes.note_agent(receiver, left)
+        self.log.order(receiver, order, problem)
+        if problem is None and receiver.flight is None and order != STAY:  # it is there at once
+            self.log.arrival(receiver, receiver.task)
+        if problem is None and self._awareness is not None and not self._is_local:
+            self._awareness.look_around([receiver])
+        return problem
+
+    def refuse(self, agent: str, order: Order, reason: str) -> None:
+        """Record an order that is not followed, in a replay.
+
+        Parameters
+        ----------
+        agent : str
+            Its id.
+        order : Order
+        reason : str
+        """
+        self.log.order(self.state.agent(agent), order, reason)
+
+    def _run(self) -> Iterator[Request]:
+        state = self.state
+        while not self._is_over() and self._agenda.hour <= self.mission.end:
+            state.hour, self._is_news = self._agenda.hour, False
+            self._looked.clear()
+            while self._agenda.hour == state.hour:
+                turn, item = self._agenda.pop()
+                if turn is Turn.RADIO:
+                    yield from self._talk()
+                else:
+                    self._take(turn, item)
+                self._changes.balance()
+            agents = self._who_decides()
+            if agents and not self._is_over():
+                self._look(agents)
+                if self._awareness is not None:
+                    self._awareness.refresh()
+                yield Request(Wanted.ORDERS, state.hour, tuple(agent.facts.id for agent in agents))
+                self._changes.balance()
+        self._finish()
+
+    def _take(self, turn: Turn, item: object) -> None:
+        """Let one entry of the agenda happen, unless it is void by now."""
+        if isinstance(item, Event):
+            self._happen(item)
+        elif isinstance(item, Arrival):
+            if item.agent.flight is item.flight:
+                self._arrive(item)
+        elif isinstance(item, Delivery):
+            for agent in item.hearers:
+                if agent.status in ACTIVE and not self._channel.is_silent(agent) and self._awareness is not None:
+                    self._awareness.hear(agent, item.message)
+        elif isinstance(item, Completion):
+            if item.task.status is TaskStatus.OPEN and item.task.version == item.version:
+                self._close(item.task, TaskStatus.DONE)
+        elif isinstance(item, TaskState) and item.status is TaskStatus.OPEN:
+            bring_up_to_date(self.state, item)
+            is_done = item.left <= CLOSE * (item.appeared + item.grown)
+            self._close(item, TaskStatus.DONE if is_done else TaskStatus.MISSED)
+
+    def _happen(self, event: Event) -> None:
+        self.log.event(event)
+        if event.kind is EventKind.RADIO_SILENT:
+            self._channel.silence(event)
+        elif event.agent is not None:
+            agent = self.state.agent(event.agent)
+            left = agent.task
+            happen(self.state, event)
+            self._changes.note_agent(agent, left)
+            self._deciding[agent.index] = agent
+        else:
+            task = self.state.task(event.task)
+            workers = tuple(task.workers.values())
+            was_open = task.status in (TaskStatus.OPEN, TaskStatus.TO_COME)
+            happen(self.state, event)
+            self._ended(task, workers)
+            if was_open and task.status is TaskStatus.DONE:
+                self.log.closed(task)
+        self._is_news = True
+
+    def _close(self, task: TaskState, status: TaskStatus) -> None:
+        workers = tuple(task.workers.values())
+        close(self.state, task, status)
+        self._ended(task, workers)
+        self.log.closed(task)
+        self._is_news = True
+
+    def _ended(self, task: TaskState, workers: tuple[AgentState, ...]) -> None:
+        """Take notice of a task that has changed; who worked there and no longer does is to decide."""
+        self._changes.note_task(task)
+        for agent in workers:
+            self._changes.note_agent(agent)
+            if agent.task is None:
+                self._deciding[agent.index] = agent
+
+    def _arrive(self, arrival: Arrival) -> None:
+        agent, task = arrival.agent, arrival.flight.task
+        land(self.state, agent)
+        self._changes.note_agent(agent, task)
+        self.log.arrival(agent, task)
+        if agent.status is AgentStatus.IDLE:
+            self._deciding[agent.index] = agent
+            self._is_news = True
+
+    def _talk(self) -> Iterator[Request]:
+        """Let all agents that can look around and send a message, and then decide."""
+        active = [agent for agent in self.state.agents if agent.status in ACTIVE]
+        self._look(active)
+        self._channel.open()
+        self._deciding.update((agent.index, agent) for agent in active)
+        senders = tuple(agent.facts.id for agent in active if not self._channel.is_silent(agent))
+        if senders:
+            yield Request(Wanted.MESSAGES, self.state.hour, senders)
+        self._tick += 1
+        self._agenda.push(self._tick * self.mission.radio.period, Turn.RADIO, None)
+
+    def _look(self, agents: list[AgentState]) -> None:
+        """Let agents look around that have not done so at this hour."""
+        if self._is_local and self._awareness is not None:
+            self._awareness.look_around([agent for agent in agents if agent.index not in self._looked])
+            self._looked.update(agent.index for agent in agents)
+
+    def _who_decides(self) -> list[AgentState]:
+        """Return the agents that are to get orders now, in their order in the mission."""
+        deciding, self._deciding = self._deciding, {}
+        if self._is_local:
+            return [deciding[index] for index in sorted(deciding) if deciding[index].status in ACTIVE]
+        return [agent for agent in self.state.agents if agent.status in ACTIVE] if self._is_news else []
+
+    def _is_over(self) -> bool:
+        """Whether no task is open or to come, or nobody is left to do one."""
+        left = any(task.status in (TaskStatus.OPEN, TaskStatus.TO_COME) for task in self.state.tasks)
+        return not left or all(agent.status is AgentStatus.FAILED for agent in self.state.agents)
+
+    def _finish(self) -> None:
+        """End the mission: whoever is in flight lands, whoever returns is home, and all ledgers are checked."""
+        if not self._is_over() and self.mission.end < self._agenda.hour < math.inf:
+            self.state.hour = self.mission.end
+        for task in self.state.tasks:
+            bring_up_to_date(self.state, task)
+        end_flights(self.state)
+        conservation.check(self.state)

@@ -1,0 +1,253 @@
+"""Agents and tasks as they are now, and their ledgers: what was flown and worked so far.
+
+Agents and tasks are brought up to date where something changes for them, not at every event: `since` is the hour up to
+which a task's ledger goes, and a flight counts when it ends.
+"""
+
+import math
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from alloc.problems.missions.mission import Mission
+from alloc.problems.missions.simulation.places import Distances, Place, Position, starting_places, task_places
+
+
+class AgentStatus(StrEnum):
+    """What an agent does."""
+
+    ABSENT = "absent"
+    IDLE = "idle"
+    FLYING = "flying"
+    WORKING = "working"
+    AWAY = "away"
+    FAILED = "failed"
+
+
+ACTIVE = frozenset({AgentStatus.IDLE, AgentStatus.FLYING, AgentStatus.WORKING})
+"""What an agent does that is in the mission: it hears, sees and takes orders."""
+
+
+class TaskStatus(StrEnum):
+    """What has become of a task."""
+
+    TO_COME = "to come"
+    OPEN = "open"
+    DONE = "done"
+    MISSED = "missed"
+    CANCELLED = "cancelled"
+
+
+@dataclass(frozen=True, slots=True)
+class AgentFacts:
+    """What never changes of an agent.
+
+    Attributes
+    ----------
+    id : str
+    ability, speed, energy_per_distance, range : float
+        ``inf`` for a speed means that flights take no time; for a range, that there is none.
+    start : Place
+    returns : bool
+        Whether it must be able to fly back to its start, and does so at the end.
+    skills : frozenset of str
+    tasks : frozenset of str, or None
+        Ids of the tasks that it may do; None for all.
+    """
+
+    id: str
+    ability: float
+    speed: float
+    energy_per_distance: float
+    range: float
+    start: Place
+    returns: bool
+    skills: frozenset[str]
+    tasks: frozenset[str] | None
+
+
+@dataclass(frozen=True, slots=True)
+class TaskFacts:
+    """What never changes of a task: see `Mission` and `Instance`."""
+
+    id: str
+    place: Place
+    priority: float
+    appears: float
+    deadline: float
+    growth: float
+    needs: frozenset[str]
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """Where an agent is to go: to a task, to work there; to a place; or nowhere, which is to stay where it is.
+
+    Attributes
+    ----------
+    task : str or None
+        Id of the task.
+    position : tuple of float, or None
+        Three coordinates, where there is no task.
+    """
+
+    task: str | None = None
+    position: Position | None = None
+
+
+STAY = Order()
+
+
+@dataclass(frozen=True, slots=True)
+class Flight:
+    """A flight that goes on; `task` is None for one to a mere place."""
+
+    source: Place
+    goal: Place
+    task: "TaskState | None"
+    distance: float
+    departs: float
+    arrives: float
+
+    def share(self, hour: float) -> float:
+        """Return the share of the way that is flown at an hour."""
+        length = self.arrives - self.departs
+        return 1.0 if length <= 0 else min(1.0, max(0.0, (hour - self.departs) / length))
+
+
+@dataclass(eq=False, slots=True)
+class AgentState:
+    """An agent now.
+
+    Attributes
+    ----------
+    index : int
+    facts : AgentFacts
+    place : Place
+        Where it is, or where its flight began.
+    battery : float
+        At that place.
+    capacity : float
+        What it had at the beginning and was recharged by.
+    status : AgentStatus
+    order : Order
+        The last one.
+    flight : Flight or None
+    task : TaskState or None
+        Where it works.
+    distance, energy : float
+        Flown so far, and what that took.
+    """
+
+    index: int
+    facts: AgentFacts
+    place: Place
+    battery: float
+    capacity: float
+    status: AgentStatus = AgentStatus.ABSENT
+    order: Order = STAY
+    flight: Flight | None = None
+    task: "TaskState | None" = None
+    distance: float = 0.0
+    energy: float = 0.0
+
+
+@dataclass(eq=False, slots=True)
+class TaskState:
+    """A task now; each unit of work that appeared, grew or was added is left, done, cancelled or missed.
+
+    Attributes
+    ----------
+    index : int
+    facts : TaskFacts
+    workload : float
+        With which it appears.
+    status : TaskStatus
+    workers : dict
+        Agents present, by index, in the order in which they came.
+    left, since : float
+        Work left, and the hour at which that was so.
+    begun : bool
+        Whether somebody has worked there, so that it grows no more.
+    appeared, grown, done, cancelled, missed : float
+        Work in all.
+    closed : float
+        Hour at which it was done, missed or cancelled.
+    version : int
+        Changes whenever the hour of its completion may.
+    """
+
+    index: int
+    facts: TaskFacts
+    workload: float
+    status: TaskStatus = TaskStatus.TO_COME
+    workers: dict[int, AgentState] = field(default_factory=dict)
+    left: float = 0.0
+    since: float = 0.0
+    begun: bool = False
+    appeared: float = 0.0
+    grown: float = 0.0
+    done: float = 0.0
+    cancelled: float = 0.0
+    missed: float = 0.0
+    closed: float = math.inf
+    version: int = 0
+
+
+class MissionState:
+    """All agents and tasks of a mission now.
+
+    Parameters
+    ----------
+    mission : Mission
+
+    Attributes
+    ----------
+    mission : Mission
+    distances : Distances
+    hour : float
+    agents : list of AgentState
+    tasks : list of TaskState
+    switches : int
+        Orders that sent a flying or working agent elsewhere while its task had work left.
+    """
+
+    def __init__(self, mission: Mission) -> None:
+        instance = mission.instance
+        self.mission, self.hour, self.switches = mission, 0.0, 0
+        self.distances = Distances(instance)
+        allowed = instance.allowed_tasks or (None,) * instance.n
+        skills, needs = instance.skills or ((),) * instance.n, instance.needs or ((),) * instance.m
+        rows = zip(
+            instance.agent_ids,
+            instance.ability.tolist(),
+            instance.speed.tolist(),
+            instance.agent_energy_per_distance.tolist(),
+            instance.communication_range.tolist(),
+            starting_places(instance),
+            instance.returns.tolist(),
+            map(frozenset, skills),
+            (None if some is None else frozenset(instance.task_ids[j] for j in some.tolist()) for some in allowed),
+            strict=True,
+        )
+        facts = [AgentFacts(*row) for row in rows]
+        batteries = instance.battery.tolist()
+        self.agents = [AgentState(i, fact, fact.start, batteries[i], batteries[i]) for i, fact in enumerate(facts)]
+        places, workload = task_places(instance), instance.workload.tolist()
+        columns = (instance.priority, mission.appears, mission.deadline, mission.growth)
+        priority, appears, deadline, growth = (column.tolist() for column in columns)
+        self.tasks = [
+            TaskState(
+                j,
+                TaskFacts(name, places[j], priority[j], appears[j], deadline[j], growth[j], frozenset(needs[j])),
+                workload[j],
+            )
+            for j, name in enumerate(instance.task_ids)
+        ]
+
+    def agent(self, name: str | None) -> AgentState:
+        """Return an agent by its id."""
+        return self.agents[self.mission.instance.agent_index[str(name)]]
+
+    def task(self, name: str | None) -> TaskState:
+        """Return a task by its id."""
+        return self.tasks[self.mission.instance.task_index[str(name)]]
