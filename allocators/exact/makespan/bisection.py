@@ -11,8 +11,11 @@ from alloc.allocators.exact.makespan.state import TIGHT, MakespanState
 from alloc.allocators.exact.model import FEW_PAIRS
 from alloc.allocators.exact.solver_model import Solver, Verdict
 
-FIRST_SHARES = (0.005, 0.2)
-"""Shares of the time in which repartitions and configurations take turns, as either alone often closes the gap."""
+SHARES = ((0.02, 0.005), (0.1, 0.05), (0.15, 0.15))
+"""Shares of the time in which local search, and then repartitions and configurations, take turns before the solver."""
+
+PROBE_SHARE = 0.1
+"""Share of the time of a probe, and of the turn of local search after one that stayed open."""
 
 
 def least_makespan(search: Search, solver: Solver, min_served: int, until_s: float, *, descent: bool) -> None:
@@ -31,19 +34,21 @@ def least_makespan(search: Search, solver: Solver, min_served: int, until_s: flo
         Whether plans are looked for without the solver first.
     """
     state = MakespanState.begin(search, min_served, until_s, descent=descent)
-    narrow_without_solver(state)
-    bisect(state, solver)
-
-
-def narrow_without_solver(state: MakespanState) -> None:
-    """Find plans and bounds that often meet, so that no solver is needed."""
-    if state.descent:
+    if descent:
         descend_in_steps(state)
-        for share in FIRST_SHARES if len(state.model.class_of_pair) > FEW_PAIRS else ():
-            search_repartitions(state, share)
-            raise_bound_by_configurations(state, share)
-    elif state.search.instance.has_travel_time or not state.search.instance.reach.is_complete:
-        raise_bound_by_relaxation(state)
+    raise_bound_by_relaxation(state)
+    if not state.ended:
+        with state.with_local_search():
+            take_turns(state)
+            bisect(state, solver)
+
+
+def take_turns(state: MakespanState) -> None:
+    """Find plans and bounds that often meet, so that no solver is needed."""
+    for local, other in SHARES if state.descent and len(state.model.class_of_pair) > FEW_PAIRS else ():
+        state.search_locally(local)
+        search_repartitions(state, other)
+        raise_bound_by_configurations(state, other)
 
 
 def bisect(state: MakespanState, solver: Solver) -> None:
@@ -62,6 +67,7 @@ def bisect(state: MakespanState, solver: Solver) -> None:
                 state.unresolved = max(state.unresolved, probe.time)
             if not state.bounds_tried:
                 raise_bound_by_configurations(state, 0.2)
+            state.search_locally(PROBE_SHARE)
         probe = _next_probe(state, verdict)
 
 
@@ -72,6 +78,6 @@ def _next_probe(state: MakespanState, last: Verdict) -> Probe:
         state.unresolved = 0.0
         return Probe(upper * (1 - 0.9 * PROVEN), np.inf, Purpose.LAST)
     if state.would_prove(floor) or (last is Verdict.INFEASIBLE and not state.bounds_tried):
-        return Probe(upper * (1 - TIGHT / 2), state.share_s(0.1), Purpose.BELOW_PLAN)
+        return Probe(upper * (1 - TIGHT / 2), state.share_s(PROBE_SHARE), Purpose.BELOW_PLAN)
     middle = float(np.sqrt(floor * upper)) if upper > 2 * floor else (floor + upper) / 2
-    return Probe(middle, state.share_s(0.1))
+    return Probe(middle, state.share_s(PROBE_SHARE))

@@ -9,27 +9,25 @@ from alloc.allocators.exact.solver_model import Verdict
 
 
 def raise_bound_by_configurations(state: MakespanState, share: float) -> None:
-    """Raise the lower bound by the configuration linear programme, or by a simpler one where it is too large."""
+    """Raise the lower bound by the configuration linear programme, unless it is too large."""
     first, state.bounds_tried = not state.bounds_tried, True
     if state.ended or state.partial:
         return
     if first:
         configurations = ConfigurationProgramme(state.model, state.lower)
         state.configurations = configurations if configurations.is_tractable else None
-        if state.configurations is None:
-            raise_bound_by_relaxation(state)
     if state.configurations is not None:
         _bisect_by_prices(state, state.configurations, state.search.elapsed_s + state.share_s(share))
 
 
 def raise_bound_by_relaxation(state: MakespanState) -> None:
-    """Raise the lower bound by linear programmes of single agents: more than the simple bounds, less than a probe."""
-    if state.ended or state.partial:
+    """Raise the lower bound by linear programmes of single agents; without reach and travel times it is simple anyway."""
+    instance = state.search.instance
+    if state.ended or state.partial or not (instance.has_travel_time or not instance.reach.is_complete):
         return
-    seconds = 1.0 if state.repeatable else state.share_s(0.1)
-    bound = relaxed_lower_bound(state.model, state.lower, state.upper, seconds, lambda: state.over)
+    bound = relaxed_lower_bound(state.model, state.lower, state.upper, state.share_s(0.2), lambda: state.over)
     if bound > state.lower:
-        state.rule_out(bound)
+        state.rule_out_below(bound)
 
 
 def probe_by_groups(state: MakespanState, time: float, seconds: float) -> Verdict:
