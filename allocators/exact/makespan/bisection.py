@@ -57,7 +57,7 @@ def bisect(state: MakespanState, solver: Solver) -> None:
     The lower bound is probed first, as it is often the optimum. A probe without a verdict raises the lower end of the
     bisection but proves nothing; it is repeated with more time once nothing else is left.
     """
-    probe = Probe(state.lower, state.share_s(0.25))
+    probe = Probe(state.lower, state.share_s(PROBE_SHARE))
     while not state.ended:
         verdict = probe_makespan(state, solver, probe)
         if verdict is Verdict.UNKNOWN:
@@ -67,7 +67,9 @@ def bisect(state: MakespanState, solver: Solver) -> None:
                 state.unresolved = max(state.unresolved, probe.time)
             if not state.bounds_tried:
                 raise_bound_by_configurations(state, 0.2)
-            state.search_locally(PROBE_SHARE)
+            if state.descent:
+                state.search_locally(PROBE_SHARE / 2)
+                search_repartitions(state, PROBE_SHARE)
         probe = _next_probe(state, verdict)
 
 

@@ -156,7 +156,7 @@ class ConfigurationProgramme:
                 best = priced
             if best.theta > 1 or (master.solved and best.theta >= master.theta - CLOSE):
                 return replace(best, converged=True)
-            new = master.add_groups(tables, self._known)
+            new = master.add_groups(tables, priced.price, self._known)
             if not new and smoothing == 0.0 and master.solved:
                 return replace(best, converged=True)
             if not master.solve():

@@ -25,7 +25,9 @@ def raise_bound_by_relaxation(state: MakespanState) -> None:
     instance = state.search.instance
     if state.ended or state.partial or not (instance.has_travel_time or not instance.reach.is_complete):
         return
-    bound = relaxed_lower_bound(state.model, state.lower, state.upper, state.share_s(0.2), lambda: state.over)
+    bound, state.price = relaxed_lower_bound(
+        state.model, state.lower, state.upper, state.share_s(0.2), lambda: state.over
+    )
     if bound > state.lower:
         state.rule_out_below(bound)
 

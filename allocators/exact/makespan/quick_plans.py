@@ -46,12 +46,12 @@ def search_repartitions(state: MakespanState, share: float) -> None:
     targets, weight = 0, 1.0
     while not state.ended:
         upper, now_s, targets = state.upper, search.elapsed_s, targets + 1
-        patience_s = max(state.share_s(share / 10, PATIENCE_S), last_s - begin_s)
+        patience_s = max(state.share_s(share / 2, PATIENCE_S), last_s - begin_s)
         late = now_s - begin_s > state.share_s(share) or now_s - last_s > patience_s
         if targets > REPEATABLE_TARGETS if state.repeatable else late:
             return
         target = max(state.lower, upper + weight * (state.lower - upper) - TIGHT / 2 * upper)
-        _, plan = repartition.run(target, lambda: state.over, max_steps=STEPS_PER_TARGET)
+        _, plan = repartition.run(target, lambda: state.over, max_steps=STEPS_PER_TARGET, price=state.price)
         search.submit(plan)
         if state.upper < upper:
             last_s = search.elapsed_s
@@ -66,7 +66,10 @@ def find_plan(state: MakespanState, time: float) -> bool:
     state.repartition.start(state.plan)
     until_s = np.inf if state.repeatable else state.search.elapsed_s + state.share_s(0.01)
     found, plan = state.repartition.run(
-        time, lambda: state.over or state.search.elapsed_s >= until_s, max_steps=STEPS_PER_PROBE
+        time,
+        lambda: state.over or state.search.elapsed_s >= until_s,
+        max_steps=STEPS_PER_PROBE,
+        price=state.price,
     )
     return state.submit(plan, time) and found
 

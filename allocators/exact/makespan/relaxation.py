@@ -30,8 +30,10 @@ CLOSE = 1e-8
 
 def relaxed_lower_bound(
     model: Model, low: float, high: float, seconds: float, should_stop: Callable[[], bool]
-) -> float:
+) -> tuple[float, FloatArray | None]:
     """Return a T from `low` to `high` such that no plan is faster, even with fractions of agents; nearly the largest.
+
+    Returns also what a unit of each need is worth near there, shape (t,), if that was found.
 
     Parameters
     ----------
@@ -44,21 +46,22 @@ def relaxed_lower_bound(
     should_stop : callable
         Asked every 20 ms.
     """
-    end = time.monotonic() + seconds
+    end, last = time.monotonic() + seconds, None
     while len(model.class_of_pair) <= MAX_PAIRS and low < high and not should_stop():
         demand = model.at(low)
         if demand.trivially_infeasible:
             low = max(low * (1 + CLOSE), model.next_makespan(low))
             continue
         price = _dual_prices(demand, end - time.monotonic(), should_stop)
+        last = last if price is None else price / model.workload * demand.need
         if price is None or not _excludes(demand, price):
             break
         proven = _largest_excluded(model, price, low, high)
         raised = max(proven, model.next_makespan(proven))
         if raised <= low * (1 + CLOSE):
-            return raised
+            return min(raised, high), last
         low = raised
-    return min(low, high)
+    return min(low, high), last
 
 
 def _dual_prices(demand: Demand, seconds: float, should_stop: Callable[[], bool]) -> FloatArray | None:

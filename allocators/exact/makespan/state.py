@@ -15,6 +15,7 @@ from alloc.allocators.exact.model import FEW_PAIRS, Model
 from alloc.allocators.exact.monitor import is_over
 from alloc.allocators.exact.solver_model import Verdict, is_repeatable
 from alloc.problems import Allocation, Evaluation, Objective, agent_classes
+from alloc.problems.instance import FloatArray
 
 TIGHT = 1e-8
 """Relative gap at which the stage ends; well above the tolerance of 1e-9 that solvers and scores have."""
@@ -48,6 +49,8 @@ class MakespanState:
         Whether linear programmes have been used for a bound; after that, a probe tries more before the solver.
     configurations : ConfigurationProgramme or None
         None before that, and where the programme is too large.
+    price : ndarray, shape (t,), or None
+        What a unit of each workload is worth by the linear programme of single agents, where that was solved.
     local_search : LocalSearchPhase or None
         None where the solver is quick enough by itself, plans are not looked for without it, or some tasks stay unserved.
     """
@@ -63,6 +66,7 @@ class MakespanState:
     unresolved: float = 0.0
     bounds_tried: bool = False
     configurations: ConfigurationProgramme | None = None
+    price: FloatArray | None = None
     local_search: LocalSearchPhase | None = None
 
     @classmethod
@@ -156,7 +160,7 @@ class MakespanState:
         if self.local_search is not None and not self.ended:
             self.local_search.turn(self.share_s(share, 0.05))
 
-    def share_s(self, share: float, least_s: float = 0.3) -> float:
+    def share_s(self, share: float, least_s: float = 0.1) -> float:
         """Return this share of the stage's time in seconds, at least `least_s`; ``inf`` where effort is counted."""
         if self.repeatable:
             return float("inf")
