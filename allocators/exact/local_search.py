@@ -1,4 +1,4 @@
-"""Local search within a run of an exact method, in turns with the other phases or beside them in a thread of its own."""
+"""Local search within a run of an exact method, in turns with other phases or beside them in its own thread."""
 
 from collections import deque
 from concurrent.futures import Future

@@ -11,11 +11,11 @@ from alloc.allocators.exact.makespan.state import TIGHT, MakespanState
 from alloc.allocators.exact.model import FEW_PAIRS
 from alloc.allocators.exact.solver_model import Solver, Verdict
 
-SHARES = ((0.02, 0.005), (0.1, 0.05), (0.15, 0.15))
-"""Shares of the time in which local search, and then repartitions and configurations, take turns before the solver."""
+SHARES = ((0.03, 0.01, 0.02), (0.1, 0.05, 0.05), (0.25, 0.15, 0.1))
+"""Shares of the time in which repartitions, configurations and local search take turns before the solver."""
 
 PROBE_SHARE = 0.1
-"""Share of the time of a probe, and of the turn of local search after one that stayed open."""
+"""Share of the time of a probe; as much goes to plans after one that stayed open."""
 
 
 def least_makespan(search: Search, solver: Solver, min_served: int, until_s: float, *, descent: bool) -> None:
@@ -34,7 +34,8 @@ def least_makespan(search: Search, solver: Solver, min_served: int, until_s: flo
         Whether plans are looked for without the solver first.
     """
     state = MakespanState.begin(search, min_served, until_s, descent=descent)
-    if descent:
+    is_plain = search.instance.reach.is_complete and state.model.unit is not None
+    if descent and (is_plain or not state.repartition.is_tractable):
         descend_in_steps(state)
     raise_bound_by_relaxation(state)
     if not state.ended:
@@ -45,10 +46,10 @@ def least_makespan(search: Search, solver: Solver, min_served: int, until_s: flo
 
 def take_turns(state: MakespanState) -> None:
     """Find plans and bounds that often meet, so that no solver is needed."""
-    for local, other in SHARES if state.descent and len(state.model.class_of_pair) > FEW_PAIRS else ():
+    for plans, bounds, local in SHARES if state.descent and len(state.model.class_of_pair) > FEW_PAIRS else ():
+        search_repartitions(state, plans)
+        raise_bound_by_configurations(state, bounds)
         state.search_locally(local)
-        search_repartitions(state, other)
-        raise_bound_by_configurations(state, other)
 
 
 def bisect(state: MakespanState, solver: Solver) -> None:
@@ -66,10 +67,11 @@ def bisect(state: MakespanState, solver: Solver) -> None:
             if probe.purpose is Purpose.BISECT:
                 state.unresolved = max(state.unresolved, probe.time)
             if not state.bounds_tried:
-                raise_bound_by_configurations(state, 0.2)
+                raise_bound_by_configurations(state, 2 * PROBE_SHARE)
             if state.descent:
-                state.search_locally(PROBE_SHARE / 2)
                 search_repartitions(state, PROBE_SHARE)
+                state.search_locally(PROBE_SHARE / 2)
+                raise_bound_by_configurations(state, PROBE_SHARE / 2)
         probe = _next_probe(state, verdict)
 
 

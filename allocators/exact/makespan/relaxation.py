@@ -1,7 +1,7 @@
 """A lower bound on the makespan from linear programmes alone: what fractions of agents could do.
 
-At a fixed T the programme maximises the least part of its need that a task gets. Its dual prices of the tasks prove more
-than that one T: with any prices >= 0, T is impossible if all agents together, each on the task where it is worth most,
+At a fixed T the programme maximises the least part of its need that a task gets. Its dual prices of the tasks prove
+more than that one T: with any prices >= 0, T is impossible if all agents together, each on the task where it is worth most,
 are worth less than all needs. So from one solution to the next T is raised to the largest one that the last prices
 exclude, which takes a few solutions in all (Newton's method; Dinkelbach (1967), doi:10.1287/mnsc.13.7.492).
 """
@@ -24,8 +24,11 @@ MAX_PAIRS = 400_000
 SAFETY = 1e-10
 """Part of the workload by which fractions of agents must fall short before that counts as a proof."""
 
-CLOSE = 1e-8
+CLOSE = 1e-5
 """Relative rise of the bound at which the method ends."""
+
+PRECISION = 1e-9
+"""Relative precision of the largest T that given prices exclude."""
 
 
 def relaxed_lower_bound(
@@ -50,7 +53,7 @@ def relaxed_lower_bound(
     while len(model.class_of_pair) <= MAX_PAIRS and low < high and not should_stop():
         demand = model.at(low)
         if demand.trivially_infeasible:
-            low = max(low * (1 + CLOSE), model.next_makespan(low))
+            low = max(low * (1 + PRECISION), model.next_makespan(low))
             continue
         price = _dual_prices(demand, end - time.monotonic(), should_stop)
         last = last if price is None else price / model.workload * demand.need
@@ -92,7 +95,7 @@ def _largest_excluded(model: Model, price: FloatArray, low: float, high: float) 
     """Return the largest T from `low`, which these prices exclude, to `high` that they exclude, or close to it."""
     if _excludes(model.at(high), price):
         return high
-    while high - low > 0.1 * CLOSE * high:
+    while high - low > PRECISION * high:
         middle = (low + high) / 2
         low, high = (middle, high) if _excludes(model.at(middle), price) else (low, middle)
     return low

@@ -2,7 +2,8 @@
 
 With two to four agents per task, single moves and swaps soon find nothing, while a few tasks have so few agents between
 them that all their partitions can be tried. One of the tasks has a shortfall, the others are drawn from those that
-agents could well change to; of several best partitions one is drawn, so that the search drifts over plans that are equally good.
+agents could well change to; of several best partitions one is drawn, so that the search drifts over plans that are
+equally good.
 """
 
 import numpy as np

@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from alloc.allocators.exact.makespan.repartition import search_repartitions
 from alloc.allocators.exact.makespan.pools import Partners
+from alloc.allocators.exact.makespan.repartition import search_repartitions
 from alloc.allocators.exact.model import Model
 from alloc.problems import Allocation
 from alloc.problems.instance import FloatArray, IntArray

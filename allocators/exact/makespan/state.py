@@ -9,6 +9,7 @@ import numpy as np
 from alloc.allocators.contract.search import Search
 from alloc.allocators.contract.tolerance import PROVEN
 from alloc.allocators.exact.local_search import LocalSearchPhase
+from alloc.allocators.exact.makespan.ascent import ConfigurationAscent
 from alloc.allocators.exact.makespan.configuration import ConfigurationProgramme
 from alloc.allocators.exact.makespan.repartition_search import RepartitionSearch
 from alloc.allocators.exact.model import FEW_PAIRS, Model
@@ -51,8 +52,10 @@ class MakespanState:
         None before that, and where the programme is too large.
     price : ndarray, shape (t,), or None
         What a unit of each workload is worth by the linear programme of single agents, where that was solved.
+    ascent : ConfigurationAscent or None
+        None before it is needed.
     local_search : LocalSearchPhase or None
-        None where the solver is quick enough by itself, plans are not looked for without it, or some tasks stay unserved.
+        None where the solver is quick enough by itself, or must find plans alone, or some tasks stay unserved.
     """
 
     search: Search
@@ -67,6 +70,7 @@ class MakespanState:
     bounds_tried: bool = False
     configurations: ConfigurationProgramme | None = None
     price: FloatArray | None = None
+    ascent: ConfigurationAscent | None = None
     local_search: LocalSearchPhase | None = None
 
     @classmethod
