@@ -36,7 +36,6 @@ class LocalSearchPhase:
         self._part = search.part(
             objective, MakespanTolerance(limit=limit), lambda found: self._found.append(found.allocation)
         )
-        self._turns = 0
         self._pool = Pool(1) if search.threads > 1 and not is_repeatable(search) else None
         self._running: Future[None] | None = None
 
@@ -64,8 +63,9 @@ class LocalSearchPhase:
     def turn(self, seconds: float) -> None:
         """Improve the plan for so long, unless that is done in another thread anyway; submit what was found."""
         if not self.is_beside:
-            self.exchange()
-            self._turns += 1
+            for known in (self._search.fastest, self._search.best):
+                if known is not None:
+                    self._part.submit(known.allocation)
             if is_repeatable(self._search):
                 improve(self._part, iterations=REPEATABLE_ITERATIONS)
             else:
@@ -73,9 +73,7 @@ class LocalSearchPhase:
         self.exchange()
 
     def exchange(self) -> None:
-        """Submit what was found to the run, and pass bounds and plans on to the local search."""
+        """Submit what was found to the run, and pass its bound on to the local search."""
         while self._found:
             self._search.submit(self._found.popleft())
         self._part.raise_bound(self._search.lower_bound)
-        if not self.is_beside and self._search.fastest is not None:
-            self._part.submit(self._search.fastest.allocation)

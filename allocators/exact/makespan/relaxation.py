@@ -1,13 +1,14 @@
 """A lower bound on the makespan from linear programmes alone: what fractions of agents could do.
 
 At a fixed T the programme maximises the least part of its need that a task gets. Its dual prices of the tasks prove
-more than that one T: with any prices >= 0, T is impossible if all agents together, each on the task where it is worth most,
-are worth less than all needs. So from one solution to the next T is raised to the largest one that the last prices
-exclude, which takes a few solutions in all (Newton's method; Dinkelbach (1967), doi:10.1287/mnsc.13.7.492).
+more than that one T: with any prices >= 0, T is impossible if all agents together, each on the task where it is worth
+most, are worth less than all needs. So from one solution to the next T is raised to the largest one that the last
+prices exclude, which takes a few solutions in all (Newton's method; Dinkelbach (1967), doi:10.1287/mnsc.13.7.492).
 """
 
 import time
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from scipy.optimize import OptimizeResult, linprog
@@ -53,13 +54,14 @@ def relaxed_lower_bound(
     while len(model.class_of_pair) <= MAX_PAIRS and low < high and not should_stop():
         demand = model.at(low)
         if demand.trivially_infeasible:
+            low = _largest(model, low, high, lambda demand: demand.trivially_infeasible)
             low = max(low * (1 + PRECISION), model.next_makespan(low))
             continue
         price = _dual_prices(demand, end - time.monotonic(), should_stop)
         last = last if price is None else price / model.workload * demand.need
-        if price is None or not _excludes(demand, price):
+        if price is None or not _excludes(price, demand):
             break
-        proven = _largest_excluded(model, price, low, high)
+        proven = _largest(model, low, high, partial(_excludes, price))
         raised = max(proven, model.next_makespan(proven))
         if raised <= low * (1 + CLOSE):
             return min(raised, high), last
@@ -91,17 +93,17 @@ def _dual_prices(demand: Demand, seconds: float, should_stop: Callable[[], bool]
     return np.asarray(np.maximum(0.0, -answer.ineqlin.marginals[:tasks])) / demand.need
 
 
-def _largest_excluded(model: Model, price: FloatArray, low: float, high: float) -> float:
-    """Return the largest T from `low`, which these prices exclude, to `high` that they exclude, or close to it."""
-    if _excludes(model.at(high), price):
+def _largest(model: Model, low: float, high: float, is_excluded: Callable[[Demand], bool]) -> float:
+    """Return the largest T from `low`, which is excluded, to `high` that is, or close to it."""
+    if is_excluded(model.at(high)):
         return high
     while high - low > PRECISION * high:
         middle = (low + high) / 2
-        low, high = (middle, high) if _excludes(model.at(middle), price) else (low, middle)
+        low, high = (middle, high) if is_excluded(model.at(middle)) else (low, middle)
     return low
 
 
-def _excludes(demand: Demand, price: FloatArray) -> bool:
+def _excludes(price: FloatArray, demand: Demand) -> bool:
     """Whether all agents are worth less than all needs at these prices: weak duality, so that any prices prove it."""
     needed = float(price @ demand.need)
     return _largest_value(demand, price[demand.task_of_pair] * demand.weight) < needed * (1 - SAFETY)
