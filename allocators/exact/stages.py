@@ -11,8 +11,9 @@ from alloc.allocators.contract.budget import Budget
 from alloc.allocators.contract.search import Search
 from alloc.allocators.exact.energy import primal_dual
 from alloc.allocators.exact.energy.least_energy import least_energy
-from alloc.allocators.exact.makespan import ascent, enumeration, repartition_search
+from alloc.allocators.exact.makespan import ascent, enumeration
 from alloc.allocators.exact.makespan.bisection import least_makespan
+from alloc.allocators.exact.makespan.repartition import search as repartition_search
 from alloc.allocators.exact.monitor import is_over
 from alloc.allocators.exact.solver_model import Solver
 from alloc.allocators.heuristic.greedy.list_schedule import greedy

@@ -11,7 +11,7 @@ from alloc.allocators.contract.tolerance import PROVEN
 from alloc.allocators.exact.local_search import LocalSearchPhase
 from alloc.allocators.exact.makespan.ascent import ConfigurationAscent
 from alloc.allocators.exact.makespan.configuration import ConfigurationProgramme
-from alloc.allocators.exact.makespan.repartition_search import RepartitionSearch
+from alloc.allocators.exact.makespan.repartition.search import RepartitionSearch
 from alloc.allocators.exact.model import FEW_PAIRS, Model
 from alloc.allocators.exact.monitor import is_over
 from alloc.allocators.exact.solver_model import Verdict, is_repeatable

@@ -30,12 +30,12 @@ class Partners(NamedTuple):
     up_to : ndarray, shape (t, t)
         Probability that the partner drawn for the task of the row is one of the first columns; the last entry is 1, or
         0 where the task has no partner.
-    is_apt : ndarray of bool, shape (n, t)
-        Whether the agent is of good use to the task.
+    use : ndarray of int8, shape (n, t)
+        0 where the agent is of no use to the task, 1 where it is of some, 2 where it is of good use.
     """
 
     up_to: FloatArray
-    is_apt: NDArray[np.bool_]
+    use: NDArray[np.int8]
 
 
 @compiled
@@ -97,15 +97,16 @@ def draw_pool(
     """Collect the agents of the tasks, those to be assigned anew first.
 
     Writes the agents to `pool`, and which of the tasks each is on to `at`; returns how many there are in all, and how
-    many are to be assigned anew: some of those that are of good use to another of the tasks.
+    many are to be assigned anew: some of those that are of good use to another of the tasks, now and then of any use.
     """
     agents, movable = 0, 0
+    least = 1 if draw(state, 4) == 0 else 2
     for q in range(tasks):
         j = task[q]
         for r in range(size[j]):
             i, moves = members[j, r], False
             for other in range(tasks):
-                moves |= other != q and partners.is_apt[i, task[other]]
+                moves |= other != q and partners.use[i, task[other]] >= least
             pool[agents], at[agents] = i, q
             if moves:
                 pool[agents], pool[movable] = pool[movable], i

@@ -8,7 +8,7 @@ equally good.
 
 import numpy as np
 
-from alloc.allocators.exact.makespan.pools import (
+from alloc.allocators.exact.makespan.repartition.pools import (
     MAX_POOL,
     MAX_TASKS,
     Members,

@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from alloc.allocators.exact.makespan.pools import Partners
-from alloc.allocators.exact.makespan.repartition import search_repartitions
+from alloc.allocators.exact.makespan.repartition.partition import search_repartitions
+from alloc.allocators.exact.makespan.repartition.pools import Partners
 from alloc.allocators.exact.model import Model
 from alloc.problems import Allocation
 from alloc.problems.instance import FloatArray, IntArray
@@ -17,8 +17,8 @@ MAX_PAIRS = 4_000_000
 USUAL_LOSS = 0.05
 """Part of an agent's work that is lost on the way to another task, at which it changes a third as often."""
 
-LEAST_USE = 0.02
-"""Weight of an agent in the choice of tasks up to which it stays where it is."""
+LEAST_USE, GOOD_USE = 1e-3, 0.02
+"""Weight of any agent in the choice of tasks, and of those that change easily."""
 
 LEAST_PRICE = 0.2
 """Least price of a need, as a part of the highest: a shortfall counts everywhere."""
@@ -83,7 +83,7 @@ class RepartitionSearch:
         if price is not None:
             worth = np.maximum(price[self._tasks], LEAST_PRICE * price.max())
             work, need = work * worth, need * worth
-        partners = _partners(work, has_travel_time=self._model.travel_time is not None)
+        partners = partners_of(work, has_travel_time=self._model.travel_time is not None)
         while True:
             shortfall, part, place = search_repartitions(work, need, partners, self._place, STEPS, self._state)
             steps += STEPS
@@ -99,23 +99,22 @@ class RepartitionSearch:
         return Allocation(np.where(useful, self._model.tasks[self._tasks[place]], IDLE))
 
 
-def _partners(work: FloatArray, *, has_travel_time: bool) -> Partners:
+def partners_of(work: FloatArray, *, has_travel_time: bool = False) -> Partners:
     """Draw tasks together by how many agents are of use to both; where travel takes time, of nearly as much use."""
     use = (work > 0).astype(float)
     if has_travel_time:
-        use = np.exp(-(1 - work / np.maximum(work.max(axis=1, keepdims=True), 1e-300)) / USUAL_LOSS)
+        loss = 1 - work / np.maximum(work.max(axis=1, keepdims=True), 1e-300)
+        use *= np.maximum(LEAST_USE, np.exp(-loss / USUAL_LOSS))
     common = use.T @ use
     np.fill_diagonal(common, 0.0)
     up_to = np.cumsum(common, axis=1)
     total = up_to[:, -1:]
     up_to = np.divide(up_to, total, out=np.zeros_like(up_to), where=total > 0)
-    return Partners(up_to, use > LEAST_USE)
+    return Partners(up_to, (work > 0).astype(np.int8) + (use > GOOD_USE))
 
 
 def compile_loops() -> None:
     """Compile the loops, or read them from the cache, so that no run waits for it."""
     place = np.array([0, 0, 0, 1])
     work = np.ones((4, 2))
-    search_repartitions(
-        work, np.full(2, 2.0), _partners(work, has_travel_time=False), place, 1, np.ones(1, dtype=np.uint64)
-    )
+    search_repartitions(work, np.full(2, 2.0), partners_of(work), place, 1, np.ones(1, dtype=np.uint64))
