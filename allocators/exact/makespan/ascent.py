@@ -1,7 +1,7 @@
 """The configuration bound by a subgradient method, for where column generation takes too long.
 
-The dual prices of the linear programme of single agents are a good start: each agent costs what it is worth on its best
-task. From there prices follow a deflected subgradient: agents that the cheapest groups of all tasks use more than once
+The dual prices of the linear programme of single agents are a good start: each agent costs the value of its work on
+its best task. From there prices follow a deflected subgradient: agents that the cheapest groups of all tasks use more than once
 get dearer, unused ones cheaper. As soon as the groups together cost more than all agents, T is proven impossible, and
 the next larger T is the aim.
 
@@ -27,10 +27,10 @@ MAX_PAIRS = 200_000
 """Pairs of class and task above which there is no such bound."""
 
 FIRST_LEVEL, LAST_LEVEL = 2e-3, 1e-5
-"""How much above its best value the subgradient method aims for theta, at first and at the end."""
+"""How much above its best value the subgradient method wants theta, at first and at the end."""
 
 PATIENCE = 12
-"""Rounds without progress after which it aims for half as much."""
+"""Rounds without progress after which it wants half as much."""
 
 DEFLECTION = 0.5
 """Part of the last direction that is added to the subgradient."""
@@ -52,7 +52,7 @@ class ConfigurationAscent:
     low : float
         Proven bound in hours.
     price : ndarray, shape (t,)
-        What a unit of each workload is worth by the linear programme of single agents.
+        Value of a unit of each workload by the linear programme of single agents.
 
     Attributes
     ----------
@@ -66,9 +66,9 @@ class ConfigurationAscent:
         self._model, self._time, self.proven = model, low, 0.0
         self._count = model.classes.count.astype(np.int64)
         self.is_tractable = len(model.class_of_pair) <= MAX_PAIRS
-        worth = (model.uncapped(low)[0] * price).max(axis=1)
-        self._price = self._best_price = worth / (worth @ self._count)
-        self._direction = np.zeros(len(worth))
+        value = (model.uncapped(low)[0] * price).max(axis=1)
+        self._price = self._best_price = value / (value @ self._count)
+        self._direction = np.zeros(len(value))
         self._best, self._stale, self._level = 0.0, 0, FIRST_LEVEL
 
     @property
@@ -111,7 +111,8 @@ class ConfigurationAscent:
         self._direction = subgradient + DEFLECTION * self._direction
         norm = float(self._direction @ self._direction)
         price = np.maximum(0.0, self._price + rise / max(norm, 1.0) * self._direction)
-        self._price = price / (price @ self._count)
+        total = float(price @ self._count)
+        self._price = price / total if total > 0 else self._best_price
 
 
 def _in_steps(model: Model, time: float) -> tuple[WholeArray, WholeArray]:

@@ -1,9 +1,10 @@
 """A lower bound on the makespan from linear programmes alone: what fractions of agents could do.
 
 At a fixed T the programme maximises the least part of its need that a task gets. Its dual prices of the tasks prove
-more than that one T: with any prices >= 0, T is impossible if all agents together, each on the task where it is worth
-most, are worth less than all needs. So from one solution to the next T is raised to the largest one that the last
-prices exclude, which takes a few solutions in all (Newton's method; Dinkelbach (1967), doi:10.1287/mnsc.13.7.492).
+more than that one T: with any prices >= 0, T is impossible if the value of all agents together, each on the task where
+it has the most, is less than that of all needs. So from one solution to the next T is raised to the largest one that
+the last prices exclude, which takes a few solutions in all (Newton's method; Dinkelbach (1967),
+doi:10.1287/mnsc.13.7.492).
 """
 
 import time
@@ -37,7 +38,7 @@ def relaxed_lower_bound(
 ) -> tuple[float, FloatArray | None]:
     """Return a T from `low` to `high` such that no plan is faster, even with fractions of agents; nearly the largest.
 
-    Returns also what a unit of each need is worth near there, shape (t,), if that was found.
+    Returns also the value of a unit of each workload near there, shape (t,), if that was found.
 
     Parameters
     ----------
@@ -104,7 +105,7 @@ def _largest(model: Model, low: float, high: float, is_excluded: Callable[[Deman
 
 
 def _excludes(price: FloatArray, demand: Demand) -> bool:
-    """Whether all agents are worth less than all needs at these prices: weak duality, so that any prices prove it."""
+    """Whether the value of all agents is less than that of all needs: weak duality, so that any prices prove it."""
     needed = float(price @ demand.need)
     return _largest_value(demand, price[demand.task_of_pair] * demand.weight) < needed * (1 - SAFETY)
 

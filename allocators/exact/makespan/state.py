@@ -51,7 +51,7 @@ class MakespanState:
     configurations : ConfigurationProgramme or None
         None before that, and where the programme is too large.
     price : ndarray, shape (t,), or None
-        What a unit of each workload is worth by the linear programme of single agents, where that was solved.
+        Value of a unit of each workload by the linear programme of single agents, where that was solved.
     ascent : ConfigurationAscent or None
         None before it is needed.
     local_search : LocalSearchPhase or None

@@ -68,7 +68,7 @@ class RepartitionSearch:
         Parameters
         ----------
         price : ndarray, shape (t,), optional
-            What a unit of each need is worth; all the same by default.
+            Value of a unit of each need; all the same by default.
 
         Returns
         -------
@@ -81,8 +81,8 @@ class RepartitionSearch:
         work = np.ascontiguousarray(weight[:, self._tasks][self._model.classes.class_of_agent])
         need, best, largest, steps = need[self._tasks], self._place, -1.0, 0
         if price is not None:
-            worth = np.maximum(price[self._tasks], LEAST_PRICE * price.max())
-            work, need = work * worth, need * worth
+            value = np.maximum(price[self._tasks], LEAST_PRICE * price.max())
+            work, need = work * value, need * value
         partners = partners_of(work, has_travel_time=self._model.travel_time is not None)
         while True:
             shortfall, part, place = search_repartitions(work, need, partners, self._place, STEPS, self._state)
