@@ -126,8 +126,8 @@ class LagrangianBound:
 
     @property
     def is_rising_slowly(self) -> bool:
-        """Whether prices are settled but for those of clusters."""
-        return self._clusters is not None or self._decays >= DECAYS_ALONE
+        """Whether a solver may soon do better; hardly where sums of weights are limited, which clusters make use of."""
+        return self._clusters is not None and bool(self._model.max_weight[0] < 0)
 
     def ascend(self, rounds: int, cost: float) -> None:
         """Change prices `rounds` times, given the cost of a plan at hand."""

@@ -24,6 +24,9 @@ MAX_TASKS = 2000
 SLICE_S = 0.02
 """Time of each side in one call of `PrimalDual.run`."""
 
+MAX_LEAD_S = 0.1
+"""How much more time one side may have had before it waits for the other."""
+
 REPEATABLE_SLICES, REPEATABLE_ROUNDS = 60, 10
 """Slices, and rounds in each, where effort is counted."""
 
@@ -136,13 +139,13 @@ class PrimalDual:
         if not self._descended:
             return self._descend()
         rising = None if pool is None else pool.submit(self._ascend)
-        behind = self._primal_timer.spent_s <= self._dual_timer.spent_s  # rounds of either side may take long
-        if self._primal is not None and (behind or rising is not None):
+        lead_s = self._primal_timer.spent_s - self._dual_timer.spent_s  # rounds of either side may take long
+        if self._primal is not None and (lead_s <= MAX_LEAD_S or rising is not None):
             primal = self._primal
             self._primal_timer.run(lambda rounds: primal.anneal(rounds, progress))
         if rising is not None:
             rising.result()
-        elif not behind or self._primal is None:
+        elif lead_s >= -MAX_LEAD_S or self._primal is None:
             self._ascend()
         return self._better()
 

@@ -1,9 +1,9 @@
 """The configuration bound by a subgradient method, for where column generation takes too long.
 
 The dual prices of the linear programme of single agents are a good start: each agent costs the value of its work on
-its best task. From there prices follow a deflected subgradient: agents that the cheapest groups of all tasks use more than once
-get dearer, unused ones cheaper. As soon as the groups together cost more than all agents, T is proven impossible, and
-the next larger T is the aim.
+its best task. From there prices follow a deflected subgradient: agents that the cheapest groups of all tasks use more
+than once get dearer, unused ones cheaper. As soon as the groups together cost more than all agents, T is proven
+impossible, and the next larger T comes.
 
 References
 ----------
