@@ -1,25 +1,25 @@
 """Repartition: assign the agents of two, three or four tasks to these tasks anew, in the best way of all; compiled.
 
 With two to four agents per task, single moves and swaps soon find nothing, while a few tasks have so few agents between
-them that all their partitions can be tried. One of the tasks has a shortfall, the others are drawn at random; of
-several best partitions one is drawn, so that the search drifts over plans that are equally good.
+them that all their partitions can be tried. One of the tasks has a shortfall, the others are drawn from those that
+agents could well change to; of several best partitions one is drawn, so that the search drifts over plans that are
+equally good.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from alloc.allocators.exact.makespan.repartition.pools import (
+    MAX_POOL,
+    MAX_TASKS,
+    Members,
+    Partners,
+    draw_pool,
+    draw_tasks,
+    shortfall,
+)
 from alloc.allocators.runtime.compiled import compiled
 from alloc.allocators.runtime.random import RandomState, draw
 from alloc.problems.instance import FloatArray, IntArray
-
-Members = NDArray[np.int32]
-"""Agents of each task, shape (t, n), as many as the task has."""
-
-MAX_TASKS = 4
-"""Tasks whose agents are assigned anew together, at the most."""
-
-MAX_POOL = 12
-"""Agents assigned anew together, at the most; of larger pools some stay where they are."""
 
 
 @compiled
@@ -29,12 +29,6 @@ def sum_subsets(value: FloatArray, size: int, sums: FloatArray) -> None:
     for bit in range(size):
         for mask in range(1 << bit):
             sums[(1 << bit) + mask] = sums[mask] + value[bit]
-
-
-@compiled
-def shortfall(has: float, need: float) -> float:
-    """How much a task has less than it needs; 0 within rounding errors."""
-    return max(0.0, need - has) if has < need * (1 - 1e-12) else 0.0
 
 
 @compiled
@@ -145,50 +139,6 @@ def total_shortfall(has: FloatArray, need: FloatArray) -> tuple[float, float]:
 
 
 @compiled
-def draw_tasks(has: FloatArray, need: FloatArray, state: RandomState, task: IntArray) -> int:
-    """Draw a task with a shortfall, and others: write them to `task` and return how many they are."""
-    count, t = 0, len(need)
-    for j in range(t):
-        if shortfall(has[j], need[j]) > 0:
-            count += 1
-            if draw(state, count) == 0:
-                task[0] = j
-    tasks = min(t, 2 + (draw(state, 8) > 0) + (draw(state, 4) == 0))
-    q = 1
-    while q < tasks:
-        task[q] = draw(state, t)
-        new = True
-        for r in range(q):
-            new &= task[r] != task[q]
-        if new:
-            q += 1
-    return tasks
-
-
-@compiled
-def draw_pool(
-    task: IntArray, tasks: int, size: IntArray, members: Members, state: RandomState, pool: IntArray, at: IntArray
-) -> tuple[int, int]:
-    """Collect the agents of the tasks, those to be assigned anew first.
-
-    Writes the agents to `pool`, and which of the tasks each is on to `at`; returns how many there are in all, and how
-    many are to be assigned anew.
-    """
-    agents = 0
-    for q in range(tasks):
-        j = task[q]
-        for r in range(size[j]):
-            pool[agents], at[agents] = members[j, r], q
-            agents += 1
-    used = min(agents, MAX_POOL)
-    for p in range(used):
-        r = p + draw(state, agents - p)
-        pool[p], pool[r] = pool[r], pool[p]
-        at[p], at[r] = at[r], at[p]
-    return agents, used
-
-
-@compiled
 def reassign(
     work: FloatArray,
     task: IntArray,
@@ -225,7 +175,12 @@ def reassign(
 
 @compiled
 def search_repartitions(
-    work: FloatArray, need: FloatArray, place: IntArray, steps: int, state: RandomState
+    work: FloatArray,
+    need: FloatArray,
+    partners: Partners,
+    place: IntArray,
+    steps: int,
+    state: RandomState,
 ) -> tuple[float, float, IntArray]:
     """Assign the agents of a few tasks anew, `steps` times or until every task has what it needs.
 
@@ -235,6 +190,8 @@ def search_repartitions(
         What each agent adds to each task, 0 where it cannot go.
     need : ndarray, shape (t,)
         What each task needs, > 0.
+    partners : Partners
+        Which tasks are drawn together, and which agents are assigned anew.
     place : ndarray of int, shape (n,)
         Task of each agent, no one idle; changed in place.
     steps : int
@@ -261,10 +218,10 @@ def search_repartitions(
     for _ in range(steps):
         if total == 0.0:
             break
-        tasks = draw_tasks(has, need, state, task)
+        tasks = draw_tasks(has, need, partners, state, task)
         if tasks < 2:
             break
-        agents, used = draw_pool(task, tasks, size, members, state, pool, at)
+        agents, used = draw_pool(task, tasks, size, members, partners, state, pool, at)
         before = 0.0
         for q in range(tasks):
             base[q], needs[q] = has[task[q]], need[task[q]]
