@@ -2,6 +2,8 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+# pip compiles modules one by one; here all processors do. Some packages hold files that no Python 3 compiles.
+COMPILE := $(BIN)/python -m compileall -q -j 0 $(VENV)/lib > /dev/null || true
 INSTALL := PYTHONWARNINGS=ignore $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 # A process of tests for each processor, each with one thread in torch, and most of a gigabyte of memory.
 PARALLEL := -n logical --maxprocesses 8 --dist worksteal
@@ -59,15 +61,18 @@ $(VENV)/bin/python:
 
 $(VENV)/.installed: $(VENV)/bin/python $(CODE)
 	$(INSTALL) --editable .
+	$(COMPILE)
 	$(BIN)/alloc methods --prepare
 	@touch $@
 
 # An installation anew makes compiled loops stale: on a fresh machine, one for the tests is all that they need.
 $(VENV)/.tested: $(VENV)/bin/python $(CODE)
 	$(INSTALL) --editable '.[test]'
+	$(COMPILE)
 	$(BIN)/alloc methods --prepare
 	@touch $(VENV)/.installed $@
 
 $(VENV)/.checked: $(VENV)/.tested
 	$(INSTALL) --editable '.[dev]'
+	$(COMPILE)
 	@touch $@
