@@ -16,8 +16,8 @@ solve: $(VENV)/.installed  ## allocate the agents of a real instance with GAPPO,
 	@mkdir -p out
 	$(BIN)/alloc solve $(EXAMPLE) --method gappo --objective makespan-energy --output out/alaska-result.json --plot out/alaska.png
 
-test: $(VENV)/.tested  ## run the tests, on all processors
-	OMP_NUM_THREADS=1 $(BIN)/python -m pytest $(PARALLEL)
+test: $(VENV)/.tested  ## run the tests but slow ones, on all processors; CI runs all of them
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest $(PARALLEL) -m 'not slow'
 
 check: $(VENV)/.checked  ## lint, format, imports and types
 	$(BIN)/ruff check .

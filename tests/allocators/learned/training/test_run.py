@@ -122,6 +122,7 @@ def test_an_engine_that_gives_up_is_a_training_error(tmp_path: Path, monkeypatch
     assert isinstance(caught.value.__cause__, EngineError)
 
 
+@pytest.mark.slow
 def test_members_have_the_threads_of_the_engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Torch computes with as many threads as the engine grants to an item."""
     import torch

@@ -97,6 +97,7 @@ def test_a_resumed_run_goes_on_as_if_nothing_had_happened(tmp_path: Path, change
     assert torch.equal(weights(whole), weights(second))
 
 
+@pytest.mark.slow
 def test_processes_train_the_same() -> None:
     """Members that learn in other processes learn the same to the last bit."""
     here, there = trainer(), trainer()
