@@ -66,12 +66,14 @@ class AnnealingState:
         group = np.where(allocation.task_of_agent == IDLE, idle, allocation.task_of_agent).astype(np.int32)
         group[np.append(self.instance.workload == 0, False)[group]] = idle
         self._is_served = np.isin(np.arange(idle), group)
+        self.plan.price[:] = 1.0
         self._set_groups(group)
         self.set_target(makespan)
 
     def set_target(self, makespan: float) -> None:
-        """Keep the plan, and set another target makespan; no plan is the best then."""
-        arrays, demand = self.arrays, self.plan.demand
+        """Keep the plan and the prices, and set another target makespan; no plan is the best then."""
+        arrays, demand, price = self.arrays, self.plan.demand, self.plan.price
+        price /= np.exp(np.log(price).mean())
         self.makespan = makespan
         with np.errstate(over="ignore"):
             exact = self.instance.workload / (makespan * arrays.ability_unit) * (1 - ROUNDING)
