@@ -50,7 +50,7 @@ def draw_helper(arrays: InstanceArrays, plan: Plan, task: int) -> int:
 
 @compiled
 def raise_price(plan: Plan, task: int) -> None:
-    """Raise the price of a short task, so that shortfalls wander from it to tasks that can make up for them."""
+    """Raise the price of a short task, so that its shortfall goes on to tasks that can make up for it."""
     shortfall = 1.0 - plan.group_ability[task] / plan.demand[task]
     plan.price[task] = min(plan.price[task] * (1.0 + PRICE_GROWTH * shortfall), HIGHEST_PRICE)
 
@@ -68,9 +68,9 @@ def anneal(
 ) -> float:
     """Make `steps` exchanges, the noise multiplied by `cooling` before each; return the last noise.
 
-    Where cost has no weight, only exchanges with short tasks are made, until there is none, and a task that stays short
-    rises in price: shortfalls wander, over any number of tasks, to where agents are cheap, as in auctions. Otherwise
-    the plan of least cost without a shortfall is saved.
+    A task that stays short rises in price: shortfalls go on, over any number of tasks, to where agents are cheap, as in
+    auctions. Where cost has no weight, only exchanges with short tasks are made, until there is none; otherwise the
+    plan of least cost without a shortfall is saved.
 
     References
     ----------
@@ -109,7 +109,7 @@ def anneal(
         exchange(arrays, plan, work, now, makespan, agent, task, other)
         if plan.counter[FULL_GROUP] > 0:
             break
-        if weights.cost == 0.0 and plan.group_ability[task] < plan.demand[task]:
+        if plan.group_ability[task] < plan.demand[task]:
             raise_price(plan, task)
         if plan.counter[N_SHORT] == 0:
             if weights.cost == 0.0:

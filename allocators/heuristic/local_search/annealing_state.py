@@ -19,6 +19,9 @@ from alloc.allocators.heuristic.local_search.plan import (
 )
 from alloc.problems import IDLE, Allocation, Instance
 
+PRICE_DECAY = 0.99
+"""Power by which the prices of tasks fall towards 1 in each run in which the cost counts."""
+
 ROUNDING = 1e-12
 """Relative part by which demands are lowered, against rounding errors of sums."""
 
@@ -89,6 +92,8 @@ class AnnealingState:
 
     def run(self, steps: int, weights: Weights, cooling: float = 1.0) -> float:
         """Make exchanges; return the last noise."""
+        if weights.cost > 0:
+            np.maximum(1.0, self.plan.price**PRICE_DECAY, out=self.plan.price)
         noise: float = anneal(
             self.arrays, self.plan, self.workspace, self.candidates, self.makespan, steps, weights, cooling
         )
