@@ -1,0 +1,199 @@
+"""From event to event, compiled: see `alloc.problems.missions.simulation.simulation`."""
+
+import numpy as np
+
+from alloc.allocators.missions.agenda import first_hour, pop, push
+from alloc.allocators.missions.channel import deliver, is_silent, send_all
+from alloc.allocators.missions.events import happen
+from alloc.allocators.missions.knowledge import look_around, refresh, see_all
+from alloc.allocators.missions.layout import (
+    DONE,
+    FAILED,
+    IDLE,
+    MESSAGES,
+    MISSED,
+    NOBODY,
+    OPEN,
+    ORDERS,
+    OVER,
+    WORKING,
+    MissionArrays,
+)
+from alloc.allocators.missions.motion import bring_up_to_date, distance_between, stop_work
+from alloc.allocators.missions.orders import balance, close, land, note_agent
+from alloc.allocators.runtime.compiled import compiled
+from alloc.problems.missions.simulation.agenda import Turn
+from alloc.problems.missions.simulation.motion import CLOSE
+
+COMPLETION, DEADLINE, EVENT, ARRIVAL, DELIVERY, RADIO = (int(turn) for turn in Turn)
+BETWEEN, WITHIN, TALKING, ORDERED = range(4)
+"""Where `advance` goes on: before the next hour, within it, after messages were asked for, after orders were."""
+
+
+@compiled
+def advance(state: MissionArrays) -> int:
+    """Go on to where agents may send messages (`MESSAGES`) or get orders (`ORDERS`), or to the end (`OVER`).
+
+    Who gets orders stands in `deciding`, the first `head.deciding` of them. Who may speak does if `Agent.speaks` says so.
+    """
+    head = state.head[0]
+    if head.stage == TALKING:
+        send(state)
+    elif head.stage == ORDERED:
+        balance(state)
+        head.stage = BETWEEN
+    while True:
+        if head.stage == BETWEEN:
+            if is_over(state) or not first_hour(state) <= head.end:
+                finish(state)
+                return OVER
+            head.hour, head.is_news = first_hour(state), 0
+            head.turn += 1
+            head.stage = WITHIN
+        while first_hour(state) == head.hour:
+            if take_first(state):
+                head.stage = TALKING
+                return MESSAGES
+            balance(state)
+        head.stage = BETWEEN
+        if find_deciding(state) and not is_over(state):
+            look(state)
+            head.stage = ORDERED
+            return ORDERS
+
+
+@compiled
+def take_first(state: MissionArrays) -> bool:
+    """Let the first entry of the agenda happen, unless it is void by now; return whether messages can be sent."""
+    head = state.head[0]
+    pop(state)
+    entry = state.agenda[head.entries]
+    turn, item, version = entry.turn, entry.item, entry.version
+    if turn == RADIO:
+        return talk(state)
+    if turn == EVENT:
+        happen(state, item)
+    elif turn == DELIVERY:
+        deliver(state, item)
+    elif turn == ARRIVAL:
+        if state.agents[item].flight == version:
+            arrive(state, item)
+    elif turn == COMPLETION:
+        if state.tasks[item].status == OPEN and state.tasks[item].version == version:
+            close(state, item, DONE)
+    elif state.tasks[item].status == OPEN:
+        bring_up_to_date(state, item)
+        task = state.tasks[item]
+        is_done = task.left <= CLOSE * (task.appeared + task.grown)
+        close(state, item, DONE if is_done else MISSED)
+    return False
+
+
+@compiled
+def arrive(state: MissionArrays, number: int) -> None:
+    """End a flight; who has nothing to do there is to decide."""
+    agent = state.agents[number]
+    task = agent.order_task if agent.order == 1 else NOBODY
+    land(state, number)
+    note_agent(state, number, task)
+    if agent.status == IDLE:
+        agent.decides = 1
+        state.head[0].is_news = 1
+
+
+@compiled
+def talk(state: MissionArrays) -> bool:
+    """Let all agents look around; return whether any can send a message."""
+    see_all(state)
+    can_send = False
+    for number in range(len(state.agents)):
+        agent = state.agents[number]
+        if IDLE <= agent.status <= WORKING:
+            if agent.looked != state.head[0].turn:
+                look_around(state, number)
+            agent.decides = 1
+            can_send = can_send or not is_silent(state, number)
+    if not can_send:
+        state.head[0].tick += 1
+        push(state, state.head[0].tick * state.head[0].period, RADIO, 0, 0)
+    return can_send
+
+
+@compiled
+def send(state: MissionArrays) -> None:
+    """Let all send that can and will; when they can the next time stands on the agenda."""
+    head = state.head[0]
+    slot = head.tick % len(state.heard)
+    if send_all(state, slot):
+        push(state, head.hour + head.delay, DELIVERY, slot, 0)
+    push(state, head.tick * head.period, RADIO, 0, 0)
+    balance(state)
+    head.stage = WITHIN
+
+
+@compiled
+def find_deciding(state: MissionArrays) -> bool:
+    """Fill in who is to get orders now, in their order in the mission; return whether there is anybody."""
+    head = state.head[0]
+    head.deciding = 0
+    for number in range(len(state.agents)):
+        agent = state.agents[number]
+        if IDLE <= agent.status <= WORKING and (agent.decides if head.is_local else head.is_news):
+            state.deciding[head.deciding] = number
+            head.deciding += 1
+        agent.decides = 0
+    return head.deciding > 0
+
+
+@compiled
+def look(state: MissionArrays) -> None:
+    """Let all who decide look around, unless they have done so in this turn."""
+    head = state.head[0]
+    if not head.is_local:
+        refresh(state)
+        return
+    is_stale = True
+    for place in range(head.deciding):
+        number = state.deciding[place]
+        if state.agents[number].looked != head.turn:
+            if is_stale:
+                see_all(state)
+                is_stale = False
+            look_around(state, number)
+
+
+@compiled
+def is_over(state: MissionArrays) -> bool:
+    """Whether no task is open or to come, or nobody is left to do one."""
+    return state.head[0].unfinished == 0 or state.head[0].failed == len(state.agents)
+
+
+@compiled
+def finish(state: MissionArrays) -> None:
+    """End the mission: whoever is in flight lands, and whoever returns is home."""
+    head = state.head[0]
+    if not is_over(state) and head.end < first_hour(state) < np.inf:
+        head.hour = head.end
+    for number in range(len(state.tasks)):
+        bring_up_to_date(state, number)
+    for number in range(len(state.agents)):
+        agent = state.agents[number]
+        if agent.flight:
+            fly_home(state, number, agent.length)
+            if not np.isnan(agent.goal_x):
+                agent.x, agent.y, agent.z = agent.goal_x, agent.goal_y, agent.goal_z
+        if agent.returns and IDLE <= agent.status <= WORKING:
+            stop_work(state, number)
+            home = agent.start_x, agent.start_y, agent.start_z
+            fly_home(state, number, distance_between(head.is_manhattan, (agent.x, agent.y, agent.z), home))
+            agent.x, agent.y, agent.z = home
+
+
+@compiled
+def fly_home(state: MissionArrays, number: int, length: float) -> None:
+    """Count a flight that ends after the mission."""
+    agent = state.agents[number]
+    agent.distance += length
+    agent.energy += agent.energy_per_distance * length
+    agent.battery -= agent.energy_per_distance * length
+    agent.flight, agent.status = 0, IDLE
