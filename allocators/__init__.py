@@ -35,20 +35,26 @@ if TYPE_CHECKING:
     from alloc.allocators.heuristic.lp_rounding.allocator import LpRound
     from alloc.allocators.learned.policy import A2c, Ddpg, Dqn, Gappo, GappoLs, Ppo
     from alloc.allocators.learned.training import train
+    from alloc.allocators.online.contract import AgentDecider, Briefing, FleetDecider, Policy, PolicyError, PolicyInfo
+    from alloc.allocators.online.registry import describe_policy, load_policy, policy_names
+    from alloc.allocators.online.run import MissionRun, simulate
     from alloc.allocators.plan.files import write_result
     from alloc.allocators.plotting import plot, plot_convergence
 
 __all__ = [
     "A2c",
+    "AgentDecider",
     "AllocError",
     "Allocator",
     "Auction",
     "Bottleneck",
+    "Briefing",
     "Budget",
     "CpSat",
     "Ddpg",
     "Dqn",
     "Fleet",
+    "FleetDecider",
     "Front",
     "Gappo",
     "GappoLs",
@@ -64,7 +70,11 @@ __all__ = [
     "Method",
     "Milp",
     "MissingPackageError",
+    "MissionRun",
     "Moves",
+    "Policy",
+    "PolicyError",
+    "PolicyInfo",
     "Ppo",
     "Proposal",
     "RefusedError",
@@ -78,15 +88,19 @@ __all__ = [
     "WhatIf",
     "compare",
     "describe",
+    "describe_policy",
     "explain",
     "load",
+    "load_policy",
     "method_parameters",
     "names",
     "pareto",
     "plot",
     "plot_convergence",
+    "policy_names",
     "read_result",
     "reasons_of_moves",
+    "simulate",
     "solve",
     "train",
     "whatif",
@@ -99,6 +113,17 @@ _LAZY = {
     "plot_convergence": "alloc.allocators.plotting",
     "train": "alloc.allocators.learned.training",
     "write_result": "alloc.allocators.plan.files",
+    "AgentDecider": "alloc.allocators.online.contract",
+    "Briefing": "alloc.allocators.online.contract",
+    "FleetDecider": "alloc.allocators.online.contract",
+    "MissionRun": "alloc.allocators.online.run",
+    "Policy": "alloc.allocators.online.contract",
+    "PolicyError": "alloc.allocators.online.contract",
+    "PolicyInfo": "alloc.allocators.online.contract",
+    "describe_policy": "alloc.allocators.online.registry",
+    "load_policy": "alloc.allocators.online.registry",
+    "policy_names": "alloc.allocators.online.registry",
+    "simulate": "alloc.allocators.online.run",
 }
 """Module of each public name that is imported on first use."""
 

@@ -25,6 +25,7 @@ from alloc.cli.commands import (
     validate,
     whatif,
 )
+from alloc.cli.commands.missions import replay, simulate
 from alloc.cli.commands.training import train, tune
 from alloc.cli.options import Parameter, examples, option_of
 from alloc.cli.output.console import complain, flush, write_out
@@ -64,6 +65,8 @@ COMMANDS = (
     validate,
     convert,
     export,
+    simulate,
+    replay,
     schema,
     methods,
     train,

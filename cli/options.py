@@ -27,6 +27,9 @@ BUILT_IN_METHODS = (
 )
 """For completion, which must not load numpy; a test compares them with the registry."""
 
+BUILT_IN_POLICIES = ("idle", "random", "nearest", "greedy", "hedonic", "auction", "replan")
+"""For completion, likewise."""
+
 READABLE = "a .json or .npz file, a folder with agents.csv and tasks.csv, or - for JSON on standard input"
 
 
@@ -43,6 +46,14 @@ def complete_methods(incomplete: str) -> list[str]:
     done, comma, last = incomplete.rpartition(",")
     names = [*BUILT_IN_METHODS, *(entry.name for entry in entry_points(group="alloc.allocators"))]
     return [done + comma + name for name in dict.fromkeys(names) if name.startswith(last)]
+
+
+def complete_policies(incomplete: str) -> list[str]:
+    """Return the policies for missions that begin with `incomplete`."""
+    from importlib.metadata import entry_points
+
+    names = [*BUILT_IN_POLICIES, *(entry.name for entry in entry_points(group="alloc.policies"))]
+    return [name for name in dict.fromkeys(names) if name.startswith(incomplete)]
 
 
 InstanceArgument = Annotated[str, typer.Argument(metavar="INSTANCE", help=f"The instance: {READABLE}.")]

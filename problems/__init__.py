@@ -26,6 +26,16 @@ if TYPE_CHECKING:
     from alloc.problems.matching.serving import only_allowed, serve_all
     from alloc.problems.matching.shortage import Shortage, find_shortage
     from alloc.problems.matching.unservable import fewest_unserved, minimal_unservable_set
+    from alloc.problems.missions.events import Event
+    from alloc.problems.missions.families.draw import random_mission
+    from alloc.problems.missions.families.parameters import MissionParameters
+    from alloc.problems.missions.files.log_file import MissionLog, read_log, write_log
+    from alloc.problems.missions.files.mission_file import read_mission, write_mission
+    from alloc.problems.missions.mission import Mission
+    from alloc.problems.missions.radio import Burst, Pace, Radio
+    from alloc.problems.missions.replay import replay
+    from alloc.problems.missions.simulation.measures import MissionResult
+    from alloc.problems.missions.snapshot import snapshot_at
     from alloc.problems.units import Units
     from alloc.problems.vocabulary import IDLE, Objective
 
@@ -34,13 +44,21 @@ __all__ = [
     "AgentClasses",
     "AllocError",
     "Allocation",
+    "Burst",
     "DistanceTable",
     "Evaluation",
+    "Event",
     "Family",
     "InputError",
     "Instance",
     "MissingPackageError",
+    "Mission",
+    "MissionLog",
+    "MissionParameters",
+    "MissionResult",
     "Objective",
+    "Pace",
+    "Radio",
     "Reach",
     "RefusedError",
     "Shortage",
@@ -61,26 +79,41 @@ __all__ = [
     "paper",
     "paper_like",
     "random_instance",
+    "random_mission",
     "read_allocation",
     "read_instance",
+    "read_log",
+    "read_mission",
+    "replay",
     "serve_all",
+    "snapshot_at",
     "write_allocation",
     "write_instance",
+    "write_log",
+    "write_mission",
     "write_model",
 ]
 
 _MODULE_OF = {
-    "IDLE": "vocabulary",
     "AgentClasses": "classes",
     "AllocError": "errors",
     "Allocation": "allocation",
+    "Burst": "missions.radio",
     "DistanceTable": "distances.given",
     "Evaluation": "evaluation",
+    "Event": "missions.events",
     "Family": "generate.family",
+    "IDLE": "vocabulary",
     "InputError": "errors",
     "Instance": "instance",
     "MissingPackageError": "errors",
+    "Mission": "missions.mission",
+    "MissionLog": "missions.files.log_file",
+    "MissionParameters": "missions.families.parameters",
+    "MissionResult": "missions.simulation.measures",
     "Objective": "vocabulary",
+    "Pace": "missions.radio",
+    "Radio": "missions.radio",
     "Reach": "distances.reach",
     "RefusedError": "errors",
     "Shortage": "matching.shortage",
@@ -101,11 +134,18 @@ _MODULE_OF = {
     "paper": "generate.paper_scenarios",
     "paper_like": "generate.paper_scenarios",
     "random_instance": "generate.random_family",
+    "random_mission": "missions.families.draw",
     "read_allocation": "formats.allocation_file",
     "read_instance": "formats.instance_file",
+    "read_log": "missions.files.log_file",
+    "read_mission": "missions.files.mission_file",
+    "replay": "missions.replay",
     "serve_all": "matching.serving",
+    "snapshot_at": "missions.snapshot",
     "write_allocation": "formats.allocation_file",
     "write_instance": "formats.instance_file",
+    "write_log": "missions.files.log_file",
+    "write_mission": "missions.files.mission_file",
     "write_model": "formats.model_file",
 }
 """Where each name is defined; the imports above say the same to type checkers."""

@@ -8,10 +8,10 @@ import typer
 
 from alloc.cli.options import examples
 from alloc.cli.output.console import STANDARD, say
-from alloc.problems.vocabulary import Distribution, Sites, Starts
+from alloc.problems.vocabulary import Distribution, Knowledge, MissionFamily, Sites, Starts
 
 if TYPE_CHECKING:
-    from alloc.problems import Instance
+    from alloc.problems import Instance, Mission
 
 EXAMPLES = examples(
     "alloc generate paper-1 --seed 7 --output demo.json",
@@ -19,12 +19,23 @@ EXAMPLES = examples(
     "alloc generate random --speed 20:60 --battery 10:30 --real --seed 3 --output demo.npz",
     "alloc generate paper-4 --seed 100 --count 20 --output instances",
     "alloc generate covering --agents 40 --tasks 16 --ability-max 100 --workload uniform --seed 3 --output demo.json",
+    "alloc generate mission --family failures --agents 20 --tasks 40 --seed 7 --output mission.json",
     closing="SPREAD is one value for all, LOW:HIGH for a uniform draw, or none for no limit.",
 )
 
 SEED = Annotated[int, typer.Option(min=0, help="Seed of all random numbers; with --count the first of several.")]
 SPREADS = ("communication_range", "battery", "speed", "priority")
 COVERING = ("agents", "tasks", "ability_min", "ability_max", "workload", "integer")
+MISSION = {
+    "agents": "agents",
+    "tasks": "tasks",
+    "mission_family": "family",
+    "knowledge": "knowledge",
+    "radius": "radius",
+    "sensing": "sensing",
+    "loss": "loss",
+}
+"""Options of missions, and the parameters that they set."""
 
 
 class Family(StrEnum):
@@ -36,6 +47,7 @@ class Family(StrEnum):
     PAPER_4 = "paper-4"
     RANDOM = "random"
     COVERING = "covering"
+    MISSION = "mission"
 
 
 def _option(text: str, default: str, *names: str, metavar: str | None = None) -> object:
@@ -52,8 +64,9 @@ def generate_command(
         Family,
         typer.Argument(
             metavar="FAMILY",
-            help="paper-1 to paper-4, a scenario of the paper; random, with the options below; or covering, machine "
-            "covering without places: 100 agents with abilities from 1 to 1000, 25 tasks, workloads equal or uniform.",
+            help="paper-1 to paper-4, a scenario of the paper; random, with the options below; covering, machine "
+            "covering without places: 100 agents with abilities from 1 to 1000, 25 tasks, workloads equal or uniform; "
+            "or mission, 20 agents and 40 tasks in time, of the kind that --family says.",
         ),
     ],
     seed: SEED = 0,
@@ -89,27 +102,43 @@ def generate_command(
     allowed_fraction: Annotated[float | None, _option("Share of the tasks that each agent may do.", "1")] = None,
     energy_per_distance: Annotated[float | None, _option("Energy per unit of distance.", "6")] = None,
     tau: Annotated[float | None, _option("Base of the reward (3).", "0.5")] = None,
+    mission_family: Annotated[MissionFamily | None, _option("Kind of mission.", "steady", "--family")] = None,
+    knowledge: Annotated[Knowledge | None, _option("What agents know in the mission.", "local")] = None,
+    radius: Annotated[float | None, _option("How far agents hear each other in the mission.", "0.3")] = None,
+    sensing: Annotated[float | None, _option("How far agents see in the mission.", "0.3")] = None,
+    loss: Annotated[float | None, _option("Share of the messages that is lost in the mission.", "0.2")] = None,
 ) -> None:
-    """Generate instances: the scenarios of the paper, random ones, or machine covering."""
+    """Generate instances: the scenarios of the paper, random ones, machine covering; or missions."""
     wanted = {name: value for name, value in locals().items() if value is not None and name not in FIXED}
-    for name in wanted:
-        if family is not Family.RANDOM and not (family is Family.COVERING and name in COVERING):
-            raise typer.BadParameter(f"is for random, not for {family}", param_hint=f"'{_flag(name)}'")
+    _check_options(family, wanted)
     if count > 1 and output == STANDARD:
         raise typer.BadParameter("must name a folder for several instances", param_hint="'--output'")
     for number in range(seed, seed + count):
         instance = _instance(family, wanted, number)
         _write(instance, output, into_folder=count > 1)
     if output != STANDARD:
-        say(f"wrote {output}" if count == 1 else f"wrote {count} instances into {output}")
+        what = "missions" if family is Family.MISSION else "instances"
+        say(f"wrote {output}" if count == 1 else f"wrote {count} {what} into {output}")
+
+
+def _check_options(family: Family, wanted: dict[str, Any]) -> None:
+    """Raise an error for an option that is not for this family."""
+    for name in wanted:
+        owner = "mission" if name in MISSION and name not in ("agents", "tasks") else "random"
+        taken = {Family.RANDOM: name not in MISSION or name in COVERING, Family.COVERING: name in COVERING}
+        if not taken.get(family, family is Family.MISSION and name in MISSION):
+            raise typer.BadParameter(f"is for {owner}, not for {family}", param_hint=f"'{_flag(name)}'")
 
 
 FIXED = ("family", "seed", "count", "output")
 
 
-def _instance(family: Family, wanted: dict[str, Any], seed: int) -> "Instance":
+def _instance(family: Family, wanted: dict[str, Any], seed: int) -> "Instance | Mission":
     from alloc.problems import Family as Parameters
-    from alloc.problems import paper, random_instance
+    from alloc.problems import MissionParameters, paper, random_instance, random_mission
+
+    if family is Family.MISSION:
+        return random_mission(MissionParameters(**{MISSION[name]: value for name, value in wanted.items()}), seed)
 
     if family is Family.COVERING:
         return _covering(seed=seed, **wanted)
@@ -139,23 +168,32 @@ def _covering(
     return machine_covering(agents, tasks, *ends, seed, equal=equal, whole=integer)
 
 
-def _write(instance: "Instance", output: str, *, into_folder: bool) -> None:
+def _write(made: "Instance | Mission", output: str, *, into_folder: bool) -> None:
     from alloc.problems import InputError
-    from alloc.problems.formats import write_instance
 
     if not into_folder:
-        write_instance(instance, output)
+        _write_file(made, output)
         return
     folder = Path(output)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except FileExistsError as error:
         raise InputError("is a file; several instances need a folder", source=output) from error
-    write_instance(instance, str(folder / f"{instance.name}.json"))
+    _write_file(made, str(folder / f"{made.name}.json"))
+
+
+def _write_file(made: "Instance | Mission", output: str) -> None:
+    from alloc.problems import Mission, write_instance, write_mission
+
+    if isinstance(made, Mission):
+        write_mission(made, output)
+    else:
+        write_instance(made, output)
 
 
 def _flag(name: str) -> str:
-    return "--" + {"communication_range": "range", "integer": "integer/--real"}.get(name, name).replace("_", "-")
+    known = {"communication_range": "range", "integer": "integer/--real", "mission_family": "family"}
+    return "--" + known.get(name, name).replace("_", "-")
 
 
 def _spread(text: str, name: str) -> float | tuple[float, ...] | None:

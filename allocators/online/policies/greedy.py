@@ -19,16 +19,13 @@ class GreedyParameters(CheckedParameters):
     ----------
     stay : float
         Factor on the utility of the task that an agent has already.
-    crowding : float
-        How much each other agent at a task takes away from its utility.
     memory : float
         Hours after which what was heard of others no longer counts.
     missed : float
         Factor on the utility of a task that will miss its deadline even with the agent.
     """
 
-    stay: float = bounded(1.5, low=0)
-    crowding: float = bounded(0.3, low=0)
+    stay: float = bounded(1.25, low=0)
     memory: float = bounded(2.0, low=0)
     missed: float = bounded(0.05, low=0)
 
@@ -66,7 +63,7 @@ class _Greedy(AgentDecider):
         facts, parameters = prospect.task.facts, self._parameters
         hours = prospect.with_me - view.hour
         share = 1.0 if hours <= 0 else (prospect.with_me - prospect.arrival) / hours
-        value = share / (1 + parameters.crowding * prospect.crew) * (facts.priority + 1e-6)
+        value = share * (facts.priority + 1e-6)
         if prospect.with_me > facts.deadline:
             value *= parameters.missed
         return value * (parameters.stay if view.own.task == facts.id else 1.0)

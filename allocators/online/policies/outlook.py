@@ -1,6 +1,7 @@
 """What an agent expects of tasks: who else will work there, and when they will be done."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from alloc.problems.missions.simulation.reports import TaskReport, View
@@ -37,7 +38,7 @@ class Prospect:
         return self.with_me < self.without
 
 
-def prospects(view: View, memory: float) -> list[Prospect]:
+def prospects(view: View, memory: float, task_of: Mapping[str, str] | None = None) -> list[Prospect]:
     """Return what an agent expects of the tasks that it knows and can take.
 
     Parameters
@@ -45,9 +46,11 @@ def prospects(view: View, memory: float) -> list[Prospect]:
     view : View
     memory : float
         Hours after which what was heard of others no longer counts.
+    task_of : mapping of str to str, optional
+        Task of each other agent, where that is agreed; where they were going by the last that was heard by default.
     """
     own = view.own
-    crews = _crews(view, memory)
+    crews = _crews(view, memory, task_of)
     found = []
     for task in view.open_tasks(own):
         is_there = own.status is AgentStatus.WORKING and own.task == task.facts.id
@@ -60,14 +63,15 @@ def prospects(view: View, memory: float) -> list[Prospect]:
     return found
 
 
-def _crews(view: View, memory: float) -> dict[str, Crew]:
+def _crews(view: View, memory: float, task_of: Mapping[str, str] | None) -> dict[str, Crew]:
     """Return who else is at each task, or on its way there, as far as is known."""
     crews: dict[str, Crew] = {}
     for name, report in view.agents.items():
-        task = view.tasks.get(report.task or "")
+        goal = report.task if task_of is None else task_of.get(name)
+        task = view.tasks.get(goal or "")
         if name == view.id or task is None or report.status not in ACTIVE or view.hour - report.hour > memory:
             continue
-        is_there = report.status is AgentStatus.WORKING
+        is_there = report.status is AgentStatus.WORKING and report.task == goal
         arrival = -math.inf if is_there else report.hour + view.hours(report, task)
         crews.setdefault(task.facts.id, []).append((arrival, report.facts.ability))
     return crews

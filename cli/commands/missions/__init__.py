@@ -1,0 +1,1 @@
+"""``alloc simulate`` and ``alloc replay``: missions, and what came of them."""

@@ -1,0 +1,95 @@
+"""``alloc simulate``."""
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from alloc.cli import options
+from alloc.cli.options import examples
+from alloc.cli.output.console import STANDARD, note, say, write_json
+from alloc.cli.output.files import check_outputs
+from alloc.problems.vocabulary import Knowledge
+
+if TYPE_CHECKING:
+    from alloc.problems import Mission, MissionResult
+
+EXAMPLES = examples(
+    "alloc simulate mission.json --policy nearest",
+    "alloc simulate mission.json --policy greedy --knowledge local --seed 3 --log run.jsonl",
+    "alloc simulate mission.json --policy replan --set method=greedy --knowledge full --json",
+    "alloc simulate mission.json --policy auction --runs 10 --json",
+    "alloc generate mission --seed 7 --output - | alloc simulate - --policy hedonic",
+    closing="Exit code 0 if all tasks are done in all runs, 1 if not. An instance is a mission in which nothing comes.",
+)
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to `app`."""
+    app.command("simulate", epilog=EXAMPLES)(simulate_command)
+
+
+def simulate_command(
+    mission: Annotated[
+        str, typer.Argument(metavar="MISSION", help="A mission as .json, - for standard input, or an instance.")
+    ],
+    policy: Annotated[
+        str,
+        typer.Option(
+            autocompletion=options.complete_policies,
+            help=f"Who gives the orders: {', '.join(options.BUILT_IN_POLICIES)}, or a plugin.",
+        ),
+    ],
+    knowledge: Annotated[
+        Knowledge | None, typer.Option(help="What agents know.", show_default="as the mission says")
+    ] = None,
+    seed: options.SeedOption = 0,
+    runs: Annotated[int, typer.Option(min=1, help="Runs, with consecutive seeds.")] = 1,
+    deadline_ms: Annotated[
+        float,
+        typer.Option(min=0, help="Milliseconds for each decision; later answers are not followed. 0 for no limit."),
+    ] = 100.0,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the policy; may be repeated."),
+    ] = None,
+    log: Annotated[str | None, typer.Option(metavar="FILE", help="Write what happens as JSON lines.")] = None,
+    json: options.JsonOption = False,
+    quiet: options.QuietOption = False,
+) -> None:
+    """Let a policy lead the agents of a mission: allocation that goes on in time."""
+    from alloc.allocators import load_policy, simulate
+    from alloc.problems import read_mission, write_log
+
+    check_outputs(("--log", log), read=[("MISSION", mission)])
+    if log is not None and runs > 1:
+        raise typer.BadParameter("is for a single run", param_hint="'--log'")
+    if log == STANDARD and json:
+        raise typer.BadParameter("cannot go to standard output together with --json", param_hint="'--log'")
+    leader = load_policy(policy, **options.values(settings))
+    problem = read_mission(mission)
+    results: list[MissionResult] = []
+    for number in range(seed, seed + runs):
+        run = simulate(problem, leader, knowledge=knowledge, seed=number, deadline_ms=deadline_ms or None)
+        results.append(run.result)
+        if log is not None:
+            write_log(run.log, log)
+    if json:
+        documents = [result.to_dict() for result in results]
+        write_json(documents[0] if runs == 1 else documents)
+    if not quiet:
+        tell(results, problem, summary=not json)
+    raise typer.Exit(0 if all(result.is_done for result in results) else 1)
+
+
+def tell(results: "list[MissionResult]", mission: "Mission", *, summary: bool) -> None:
+    """Print the measures of some runs for people, and notes on what is not as it should be."""
+    from alloc.cli.output.mission import lines, rows
+
+    if summary:
+        say(lines(results[0], mission.instance.units) if len(results) == 1 else rows(results))
+    late = sum(result.decisions_late for result in results)
+    if late:
+        note(f"{late} of {sum(result.decisions for result in results)} decisions came after the deadline")
+    refused = sum(result.orders_refused for result in results)
+    if refused:
+        note(f"{refused} orders were not followed, as the agent could not; --log says which and why")
