@@ -1,5 +1,7 @@
 """From event to event, compiled: see `alloc.problems.missions.simulation.simulation`."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from alloc.allocators.missions.agenda import first_hour, pop, push
@@ -8,7 +10,6 @@ from alloc.allocators.missions.events import happen
 from alloc.allocators.missions.knowledge import look_around, refresh, see_all
 from alloc.allocators.missions.layout import (
     DONE,
-    FAILED,
     IDLE,
     MESSAGES,
     MISSED,
@@ -17,11 +18,14 @@ from alloc.allocators.missions.layout import (
     ORDERS,
     OVER,
     WORKING,
+    Agent,
+    Head,
     MissionArrays,
 )
 from alloc.allocators.missions.motion import bring_up_to_date, distance_between, stop_work
 from alloc.allocators.missions.orders import balance, close, land, note_agent
-from alloc.allocators.runtime.compiled import compiled
+from alloc.allocators.runtime.compiled import compiled, inlined
+from alloc.problems.fields import IntArray
 from alloc.problems.missions.simulation.agenda import Turn
 from alloc.problems.missions.simulation.motion import CLOSE
 
@@ -36,7 +40,7 @@ def advance(state: MissionArrays) -> int:
 
     Who gets orders stands in `deciding`, the first `head.deciding` of them. Who may speak does if `Agent.speaks` says so.
     """
-    head = state.head[0]
+    head, agents, agenda = state.head[0], state.agents, state.agenda
     if head.stage == TALKING:
         send(state)
     elif head.stage == ORDERED:
@@ -44,48 +48,49 @@ def advance(state: MissionArrays) -> int:
         head.stage = BETWEEN
     while True:
         if head.stage == BETWEEN:
-            if is_over(state) or not first_hour(state) <= head.end:
+            if is_over(head, agents) or not first_hour(head, agenda) <= head.end:
                 finish(state)
                 return OVER
-            head.hour, head.is_news = first_hour(state), 0
+            head.hour, head.is_news = first_hour(head, agenda), 0
             head.turn += 1
             head.stage = WITHIN
-        while first_hour(state) == head.hour:
+        while first_hour(head, agenda) == head.hour:
             if take_first(state):
                 head.stage = TALKING
                 return MESSAGES
-            balance(state)
+            if head.changed_agents or head.changed_tasks:
+                balance(state)
         head.stage = BETWEEN
-        if find_deciding(state) and not is_over(state):
+        if find_deciding(head, agents, state.deciding) and not is_over(head, agents):
             look(state)
             head.stage = ORDERED
             return ORDERS
 
 
-@compiled
+@inlined
 def take_first(state: MissionArrays) -> bool:
     """Let the first entry of the agenda happen, unless it is void by now; return whether messages can be sent."""
     head = state.head[0]
-    pop(state)
+    pop(head, state.agenda)
     entry = state.agenda[head.entries]
-    turn, item, version = entry.turn, entry.item, entry.version
+    turn, subject, version = entry.turn, entry.subject, entry.version
     if turn == RADIO:
         return talk(state)
     if turn == EVENT:
-        happen(state, item)
+        happen(state, subject)
     elif turn == DELIVERY:
-        deliver(state, item)
+        deliver(state, subject)
     elif turn == ARRIVAL:
-        if state.agents[item].flight == version:
-            arrive(state, item)
+        if state.agents[subject].flight == version:
+            arrive(state, subject)
     elif turn == COMPLETION:
-        if state.tasks[item].status == OPEN and state.tasks[item].version == version:
-            close(state, item, DONE)
-    elif state.tasks[item].status == OPEN:
-        bring_up_to_date(state, item)
-        task = state.tasks[item]
+        if state.tasks[subject].status == OPEN and state.tasks[subject].version == version:
+            close(state, subject, DONE)
+    elif state.tasks[subject].status == OPEN:
+        task = state.tasks[subject]
+        bring_up_to_date(head, state.agents, task, subject)
         is_done = task.left <= CLOSE * (task.appeared + task.grown)
-        close(state, item, DONE if is_done else MISSED)
+        close(state, subject, DONE if is_done else MISSED)
     return False
 
 
@@ -104,7 +109,7 @@ def arrive(state: MissionArrays, number: int) -> None:
 @compiled
 def talk(state: MissionArrays) -> bool:
     """Let all agents look around; return whether any can send a message."""
-    see_all(state)
+    see_all(state.head[0], state.agents, state.tasks, state.places, state.visible, state.now)
     can_send = False
     for number in range(len(state.agents)):
         agent = state.agents[number]
@@ -112,7 +117,7 @@ def talk(state: MissionArrays) -> bool:
             if agent.looked != state.head[0].turn:
                 look_around(state, number)
             agent.decides = 1
-            can_send = can_send or not is_silent(state, number)
+            can_send = can_send or not state.head[0].silences or not is_silent(state, number)
     if not can_send:
         state.head[0].tick += 1
         push(state, state.head[0].tick * state.head[0].period, RADIO, 0, 0)
@@ -132,14 +137,13 @@ def send(state: MissionArrays) -> None:
 
 
 @compiled
-def find_deciding(state: MissionArrays) -> bool:
+def find_deciding(head: Head, agents: Sequence[Agent], deciding: IntArray) -> bool:
     """Fill in who is to get orders now, in their order in the mission; return whether there is anybody."""
-    head = state.head[0]
     head.deciding = 0
-    for number in range(len(state.agents)):
-        agent = state.agents[number]
+    for number in range(len(agents)):
+        agent = agents[number]
         if IDLE <= agent.status <= WORKING and (agent.decides if head.is_local else head.is_news):
-            state.deciding[head.deciding] = number
+            deciding[head.deciding] = number
             head.deciding += 1
         agent.decides = 0
     return head.deciding > 0
@@ -157,42 +161,41 @@ def look(state: MissionArrays) -> None:
         number = state.deciding[place]
         if state.agents[number].looked != head.turn:
             if is_stale:
-                see_all(state)
+                see_all(head, state.agents, state.tasks, state.places, state.visible, state.now)
                 is_stale = False
             look_around(state, number)
 
 
-@compiled
-def is_over(state: MissionArrays) -> bool:
+@inlined
+def is_over(head: Head, agents: Sequence[Agent]) -> bool:
     """Whether no task is open or to come, or nobody is left to do one."""
-    return state.head[0].unfinished == 0 or state.head[0].failed == len(state.agents)
+    return head.unfinished == 0 or head.failed == len(agents)
 
 
 @compiled
 def finish(state: MissionArrays) -> None:
     """End the mission: whoever is in flight lands, and whoever returns is home."""
     head = state.head[0]
-    if not is_over(state) and head.end < first_hour(state) < np.inf:
+    if not is_over(head, state.agents) and head.end < first_hour(head, state.agenda) < np.inf:
         head.hour = head.end
     for number in range(len(state.tasks)):
-        bring_up_to_date(state, number)
+        bring_up_to_date(head, state.agents, state.tasks[number], number)
     for number in range(len(state.agents)):
         agent = state.agents[number]
         if agent.flight:
-            fly_home(state, number, agent.length)
+            fly_home(agent, agent.length)
             if not np.isnan(agent.goal_x):
                 agent.x, agent.y, agent.z = agent.goal_x, agent.goal_y, agent.goal_z
         if agent.returns and IDLE <= agent.status <= WORKING:
-            stop_work(state, number)
+            stop_work(head, state.agents, state.tasks, number)
             home = agent.start_x, agent.start_y, agent.start_z
-            fly_home(state, number, distance_between(head.is_manhattan, (agent.x, agent.y, agent.z), home))
+            fly_home(agent, distance_between(head.is_manhattan, (agent.x, agent.y, agent.z), home))
             agent.x, agent.y, agent.z = home
 
 
 @compiled
-def fly_home(state: MissionArrays, number: int, length: float) -> None:
+def fly_home(agent: Agent, length: float) -> None:
     """Count a flight that ends after the mission."""
-    agent = state.agents[number]
     agent.distance += length
     agent.energy += agent.energy_per_distance * length
     agent.battery -= agent.energy_per_distance * length

@@ -70,7 +70,7 @@ def happen_to_task(state: MissionArrays, number: int, kind: int, workload: float
     elif task.status == OPEN and kind == CANCELS:
         close(state, number, CANCELLED)
     elif task.status == OPEN:
-        bring_up_to_date(state, number)
+        bring_up_to_date(state.head[0], state.agents, task, number)
         task.appeared += max(0.0, workload - task.left)
         task.cancelled += max(0.0, task.left - workload)
         task.left = workload

@@ -1,85 +1,108 @@
 """What agents see and hear, compiled: see `alloc.problems.missions.simulation.awareness`."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
-from alloc.allocators.missions.layout import ABSENT, IDLE, NOBODY, OPEN, TO_COME, TO_TASK, WORKING, MissionArrays
+from alloc.allocators.missions.layout import (
+    ABSENT,
+    IDLE,
+    NOBODY,
+    OPEN,
+    TO_COME,
+    TO_TASK,
+    WORKING,
+    Agent,
+    Head,
+    MissionArrays,
+    Report,
+    Task,
+)
 from alloc.allocators.missions.motion import battery_of, place_of, work_left
 from alloc.allocators.runtime.compiled import compiled
+from alloc.problems.fields import BoolArray, FloatArray
 
 INVISIBLE = -9.0
 """What is seen of a task that is to come."""
 
 
 @compiled
-def see_all(state: MissionArrays) -> None:
-    """Fill in where all agents are, and what is seen of all tasks."""
-    hour = state.head[0].hour
-    for number in range(len(state.agents)):
-        x, y, z = place_of(state.agents[number], hour)
-        state.places[0, number], state.places[1, number], state.places[2, number] = x, y, z
-    for number in range(len(state.tasks)):
-        state.now[number] = seen_of(state, number)
+def see_all(
+    head: Head, agents: Sequence[Agent], tasks: Sequence[Task], places: FloatArray, visible: BoolArray, now: FloatArray
+) -> None:
+    """Fill in where all agents are, which are in the mission, and what is seen of all tasks."""
+    for number in range(len(agents)):
+        agent = agents[number]
+        places[0, number], places[1, number], places[2, number] = place_of(agent, head.hour)
+        visible[number] = IDLE <= agent.status <= WORKING
+    for number in range(len(tasks)):
+        now[number] = seen_of(head, agents, tasks[number], number)
 
 
 @compiled
-def seen_of(state: MissionArrays, number: int) -> float:
+def seen_of(head: Head, agents: Sequence[Agent], task: Task, number: int) -> float:
     """Return the work left of a task, minus its status where it is closed."""
-    status = state.tasks[number].status
-    if status == OPEN:
-        return work_left(state, number)
-    return INVISIBLE if status == TO_COME else -float(status)
+    if task.status == OPEN:
+        return work_left(head, agents, task, number)
+    return INVISIBLE if task.status == TO_COME else -float(task.status)
 
 
 @compiled
 def look_around(state: MissionArrays, number: int) -> None:
     """Let an agent see all tasks and all agents in the mission within its sensing radius."""
+    head, agents = state.head[0], state.agents
+    agents[number].looked = head.turn
+    fill_distances(head, state.places, number, state.places, state.distance)
+    for other in range(len(agents)):
+        if other == number or (state.visible[other] and not state.distance[other] > head.sensing):
+            if agents[other].reported != head.turn:
+                report(state, other)
+            state.agent_hour[number, other] = head.hour
+            state.agent_report[number, other] = agents[other].report
+    fill_distances(head, state.places, number, state.sites, state.distance)
+    see_tasks(head, state.now, state.distance, state.task_hour[number], state.task_left[number])
+
+
+@compiled
+def see_tasks(head: Head, now: FloatArray, distance: FloatArray, hour: FloatArray, left: FloatArray) -> None:
+    """Take notice of the tasks that an agent sees."""
+    for task in range(len(now)):
+        seen = now[task] != INVISIBLE and not distance[task] > head.sensing
+        hour[task] = head.hour if seen else hour[task]
+        left[task] = now[task] if seen else left[task]
+
+
+@compiled
+def fill_distances(head: Head, places: FloatArray, number: int, goals: FloatArray, distance: FloatArray) -> None:
+    """Fill in how far places are from that of an agent; NaN where one is unknown."""
+    x, y, z = places[0, number], places[1, number], places[2, number]
+    is_manhattan = head.is_manhattan
+    for goal in range(goals.shape[1]):
+        dx, dy, dz = goals[0, goal] - x, goals[1, goal] - y, goals[2, goal] - z
+        if is_manhattan:
+            distance[goal] = abs(dx) + abs(dy) + abs(dz)
+        else:
+            distance[goal] = math.sqrt(dx * dx + dy * dy + dz * dz)
+
+
+@compiled
+def report(state: MissionArrays, number: int) -> None:
+    """Report what is true of an agent now, once for all who see it in a turn."""
     head, agent = state.head[0], state.agents[number]
-    agent.looked = head.turn
-    hour, sensing = head.hour, head.sensing
-    x, y, z = state.places[0, number], state.places[1, number], state.places[2, number]
-    for other in range(len(state.agents)):
-        if other == number or (
-            IDLE <= state.agents[other].status <= WORKING
-            and is_within(sensing, head.is_manhattan, x, y, z, state.places, other)
-        ):
-            state.agent_hour[number, other] = hour
-            state.agent_report[number, other] = report_on(state, other)
-    for task in range(len(state.tasks)):
-        left = state.now[task]
-        if left != INVISIBLE and is_within(sensing, head.is_manhattan, x, y, z, state.sites, task):
-            state.task_hour[number, task] = hour
-            state.task_left[number, task] = left
+    if head.reports == len(state.reports):
+        drop_unknown(state)
+    agent.report, agent.reported = head.reports, head.turn
+    write_report(head, agent, state.reports[head.reports])
+    head.reports += 1
 
 
 @compiled
-def is_within(radius: float, is_manhattan: int, x: float, y: float, z: float, places: np.ndarray, number: int) -> bool:
-    """Whether a place is within a radius; one that is unknown is."""
-    dx, dy, dz = places[0, number] - x, places[1, number] - y, places[2, number] - z
-    distance = abs(dx) + abs(dy) + abs(dz) if is_manhattan else math.sqrt(dx * dx + dy * dy + dz * dz)
-    return not distance > radius
-
-
-@compiled
-def report_on(state: MissionArrays, number: int) -> int:
-    """Return the number of the report of what is true of an agent now, the same for all who see it in a turn."""
-    head, agent = state.head[0], state.agents[number]
-    if agent.reported != head.turn:
-        if head.reports == len(state.reports):
-            drop_unknown(state)
-        agent.report, agent.reported = head.reports, head.turn
-        head.reports += 1
-        write_report(state, number, agent.report)
-    return agent.report
-
-
-@compiled
-def write_report(state: MissionArrays, number: int, place: int) -> None:
+def write_report(head: Head, agent: Agent, report: Report) -> None:
     """Write a report of an agent."""
-    agent, report, hour = state.agents[number], state.reports[place], state.head[0].hour
-    report.x, report.y, report.z = place_of(agent, hour)
-    report.status, report.battery = agent.status, battery_of(agent, hour)
+    report.x, report.y, report.z = place_of(agent, head.hour)
+    report.status, report.battery = agent.status, battery_of(agent, head.hour)
     report.task = agent.order_task if agent.order == TO_TASK else NOBODY
 
 
@@ -117,7 +140,7 @@ def drop_unknown(state: MissionArrays) -> None:
 
 
 @compiled
-def renumber(known: np.ndarray, number: np.ndarray) -> None:
+def renumber(known: NDArray[np.int32], number: NDArray[np.int32]) -> None:
     """Replace numbers of reports by new ones."""
     for place in range(len(known)):
         if known[place] != NOBODY:
@@ -134,21 +157,12 @@ def refresh(state: MissionArrays) -> None:
     for number in range(len(state.tasks)):
         if state.tasks[number].status != TO_COME:
             state.task_hour[0, number] = head.hour
-            state.task_left[0, number] = seen_of(state, number)
+            state.task_left[0, number] = seen_of(head, state.agents, state.tasks[number], number)
 
 
 @compiled
 def tell_all(state: MissionArrays, number: int) -> None:
     """Let all know what is so of an agent now."""
-    write_report(state, number, number)
+    write_report(state.head[0], state.agents[number], state.reports[number])
     state.agent_hour[0, number] = state.head[0].hour
     state.agent_report[0, number] = number
-
-
-@compiled
-def hear(hour: np.ndarray, value: np.ndarray, told_hour: np.ndarray, told: np.ndarray) -> None:
-    """Take over what is newer in a message than what is known."""
-    for place in range(len(hour)):
-        newer = told_hour[place] > hour[place]
-        value[place] = told[place] if newer else value[place]
-        hour[place] = told_hour[place] if newer else hour[place]

@@ -138,7 +138,7 @@ class Entry:
     hour: float
     turn: int
     count: int
-    item: int
+    subject: int
     version: int
 
 
@@ -230,8 +230,12 @@ class MissionArrays(NamedTuple):
         Where tasks are.
     places : ndarray, shape (3, n)
         Where agents are, in the turn in which somebody looks around.
+    visible : ndarray of bool, shape (n,)
+        Which agents are in the mission then.
     now : ndarray, shape (m,)
         What is seen of tasks then.
+    distance : ndarray, shape (max(n, m),)
+        How far they are from whoever looks around.
     task_hour, task_left : ndarray, shape (rows, m)
         Hour at which an agent's knowledge of a task was true, -1 where it knows nothing, and the work left then.
     agent_hour : ndarray, shape (rows, n)
@@ -258,7 +262,9 @@ class MissionArrays(NamedTuple):
     allowed: BoolArray
     sites: FloatArray
     places: FloatArray
+    visible: BoolArray
     now: FloatArray
+    distance: FloatArray
     task_hour: FloatArray
     task_left: FloatArray
     agent_hour: FloatArray

@@ -1,11 +1,12 @@
 """Flights and work between two events, compiled: see `alloc.problems.missions.simulation.motion`."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from alloc.allocators.missions.chance import fraction, keyed
-from alloc.allocators.missions.layout import FLYING, IDLE, NOBODY, OPEN, WORKING, Agent, Task, MissionArrays
+from alloc.allocators.missions.layout import FLYING, IDLE, NOBODY, OPEN, WORKING, Agent, Head, Task
 from alloc.allocators.runtime.compiled import compiled
 from alloc.problems.distances.reach import TOLERANCE
 
@@ -60,9 +61,8 @@ def can_fly(is_manhattan: int, agent: Agent, place: Point, battery: float, goal:
 
 
 @compiled
-def depart(state: MissionArrays, agent: Agent, goal: Point) -> None:
+def depart(head: Head, agent: Agent, goal: Point) -> None:
     """Let an agent that stands still begin a flight."""
-    head = state.head[0]
     agent.length = distance_between(head.is_manhattan, (agent.x, agent.y, agent.z), goal)
     agent.goal_x, agent.goal_y, agent.goal_z = goal
     agent.departs, agent.arrives = head.hour, head.hour + agent.length / agent.speed
@@ -90,15 +90,15 @@ def break_off(agent: Agent, hour: float) -> None:
 
 
 @compiled
-def begin_work(state: MissionArrays, number: int, at: int) -> None:
+def begin_work(head: Head, agents: Sequence[Agent], tasks: Sequence[Task], number: int, at: int) -> None:
     """Let an agent that is at an open task join those who work there."""
-    bring_up_to_date(state, at)
-    agent, task = state.agents[number], state.tasks[at]
+    agent, task = agents[number], tasks[at]
+    bring_up_to_date(head, agents, task, at)
     agent.previous, agent.next = task.last, NOBODY
     if task.last == NOBODY:
         task.first = number
     else:
-        state.agents[task.last].next = number
+        agents[task.last].next = number
     task.last = number
     task.begun = 1
     task.version += 1
@@ -106,42 +106,42 @@ def begin_work(state: MissionArrays, number: int, at: int) -> None:
 
 
 @compiled
-def stop_work(state: MissionArrays, number: int) -> None:
+def stop_work(head: Head, agents: Sequence[Agent], tasks: Sequence[Task], number: int) -> None:
     """Let an agent leave the task where it works, if there is one."""
-    agent = state.agents[number]
+    agent = agents[number]
     if agent.task == NOBODY:
         return
-    bring_up_to_date(state, agent.task)
-    task = state.tasks[agent.task]
+    task = tasks[agent.task]
+    bring_up_to_date(head, agents, task, agent.task)
     if agent.previous == NOBODY:
         task.first = agent.next
     else:
-        state.agents[agent.previous].next = agent.next
+        agents[agent.previous].next = agent.next
     if agent.next == NOBODY:
         task.last = agent.previous
     else:
-        state.agents[agent.next].previous = agent.previous
+        agents[agent.next].previous = agent.previous
     task.version += 1
     agent.task, agent.status = NOBODY, IDLE
 
 
 @compiled
-def ability_at(state: MissionArrays, task: Task) -> float:
+def ability_at(agents: Sequence[Agent], task: Task) -> float:
     """Return the ability of all who work at a task."""
     total, number = 0.0, task.first
     while number != NOBODY:
-        total += state.agents[number].ability
-        number = state.agents[number].next
+        total += agents[number].ability
+        number = agents[number].next
     return total
 
 
 @compiled
-def bring_up_to_date(state: MissionArrays, number: int) -> None:
+def bring_up_to_date(head: Head, agents: Sequence[Agent], task: Task, number: int) -> None:
     """Count what was worked, or grew, on an open task since it was brought up to date."""
-    task, hour = state.tasks[number], state.head[0].hour
+    hour = head.hour
     if task.status == OPEN:
         if task.first != NOBODY:
-            work = min(task.left, ability_at(state, task) * paced_hours(state, number, task.since, hour))
+            work = min(task.left, ability_at(agents, task) * paced_hours(head, number, task.since, hour))
             task.left -= work
             task.done += work
         elif not task.begun:
@@ -152,28 +152,27 @@ def bring_up_to_date(state: MissionArrays, number: int) -> None:
 
 
 @compiled
-def work_left(state: MissionArrays, number: int) -> float:
+def work_left(head: Head, agents: Sequence[Agent], task: Task, number: int) -> float:
     """Return the work left of a task now, without a change to it."""
-    task, hour = state.tasks[number], state.head[0].hour
+    hour = head.hour
     if task.status == OPEN and task.first != NOBODY:
-        return max(0.0, task.left - ability_at(state, task) * paced_hours(state, number, task.since, hour))
+        return max(0.0, task.left - ability_at(agents, task) * paced_hours(head, number, task.since, hour))
     if task.status == OPEN and not task.begun:
         return task.left + task.growth * (hour - task.since)
     return task.left
 
 
 @compiled
-def completion_hour(state: MissionArrays, number: int) -> float:
+def completion_hour(head: Head, agents: Sequence[Agent], task: Task, number: int) -> float:
     """Return when a task that is up to date will be done if nothing changes; ``inf`` if it will not in the mission."""
-    head, task = state.head[0], state.tasks[number]
-    needed = task.left / ability_at(state, task)
+    needed = task.left / ability_at(agents, task)
     if not head.has_pace:
         return task.since + needed
     begin, end = task.since, min(head.end, task.deadline)
     while begin <= end:
         period = math.floor(begin / head.pace_period)
         until = max((period + 1) * head.pace_period, np.nextafter(begin, np.inf))
-        factor = pace_factor(state, number, int(period))
+        factor = pace_factor(head, number, int(period))
         if factor * (until - begin) >= needed:
             return begin + needed / factor
         needed -= factor * (until - begin)
@@ -182,23 +181,21 @@ def completion_hour(state: MissionArrays, number: int) -> float:
 
 
 @compiled
-def paced_hours(state: MissionArrays, number: int, begin: float, end: float) -> float:
+def paced_hours(head: Head, number: int, begin: float, end: float) -> float:
     """Return the hours between two hours, each counted as often as the pace says."""
-    head = state.head[0]
     if not head.has_pace:
         return end - begin
     total = 0.0
     while begin < end:
         period = math.floor(begin / head.pace_period)
         until = min(end, max((period + 1) * head.pace_period, np.nextafter(begin, np.inf)))
-        total += pace_factor(state, number, int(period)) * (until - begin)
+        total += pace_factor(head, number, int(period)) * (until - begin)
         begin = until
     return total
 
 
 @compiled
-def pace_factor(state: MissionArrays, number: int, period: int) -> float:
+def pace_factor(head: Head, number: int, period: int) -> float:
     """Return how fast any group works on a task in a period."""
-    head = state.head[0]
     chance = fraction(keyed(keyed(head.pace_key, number), period))
     return head.pace_low + (head.pace_high - head.pace_low) * chance

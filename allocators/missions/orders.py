@@ -1,6 +1,7 @@
 """What orders do to agents, and what ends a task, compiled: see `alloc.problems.missions.simulation.changes`."""
 
 from alloc.allocators.missions.agenda import push
+from alloc.allocators.missions.knowledge import tell_all
 from alloc.allocators.missions.layout import (
     CANCELLED,
     DONE,
@@ -30,7 +31,7 @@ from alloc.allocators.missions.motion import (
     stop_work,
     work_left,
 )
-from alloc.allocators.runtime.compiled import compiled
+from alloc.allocators.runtime.compiled import compiled, inlined
 from alloc.problems.missions.simulation.agenda import Turn
 
 ARRIVAL, COMPLETION = int(Turn.ARRIVAL), int(Turn.COMPLETION)
@@ -75,8 +76,8 @@ def balance(state: MissionArrays) -> None:
         task = state.tasks[number]
         task.changed = 0
         if task.first != NOBODY:
-            bring_up_to_date(state, number)
-            hour = completion_hour(state, number)
+            bring_up_to_date(head, state.agents, task, number)
+            hour = completion_hour(head, state.agents, task, number)
             if hour < float("inf"):
                 push(state, max(hour, head.hour), COMPLETION, number, task.version)
 
@@ -84,8 +85,8 @@ def balance(state: MissionArrays) -> None:
 @compiled
 def close(state: MissionArrays, number: int, status: int) -> None:
     """Let a task be done, missed or cancelled now; who worked there is idle, and is to decide."""
-    bring_up_to_date(state, number)
     task, head = state.tasks[number], state.head[0]
+    bring_up_to_date(head, state.agents, task, number)
     if status == DONE:
         task.done += task.left
     elif status == MISSED:
@@ -109,7 +110,7 @@ def close(state: MissionArrays, number: int, status: int) -> None:
 @compiled
 def stand_still(state: MissionArrays, number: int) -> None:
     """Let an agent end its flight or its work where it is."""
-    stop_work(state, number)
+    stop_work(state.head[0], state.agents, state.tasks, number)
     break_off(state.agents[number], state.head[0].hour)
 
 
@@ -119,12 +120,12 @@ def land(state: MissionArrays, number: int) -> None:
     agent = state.agents[number]
     break_off(agent, state.head[0].hour)
     if agent.order == TO_TASK and state.tasks[agent.order_task].status == OPEN:
-        begin_work(state, number, agent.order_task)
+        begin_work(state.head[0], state.agents, state.tasks, number, agent.order_task)
     else:
         agent.order = STAY
 
 
-@compiled
+@inlined
 def order(state: MissionArrays, number: int, kind: int, task: int, place: Point) -> bool:
     """Give an agent an order; return whether it is followed, or done already.
 
@@ -139,9 +140,13 @@ def order(state: MissionArrays, number: int, kind: int, task: int, place: Point)
     place : tuple of float
         Where there is no task.
     """
+    return is_same(state.agents[number], kind, task, place) or follow(state, number, kind, task, place)
+
+
+@compiled
+def follow(state: MissionArrays, number: int, kind: int, task: int, place: Point) -> bool:
+    """Give an agent an order that is not its last one; return whether it is followed."""
     agent = state.agents[number]
-    if is_same(agent, kind, task, place):
-        return True
     left = agent.task
     if not obey(state, number, kind, task, place):
         state.head[0].refused += 1
@@ -151,9 +156,11 @@ def order(state: MissionArrays, number: int, kind: int, task: int, place: Point)
         agent.order_task = task
     elif kind == TO_PLACE:
         agent.order_x, agent.order_y, agent.order_z = place
-    if kind != STAY and agent.task == NOBODY and agent.arrives <= state.head[0].hour:
+    if agent.flight and agent.arrives <= state.head[0].hour:
         land(state, number)
     note_agent(state, number, left)
+    if not state.head[0].is_local:
+        tell_all(state, number)
     return True
 
 
@@ -192,7 +199,7 @@ def obey(state: MissionArrays, number: int, kind: int, task: int, place: Point) 
         return False
     count_switch(state, number, task if kind == TO_TASK else NOBODY)
     stand_still(state, number)
-    depart(state, agent, goal)
+    depart(head, agent, goal)
     return True
 
 
@@ -200,9 +207,8 @@ def obey(state: MissionArrays, number: int, kind: int, task: int, place: Point) 
 def count_switch(state: MissionArrays, number: int, to: int) -> None:
     """Count an order that sends a flying or working agent elsewhere while its task has work left."""
     agent = state.agents[number]
-    left = agent.task
-    if agent.status == FLYING and agent.order == TO_TASK:
-        left = agent.order_task
-    if left != NOBODY and left != to and state.tasks[left].status == OPEN and work_left(state, left) > 0:
+    left = agent.order_task if agent.status == FLYING and agent.order == TO_TASK else agent.task
+    if left in (NOBODY, to) or state.tasks[left].status != OPEN:
+        return
+    if work_left(state.head[0], state.agents, state.tasks[left], left) > 0:
         state.head[0].switches += 1
-

@@ -63,7 +63,9 @@ def pack(mission: Mission, knowledge: Knowledge | str | None = None) -> MissionA
         "allowed": _allowed(mission),
         "sites": np.ascontiguousarray(instance.task_position.T),
         "places": np.ascontiguousarray(instance.start_position.T),
+        "visible": np.zeros(n, np.bool_),
         "now": np.zeros(m),
+        "distance": np.zeros(max(n, m)),
         "task_hour": np.full((rows, m), -1.0),
         "task_left": np.zeros((rows, m)),
         "agent_hour": np.full((rows, n), -1.0),
@@ -80,7 +82,7 @@ def pack(mission: Mission, knowledge: Knowledge | str | None = None) -> MissionA
         "changed_agents": np.zeros(n, np.intp),
         "changed_tasks": np.zeros(m, np.intp),
     }
-    return cast(MissionArrays, MissionArrays(**parts))  # type: ignore[arg-type]  # records as compiled code sees them
+    return MissionArrays(**{name: _by_attribute(part) for name, part in parts.items()})  # type: ignore[arg-type]
 
 
 def begun(packed: MissionArrays, seed: int = 0) -> MissionArrays:
@@ -93,14 +95,14 @@ def begun(packed: MissionArrays, seed: int = 0) -> MissionArrays:
         Of the radio's chances, beside that of the mission.
     """
     state = MissionArrays(*(cast(FloatArray, part).copy() for part in packed))  # type: ignore[arg-type]
-    for key in ("loss_key", "burst_key"):
-        records(state.head)[key] = keyed(int(records(state.head)[key][0]), seed)
+    head = state.head[0]
+    head.loss_key, head.burst_key = keyed(head.loss_key, seed), keyed(head.burst_key, seed)
     return state
 
 
-def records(part: object) -> Records:
-    """Return a part of `MissionArrays` as the array that it is."""
-    return cast(Records, part)
+def _by_attribute(part: Records | FloatArray) -> Records | FloatArray:
+    """Return an array; one of records with its fields as attributes."""
+    return part if part.dtype.names is None else part.view(np.recarray)
 
 
 def _head(mission: Mission, knowledge: Knowledge, entries: int) -> Records:
@@ -190,7 +192,7 @@ def _agenda(mission: Mission, deadlines: NDArray[np.intp], knowledge: Knowledge,
     agenda = np.zeros(2 * least + 64, record_type(layout.Entry))
     ordered = sorted((hour, turn, count, item) for count, (hour, turn, item) in enumerate(rows, 1))
     for row, (hour, turn, count, item) in zip(agenda, ordered, strict=False):
-        row["hour"], row["turn"], row["count"], row["item"] = hour, turn, count, item
+        row["hour"], row["turn"], row["count"], row["subject"] = hour, turn, count, item
     return agenda
 
 
@@ -218,16 +220,16 @@ def measure(mission: Mission, state: MissionArrays, policy: str, seed: int = 0) 
     seed : int
         Of the run.
     """
-    head, agents, tasks = records(state.head)[0], records(state.agents), records(state.tasks)
-    knowledge = Knowledge.LOCAL if head["is_local"] else Knowledge.FULL
-    simulation = Simulation(mission, knowledge, seed, aware=False)
-    for agent, row in zip(simulation.state.agents, agents, strict=True):
-        agent.status = tuple(AgentStatus)[row["status"]]
-        agent.battery, agent.capacity = float(row["battery"]), float(row["capacity"])
-        agent.distance, agent.energy = float(row["distance"]), float(row["energy"])
-    for task, row in zip(simulation.state.tasks, tasks, strict=True):
-        task.status, task.begun = tuple(TaskStatus)[row["status"]], bool(row["begun"])
-        task.left, task.closed = float(row["left"]), float(row["closed"])
-    simulation.state.switches = int(head["switches"])
-    simulation.messages, simulation.bytes = agents["messages"].tolist(), agents["bytes"].tolist()
-    return replace(measured(simulation, policy, seed, DecisionTimes()), orders_refused=int(head["refused"]))
+    head = state.head[0]
+    simulation = Simulation(mission, Knowledge.LOCAL if head.is_local else Knowledge.FULL, seed, aware=False)
+    for agent, flown in zip(simulation.state.agents, state.agents, strict=True):
+        agent.status = tuple(AgentStatus)[flown.status]
+        agent.battery, agent.capacity = float(flown.battery), float(flown.capacity)
+        agent.distance, agent.energy = float(flown.distance), float(flown.energy)
+    for task, worked in zip(simulation.state.tasks, state.tasks, strict=True):
+        task.status, task.begun = tuple(TaskStatus)[worked.status], bool(worked.begun)
+        task.left, task.closed = float(worked.left), float(worked.closed)
+    simulation.state.switches = int(head.switches)
+    for number, agent in enumerate(state.agents):
+        simulation.messages[number], simulation.bytes[number] = int(agent.messages), int(agent.bytes)
+    return replace(measured(simulation, policy, seed, DecisionTimes()), orders_refused=int(head.refused))

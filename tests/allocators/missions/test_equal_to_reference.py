@@ -10,7 +10,7 @@ import pytest
 from alloc.allocators.missions.advance import advance
 from alloc.allocators.missions.layout import MESSAGES, NOBODY, ORDERS, OVER, STAY, TO_PLACE, TO_TASK, MissionArrays
 from alloc.allocators.missions.orders import order
-from alloc.allocators.missions.pack import begun, measure, pack, records
+from alloc.allocators.missions.pack import begun, measure, pack
 from alloc.problems.instance import Instance
 from alloc.problems.missions.events import Event, EventKind
 from alloc.problems.missions.mission import Mission
@@ -72,7 +72,11 @@ def random_mission(seed: int) -> Mission:
     joins = [rng.choice([0.0, 0.0, rng.uniform(0, 0.4)]) for _ in range(n)]
     appears = [rng.choice([0.0, 0.0, rng.uniform(0, 1.4)]) for _ in range(m)]
     grid = rng.random() < 0.3
-    place = (lambda: (float(rng.randint(0, 4)), float(rng.randint(0, 4)))) if grid else (lambda: (rng.random(), rng.random()))
+    place = (
+        (lambda: (float(rng.randint(0, 4)), float(rng.randint(0, 4))))
+        if grid
+        else (lambda: (rng.random(), rng.random()))
+    )
     known = rng.random() < 0.9
     instance = Instance(
         ability=[rng.choice([1.0, 2.0, rng.uniform(0.5, 4)]) for _ in range(n)],
@@ -121,12 +125,12 @@ def require_same_knowledge(view: View, state: MissionArrays, row: int, mission: 
     for name, agent in view.agents.items():
         i = mission.instance.agent_index[name]
         assert state.agent_hour[row, i] == pytest.approx(agent.hour, rel=1e-9)
-        report = records(state.reports)[state.agent_report[row, i]]
-        assert AGENT_STATUS[report["status"]] is agent.status
+        report = state.reports[state.agent_report[row, i]]
+        assert AGENT_STATUS[report.status] is agent.status
         if agent.place.position is not None:
-            assert [report[axis] for axis in "xyz"] == pytest.approx(agent.place.position, rel=1e-9, abs=1e-9)
-        assert report["battery"] == pytest.approx(agent.battery, rel=1e-9, abs=1e-9)
-        assert report["task"] == (NOBODY if agent.task is None else mission.instance.task_index[agent.task])
+            assert (report.x, report.y, report.z) == pytest.approx(agent.place.position, rel=1e-9, abs=1e-9)
+        assert report.battery == pytest.approx(agent.battery, rel=1e-9, abs=1e-9)
+        assert report.task == (NOBODY if agent.task is None else mission.instance.task_index[agent.task])
 
 
 def random_order(rng: random.Random, mission: Mission) -> tuple[Order, int, int, tuple[float, float, float]]:
@@ -144,7 +148,7 @@ def run_both(mission: Mission, seed: int, patience: float) -> tuple[MissionResul
     At every request all that is known is compared, and what becomes of each order.
     """
     reference, state = Simulation(mission, seed=seed), begun(pack(mission), seed)
-    rng, head = random.Random(seed), records(state.head)
+    rng, head = random.Random(seed), state.head[0]
     index = mission.instance.agent_index
     while True:
         request, wanted = reference.advance(), advance(state)
@@ -152,16 +156,17 @@ def run_both(mission: Mission, seed: int, patience: float) -> tuple[MissionResul
             assert wanted == OVER
             break
         assert wanted == (MESSAGES if request.wanted is Wanted.MESSAGES else ORDERS)
-        assert head["hour"][0] == pytest.approx(request.hour, rel=1e-9)
+        assert head.hour == pytest.approx(request.hour, rel=1e-9)
         numbers = [index[name] for name in request.agents]
         if request.wanted is Wanted.MESSAGES:
-            records(state.agents)["speaks"] = 0
+            for agent in state.agents:
+                agent.speaks = 0
             for name, number in zip(request.agents, numbers, strict=True):
                 if rng.random() < 0.8:
-                    records(state.agents)["speaks"][number] = 1
+                    state.agents[number].speaks = 1
                     reference.send(name, reference.view(name, is_glance=True).message())
             continue
-        assert state.deciding[: head["deciding"][0]].tolist() == numbers
+        assert state.deciding[: head.deciding].tolist() == numbers
         for name, number in zip(request.agents, numbers, strict=True):
             row = number if reference.knowledge is Knowledge.LOCAL else 0
             require_same_knowledge(reference.view(name), state, row, mission)
