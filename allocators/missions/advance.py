@@ -7,7 +7,7 @@ import numpy as np
 from alloc.allocators.missions.agenda import first_hour, pop, push
 from alloc.allocators.missions.channel import deliver, is_silent, send_all
 from alloc.allocators.missions.events import happen
-from alloc.allocators.missions.knowledge import look_around, refresh, see_all
+from alloc.allocators.missions.knowledge import look_around, refresh
 from alloc.allocators.missions.layout import (
     DONE,
     IDLE,
@@ -38,7 +38,7 @@ BETWEEN, WITHIN, TALKING, ORDERED = range(4)
 def advance(state: MissionArrays) -> int:
     """Go on to where agents may send messages (`MESSAGES`) or get orders (`ORDERS`), or to the end (`OVER`).
 
-    Who gets orders stands in `deciding`, the first `head.deciding` of them. Who may speak does if `Agent.speaks` says so.
+    Who gets orders stands in `deciding`, the first `head.deciding` of them. Who can speak does if `Agent.speaks` is set.
     """
     head, agents, agenda = state.head[0], state.agents, state.agenda
     if head.stage == TALKING:
@@ -109,18 +109,18 @@ def arrive(state: MissionArrays, number: int) -> None:
 @compiled
 def talk(state: MissionArrays) -> bool:
     """Let all agents look around; return whether any can send a message."""
-    see_all(state.head[0], state.agents, state.tasks, state.places, state.visible, state.now)
-    can_send = False
+    head, can_send = state.head[0], False
     for number in range(len(state.agents)):
         agent = state.agents[number]
         if IDLE <= agent.status <= WORKING:
-            if agent.looked != state.head[0].turn:
-                look_around(state, number)
             agent.decides = 1
-            can_send = can_send or not state.head[0].silences or not is_silent(state, number)
+            agent.looked = head.turn
+            state.looks[number] = True
+            can_send = can_send or not head.silences or not is_silent(state, number)
+    look_around(state)
     if not can_send:
-        state.head[0].tick += 1
-        push(state, state.head[0].tick * state.head[0].period, RADIO, 0, 0)
+        head.tick += 1
+        push(state, head.tick * head.period, RADIO, 0, 0)
     return can_send
 
 
@@ -156,14 +156,14 @@ def look(state: MissionArrays) -> None:
     if not head.is_local:
         refresh(state)
         return
-    is_stale = True
+    is_stale = False
     for place in range(head.deciding):
-        number = state.deciding[place]
-        if state.agents[number].looked != head.turn:
-            if is_stale:
-                see_all(head, state.agents, state.tasks, state.places, state.visible, state.now)
-                is_stale = False
-            look_around(state, number)
+        agent = state.agents[state.deciding[place]]
+        if agent.looked != head.turn:
+            agent.looked = head.turn
+            state.looks[state.deciding[place]] = is_stale = True
+    if is_stale:
+        look_around(state)
 
 
 @inlined

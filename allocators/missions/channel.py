@@ -1,19 +1,17 @@
 """The radio, compiled: see `alloc.problems.missions.simulation.channel`."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from alloc.allocators.missions.chance import fraction, keyed
-from alloc.allocators.missions.knowledge import fill_distances
-from alloc.allocators.missions.layout import IDLE, NOBODY, WORKING, Head, MissionArrays
+from alloc.allocators.missions.knowledge import Numbers, length
+from alloc.allocators.missions.layout import IDLE, NOBODY, WORKING, Agent, Head, MissionArrays
 from alloc.allocators.missions.motion import distance_between, place_of
 from alloc.allocators.runtime.compiled import compiled
 from alloc.problems.fields import BoolArray, FloatArray, IntArray
 from alloc.problems.missions.simulation.reports import BYTES_OF_AGENT, BYTES_OF_MESSAGE, BYTES_OF_TASK
-
-Numbers = NDArray[np.int32]
 
 
 @compiled
@@ -37,49 +35,78 @@ def is_silent(state: MissionArrays, number: int) -> bool:
 @compiled
 def send_all(state: MissionArrays, slot: int) -> bool:
     """Send a message of each agent that can and will, all that it knows; return whether any is heard."""
-    head = state.head[0]
-    found = False
-    state.heard[slot] = False
-    for number in range(len(state.agents)):
-        agent = state.agents[number]
-        if not (state.visible[number] and agent.speaks) or (head.silences and is_silent(state, number)):
-            continue
-        agent.messages += 1
-        agent.bytes += BYTES_OF_MESSAGE + BYTES_OF_AGENT * count_known(state.agent_hour, number)
-        agent.bytes += BYTES_OF_TASK * count_known(state.task_hour, number)
-        fill_distances(head, state.places, number, state.places, state.distance)
-        if find_hearers(head, number, state.visible, state.distance, state.heard[slot, number]):
-            found = True
-            state.sent_task_hour[slot, number] = state.task_hour[number]
-            state.sent_task_left[slot, number] = state.task_left[number]
-            state.sent_agent_hour[slot, number] = state.agent_hour[number]
-            state.sent_agent_report[slot, number] = state.agent_report[number]
+    head, agents, speaks = state.head[0], state.agents, state.speaks
+    for number in range(len(agents)):
+        speaks[number] = state.visible[number] and agents[number].speaks != 0
+        if speaks[number] and head.silences and is_silent(state, number):
+            speaks[number] = False
+        if speaks[number]:
+            agents[number].messages += 1
+            agents[number].bytes += BYTES_OF_MESSAGE
+    heard = state.heard[slot]
+    found = find_hearers(head, speaks, state.visible, state.places, heard)
+    keep_tasks(agents, speaks, state.task_hour, state.task_left, state.sent_task_hour[slot], state.sent_task_left[slot])
+    sent = state.sent_agent_hour[slot], state.sent_agent_report[slot]
+    keep_agents(agents, speaks, state.agent_hour, state.agent_report, sent[0], sent[1])
     if head.has_burst and found:
-        lose_in_bursts(head, state.heard[slot], state.link_number, state.link_bad)
+        lose_in_bursts(head, heard, state.link_number, state.link_bad)
     head.tick += 1
     return found
 
 
 @compiled
-def count_known(hours: FloatArray, row: int) -> int:
-    """Return of how many agents or tasks something is known."""
-    known = 0
-    for place in range(hours.shape[1]):
-        known += hours[row, place] >= 0
-    return known
+def keep_tasks(
+    agents: Sequence[Agent], speaks: BoolArray, hour: FloatArray, left: FloatArray, sent: FloatArray, told: FloatArray
+) -> None:
+    """Keep what is sent of tasks, and count its bytes."""
+    for number in range(len(speaks)):
+        if speaks[number]:
+            known = 0
+            hours, works, sent_hours, sent_works = hour[number], left[number], sent[number], told[number]
+            for task in range(len(hours)):
+                sent_hours[task] = hours[task]
+                sent_works[task] = works[task]
+                known += hours[task] >= 0
+            agents[number].bytes += BYTES_OF_TASK * known
 
 
 @compiled
-def find_hearers(head: Head, sender: int, visible: BoolArray, distance: FloatArray, heard: BoolArray) -> bool:
-    """Fill in who will hear the message that an agent sends now; return whether there is anybody."""
+def keep_agents(
+    agents: Sequence[Agent], speaks: BoolArray, hour: FloatArray, report: Numbers, sent: FloatArray, told: Numbers
+) -> None:
+    """Keep what is sent of agents, and count its bytes."""
+    for number in range(len(speaks)):
+        if speaks[number]:
+            known = 0
+            hours, reports, sent_hours, sent_reports = hour[number], report[number], sent[number], told[number]
+            for agent in range(len(hours)):
+                sent_hours[agent] = hours[agent]
+                sent_reports[agent] = reports[agent]
+                known += hours[agent] >= 0
+            agents[number].bytes += BYTES_OF_AGENT * known
+
+
+@compiled
+def find_hearers(head: Head, speaks: BoolArray, visible: BoolArray, places: FloatArray, heard: BoolArray) -> bool:
+    """Fill in who will hear the message that each agent sends now; return whether there is anybody."""
     found = False
-    key = keyed(head.loss_key, sender)
-    for number in range(len(visible)):
-        if not visible[number] or number == sender or distance[number] > head.radius:
+    radius, loss, is_manhattan, tick = head.radius, head.loss, head.is_manhattan, head.tick
+    at_x, at_y, at_z = places[0], places[1], places[2]
+    for sender in range(len(speaks)):
+        hears = heard[sender]
+        hears[:] = False
+        if not speaks[sender]:
             continue
-        if head.loss > 0 and fraction(keyed(keyed(key, number), head.tick)) < head.loss:
-            continue
-        heard[number] = found = True
+        x, y, z = at_x[sender], at_y[sender], at_z[sender]
+        key = keyed(head.loss_key, sender)
+        for number in range(len(visible)):
+            if length(is_manhattan, at_x[number] - x, at_y[number] - y, at_z[number] - z) > radius:
+                continue
+            if not visible[number] or number == sender:
+                continue
+            if loss > 0 and fraction(keyed(keyed(key, number), tick)) < loss:
+                continue
+            hears[number] = found = True
     return found
 
 
@@ -128,21 +155,25 @@ def hear_of_tasks(
 ) -> None:
     """Take over what is newer in messages than what is known of tasks."""
     for sender in range(len(heard)):
-        for number in range(len(heard)):
-            if heard[sender, number]:
-                for task in range(hour.shape[1]):
-                    newer = told_hour[sender, task] > hour[number, task]
-                    left[number, task] = told_left[sender, task] if newer else left[number, task]
-                    hour[number, task] = told_hour[sender, task] if newer else hour[number, task]
+        sent_hours, sent_works, hears = told_hour[sender], told_left[sender], heard[sender]
+        for number in range(len(hears)):
+            if hears[number]:
+                hours, works = hour[number], left[number]
+                for task in range(len(hours)):
+                    newer = sent_hours[task] > hours[task]
+                    works[task] = sent_works[task] if newer else works[task]
+                    hours[task] = sent_hours[task] if newer else hours[task]
 
 
 @compiled
 def hear_of_agents(heard: BoolArray, told_hour: FloatArray, told: Numbers, hour: FloatArray, report: Numbers) -> None:
     """Take over what is newer in messages than what is known of agents."""
     for sender in range(len(heard)):
-        for number in range(len(heard)):
-            if heard[sender, number]:
-                for agent in range(hour.shape[1]):
-                    newer = told_hour[sender, agent] > hour[number, agent]
-                    report[number, agent] = told[sender, agent] if newer else report[number, agent]
-                    hour[number, agent] = told_hour[sender, agent] if newer else hour[number, agent]
+        sent_hours, sent_reports, hears = told_hour[sender], told[sender], heard[sender]
+        for number in range(len(hears)):
+            if hears[number]:
+                hours, reports = hour[number], report[number]
+                for agent in range(len(hours)):
+                    newer = sent_hours[agent] > hours[agent]
+                    reports[agent] = sent_reports[agent] if newer else reports[agent]
+                    hours[agent] = sent_hours[agent] if newer else hours[agent]

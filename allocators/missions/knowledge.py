@@ -21,24 +21,43 @@ from alloc.allocators.missions.layout import (
     Task,
 )
 from alloc.allocators.missions.motion import battery_of, place_of, work_left
-from alloc.allocators.runtime.compiled import compiled
+from alloc.allocators.runtime.compiled import compiled, inlined
 from alloc.problems.fields import BoolArray, FloatArray
+
+Numbers = NDArray[np.int32]
 
 INVISIBLE = -9.0
 """What is seen of a task that is to come."""
 
 
 @compiled
-def see_all(
-    head: Head, agents: Sequence[Agent], tasks: Sequence[Task], places: FloatArray, visible: BoolArray, now: FloatArray
-) -> None:
-    """Fill in where all agents are, which are in the mission, and what is seen of all tasks."""
+def look_around(state: MissionArrays) -> None:
+    """Let all agents that are to look around see all tasks and all agents in the mission within the sensing radius."""
+    head, agents = state.head[0], state.agents
+    if head.reports + len(agents) > len(state.reports):
+        drop_unknown(state)
     for number in range(len(agents)):
         agent = agents[number]
-        places[0, number], places[1, number], places[2, number] = place_of(agent, head.hour)
-        visible[number] = IDLE <= agent.status <= WORKING
-    for number in range(len(tasks)):
-        now[number] = seen_of(head, agents, tasks[number], number)
+        state.visible[number] = IDLE <= agent.status <= WORKING
+        if state.visible[number]:
+            agent.report = head.reports
+            write_report(head, agent, state.reports[head.reports])
+            head.reports += 1
+    locate(head, agents, state.places, state.numbers)
+    for number in range(len(state.tasks)):
+        state.now[number] = seen_of(head, agents, state.tasks[number], number)
+    see_tasks(head, state.looks, state.places, state.sites, state.now, state.task_hour, state.task_left)
+    seen = state.visible, state.numbers, state.agent_hour, state.agent_report
+    see_agents(head, state.looks, state.places, seen[0], seen[1], seen[2], seen[3])
+    state.looks[:] = False
+
+
+@compiled
+def locate(head: Head, agents: Sequence[Agent], places: FloatArray, reports: Numbers) -> None:
+    """Fill in where all agents are, and their last reports."""
+    for number in range(len(agents)):
+        places[0, number], places[1, number], places[2, number] = place_of(agents[number], head.hour)
+        reports[number] = agents[number].report
 
 
 @compiled
@@ -49,53 +68,58 @@ def seen_of(head: Head, agents: Sequence[Agent], task: Task, number: int) -> flo
     return INVISIBLE if task.status == TO_COME else -float(task.status)
 
 
-@compiled
-def look_around(state: MissionArrays, number: int) -> None:
-    """Let an agent see all tasks and all agents in the mission within its sensing radius."""
-    head, agents = state.head[0], state.agents
-    agents[number].looked = head.turn
-    fill_distances(head, state.places, number, state.places, state.distance)
-    for other in range(len(agents)):
-        if other == number or (state.visible[other] and not state.distance[other] > head.sensing):
-            if agents[other].reported != head.turn:
-                report(state, other)
-            state.agent_hour[number, other] = head.hour
-            state.agent_report[number, other] = agents[other].report
-    fill_distances(head, state.places, number, state.sites, state.distance)
-    see_tasks(head, state.now, state.distance, state.task_hour[number], state.task_left[number])
+@inlined
+def length(is_manhattan: int, dx: float, dy: float, dz: float) -> float:
+    """Return the length of a way, NaN where an end is unknown."""
+    return abs(dx) + abs(dy) + abs(dz) if is_manhattan else math.sqrt(dx * dx + dy * dy + dz * dz)
 
 
 @compiled
-def see_tasks(head: Head, now: FloatArray, distance: FloatArray, hour: FloatArray, left: FloatArray) -> None:
-    """Take notice of the tasks that an agent sees."""
-    for task in range(len(now)):
-        seen = now[task] != INVISIBLE and not distance[task] > head.sensing
-        hour[task] = head.hour if seen else hour[task]
-        left[task] = now[task] if seen else left[task]
+def see_tasks(
+    head: Head,
+    looks: BoolArray,
+    places: FloatArray,
+    sites: FloatArray,
+    now: FloatArray,
+    task_hour: FloatArray,
+    task_left: FloatArray,
+) -> None:
+    """Take notice of the tasks that agents see."""
+    at_x, at_y, at_z = sites[0], sites[1], sites[2]
+    sensing, hour, is_manhattan = head.sensing, head.hour, head.is_manhattan
+    for number in range(len(looks)):
+        if looks[number]:
+            x, y, z = places[0, number], places[1, number], places[2, number]
+            hours, left = task_hour[number], task_left[number]
+            for task in range(len(now)):
+                is_far = length(is_manhattan, at_x[task] - x, at_y[task] - y, at_z[task] - z) > sensing
+                is_unseen = is_far | (now[task] == INVISIBLE)
+                hours[task] = hours[task] if is_unseen else hour
+                left[task] = left[task] if is_unseen else now[task]
 
 
 @compiled
-def fill_distances(head: Head, places: FloatArray, number: int, goals: FloatArray, distance: FloatArray) -> None:
-    """Fill in how far places are from that of an agent; NaN where one is unknown."""
-    x, y, z = places[0, number], places[1, number], places[2, number]
-    is_manhattan = head.is_manhattan
-    for goal in range(goals.shape[1]):
-        dx, dy, dz = goals[0, goal] - x, goals[1, goal] - y, goals[2, goal] - z
-        if is_manhattan:
-            distance[goal] = abs(dx) + abs(dy) + abs(dz)
-        else:
-            distance[goal] = math.sqrt(dx * dx + dy * dy + dz * dz)
-
-
-@compiled
-def report(state: MissionArrays, number: int) -> None:
-    """Report what is true of an agent now, once for all who see it in a turn."""
-    head, agent = state.head[0], state.agents[number]
-    if head.reports == len(state.reports):
-        drop_unknown(state)
-    agent.report, agent.reported = head.reports, head.turn
-    write_report(head, agent, state.reports[head.reports])
-    head.reports += 1
+def see_agents(
+    head: Head,
+    looks: BoolArray,
+    places: FloatArray,
+    visible: BoolArray,
+    reports: Numbers,
+    agent_hour: FloatArray,
+    agent_report: Numbers,
+) -> None:
+    """Take notice of the agents that agents see."""
+    at_x, at_y, at_z = places[0], places[1], places[2]
+    sensing, hour, is_manhattan = head.sensing, head.hour, head.is_manhattan
+    for number in range(len(looks)):
+        if looks[number]:
+            x, y, z = at_x[number], at_y[number], at_z[number]
+            hours, known = agent_hour[number], agent_report[number]
+            for other in range(len(visible)):
+                is_far = length(is_manhattan, at_x[other] - x, at_y[other] - y, at_z[other] - z) > sensing
+                is_unseen = is_far | (not visible[other])
+                hours[other] = hours[other] if is_unseen else hour
+                known[other] = known[other] if is_unseen else reports[other]
 
 
 @compiled
@@ -117,9 +141,6 @@ def drop_unknown(state: MissionArrays) -> None:
     for known in state.sent_agent_report.flat:
         if known != NOBODY:
             number[known] = 0
-    for agent in range(len(state.agents)):
-        if state.agents[agent].reported == head.turn:
-            number[state.agents[agent].report] = 0
     kept = 0
     for place in range(len(number)):
         if number[place] != NOBODY:
@@ -129,18 +150,15 @@ def drop_unknown(state: MissionArrays) -> None:
                 one.status, one.x, one.y, one.z = other.status, other.x, other.y, other.z
                 one.battery, one.task = other.battery, other.task
             kept += 1
-    if kept == len(number):
+    if kept + len(state.agents) > len(number):
         raise OverflowError("a compiled mission has no room for what agents know")
     head.reports = kept
     renumber(state.agent_report.reshape(-1), number)
     renumber(state.sent_agent_report.reshape(-1), number)
-    for agent in range(len(state.agents)):
-        if state.agents[agent].reported == head.turn:
-            state.agents[agent].report = number[state.agents[agent].report]
 
 
 @compiled
-def renumber(known: NDArray[np.int32], number: NDArray[np.int32]) -> None:
+def renumber(known: Numbers, number: Numbers) -> None:
     """Replace numbers of reports by new ones."""
     for place in range(len(known)):
         if known[place] != NOBODY:

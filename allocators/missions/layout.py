@@ -41,8 +41,8 @@ class Agent:
         Whether it is to get an order; whether its flight may end at another hour.
     looked : int
         Number of the turn in which it looked around.
-    report, reported : int
-        What is known of it by those who see it in turn `reported`.
+    report : int
+        The last one of it.
     known : int
         Row of what it knows.
     """
@@ -86,12 +86,11 @@ class Agent:
     changed: int
     looked: int
     report: int
-    reported: int
     known: int
 
 
 class Task:
-    """A task: see `TaskFacts` and `TaskState`; `first` and `last` are those who work there, `changed` as of an agent."""
+    """A task: see `TaskFacts` and `TaskState`; `first` and `last` work there, `changed` is as of an agent."""
 
     workload: float
     x: float
@@ -234,8 +233,10 @@ class MissionArrays(NamedTuple):
         Which agents are in the mission then.
     now : ndarray, shape (m,)
         What is seen of tasks then.
-    distance : ndarray, shape (max(n, m),)
-        How far they are from whoever looks around.
+    looks, speaks : ndarray of bool, shape (n,)
+        Who is to look around, and who sends a message.
+    numbers : ndarray of int, shape (n,)
+        Last report of each agent.
     task_hour, task_left : ndarray, shape (rows, m)
         Hour at which an agent's knowledge of a task was true, -1 where it knows nothing, and the work left then.
     agent_hour : ndarray, shape (rows, n)
@@ -264,7 +265,9 @@ class MissionArrays(NamedTuple):
     places: FloatArray
     visible: BoolArray
     now: FloatArray
-    distance: FloatArray
+    looks: BoolArray
+    speaks: BoolArray
+    numbers: NDArray[np.int32]
     task_hour: FloatArray
     task_left: FloatArray
     agent_hour: FloatArray
