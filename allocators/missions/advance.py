@@ -38,7 +38,7 @@ BETWEEN, WITHIN, TALKING, ORDERED = range(4)
 def advance(state: MissionArrays) -> int:
     """Go on to where agents may send messages (`MESSAGES`) or get orders (`ORDERS`), or to the end (`OVER`).
 
-    Who gets orders stands in `deciding`, the first `head.deciding` of them. Who can speak does if `Agent.speaks` is set.
+    Who gets orders stands in `deciding`, the first `head.deciding` of them. Who can send does if `Agent.speaks` is set.
     """
     head, agents, agenda = state.head[0], state.agents, state.agenda
     if head.stage == TALKING:

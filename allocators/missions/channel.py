@@ -155,25 +155,21 @@ def hear_of_tasks(
 ) -> None:
     """Take over what is newer in messages than what is known of tasks."""
     for sender in range(len(heard)):
-        sent_hours, sent_works, hears = told_hour[sender], told_left[sender], heard[sender]
-        for number in range(len(hears)):
-            if hears[number]:
-                hours, works = hour[number], left[number]
-                for task in range(len(hours)):
-                    newer = sent_hours[task] > hours[task]
-                    works[task] = sent_works[task] if newer else works[task]
-                    hours[task] = sent_hours[task] if newer else hours[task]
+        for number in range(len(heard)):
+            if heard[sender, number]:
+                for task in range(hour.shape[1]):
+                    if told_hour[sender, task] > hour[number, task]:
+                        hour[number, task] = told_hour[sender, task]
+                        left[number, task] = told_left[sender, task]
 
 
 @compiled
 def hear_of_agents(heard: BoolArray, told_hour: FloatArray, told: Numbers, hour: FloatArray, report: Numbers) -> None:
     """Take over what is newer in messages than what is known of agents."""
     for sender in range(len(heard)):
-        sent_hours, sent_reports, hears = told_hour[sender], told[sender], heard[sender]
-        for number in range(len(hears)):
-            if hears[number]:
-                hours, reports = hour[number], report[number]
-                for agent in range(len(hours)):
-                    newer = sent_hours[agent] > hours[agent]
-                    reports[agent] = sent_reports[agent] if newer else reports[agent]
-                    hours[agent] = sent_hours[agent] if newer else hours[agent]
+        for number in range(len(heard)):
+            if heard[sender, number]:
+                for agent in range(hour.shape[1]):
+                    if told_hour[sender, agent] > hour[number, agent]:
+                        hour[number, agent] = told_hour[sender, agent]
+                        report[number, agent] = told[sender, agent]

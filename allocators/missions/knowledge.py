@@ -90,12 +90,11 @@ def see_tasks(
     for number in range(len(looks)):
         if looks[number]:
             x, y, z = places[0, number], places[1, number], places[2, number]
-            hours, left = task_hour[number], task_left[number]
             for task in range(len(now)):
                 is_far = length(is_manhattan, at_x[task] - x, at_y[task] - y, at_z[task] - z) > sensing
-                is_unseen = is_far | (now[task] == INVISIBLE)
-                hours[task] = hours[task] if is_unseen else hour
-                left[task] = left[task] if is_unseen else now[task]
+                if not is_far and now[task] != INVISIBLE:
+                    task_hour[number, task] = hour
+                    task_left[number, task] = now[task]
 
 
 @compiled
@@ -114,12 +113,11 @@ def see_agents(
     for number in range(len(looks)):
         if looks[number]:
             x, y, z = at_x[number], at_y[number], at_z[number]
-            hours, known = agent_hour[number], agent_report[number]
             for other in range(len(visible)):
                 is_far = length(is_manhattan, at_x[other] - x, at_y[other] - y, at_z[other] - z) > sensing
-                is_unseen = is_far | (not visible[other])
-                hours[other] = hours[other] if is_unseen else hour
-                known[other] = known[other] if is_unseen else reports[other]
+                if not is_far and visible[other]:
+                    agent_hour[number, other] = hour
+                    agent_report[number, other] = reports[other]
 
 
 @compiled

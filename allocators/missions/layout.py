@@ -157,6 +157,8 @@ class Head:
 
     Attributes
     ----------
+    span : float
+        Diagonal of the area.
     loss_key, burst_key, pace_key : int
         States of the hash of chances after the seeds.
     stage : int
@@ -170,6 +172,7 @@ class Head:
     """
 
     end: float
+    span: float
     is_local: int
     is_manhattan: int
     sensing: float
@@ -225,6 +228,8 @@ class MissionArrays(NamedTuple):
     events, agenda, reports : records
     allowed : ndarray of bool, shape (n, m)
         Which agent may do which task, by its list and its skills.
+    area : ndarray, shape (2, 3)
+        Least and largest coordinates of all places, which all know.
     sites : ndarray, shape (3, m)
         Where tasks are.
     places : ndarray, shape (3, n)
@@ -261,6 +266,7 @@ class MissionArrays(NamedTuple):
     agenda: Sequence[Entry]
     reports: Sequence[Report]
     allowed: BoolArray
+    area: FloatArray
     sites: FloatArray
     places: FloatArray
     visible: BoolArray

@@ -1,5 +1,6 @@
 """A mission as arrays for compiled code, and its measures when it is over."""
 
+import math
 from dataclasses import replace
 from typing import cast
 
@@ -61,6 +62,7 @@ def pack(mission: Mission, knowledge: Knowledge | str | None = None) -> MissionA
         "agenda": agenda,
         "reports": np.zeros(reports, record_type(layout.Report)),
         "allowed": _allowed(mission),
+        "area": np.array(mission.area),
         "sites": np.ascontiguousarray(instance.task_position.T),
         "places": np.ascontiguousarray(instance.start_position.T),
         "visible": np.zeros(n, np.bool_),
@@ -112,6 +114,7 @@ def _head(mission: Mission, knowledge: Knowledge, entries: int) -> Records:
     head = np.zeros(1, record_type(layout.Head))
     values: dict[str, float] = {
         "end": mission.end,
+        "span": math.dist(*mission.area),
         "is_local": knowledge is Knowledge.LOCAL,
         "is_manhattan": mission.instance.metric == MANHATTAN,
         "sensing": mission.sensing,

@@ -5,10 +5,7 @@ import torch
 from torch import Tensor, nn
 
 from alloc.allocators.learned.missions.feature_names import FEATURES, FIRST_SKIP
-from alloc.allocators.learned.missions.network_arrays import MissionWeights, Singles
-
-HIDDEN = 16
-"""Width of the network."""
+from alloc.allocators.learned.missions.network_arrays import HIDDEN, MissionWeights, Singles
 
 
 class MissionNetwork(nn.Module):

@@ -7,6 +7,9 @@ from numpy.typing import NDArray
 
 Singles = NDArray[np.float32]
 
+HIDDEN = 16
+"""Width of the network."""
+
 
 class MissionWeights(NamedTuple):
     """Weights of a `MissionNetwork` that score options; matrices by input, then output."""

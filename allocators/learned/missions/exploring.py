@@ -1,0 +1,93 @@
+"""Where to look around: the place that is near, and was not seen for long by anybody, as far as an agent knows."""
+
+import math
+
+import numpy as np
+
+from alloc.allocators.learned.missions import situation as known
+from alloc.allocators.learned.missions.situation import Situation
+from alloc.allocators.missions.chance import first_key, fraction, keyed
+from alloc.allocators.runtime.compiled import compiled
+from alloc.problems.fields import FloatArray
+
+CELLS = 8
+"""Cells of the area along two axes, of each of which an agent remembers when it was last seen."""
+
+BATTERY_SHARE = 0.25
+"""Part of its battery that an agent spends on one flight without a task at the most."""
+
+SPREAD = 0.3
+"""Part of the choice that is chance, so that agents who know the same go different ways."""
+
+EXPLORING = 11
+"""What chances are for, as `alloc.problems.missions.chance` counts."""
+
+
+@compiled
+def centre(area: FloatArray, cell: int) -> tuple[float, float, float]:
+    """Return the centre of a cell; `area` has the least and the largest coordinates in two rows."""
+    x, y = (cell % CELLS + 0.5) / CELLS, (cell // CELLS + 0.5) / CELLS
+    low, high = area[0], area[1]
+    return low[0] + x * (high[0] - low[0]), low[1] + y * (high[1] - low[1]), 0.5 * (low[2] + high[2])
+
+
+@compiled
+def notice(area: FloatArray, sensing: float, x: float, y: float, hour: float, seen: FloatArray) -> None:
+    """Note that all within the sensing radius of a place was seen at an hour; `seen` has one hour for each cell."""
+    wide, deep = (area[1, 0] - area[0, 0]) / CELLS, (area[1, 1] - area[0, 1]) / CELLS
+    for cell in range(len(seen)):
+        dx = area[0, 0] + (cell % CELLS + 0.5) * wide - x
+        dy = area[0, 1] + (cell // CELLS + 0.5) * deep - y
+        if dx * dx + dy * dy <= sensing * sensing:
+            seen[cell] = max(seen[cell], hour)
+
+
+@compiled
+def find_unseen(
+    situation: Situation,
+    area: FloatArray,
+    sensing: float,
+    seen: FloatArray,
+    seed: int,
+    number: int,
+    goal: int,
+    look: FloatArray,
+) -> int:
+    """Fill in how far off and how long unseen the best cell to fly to is; return its number, -1 if there is none.
+
+    Parameters
+    ----------
+    situation : Situation
+    area : ndarray, shape (2, 3)
+    sensing : float
+    seen : ndarray, shape (cells,)
+    seed, number : int
+        Of the run, and of the agent.
+    goal : int
+        Cell to which it is on its way, which it keeps to; -1 for none.
+    look : ndarray, shape (3,)
+        See `fill_options`.
+    """
+    own, last = situation.own, seen.copy()
+    for i in range(len(situation.counts)):
+        if situation.counts[i]:
+            at = situation.other[known.OTHER_X, i], situation.other[known.OTHER_Y, i]
+            notice(area, sensing, at[0], at[1], own[known.HOUR] - 1e-3, last)
+    key = keyed(keyed(first_key(EXPLORING), seed), number)
+    scale = max(own[known.SPAN] / own[known.SPEED], 1e-9)
+    best, found = -np.inf, -1
+    look[0] = 0.0
+    for cell in range(len(seen)):
+        if goal not in (-1, cell):
+            continue
+        x, y, z = centre(area, cell)
+        way = math.sqrt((x - own[known.X]) ** 2 + (y - own[known.Y]) ** 2 + (z - own[known.Z]) ** 2)
+        if cell != goal and own[known.ENERGY_PER_DISTANCE] * way > BATTERY_SHARE * own[known.BATTERY]:
+            continue
+        unseen = min(1.0, (own[known.HOUR] - last[cell]) / scale) if last[cell] >= 0 else 1.0
+        share = way / max(own[known.SPAN], 1e-9)
+        value = unseen - share + SPREAD * fraction(keyed(key, cell))
+        if value > best:
+            best, found = value, cell
+            look[0], look[1], look[2] = 1.0, share, unseen
+    return found
