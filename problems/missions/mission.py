@@ -125,6 +125,10 @@ class Mission(fields.ReadOnly):
         _require(self.growth, (self.growth >= 0) & (self.growth <= LATEST), "tasks[{}].growth", "a finite number >= 0")
         late = self.deadline > self.appears
         _require(self.deadline, late, "tasks[{}].deadline", "after the hour at which the task appears")
+        if self.instance.distances is not None and self.instance.returns.any():
+            row = int(np.argmax(self.instance.returns))
+            message = "cannot be combined with distances of one's own: who stops on the way has no way back"
+            raise InputError(message, f"agents[{row}].returns")
         check_sequence(self._numbered_timeline)
 
     def __repr__(self) -> str:

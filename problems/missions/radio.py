@@ -58,7 +58,7 @@ class Radio:
     loss : float
         Share of the messages that is lost, each independently, from 0 to 1.
     delay : float
-        Hours from sending to hearing.
+        Hours until a message is heard.
     burst : Burst or None
         Losses that come on top in bursts.
     """

@@ -160,9 +160,14 @@ def _times(result: Record, line: int) -> DecisionTimes:
             return value
         raise InputError(f"must have a number as {name}", f"line {line}")
 
-    counts = [_whole(result.get(name), f"line {line}") for name in ("decisions", "decisions_late")]
-    milliseconds = [figure(f"decision_ms_{name}") for name in ("mean", "p99", "worst")]
-    return DecisionTimes(counts[0], counts[1], *milliseconds, runtime_s=figure("runtime_s") or 0.0)
+    return DecisionTimes(
+        count=_whole(result.get("decisions"), f"line {line}"),
+        late=_whole(result.get("decisions_late"), f"line {line}"),
+        mean_ms=figure("decision_ms_mean"),
+        p99_ms=figure("decision_ms_p99"),
+        worst_ms=figure("decision_ms_worst"),
+        runtime_s=figure("runtime_s") or 0.0,
+    )
 
 
 def _whole(value: object, place: str) -> int:

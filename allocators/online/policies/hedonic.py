@@ -73,7 +73,7 @@ class _Member(AgentDecider):
                 hours = max(prospect.with_me - view.hour, 1e-12)
                 value = (prospect.with_me - prospect.arrival) / hours * (prospect.task.facts.priority + 1e-6)
                 value *= self._parameters.stay if name == home else 1.0
-                value /= 1 + self._parameters.crowding * prospect.crew
+                value /= 1 + self._parameters.crowding * prospect.group
                 if value > highest:
                     choice, highest = name, value
         if choice != home:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from alloc.problems.missions.simulation.reports import TaskReport, View
 from alloc.problems.missions.simulation.state import ACTIVE, AgentStatus
 
-Crew = list[tuple[float, float]]
+Group = list[tuple[float, float]]
 """Hour of arrival and ability of each."""
 
 
@@ -22,7 +22,7 @@ class Prospect:
         Hour at which the agent would be there.
     without, with_me : float
         Hour at which the task is done without the agent, and with it.
-    crew : int
+    group : int
         Others that are there, or on their way.
     """
 
@@ -30,7 +30,7 @@ class Prospect:
     arrival: float
     without: float
     with_me: float
-    crew: int
+    group: int
 
     @property
     def is_useful(self) -> bool:
@@ -50,22 +50,22 @@ def prospects(view: View, memory: float, task_of: Mapping[str, str] | None = Non
         Task of each other agent, where that is agreed; where they were going by the last that was heard by default.
     """
     own = view.own
-    crews = _crews(view, memory, task_of)
+    groups = _groups(view, memory, task_of)
     found = []
     for task in view.open_tasks(own):
         is_there = own.status is AgentStatus.WORKING and own.task == task.facts.id
         arrival = view.hour + (0.0 if is_there else view.hours(own, task))
-        crew = crews.get(task.facts.id, [])
-        left = task.left if crew or is_there else task.left + task.facts.growth * (arrival - task.hour)
-        without = done_at(left, task.hour, crew)
-        with_me = done_at(left, task.hour, [*crew, (arrival, own.facts.ability)])
-        found.append(Prospect(task, arrival, without, with_me, len(crew)))
+        group = groups.get(task.facts.id, [])
+        left = task.left if group or is_there else task.left + task.facts.growth * (arrival - task.hour)
+        without = done_at(left, task.hour, group)
+        with_me = done_at(left, task.hour, [*group, (arrival, own.facts.ability)])
+        found.append(Prospect(task, arrival, without, with_me, len(group)))
     return found
 
 
-def _crews(view: View, memory: float, task_of: Mapping[str, str] | None) -> dict[str, Crew]:
+def _groups(view: View, memory: float, task_of: Mapping[str, str] | None) -> dict[str, Group]:
     """Return who else is at each task, or on its way there, as far as is known."""
-    crews: dict[str, Crew] = {}
+    groups: dict[str, Group] = {}
     for name, report in view.agents.items():
         goal = report.task if task_of is None else task_of.get(name)
         task = view.tasks.get(goal or "")
@@ -73,15 +73,15 @@ def _crews(view: View, memory: float, task_of: Mapping[str, str] | None) -> dict
             continue
         is_there = report.status is AgentStatus.WORKING and report.task == goal
         arrival = -math.inf if is_there else report.hour + view.hours(report, task)
-        crews.setdefault(task.facts.id, []).append((arrival, report.facts.ability))
-    return crews
+        groups.setdefault(task.facts.id, []).append((arrival, report.facts.ability))
+    return groups
 
 
-def done_at(left: float, since: float, crew: Crew) -> float:
+def done_at(left: float, since: float, group: Group) -> float:
     """Return the hour at which work is done that is left since an hour, by those who arrive; ``inf`` if nobody does."""
     rate = work = 0.0
     hour = math.inf
-    for arrival, ability in sorted(crew):
+    for arrival, ability in sorted(group):
         begin = max(arrival, since)
         if begin >= hour:
             break

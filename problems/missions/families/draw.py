@@ -210,4 +210,5 @@ def _paper(parameters: MissionParameters, scenario: int, seed: int, name: str, r
 
 def _some(count: int, share: float, rng: np.random.Generator) -> list[int]:
     """Return a share of the numbers below `count`, but never all of them."""
-    return rng.permutation(count)[: min(round(share * count), count - 1)].tolist()
+    order: list[int] = rng.permutation(count).tolist()
+    return order[: min(round(share * count), count - 1)]

@@ -64,6 +64,10 @@ def read_log(path: PathLike) -> MissionLog:
     ----------
     path : str or path
 
+    Returns
+    -------
+    MissionLog
+
     Raises
     ------
     InputError

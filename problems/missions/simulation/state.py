@@ -232,13 +232,16 @@ class MissionState:
         facts = [AgentFacts(*row) for row in rows]
         batteries = instance.battery.tolist()
         self.agents = [AgentState(i, fact, fact.start, batteries[i], batteries[i]) for i, fact in enumerate(facts)]
+        places, workload = task_places(instance), instance.workload.tolist()
         columns = (instance.priority, mission.appears, mission.deadline, mission.growth)
-        numbers = zip(*(column.tolist() for column in columns), strict=True)
-        parts = zip(instance.task_ids, task_places(instance), numbers, map(frozenset, needs), strict=True)
-        workload = instance.workload.tolist()
+        priority, appears, deadline, growth = (column.tolist() for column in columns)
         self.tasks = [
-            TaskState(j, TaskFacts(name, place, *values, needed), workload[j])
-            for j, (name, place, values, needed) in enumerate(parts)
+            TaskState(
+                j,
+                TaskFacts(name, places[j], priority[j], appears[j], deadline[j], growth[j], frozenset(needs[j])),
+                workload[j],
+            )
+            for j, name in enumerate(instance.task_ids)
         ]
 
     def agent(self, name: str | None) -> AgentState:

@@ -43,7 +43,7 @@ def test_every_format_has_a_schema() -> None:
     package = Path(alloc.problems.__file__).parents[1]  # of the working tree, or as installed
     sources = [path for part in ("problems", "allocators", "cli") for path in (package / part).glob("**/*.py")]
     texts = [*TEXTS.values(), *(path.read_text("utf-8") for path in sources)]
-    named = {name for text in texts for name in re.findall(r"\balloc-[a-z]+/\d+\b", text)}
+    named = {name for text in texts for name in re.findall(r"\balloc-[a-z-]+/\d+\b", text)}
     assert named - {"alloc-checkpoint/3"} == set(SCHEMAS)
 
 
