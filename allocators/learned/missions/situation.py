@@ -94,7 +94,8 @@ def fill_tasks(state: MissionArrays, number: int, task: FloatArray, can: BoolArr
         if can[j]:
             facts = state.tasks[j]
             place = (facts.x, facts.y, facts.z)
-            can[j] = agent.task == j or (allowed[j] and can_fly(head.is_manhattan, agent, here, battery, place))
+            is_order = agent.order == TO_TASK and agent.order_task == j
+            can[j] = is_order or (allowed[j] and can_fly(head.is_manhattan, agent, here, battery, place))
             task[TASK_X, j], task[TASK_Y, j], task[TASK_Z, j] = place
             task[LEFT, j], task[KNOWN_AT, j] = left[j], hours[j]
             task[PRIORITY, j], task[DEADLINE, j] = facts.priority, facts.deadline
