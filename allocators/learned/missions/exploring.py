@@ -35,11 +35,13 @@ def centre(area: FloatArray, cell: int) -> tuple[float, float, float]:
 def notice(area: FloatArray, sensing: float, x: float, y: float, hour: float, seen: FloatArray) -> None:
     """Note that all within the sensing radius of a place was seen at an hour; `seen` has one hour for each cell."""
     wide, deep = (area[1, 0] - area[0, 0]) / CELLS, (area[1, 1] - area[0, 1]) / CELLS
-    for cell in range(len(seen)):
-        dx = area[0, 0] + (cell % CELLS + 0.5) * wide - x
-        dy = area[0, 1] + (cell // CELLS + 0.5) * deep - y
-        if dx * dx + dy * dy <= sensing * sensing:
-            seen[cell] = max(seen[cell], hour)
+    for row in range(CELLS):
+        dy = area[0, 1] + (row + 0.5) * deep - y
+        if dy * dy <= sensing * sensing:
+            for column in range(CELLS):
+                dx = area[0, 0] + (column + 0.5) * wide - x
+                if dx * dx + dy * dy <= sensing * sensing:
+                    seen[row * CELLS + column] = max(seen[row * CELLS + column], hour)
 
 
 @compiled
@@ -73,21 +75,34 @@ def find_unseen(
         if situation.counts[i]:
             at = situation.other[known.OTHER_X, i], situation.other[known.OTHER_Y, i]
             notice(area, sensing, at[0], at[1], own[known.HOUR] - 1e-3, last)
-    key = keyed(keyed(first_key(EXPLORING), seed), number)
-    scale = max(own[known.SPAN] / own[known.SPEED], 1e-9)
-    best, found = -np.inf, -1
     look[0] = 0.0
-    for cell in range(len(seen)):
-        if goal not in (-1, cell):
-            continue
-        x, y, z = centre(area, cell)
-        way = math.sqrt((x - own[known.X]) ** 2 + (y - own[known.Y]) ** 2 + (z - own[known.Z]) ** 2)
-        if cell != goal and own[known.ENERGY_PER_DISTANCE] * way > BATTERY_SHARE * own[known.BATTERY]:
-            continue
-        unseen = min(1.0, (own[known.HOUR] - last[cell]) / scale) if last[cell] >= 0 else 1.0
-        share = way / max(own[known.SPAN], 1e-9)
-        value = unseen - share + SPREAD * fraction(keyed(key, cell))
-        if value > best:
-            best, found = value, cell
-            look[0], look[1], look[2] = 1.0, share, unseen
+    if goal >= 0:
+        rate_cell(own, area, last, goal // CELLS, goal % CELLS, look)
+        return goal
+    key = keyed(keyed(first_key(EXPLORING), seed), number)
+    rated = np.zeros(3)
+    best, found = -np.inf, -1
+    for row in range(CELLS):
+        for column in range(CELLS):
+            way = rate_cell(own, area, last, row, column, rated)
+            value = rated[2] - rated[1] + SPREAD * fraction(keyed(key, row * CELLS + column))
+            is_cheap = own[known.ENERGY_PER_DISTANCE] * way <= BATTERY_SHARE * own[known.BATTERY]
+            if value > best and is_cheap:
+                best, found = value, row * CELLS + column
+                look[:] = rated
     return found
+
+
+@compiled
+def rate_cell(own: FloatArray, area: FloatArray, last: FloatArray, row: int, column: int, look: FloatArray) -> float:
+    """Fill in how far off and how long unseen a cell is; return the length of the way."""
+    low, high = area[0], area[1]
+    x = low[0] + (column + 0.5) / CELLS * (high[0] - low[0])
+    y = low[1] + (row + 0.5) / CELLS * (high[1] - low[1])
+    dx, dy, dz = x - own[known.X], y - own[known.Y], 0.5 * (low[2] + high[2]) - own[known.Z]
+    way = math.sqrt(dx * dx + dy * dy + dz * dz)
+    seen = last[row * CELLS + column]
+    scale = max(own[known.SPAN] / own[known.SPEED], 1e-9)
+    look[0], look[1] = 1.0, way / max(own[known.SPAN], 1e-9)
+    look[2] = min(1.0, (own[known.HOUR] - seen) / scale) if seen >= 0 else 1.0
+    return way
