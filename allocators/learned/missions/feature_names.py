@@ -52,5 +52,8 @@ FIRST_WEIGHTS = {
     STAYS: -3.0,
     UNSEEN: 0.3,
 }
-FIRST_SKIP = [FIRST_WEIGHTS.get(feature, 0.0) for feature in range(FEATURES)]
+SHARPNESS = 6.0
+"""Factor on these weights: samples of the first network seldom differ from its best option."""
+
+FIRST_SKIP = [SHARPNESS * FIRST_WEIGHTS.get(feature, 0.0) for feature in range(FEATURES)]
 """Linear weights of a rule that training begins with."""

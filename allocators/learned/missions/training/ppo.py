@@ -18,10 +18,10 @@ from torch import Tensor, nn
 from alloc.allocators.learned.algorithms.hyperparameters import PpoParameters
 from alloc.allocators.learned.algorithms.ppo import adapted_learning_rate, clipped_surrogate, value_loss
 from alloc.allocators.learned.algorithms.schedules import linear, set_learning_rate
-from alloc.allocators.learned.missions.curriculum import MissionCurriculum, PackedMission
 from alloc.allocators.learned.missions.network import compiled_weights, first_network
 from alloc.allocators.learned.missions.play import room_for
 from alloc.allocators.learned.missions.rollout import Record, record_for, rollout
+from alloc.allocators.learned.missions.training.curriculum import MissionCurriculum, PackedMission
 from alloc.allocators.learned.network.state_dict import StateDict
 from alloc.allocators.missions.pack import begun
 from alloc.problems.fields import FloatArray
