@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from alloc.allocators.learned.missions.network_arrays import MissionWeights, Singles
+from alloc.allocators.learned.missions.feature_names import FEATURES
+from alloc.allocators.learned.missions.network_arrays import HIDDEN, MissionWeights, Singles
 from alloc.allocators.runtime.compiled import compiled_loosely
 
 F = np.float32
@@ -22,40 +23,41 @@ def score(options: Singles, count: int, weights: MissionWeights, token: Singles,
         Scratch.
     scores : ndarray, shape (most,)
     """
-    features, width = weights.inner.shape
-    pooled, both = np.zeros(width, dtype=np.float32), np.empty(width, dtype=np.float32)
+    pooled, both = np.zeros(HIDDEN, dtype=np.float32), np.empty(HIDDEN, dtype=np.float32)
+    inner, own = weights.inner, weights.own
     largest = F(-np.inf)
     for row in range(count):
-        for k in range(width):
-            token[row, k] = weights.inner_bias[k]
-        for feature in range(features):
+        for k in range(HIDDEN):
+            both[k] = weights.inner_bias[k]
+        for feature in range(FEATURES):
             value = options[row, feature]
-            for k in range(width):
-                token[row, k] += value * weights.inner[feature, k]
+            for k in range(HIDDEN):
+                both[k] += value * inner[feature, k]
         attention = F(0)
-        for k in range(width):
-            token[row, k] = max(token[row, k], SLOPE * token[row, k])
-            attention += token[row, k] * weights.query[k]
+        for k in range(HIDDEN):
+            both[k] = max(both[k], SLOPE * both[k])
+            token[row, k] = both[k]
+            attention += both[k] * weights.query[k]
         scores[row] = attention
         largest = max(largest, attention)
     total = F(0)
     for row in range(count):
         share = np.exp(scores[row] - largest)
         total += share
-        for k in range(width):
+        for k in range(HIDDEN):
             pooled[k] += share * token[row, k]
     add_context(pooled, total, weights)
     for row in range(count):
-        for k in range(width):
+        for k in range(HIDDEN):
             both[k] = pooled[k]
-        for j in range(width):
+        for j in range(HIDDEN):
             value = token[row, j]
-            for k in range(width):
-                both[k] += value * weights.own[j, k]
+            for k in range(HIDDEN):
+                both[k] += value * own[j, k]
         value = F(0)
-        for k in range(width):
+        for k in range(HIDDEN):
             value += max(both[k], SLOPE * both[k]) * weights.out[k]
-        for feature in range(features):
+        for feature in range(FEATURES):
             value += options[row, feature] * weights.skip[feature]
         scores[row] = value
 
@@ -63,10 +65,9 @@ def score(options: Singles, count: int, weights: MissionWeights, token: Singles,
 @compiled_loosely
 def add_context(pooled: Singles, total: float, weights: MissionWeights) -> None:
     """Replace the sum of tokens, shape (width,), by what the pooled token adds to each option."""
-    width = len(pooled)
     result = weights.own_bias.copy()
-    for j in range(width):
+    for j in range(HIDDEN):
         value = pooled[j] / total
-        for k in range(width):
+        for k in range(HIDDEN):
             result[k] += value * weights.context[j, k]
     pooled[:] = result

@@ -149,7 +149,7 @@ def fill_options(
     return count
 
 
-@compiled
+@inlined
 def fill_task(situation: Situation, j: int, option: Singles, rank: IntArray, crew: int, without: float) -> None:
     """Fill the features of a task."""
     own, task = situation.own, situation.task
@@ -182,7 +182,7 @@ def fill_task(situation: Situation, j: int, option: Singles, rank: IntArray, cre
     option[names.RIVALS] = squashed(rivals(situation, j, distance) / 3.0)
 
 
-@compiled
+@inlined
 def rivals(situation: Situation, j: int, distance: float) -> float:
     """Return how many others that have no task are nearer to one."""
     other, found = situation.other, 0.0
@@ -195,7 +195,7 @@ def rivals(situation: Situation, j: int, distance: float) -> float:
     return found
 
 
-@compiled
+@inlined
 def crowding(situation: Situation, choice: IntArray, tasks: int, row: int) -> float:
     """Return how much other work there is near a task."""
     at, j, found = situation.task, choice[row], 0.0

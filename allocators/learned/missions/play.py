@@ -96,7 +96,7 @@ def consider(
     room : Room
     area : ndarray, shape (2, 3)
     sensing : float
-        ``inf`` where nothing is to be looked for.
+        ``inf`` where nothing is to be looked for. An agent that has a task does not look around.
     seed, number : int
         Of the run and of the agent, for its chances.
     row : int
@@ -105,7 +105,8 @@ def consider(
     """
     own = room.situation.own
     room.look[:] = 0.0
-    if sensing < np.inf:
+    target = int(own[TARGET])
+    if sensing < np.inf and (target < 0 or not room.situation.can[target]):
         goal = room.goal[row] if own[TARGET] < 0 and own[IS_FLYING] > 0 else -1
         room.goal[row] = find_unseen(room.situation, area, sensing, room.seen[row], seed, number, goal, room.look)
     count = fill_options(
