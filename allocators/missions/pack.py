@@ -104,6 +104,11 @@ def begun(packed: MissionArrays, seed: int = 0) -> MissionArrays:
     return state
 
 
+def records(part: object) -> Records:
+    """Return records of `MissionArrays` as the array that they are, with columns by name."""
+    return cast(Records, part)
+
+
 def _by_attribute(part: Records | FloatArray) -> Records | FloatArray:
     """Return an array; one of records with its fields as attributes."""
     return part if part.dtype.names is None else part.view(np.recarray)

@@ -14,10 +14,10 @@ from alloc.allocators.missions.advance import advance
 from alloc.allocators.missions.layout import MESSAGES, OVER, STAY, TO_PLACE, TO_TASK, MissionArrays
 from alloc.allocators.missions.motion import place_of
 from alloc.allocators.missions.orders import order
-from alloc.allocators.runtime.compiled import compiled
+from alloc.allocators.runtime.compiled import compiled, inlined
 from alloc.problems.fields import FloatArray, IntArray
 
-REVIEW = 4
+REVIEW = 10
 """Radio periods after which an agent that is busy considers its options anew, if nothing else makes it do so."""
 
 
@@ -79,7 +79,7 @@ def room_for(n: int, m: int) -> Room:
     )
 
 
-@compiled
+@inlined
 def is_due(room: Room, number: int, hour: float, period: float, tasks: int, is_busy: bool) -> bool:
     """Whether an agent is to consider its options: it is not busy, knows of other tasks, or has not for a while."""
     return not is_busy or tasks != room.tasks[number] or hour - room.decided[number] >= REVIEW * period
@@ -116,16 +116,16 @@ def consider(
     return count
 
 
-@compiled
+@inlined
 def open_tasks(state: MissionArrays, number: int) -> int:
     """Return how many tasks an agent knows as open."""
-    hours, left, found = state.task_hour[number], state.task_left[number], 0
-    for task in range(len(hours)):
-        found += (hours[task] >= 0) & (left[task] >= 0)
+    found = 0
+    for task in range(len(state.tasks)):
+        found += (state.task_hour[number, task] >= 0) & (state.task_left[number, task] >= 0)
     return found
 
 
-@compiled
+@inlined
 def is_busy(state: MissionArrays, number: int) -> bool:
     """Whether an agent has a task that is open as far as it knows, or is on its way to look around."""
     agent = state.agents[number]
@@ -134,7 +134,7 @@ def is_busy(state: MissionArrays, number: int) -> bool:
     return agent.flight != 0
 
 
-@compiled
+@inlined
 def act(state: MissionArrays, room: Room, number: int, choice: int) -> None:
     """Give the agent the order that its choice needs."""
     agent = state.agents[number]
@@ -147,15 +147,16 @@ def act(state: MissionArrays, room: Room, number: int, choice: int) -> None:
         order(state, number, TO_PLACE, -1, centre(state.area, room.goal[number]))
 
 
-@compiled
+@inlined
 def wants(state: MissionArrays, room: Room, number: int) -> bool:
     """Whether an agent is to consider its options now; what it sees is noticed."""
     head, agent = state.head[0], state.agents[number]
-    if head.sensing < np.inf and head.is_local:
+    tasks = open_tasks(state, agent.known)
+    is_considered = is_due(room, number, head.hour, head.period, tasks, is_busy(state, number))
+    if (is_considered or agent.flight != 0) and head.sensing < np.inf and head.is_local:
         x, y, _ = place_of(agent, head.hour)
         notice(state.area, head.sensing, x, y, head.hour, room.seen[number])
-    tasks = open_tasks(state, agent.known)
-    if not is_due(room, number, head.hour, head.period, tasks, is_busy(state, number)):
+    if not is_considered:
         return False
     room.decided[number], room.tasks[number] = head.hour, tasks
     fill(state, number, room.situation)

@@ -58,13 +58,15 @@ class _NetworkDecider(AgentDecider):
 
     def decide(self, view: View) -> Order | None:
         room, own = self._room, view.own
-        x, y, _ = own.place.position or NOWHERE
-        if self._sensing < math.inf:
-            notice(self._area, self._sensing, x, y, view.hour, room.seen[0])
         tasks = [task for task in view.tasks.values() if task.status is TaskStatus.OPEN]
         names = [task.facts.id for task in tasks]
-        is_busy = own.task in names if own.task is not None else own.status is AgentStatus.FLYING
-        if not is_due(room, 0, view.hour, self._period, len(tasks), is_busy):
+        is_flying = own.status is AgentStatus.FLYING
+        is_busy = own.task in names if own.task is not None else is_flying
+        is_considered = is_due(room, 0, view.hour, self._period, len(tasks), is_busy)
+        if (is_considered or is_flying) and self._sensing < math.inf:
+            x, y, _ = own.place.position or NOWHERE
+            notice(self._area, self._sensing, x, y, view.hour, room.seen[0])
+        if not is_considered:
             return None
         room.decided[0], room.tasks[0] = view.hour, len(tasks)
         room = self._with_room(len(view.agents), len(tasks) + 1)
@@ -75,7 +77,7 @@ class _NetworkDecider(AgentDecider):
             return Order(names[choice])
         if choice == WAIT:
             return STAY
-        if own.status is AgentStatus.FLYING and own.task is None:
+        if is_flying and own.task is None:
             return None
         x, y, z = centre(self._area, int(room.goal[0]))
         return Order(position=(float(x), float(y), float(z)))

@@ -18,7 +18,7 @@ from alloc.problems.arguments import whole
 from alloc.problems.errors import nearest
 from alloc.problems.missions.mission import Mission
 
-DEFAULT_GENERATIONS = 100
+DEFAULT_GENERATIONS = 150
 """Generations where no limit is given."""
 
 DEFAULT_POPULATION = 4

@@ -22,6 +22,7 @@ from alloc.allocators.learned.missions.feature_names import FEATURE_SET
 from alloc.allocators.learned.missions.network import MissionNetwork
 from alloc.allocators.learned.missions.policy_file import save_network
 from alloc.allocators.learned.missions.training.curriculum import MissionCurriculum
+from alloc.allocators.learned.missions.training.evolution import Evolution
 from alloc.allocators.learned.missions.training.ppo import MissionPpo
 from alloc.allocators.learned.missions.training.validation import validate
 from alloc.allocators.learned.network.state_dict import StateDict
@@ -58,6 +59,10 @@ class MissionTrainingParameters:
         Missions between two updates.
     validations : int
         Missions on which networks are compared.
+    evolved : int
+        Generations at the beginning in which the linear part of the network is evolved; then PPO goes on from it.
+    candidates : int
+        Of each of those.
     learner : PpoParameters
     breeding : BreedingParameters
     curriculum : MissionCurriculum
@@ -67,7 +72,9 @@ class MissionTrainingParameters:
     population: int = 4
     decisions: int = 60_000
     missions: int = 12
-    validations: int = 32
+    validations: int = 24
+    evolved: int = 100
+    candidates: int = 16
     learner: PpoParameters = DEFAULT_PPO
     breeding: BreedingParameters = field(default_factory=BreedingParameters)
     curriculum: MissionCurriculum = field(default_factory=MissionCurriculum)
@@ -129,6 +136,8 @@ class MissionTrainer:
         if init is not None:
             learner.network.load_state_dict(init)
         self.members: list[StateDict] = [learner.state_dict()] * self.parameters.population
+        weights = {name: weight.clone() for name, weight in learner.network.state_dict().items()}
+        self.evolution = Evolution(weights, self.parameters.candidates, self.parameters.missions)
         self.history: list[Report] = []
         self.best: list[Weights] = []
 
@@ -158,12 +167,8 @@ class MissionTrainer:
     ) -> Report | None:
         """Train, validate and breed one generation; see `Trainer.advance`."""
         began, engine = time.monotonic(), engine or SerialEngine()
-        progress = self.progress(limits or Limits())
-        jobs = [
-            MissionJob(self.parameters, state, self._seed(member), progress, engine.threads)
-            for member, state in enumerate(self.members)
-        ]
-        results = engine.map(train_member, jobs, should_stop)
+        progress, is_evolving = self.progress(limits or Limits()), self.generation < self.parameters.evolved
+        results = (self._evolve if is_evolving else self._train)(progress, engine, should_stop)
         if results is None:
             return None
         scores = self._fitness(results)
@@ -172,10 +177,33 @@ class MissionTrainer:
         if not self.history or report.cost < self.history[-1].best_cost:
             self.best = [results[member].policy for member in ranking]
         self.history.append(report)
-        self.members = [one.state for one in results]
-        if len(self.members) > 1:
-            self.members = breed(self.members, scores, self.parameters.breeding, self._seed(len(self.members)))
+        if not is_evolving:
+            self.members = [one.state for one in results]
+            if len(self.members) > 1:
+                self.members = breed(self.members, scores, self.parameters.breeding, self._seed(len(self.members)))
         return report
+
+    def _train(self, progress: float, engine: Engine, should_stop: Callable[[], bool]) -> list[MemberResult] | None:
+        """Train and validate all members."""
+        jobs = [
+            MissionJob(self.parameters, state, self._seed(member), progress, engine.threads)
+            for member, state in enumerate(self.members)
+        ]
+        return engine.map(train_member, jobs, should_stop)
+
+    def _evolve(self, progress: float, engine: Engine, should_stop: Callable[[], bool]) -> list[MemberResult] | None:
+        """Evolve the linear part of the network for a generation; all members then begin with it."""
+        parameters = self.parameters
+        weights = self.evolution.advance(parameters.curriculum, self._seed(0), progress, engine, should_stop)
+        if weights is None:
+            return None
+        learner = MissionPpo(parameters.learner)
+        learner.network.load_state_dict(weights)
+        validation = validate(learner.network, parameters.curriculum.validation(parameters.validations))
+        self.members = [learner.state_dict()] * parameters.population
+        missions = parameters.candidates * parameters.missions
+        stats = TrainingStats(0, missions, validation.reward, 0.0, 0.0, parameters.learner.learning_rate)
+        return [MemberResult(self.members[0], weights, stats, validation)]
 
     def _fitness(self, results: Sequence[MemberResult]) -> list[float]:
         """Return the fitness (12) of all members."""
@@ -189,13 +217,19 @@ class MissionTrainer:
 
     def save(self, path: Path) -> None:
         """Write a checkpoint of the whole run, from which `resume` continues as without a break."""
-        state = {"members": self.members, "history": [asdict(report) for report in self.history], "best": self.best}
+        state = {
+            "members": self.members,
+            "history": [asdict(report) for report in self.history],
+            "best": self.best,
+            "evolution": self.evolution.state_dict(),
+        }
         write_checkpoint(path, self._description(), state)
 
     def resume(self, path: Path) -> None:
         """Restore the run of a checkpoint; see `Trainer.resume`."""
         state = read_checkpoint(path, self._description())
         self.members, self.best = state["members"], state["best"]
+        self.evolution.load_state_dict(state["evolution"])
         self.history = [Report(**report) for report in state["history"]]
 
     def _description(self) -> dict[str, str]:

@@ -7,7 +7,7 @@ from alloc.allocators.learned.missions.play import play, room_for
 from alloc.allocators.learned.missions.training.curriculum import PackedMission
 from alloc.allocators.learned.training.validation import Validation
 from alloc.allocators.missions.layout import DONE, MissionArrays
-from alloc.allocators.missions.pack import begun
+from alloc.allocators.missions.pack import begun, records
 
 MISSED_WEIGHT = 3.0
 """Cost of a mission without any priority done, in ideal mission times."""
@@ -40,11 +40,9 @@ def validate(network: MissionNetwork, missions: list[tuple[PackedMission, int]])
 
 def _figures(state: MissionArrays, ideal: float) -> tuple[float, float, float, float]:
     """Return mission time, tasks not done, their share of all priority, and distance per agent."""
-    done = [task.status == DONE for task in state.tasks]
-    priority = [float(task.priority) for task in state.tasks]
-    undone = sum(weight for weight, is_done in zip(priority, done, strict=True) if not is_done)
-    last = max((float(task.closed) for task in state.tasks if task.closed < np.inf), default=0.0)
-    time = last if all(task.closed < np.inf for task in state.tasks) else float(state.head[0].end)
-    flown = sum(float(agent.distance) for agent in state.agents) / len(state.agents)
-    share = undone / sum(priority) if sum(priority) > 0 else 1.0 - float(np.mean(done))
-    return time / ideal, len(done) - sum(done), share, flown / max(float(state.head[0].span), 1e-9)
+    tasks, agents, head = records(state.tasks), records(state.agents), state.head[0]
+    undone = tasks["status"] != DONE
+    is_closed, priority = tasks["closed"] < np.inf, tasks["priority"]
+    time = tasks["closed"].max() if is_closed.all() else head.end
+    share = priority[undone].sum() / priority.sum() if priority.any() else undone.mean()
+    return time / ideal, undone.sum(), share, agents["distance"].mean() / max(head.span, 1e-9)
