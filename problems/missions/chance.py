@@ -3,7 +3,7 @@
 _MASK = (1 << 64) - 1
 _GOLDEN = 0x9E3779B97F4A7C15
 
-LOSS, BURST, PACE = 1, 2, 3
+LOSS, BURST, PACE, EXPLORING = 1, 2, 3, 4
 """First part of a key: what the number is for."""
 
 

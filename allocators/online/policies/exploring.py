@@ -3,6 +3,7 @@
 import math
 
 from alloc.allocators.online.contract import Briefing
+from alloc.problems.missions.chance import EXPLORING, uniform
 from alloc.problems.missions.simulation.places import Place
 from alloc.problems.missions.simulation.reports import View
 from alloc.problems.missions.simulation.state import STAY, AgentStatus, Order
@@ -24,7 +25,7 @@ class Explorer:
     """
 
     def __init__(self, briefing: Briefing) -> None:
-        self._rng, self._area = briefing.generator(), briefing.area
+        self._seed, self._area, self._drawn = briefing.seed, briefing.area, 0
         self._is_blind = briefing.knowledge is Knowledge.LOCAL and briefing.sensing < math.inf
 
     def order(self, view: View) -> Order | None:
@@ -36,10 +37,14 @@ class Explorer:
             return None
         low, high = self._area
         for _ in range(TRIES):
-            x, y, z = (float(self._rng.uniform(a, b)) for a, b in zip(low, high, strict=True))
+            x, y, z = (a + (b - a) * self._draw() for a, b in zip(low, high, strict=True))
             place = Place((x, y, z))
             energy = own.facts.energy_per_distance * view.distance_to_place(own, place)
             is_cheap = own.battery == math.inf or energy <= BATTERY_SHARE * own.battery
             if is_cheap and view.refusal_of_place(own, place) is None:
                 return Order(position=(x, y, z))
         return STAY
+
+    def _draw(self) -> float:
+        self._drawn += 1
+        return uniform(EXPLORING, *self._seed, self._drawn)

@@ -6,6 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from alloc.allocators.contract.base import Allocator
 from alloc.allocators.contract.parameters import CheckedParameters, bounded
 from alloc.allocators.online.contract import Briefing, FleetDecider, Policy, PolicyInfo
 from alloc.allocators.registry import load
@@ -57,8 +58,9 @@ class Replan(Policy):
     def __init__(self, parameters: ReplanParameters | None = None, **settings: object) -> None:
         super().__init__(parameters, **settings)
         self._method = load(self.parameters.method)
-        tiny = Instance(ability=[1, 2], workload=[1, 1], speed=[1, 1] if self._method.method.finite_speeds else None)
-        solve(tiny, self._method, iterations=1, time_limit_s=None, handle_signals=False)  # compiles its loops
+        solve(
+            _tiny(self._method), self._method, iterations=1, time_limit_s=None, handle_signals=False
+        )  # compiles loops
 
     def begin(self, briefing: Briefing) -> FleetDecider:
         """Return who plans anew."""
@@ -90,6 +92,19 @@ class Replan(Policy):
     def _in_force(self, view: View, name: str, instance: Instance) -> str | None:
         task = view.agents[name].task
         return task if task in instance.task_index else None
+
+
+def _tiny(method: Allocator) -> Instance:
+    """Return an instance that has all that snapshots have: travel times, batteries, more tasks than agents."""
+    places = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]
+    return Instance(
+        ability=[1, 2],
+        workload=[1, 1, 1],
+        agent_position=places[:2],
+        task_position=places,
+        battery=[9, 9],
+        speed=[1, 1] if method.method.finite_speeds else None,
+    )
 
 
 class _Replanner(FleetDecider):
