@@ -82,7 +82,7 @@ def test_curriculum_grows_harder() -> None:
 
 
 def test_advantages_follow_the_hours_between_decisions() -> None:
-    """With a critic that says 0, and traces of length 0, the advantage is minus what was lost until the next decision."""
+    """With traces of length 0 the advantage is minus what was lost until the next decision, and what follows it."""
     record = record_for(1, 1, 2, ideal=4.0)
     record.length[0] = 2
     record.hour[:], record.idle[:], record.cost[:] = (0.0, 1.0), (0.0, 1.0), (0.0, 0.5)
