@@ -240,6 +240,6 @@ def measure(mission: Mission, state: MissionArrays, policy: str, seed: int = 0) 
         task.status, task.begun = tuple(TaskStatus)[worked.status], bool(worked.begun)
         task.left, task.closed = float(worked.left), float(worked.closed)
     simulation.state.switches = int(head.switches)
-    for number, agent in enumerate(state.agents):
-        simulation.messages[number], simulation.bytes[number] = int(agent.messages), int(agent.bytes)
+    simulation.messages = records(state.agents)["messages"].tolist()
+    simulation.bytes = records(state.agents)["bytes"].tolist()
     return replace(measured(simulation, policy, seed, DecisionTimes()), orders_refused=int(head.refused))

@@ -46,7 +46,7 @@ def score(options: Singles, count: int, weights: MissionWeights, token: Singles,
         total += share
         for k in range(HIDDEN):
             pooled[k] += share * token[row, k]
-    add_context(pooled, total, weights)
+    add_context(pooled, float(total), weights)
     for row in range(count):
         for k in range(HIDDEN):
             both[k] = pooled[k]

@@ -30,7 +30,7 @@ def time_scale(own: FloatArray) -> float:
 
 
 @compiled
-def expect(situation: Situation, rank: IntArray, crew: IntArray, rate: FloatArray, without: FloatArray) -> None:
+def expect(situation: Situation, rank: IntArray, others: IntArray, rate: FloatArray, without: FloatArray) -> None:
     """Fill in who comes to each task, and when it is done without the agent.
 
     Parameters
@@ -38,11 +38,11 @@ def expect(situation: Situation, rank: IntArray, crew: IntArray, rate: FloatArra
     situation : Situation
     rank : ndarray of int, shape (n,)
         Others by the hours at which they arrive; those that have no task last.
-    crew, rate, without : ndarray, shape (m,)
+    others, rate, without : ndarray, shape (m,)
         Others at each task or on their way, their ability, and the hour at which they have done it.
     """
     arrives, target, counts = situation.other[known.ARRIVES], situation.target, situation.counts
-    crew[:] = 0
+    others[:] = 0
     rate[:] = 0.0
     without[:] = np.inf
     done = np.zeros(len(without))
@@ -58,7 +58,7 @@ def expect(situation: Situation, rank: IntArray, crew: IntArray, rate: FloatArra
     for place in range(found):
         i = rank[place]
         j = target[i]
-        crew[j] += 1
+        others[j] += 1
         begin = max(arrives[i], situation.task[known.KNOWN_AT, j])
         if begin < without[j]:
             rate[j] += situation.other[known.STRENGTH, i]
@@ -104,7 +104,7 @@ def fill_options(
     options: Singles,
     choice: IntArray,
     rank: IntArray,
-    crew: IntArray,
+    others: IntArray,
     rate: FloatArray,
     without: FloatArray,
 ) -> int:
@@ -118,10 +118,10 @@ def fill_options(
     options : ndarray, shape (m + 2, FEATURES)
     choice : ndarray of int, shape (m + 2,)
         Task of each, `LOOK` or `WAIT`.
-    rank, crew, rate, without : ndarray
+    rank, others, rate, without : ndarray
         Scratch, see `expect`.
     """
-    expect(situation, rank, crew, rate, without)
+    expect(situation, rank, others, rate, without)
     count = 0
     for j in range(len(situation.can)):
         if situation.can[j]:
@@ -135,7 +135,7 @@ def fill_options(
     count += 1
     options[:count] = 0
     for row in range(tasks):
-        fill_task(situation, choice[row], options[row], rank, crew[choice[row]], without[choice[row]])
+        fill_task(situation, choice[row], options[row], rank, others[choice[row]], without[choice[row]])
     for row in range(tasks):
         options[row, names.CROWDING] = crowding(situation, choice, tasks, row)
     for row in range(tasks, count):
@@ -150,7 +150,7 @@ def fill_options(
 
 
 @inlined
-def fill_task(situation: Situation, j: int, option: Singles, rank: IntArray, crew: int, without: float) -> None:
+def fill_task(situation: Situation, j: int, option: Singles, rank: IntArray, others: int, without: float) -> None:
     """Fill the features of a task."""
     own, task = situation.own, situation.task
     hour, scale = own[known.HOUR], time_scale(own)
@@ -159,14 +159,14 @@ def fill_task(situation: Situation, j: int, option: Singles, rank: IntArray, cre
     distance = 0.0 if is_there else task[known.DISTANCE, j]
     arrival = hour + distance / own[known.SPEED]
     left = task[known.LEFT, j]
-    if crew == 0 and not is_there:
+    if others == 0 and not is_there:
         left += task[known.GROWTH, j] * (arrival - task[known.KNOWN_AT, j])
     with_me = max(hour, done_with(situation, rank, j, arrival, left))
     option[names.TRAVEL] = min(distance / own[known.SPAN], 2.0) if own[known.SPAN] > 0 else 0.0
     option[names.WITH_ME] = squashed((with_me - hour) / scale)
     option[names.WITHOUT] = squashed(max(0.0, without - hour) / scale)
     option[names.IS_ORDER], option[names.IS_WORK] = is_order, is_there
-    option[names.OTHERS], option[names.IS_ALONE] = squashed(crew / 3.0), crew == 0
+    option[names.OTHERS], option[names.IS_ALONE] = squashed(others / 3.0), others == 0
     option[names.WORK] = squashed(left / own[known.ABILITY] / scale)
     option[names.IS_LATE] = without <= arrival
     option[names.AGE] = squashed((hour - task[known.KNOWN_AT, j]) / scale)

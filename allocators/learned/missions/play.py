@@ -29,7 +29,7 @@ class Room(NamedTuple):
     situation : Situation
     options, token, scores : ndarray
         See `score`.
-    choice, rank, crew : ndarray of int
+    choice, rank, others : ndarray of int
     rate, without : ndarray
         See `fill_options`.
     look : ndarray, shape (3,)
@@ -49,7 +49,7 @@ class Room(NamedTuple):
     scores: Singles
     choice: IntArray
     rank: IntArray
-    crew: IntArray
+    others: IntArray
     rate: FloatArray
     without: FloatArray
     look: FloatArray
@@ -68,7 +68,7 @@ def room_for(n: int, m: int) -> Room:
         scores=np.zeros(m + 2, np.float32),
         choice=np.zeros(m + 2, np.intp),
         rank=np.zeros(n, np.intp),
-        crew=np.zeros(m, np.intp),
+        others=np.zeros(m, np.intp),
         rate=np.zeros(m),
         without=np.zeros(m),
         look=np.zeros(3),
@@ -110,7 +110,7 @@ def consider(
         goal = room.goal[row] if own[TARGET] < 0 and own[IS_FLYING] > 0 else -1
         room.goal[row] = find_unseen(room.situation, area, sensing, room.seen[row], seed, number, goal, room.look)
     count = fill_options(
-        room.situation, room.look, room.options, room.choice, room.rank, room.crew, room.rate, room.without
+        room.situation, room.look, room.options, room.choice, room.rank, room.others, room.rate, room.without
     )
     score(room.options, count, weights, room.token, room.scores)
     return count

@@ -72,47 +72,62 @@ def train_command(
 ) -> None:
     """Train a learned method, with a checkpoint after each generation."""
     state, lines = _files(output, checkpoint, log, init)
-    from alloc.allocators import train
     from alloc.allocators.parallel.engines import check_engine, make_engine
 
     check_engine(engine.value, workers, address)
     if missions is not None:
         check_no_games(family=family, instances=instances, turn=turn, reward=reward)
     problems = None if instances is None else read_instances(instances)
-    progress = Progress(problems or [])
+    progress, size = Progress(problems or []), former_generation_steps or generation_steps
     with _failures_told(state, progress), make_engine(engine.value, workers, address, threads) as where, _interrupts():
-        shared: Shared = {
-            "steps": steps,
-            "minutes": minutes,
-            "iterations": iterations,
-            "patience": patience,
-            "init": init,
-            "population": population,
-            "parameters": assignments(settings),
-            "seed": seed,
-            "resume": resume,
-            "checkpoint": state,
-            "log": lines,
-            "tensorboard": tensorboard,
-            "engine": where,
-        }
-        decisions = former_generation_steps or generation_steps
-        if missions is not None:
-            train_in_missions(method, output, missions, decisions, shared, progress)
+        shared = Shared(
+            steps=steps,
+            minutes=minutes,
+            iterations=iterations,
+            patience=patience,
+            init=init,
+            population=population,
+            parameters=assignments(settings),
+            seed=seed,
+            resume=resume,
+            checkpoint=state,
+            log=lines,
+            tensorboard=tensorboard,
+            engine=where,
+        )
+        if missions is None:
+            _train_in_games(method, output, family, problems, size, turn, reward, shared, progress)
         else:
-            train(
-                method,
-                output,
-                families=family or ["mixed"],
-                instances=problems,
-                decisions=decisions or 20_000,
-                turn=turn.value,
-                reward=reward.value,
-                on_start=progress.start,
-                on_report=progress.tell,
-                **shared,
-            )
+            train_in_missions(method, output, missions, size, shared, progress)
     progress.close(output)
+
+
+def _train_in_games(
+    method: str,
+    output: str,
+    families: list[str] | None,
+    problems: "list[Instance] | None",
+    decisions: int | None,
+    turn: TurnRule,
+    reward: Reward,
+    shared: Shared,
+    progress: "Progress",
+) -> None:
+    """Train on families of instances, or on given ones."""
+    from alloc.allocators import train
+
+    train(
+        method,
+        output,
+        families=families or ["mixed"],
+        instances=problems,
+        decisions=decisions or 20_000,
+        turn=turn.value,
+        reward=reward.value,
+        on_start=progress.start,
+        on_report=progress.tell,
+        **shared,
+    )
 
 
 @contextmanager
