@@ -133,7 +133,7 @@ def is_link_bad(head: Head, sender: int, hearer: int, number: IntArray, bad: Int
         forgotten = -math.expm1(-hours * (1 / head.burst_good + 1 / head.burst_bad))
         is_bad = int(fraction(keyed(key, step)) < share + (is_bad - share) * (1 - forgotten))
     number[sender, hearer], bad[sender, hearer] = head.tick, is_bad
-    return is_bad != 0
+    return bool(is_bad != 0)
 
 
 @compiled

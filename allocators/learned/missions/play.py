@@ -130,7 +130,7 @@ def is_busy(state: MissionArrays, number: int) -> bool:
     """Whether an agent has a task that is open as far as it knows, or is on its way to look around."""
     agent = state.agents[number]
     if agent.order == TO_TASK:
-        return state.task_left[agent.known, agent.order_task] >= 0
+        return bool(state.task_left[agent.known, agent.order_task] >= 0)
     return agent.flight != 0
 
 

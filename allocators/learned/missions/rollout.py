@@ -27,7 +27,7 @@ class Record(NamedTuple):
     Attributes
     ----------
     options : ndarray, shape (most, options, FEATURES)
-    count, action, agent : ndarray of int, shape (most,)
+    choices, action, agent : ndarray of int, shape (most,)
         Options of each decision, the one that was taken, and whose decision it was.
     log_probability, hour : ndarray, shape (most,)
     idle, cost : ndarray, shape (most,)
@@ -44,7 +44,7 @@ class Record(NamedTuple):
     """
 
     options: Singles
-    count: IntArray
+    choices: IntArray
     action: IntArray
     agent: IntArray
     log_probability: FloatArray
@@ -62,8 +62,13 @@ def record_for(n: int, m: int, most: int, ideal: float) -> Record:
     """Return room for so many decisions of n agents on m tasks in a mission of some ideal time."""
     return Record(
         options=np.zeros((most, m + 2, FEATURES), np.float32),
-        **{name: np.zeros(most, np.intp) for name in ("count", "action", "agent")},
-        **{name: np.zeros(most) for name in ("log_probability", "hour", "idle", "cost")},
+        choices=np.zeros(most, np.intp),
+        action=np.zeros(most, np.intp),
+        agent=np.zeros(most, np.intp),
+        log_probability=np.zeros(most),
+        hour=np.zeros(most),
+        idle=np.zeros(most),
+        cost=np.zeros(most),
         length=np.zeros(1, np.intp),
         asked=np.full(n, -1.0),
         unproductive=np.zeros(n),
@@ -147,9 +152,9 @@ def rollout(state: MissionArrays, room: Room, weights: MissionWeights, seed: int
                 option, log_probability = sample(room, count, keyed(key, drawn))
                 drawn += 1
                 k = record.length[0]
-                if k < len(record.count):
+                if k < len(record.choices):
                     record.options[k, :count] = room.options[:count]
-                    record.count[k], record.action[k], record.agent[k] = count, option, number
+                    record.choices[k], record.action[k], record.agent[k] = count, option, number
                     record.log_probability[k], record.hour[k] = log_probability, head.hour
                     record.idle[k], record.cost[k] = record.unproductive[number], record.total[0] + missed
                     record.length[0] += 1

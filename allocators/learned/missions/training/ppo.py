@@ -108,14 +108,14 @@ class MissionPpo:
 
     @torch.no_grad()
     def _samples(self, records: list[Record]) -> MissionSamples:
-        most = max(int(record.count[: record.length[0]].max(initial=1)) for record in records)
+        most = max(int(record.choices[: record.length[0]].max(initial=1)) for record in records)
         parts = []
         for record in records:
             length = int(record.length[0])
             options = torch.from_numpy(record.options[:length, :most])
             if options.shape[1] < most:
                 options = nn.functional.pad(options, (0, 0, 0, most - options.shape[1]))
-            is_option = torch.arange(most)[None] < torch.from_numpy(record.count[:length])[:, None]
+            is_option = torch.arange(most)[None] < torch.from_numpy(record.choices[:length])[:, None]
             values = self.network(options, is_option)[1].numpy().astype(np.float64)
             advantage = record_advantages(record, values, self.parameters)
             target = torch.from_numpy(advantage + values).float()
@@ -123,8 +123,8 @@ class MissionPpo:
             action = torch.from_numpy(record.action[:length])
             parts.append((options, is_option, action, old, torch.from_numpy(advantage).float(), target))
         samples = MissionSamples(*(torch.cat(column) for column in zip(*parts, strict=True)))
-        advantage = samples.advantage
-        return samples._replace(advantage=(advantage - advantage.mean()) / (advantage.std(correction=0) + 1e-6))
+        gain = samples.advantage
+        return samples._replace(advantage=(gain - gain.mean()) / (gain.std(correction=0) + 1e-6))
 
     def _update(self, samples: MissionSamples, generator: torch.Generator, max_rate: float) -> tuple[float, float]:
         """Take gradient steps; return mean entropy and divergence in nats."""
