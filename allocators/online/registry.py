@@ -17,6 +17,7 @@ POLICIES = {
     "greedy": "alloc.allocators.online.policies.greedy:GreedyUtility",
     "hedonic": "alloc.allocators.online.policies.hedonic:HedonicCoalitions",
     "auction": "alloc.allocators.online.policies.auction:ConsensusAuction",
+    "gappo": "alloc.allocators.online.policies.gappo:NetworkPolicy",
     "replan": "alloc.allocators.online.policies.replan:Replan",
 }
 
