@@ -1,0 +1,337 @@
+"""A planner for the missions of another program, such as a ground station."""
+
+import math
+import threading
+import time
+from collections.abc import Mapping
+from types import MappingProxyType, TracebackType
+from typing import Self
+
+from alloc.allocators.online.contract import Policy
+from alloc.allocators.online.planner import saved
+from alloc.allocators.online.planner.inputs import Input, Report
+from alloc.allocators.online.planner.leader import Decision, Leader
+from alloc.allocators.online.planner.picture import News, Picture
+from alloc.allocators.online.planner.plan import OrderChange, Plan, changes_of
+from alloc.allocators.online.registry import load_policy
+from alloc.problems import InputError, Instance, Mission
+from alloc.problems.arguments import of_type, real, shown, text, whole
+from alloc.problems.formats.files import PathLike
+from alloc.problems.missions.events import LATEST, Event
+from alloc.problems.missions.simulation.reports import View
+from alloc.problems.missions.simulation.state import ACTIVE, STAY, AgentStatus, Order, TaskStatus
+
+RESERVE_MS = 8.0
+"""Kept of the deadline beside the time that orders took to check before: another thread may hold the interpreter."""
+
+
+class MissionPlanner:
+    """Plans for agents and tasks that it is told of, and answers before a deadline.
+
+    It knows what is there at hour 0 of a mission. All that comes later has to be submitted as it happens. Between two
+    events agents are taken to follow their orders, until they report something else. All methods may be called from
+    any thread; a plan is made in a thread of its own.
+
+    Parameters
+    ----------
+    mission : Mission or Instance
+    policy : str or Policy
+        A name, or a policy with its own parameters. Everything is known here, so that any policy will do.
+    deadline_ms : float or None
+        Milliseconds within which `plan` answers; None to wait for the policy.
+    seed : int
+        Of the policy.
+    **settings
+        Single parameters of a policy that is given by name.
+
+    Raises
+    ------
+    InputError
+        If the policy or a parameter is unknown, or an argument is wrong.
+    """
+
+    def __init__(
+        self,
+        mission: Mission | Instance,
+        policy: str | Policy = "replan",
+        deadline_ms: float | None = 100.0,
+        *,
+        seed: int = 0,
+        **settings: object,
+    ) -> None:
+        of_type(mission, (Mission, Instance), "mission")
+        of_type(policy, (str, Policy), "policy")
+        if isinstance(policy, Policy) and settings:
+            raise InputError("is an object with its own parameters; set them where it is made", "policy")
+        self._deadline_s = None if deadline_ms is None else real(deadline_ms, "deadline_ms", above=True) / 1000
+        self._seed = whole(seed, "seed", 0, 2**63 - 1)
+        self._made_of = (policy if isinstance(policy, str) else None, settings)
+        leader = load_policy(policy, **settings) if isinstance(policy, str) else policy
+        self._picture = Picture(mission if isinstance(mission, Mission) else Mission.from_instance(mission))
+        self._lock = threading.RLock()
+        self._pins: dict[str, str | None] = {}
+        self._plan, self._version, self._planned = Plan(), 0, -1
+        self._told: set[str] = set()
+        self._decision: Decision | None = None
+        self._conclude_s = 0.0
+        self._is_closed = False
+        self._leader = Leader(leader, self._seed, self._deadline_s, self._picture.state, self._look)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the planner's thread; it cannot plan any more."""
+        self._is_closed = True
+        self._leader.close()
+
+    @property
+    def hour(self) -> float:
+        """Up to which hour it knows what happened."""
+        return self._picture.state.hour
+
+    def submit(self, event: Event | Report | Mapping[str, object]) -> None:
+        """Take notice of an event of the mission, or of a report of an agent.
+
+        Parameters
+        ----------
+        event : Event, Report or mapping
+            Or its fields as in a file; without an hour it is now. ``task-changes`` says what is left of a task, and
+            ``agent-reports`` where an agent is and what its battery holds.
+
+        Raises
+        ------
+        InputError
+            If a field is wrong, an id unknown, its hour has passed, it was submitted before, or cannot happen. Then
+            nothing has changed.
+        """
+        with self._lock:
+            given = Input.of(event, self.hour)
+            line = repr(given)
+            if line in self._told:
+                raise InputError("was submitted before, at the same hour", "event")
+            before = self.hour
+            self._picture.take(given)
+            if self.hour > before:
+                self._told.clear()
+            self._told.add(line)
+            self._version += 1
+
+    def pin(self, agent: str, task: str | None) -> None:
+        """Let an agent do this task until it is over, whatever the policy says, or None to stay where it is.
+
+        Parameters
+        ----------
+        agent, task : str
+            Their ids.
+
+        Raises
+        ------
+        InputError
+            If one is unknown, or the agent cannot take the task now.
+        """
+        with self._lock:
+            state = self._picture.state
+            named = state.agent(text(agent, "agent"))
+            if task is not None:
+                problem = self._picture.refusal(agent, text(task, "task"))
+            else:
+                problem = None if named.status in ACTIVE else f"the agent is {named.status}"
+            if problem is not None:
+                raise InputError(f"cannot be pinned: {problem}", "agent")
+            self._pins[agent] = task
+            self._note(News(self.hour, "was pinned", agent))
+
+    def unpin(self, agent: str) -> None:
+        """Let the policy lead an agent again.
+
+        Parameters
+        ----------
+        agent : str
+            Its id.
+
+        Raises
+        ------
+        InputError
+            If it is not pinned.
+        """
+        with self._lock:
+            if agent not in self._pins:
+                raise InputError(f"{shown(agent)} is not pinned", "agent")
+            del self._pins[agent]
+            self._note(News(self.hour, "was unpinned", agent))
+
+    def plan(self, hour: float | None = None) -> Plan:
+        """Return the orders of all agents, by the policy if it answers in time.
+
+        Parameters
+        ----------
+        hour : float, optional
+            What time it is; that of the last event by default.
+
+        Returns
+        -------
+        Plan
+            Orders that can be followed. Where nothing has happened since the last one it is the same.
+
+        Raises
+        ------
+        InputError
+            If the hour has passed, or the planner is closed.
+        """
+        until = math.inf if self._deadline_s is None else time.perf_counter() + self._deadline_s
+        with self._lock:
+            if self._is_closed:
+                raise InputError("is closed", "planner")
+            if hour is not None:
+                self._advance(hour)
+            if self._planned == self._version:
+                return self._plan
+            decision = self._ask(until)
+        decision.done.wait(None if until == math.inf else max(0.0, until - self._reserve() - time.perf_counter()))
+        with self._lock:
+            return self._conclude(decision)
+
+    def why_changed(self) -> tuple[OrderChange, ...]:
+        """Return each order of the last plan that differs from the one before, and what caused it."""
+        return self._plan.changes
+
+    def save(self, path: PathLike) -> None:
+        """Write all that it knows, its pins and its plan to a file, from which `restore` goes on.
+
+        Parameters
+        ----------
+        path : str or path
+
+        Raises
+        ------
+        InputError
+            If it cannot be written.
+        """
+        with self._lock:
+            name, settings = self._made_of
+            document = {
+                "policy": name,
+                "settings": settings,
+                "deadline_ms": None if self._deadline_s is None else self._deadline_s * 1000,
+                "seed": self._seed,
+                "pins": self._pins,
+                "is_planned": self._planned == self._version,
+                "told": sorted(self._told),
+                **saved.document_of(self._picture, self._plan),
+            }
+        saved.write(document, path)
+
+    @classmethod
+    def restore(cls, path: PathLike, policy: Policy | None = None) -> "MissionPlanner":
+        """Return the planner that was saved: it has the same plan, and goes on from there.
+
+        What a policy remembers of its own begins anew.
+
+        Parameters
+        ----------
+        path : str or path
+        policy : Policy, optional
+            The policy, where it was an object when the planner was saved.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be read, or is none of `save`.
+        """
+        document = saved.read(path)
+        with saved.told_of(path):
+            name = document["policy"]
+            if name is None and policy is None:
+                raise InputError("was an object; give it again", "policy")
+            planner = cls(
+                saved.mission_of(document),
+                policy if policy is not None else text(name, "policy"),
+                document["deadline_ms"],  # type: ignore[arg-type]  # which is checked
+                seed=int(document["seed"]),  # type: ignore[call-overload]
+                **({} if policy is not None else document["settings"]),  # type: ignore[dict-item]
+            )
+            planner._plan = saved.restored(document, planner._picture)
+            planner._pins = dict(document["pins"])  # type: ignore[call-overload]
+            planner._told = set(document["told"])  # type: ignore[call-overload]
+            planner._planned = 0 if document["is_planned"] else -1
+        return planner
+
+    def _note(self, news: News) -> None:
+        self._picture.tell(news)
+        self._version += 1
+
+    def _advance(self, hour: float) -> None:
+        now = float(real(hour, "hour", 0, LATEST))
+        if now < self.hour:
+            raise InputError(f"is {now:g}, but it is hour {self.hour:g} already", "hour")
+        known, before = self._picture.told, self.hour
+        self._picture.advance(now)
+        if now > before:
+            self._told.clear()
+        if self._picture.told > known:
+            self._version += 1
+
+    def _look(self, decision: Decision) -> View:
+        with self._lock:
+            decision.version, decision.seen = self._version, self._picture.told
+            return self._picture.view(self._pins)
+
+    def _ask(self, until: float) -> Decision:
+        """Return a decision about what is known now, or about more; one that has not begun will do for many."""
+        decision = self._decision
+        if decision is None or decision.is_stale(self._version):
+            decision = self._decision = Decision(until)
+            self._leader.ask(decision)
+        return decision
+
+    def _reserve(self) -> float:
+        """Return the seconds to keep for what comes after the policy's answer."""
+        assert self._deadline_s is not None
+        return min(self._deadline_s / 2, RESERVE_MS / 1000 + 2 * self._conclude_s)
+
+    def _conclude(self, decision: Decision) -> Plan:
+        """Make the next plan of what was decided; of the last one where that is nothing."""
+        if decision.is_whole and decision.version <= self._planned:
+            return self._plan  # another thread was here with the same
+        began = time.perf_counter()
+        late = self._leader.last
+        orders = dict(decision.orders)
+        if not decision.is_whole and late is not None and late.version > self._planned:
+            orders = {**late.orders, **orders}  # of what was known a little earlier
+        self._follow(orders)
+        picture, before = self._picture, self._plan
+        orders = {agent.facts.id: agent.order for agent in picture.active()}
+        changes = changes_of(before.orders, orders, picture.news)
+        self._plan = Plan(self.hour, MappingProxyType(orders), decision.is_whole, decision.problem, changes)
+        if decision.is_whole:
+            self._planned = decision.version
+            picture.forget(decision.seen)
+        self._conclude_s = max(time.perf_counter() - began, 0.9 * self._conclude_s)
+        return self._plan
+
+    def _follow(self, orders: dict[str, Order]) -> None:
+        """Give the orders that can be followed now, those of pins before all, and end those that lead nowhere."""
+        picture = self._picture
+        self._pins = {agent: task for agent, task in self._pins.items() if self._holds(agent, task)}
+        for agent in picture.active():
+            name = agent.facts.id
+            wanted = orders.get(name)
+            if name in self._pins:
+                wanted = STAY if self._pins[name] is None else Order(self._pins[name])
+            if wanted is not None:
+                picture.order(name, wanted)
+            task = agent.order.task
+            if task is not None and picture.state.task(task).status is not TaskStatus.OPEN:
+                picture.order(name, STAY)
+
+    def _holds(self, agent: str, task: str | None) -> bool:
+        """Return whether a pin still holds."""
+        state = self._picture.state
+        is_open = task is None or state.task(task).status is TaskStatus.OPEN
+        return is_open and state.agent(agent).status is not AgentStatus.FAILED
