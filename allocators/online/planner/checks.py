@@ -21,7 +21,7 @@ def check_hour(state: LiveState, hour: float) -> None:
 def check_event(state: LiveState, event: Event) -> None:
     """Raise `InputError` if an event cannot happen as things are.
 
-    A task that is done by what is believed may have work left, so that whatever happens to an open one may happen to it.
+    A task that is believed to be done may have work left: whatever happens to an open one may happen to it.
     """
     agent = None if event.agent is None else state.agent(event.agent)
     task = None if event.task is None else state.task(event.task)

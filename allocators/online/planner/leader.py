@@ -13,7 +13,7 @@ from alloc.problems.missions.simulation.reports import View
 from alloc.problems.missions.simulation.state import Order
 from alloc.problems.vocabulary import Knowledge
 
-DECISION_SHARE = 0.8
+DECISION_SHARE = 0.6
 """Part of the deadline that a policy is told it has: the rest is for the view before, and the orders after."""
 
 

@@ -22,7 +22,6 @@ from alloc.problems.missions.simulation.state import (
     TaskStatus,
 )
 
-
 WORDS = {
     EventKind.AGENT_JOINS: "joined",
     EventKind.AGENT_FAILS: "failed",
@@ -121,7 +120,7 @@ class Picture:
         self._changes.balance()
 
     def order(self, name: str, order: Order) -> str | None:
-        """Give an agent an order; return why it is not given, None if it is."""
+        """Give an agent an order; return why it is not given, None if it is. `settle` comes after the last."""
         agent = self.state.agent(name)
         if order == agent.order:
             return None
@@ -133,8 +132,11 @@ class Picture:
         problem = obey(self.state, agent, order)
         if problem is None:
             self._changes.note_agent(agent, left)
-            self._changes.balance()
         return problem
+
+    def settle(self) -> None:
+        """Look ahead after some orders: when flights and work will end."""
+        self._changes.balance()
 
     def active(self) -> list[AgentState]:
         """Return the agents that take orders."""

@@ -95,7 +95,6 @@ def _cause(
 
 def told(news: News) -> str:
     """Return news as words."""
-    subject = (
-        f"agent {news.agent} " if news.agent is not None else f"task {news.task} " if news.task is not None else ""
-    )
+    subjects = (("agent", news.agent), ("task", news.task))
+    subject = "".join(f"{kind} {name} " for kind, name in subjects if name is not None)
     return f"{subject}{news.text} at {news.hour:g}"

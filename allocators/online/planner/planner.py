@@ -21,8 +21,9 @@ from alloc.problems.missions.events import LATEST, Event
 from alloc.problems.missions.simulation.reports import View
 from alloc.problems.missions.simulation.state import ACTIVE, STAY, AgentStatus, Order, TaskStatus
 
-RESERVE_MS = 8.0
-"""Kept of the deadline beside the time that orders took to check before: another thread may hold the interpreter."""
+RESERVE_MS, RESERVE_SHARE = 8.0, 0.3
+"""Kept of the deadline, beside the time that it took before to follow orders, as another thread may hold the
+interpreter; and the part of the deadline that this is at the most."""
 
 
 class MissionPlanner:
@@ -293,7 +294,7 @@ class MissionPlanner:
     def _reserve(self) -> float:
         """Return the seconds to keep for what comes after the policy's answer."""
         assert self._deadline_s is not None
-        return min(self._deadline_s / 2, RESERVE_MS / 1000 + 2 * self._conclude_s)
+        return min(RESERVE_SHARE * self._deadline_s, RESERVE_MS / 1000 + 2 * self._conclude_s)
 
     def _conclude(self, decision: Decision) -> Plan:
         """Make the next plan of what was decided; of the last one where that is nothing."""
@@ -329,6 +330,7 @@ class MissionPlanner:
             task = agent.order.task
             if task is not None and picture.state.task(task).status is not TaskStatus.OPEN:
                 picture.order(name, STAY)
+        picture.settle()
 
     def _holds(self, agent: str, task: str | None) -> bool:
         """Return whether a pin still holds."""

@@ -116,11 +116,9 @@ def restored(document: Row, picture: Picture) -> Plan:
         OrderChange(str(row["agent"]), _order(row["before"]), _order(row["after"]), str(row["cause"]))
         for row in _rows(plan["changes"])
     )
-    problem = plan["problem"]
     found = {name: order for name, order in orders.items() if order is not None}
-    return Plan(
-        float(str(plan["hour"])), found, bool(plan["is_new"]), None if problem is None else str(problem), changes
-    )
+    problem = None if plan["problem"] is None else str(plan["problem"])
+    return Plan(float(str(plan["hour"])), found, bool(plan["is_new"]), problem, changes)
 
 
 def _agent(agent: AgentState) -> Row:

@@ -6,8 +6,12 @@ from alloc.problems.arguments import shown
 from alloc.problems.errors import InputError, nearest
 from alloc.problems.formats.json_columns import Row
 from alloc.problems.missions.events import EventKind
-from alloc.problems.missions.files.document import HEADER_FIELDS, MISSION_FORMAT, mission_from_document
-from alloc.problems.missions.files.document import mission_to_document
+from alloc.problems.missions.files.document import (
+    HEADER_FIELDS,
+    MISSION_FORMAT,
+    mission_from_document,
+    mission_to_document,
+)
 from alloc.problems.missions.mission import Mission
 from alloc.problems.missions.simulation.places import Place
 from alloc.problems.missions.simulation.state import AgentState, MissionState, TaskState
@@ -82,10 +86,9 @@ class LiveState(MissionState):
         else:
             listed = row.get("tasks")
             named = [*(listed if isinstance(listed, list) else ()), row.get("start_task")]
-            found = [
-                self.task(str(one)) for one in dict.fromkeys(map(str, filter(None, named))) if one in self._task_index
-            ]
-            tasks += [{"id": one.facts.id, "workload": 1, "position": one.facts.place.position} for one in found]
+            for one in dict.fromkeys(str(name) for name in named if name is not None):
+                if one in self._task_index:
+                    tasks.append({"id": one, "workload": 1, "position": self.task(one).facts.place.position})
             if not tasks:
                 tasks.append({**other, "workload": 1})
         document = {**self._header, "format": MISSION_FORMAT, "agents": agents, "tasks": tasks, "events": [event]}
