@@ -8,7 +8,7 @@ import time
 
 import numpy as np
 
-from alloc.allocators.online.planner.planner import MissionPlanner
+from alloc.allocators import MissionPlanner
 from alloc.problems import Instance
 
 

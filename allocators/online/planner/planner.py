@@ -11,15 +11,16 @@ from alloc.allocators.online.contract import Policy
 from alloc.allocators.online.planner import saved
 from alloc.allocators.online.planner.inputs import Input, Report
 from alloc.allocators.online.planner.leader import Decision, Leader
-from alloc.allocators.online.planner.picture import News, Picture
+from alloc.allocators.online.planner.picture import Picture
+from alloc.allocators.online.planner.pins import Pins
 from alloc.allocators.online.planner.plan import OrderChange, Plan, changes_of
 from alloc.allocators.online.registry import load_policy
 from alloc.problems import InputError, Instance, Mission
-from alloc.problems.arguments import of_type, real, shown, text, whole
+from alloc.problems.arguments import of_type, real, text, whole
 from alloc.problems.formats.files import PathLike
 from alloc.problems.missions.events import LATEST, Event
 from alloc.problems.missions.simulation.reports import View
-from alloc.problems.missions.simulation.state import ACTIVE, STAY, AgentStatus, Order, TaskStatus
+from alloc.problems.missions.simulation.state import STAY, Order, TaskStatus
 
 RESERVE_MS, RESERVE_SHARE = 8.0, 0.3
 """Kept of the deadline, beside the time that it took before to follow orders, as another thread may hold the
@@ -70,7 +71,7 @@ class MissionPlanner:
         leader = load_policy(policy, **settings) if isinstance(policy, str) else policy
         self._picture = Picture(mission if isinstance(mission, Mission) else Mission.from_instance(mission))
         self._lock = threading.RLock()
-        self._pins: dict[str, str | None] = {}
+        self._pins = Pins(self._picture)
         self._plan, self._version, self._planned = Plan(), 0, -1
         self._told: set[str] = set()
         self._decision: Decision | None = None
@@ -137,16 +138,8 @@ class MissionPlanner:
             If one is unknown, or the agent cannot take the task now.
         """
         with self._lock:
-            state = self._picture.state
-            named = state.agent(text(agent, "agent"))
-            if task is not None:
-                problem = self._picture.refusal(agent, text(task, "task"))
-            else:
-                problem = None if named.status in ACTIVE else f"the agent is {named.status}"
-            if problem is not None:
-                raise InputError(f"cannot be pinned: {problem}", "agent")
-            self._pins[agent] = task
-            self._note(News(self.hour, "was pinned", agent))
+            self._pins.add(agent, task)
+            self._version += 1
 
     def unpin(self, agent: str) -> None:
         """Let the policy lead an agent again.
@@ -162,10 +155,8 @@ class MissionPlanner:
             If it is not pinned.
         """
         with self._lock:
-            if agent not in self._pins:
-                raise InputError(f"{shown(agent)} is not pinned", "agent")
-            del self._pins[agent]
-            self._note(News(self.hour, "was unpinned", agent))
+            self._pins.remove(agent)
+            self._version += 1
 
     def plan(self, hour: float | None = None) -> Plan:
         """Return the orders of all agents, by the policy if it answers in time.
@@ -221,7 +212,7 @@ class MissionPlanner:
                 "settings": settings,
                 "deadline_ms": None if self._deadline_s is None else self._deadline_s * 1000,
                 "seed": self._seed,
-                "pins": self._pins,
+                "pins": self._pins.tasks,
                 "is_planned": self._planned == self._version,
                 "told": sorted(self._told),
                 **saved.document_of(self._picture, self._plan),
@@ -258,14 +249,10 @@ class MissionPlanner:
                 **({} if policy is not None else document["settings"]),  # type: ignore[dict-item]
             )
             planner._plan = saved.restored(document, planner._picture)
-            planner._pins = dict(document["pins"])  # type: ignore[call-overload]
+            planner._pins.tasks = dict(document["pins"])  # type: ignore[call-overload]
             planner._told = set(document["told"])  # type: ignore[call-overload]
             planner._planned = 0 if document["is_planned"] else -1
         return planner
-
-    def _note(self, news: News) -> None:
-        self._picture.tell(news)
-        self._version += 1
 
     def _advance(self, hour: float) -> None:
         now = float(real(hour, "hour", 0, LATEST))
@@ -281,7 +268,7 @@ class MissionPlanner:
     def _look(self, decision: Decision) -> View:
         with self._lock:
             decision.version, decision.seen = self._version, self._picture.told
-            return self._picture.view(self._pins)
+            return self._picture.view(self._pins.tasks)
 
     def _ask(self, until: float) -> Decision:
         """Return a decision about what is known now, or about more; one that has not begun will do for many."""
@@ -319,21 +306,13 @@ class MissionPlanner:
     def _follow(self, orders: dict[str, Order]) -> None:
         """Give the orders that can be followed now, those of pins before all, and end those that lead nowhere."""
         picture = self._picture
-        self._pins = {agent: task for agent, task in self._pins.items() if self._holds(agent, task)}
+        self._pins.lapse()
         for agent in picture.active():
             name = agent.facts.id
-            wanted = orders.get(name)
-            if name in self._pins:
-                wanted = STAY if self._pins[name] is None else Order(self._pins[name])
+            wanted = self._pins.order(name) or orders.get(name)
             if wanted is not None:
                 picture.order(name, wanted)
             task = agent.order.task
             if task is not None and picture.state.task(task).status is not TaskStatus.OPEN:
                 picture.order(name, STAY)
         picture.settle()
-
-    def _holds(self, agent: str, task: str | None) -> bool:
-        """Return whether a pin still holds."""
-        state = self._picture.state
-        is_open = task is None or state.task(task).status is TaskStatus.OPEN
-        return is_open and state.agent(agent).status is not AgentStatus.FAILED

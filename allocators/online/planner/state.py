@@ -86,16 +86,18 @@ class LiveState(MissionState):
         else:
             listed = row.get("tasks")
             named = [*(listed if isinstance(listed, list) else ()), row.get("start_task")]
-            for one in dict.fromkeys(str(name) for name in named if name is not None):
-                if one in self._task_index:
-                    tasks.append({"id": one, "workload": 1, "position": self.task(one).facts.place.position})
-            if not tasks:
-                tasks.append({**other, "workload": 1})
+            known = {str(name): None for name in named if str(name) in self._task_index}
+            tasks = [{"id": one, "workload": 1, "position": self._position(one)} for one in known]
+            tasks = tasks or [{**other, "workload": 1}]
         document = {**self._header, "format": MISSION_FORMAT, "agents": agents, "tasks": tasks, "events": [event]}
         try:
             return mission_from_document(document)
         except InputError as error:
             raise InputError(error.message, error.place.removeprefix("events[0].")) from error
+
+    def _position(self, task: str) -> list[float] | None:
+        position = self.task(task).facts.place.position
+        return None if position is None else list(position)
 
     def _add_agent(self, agent: AgentState, row: Row) -> None:
         start = row.get("start_task")
