@@ -58,7 +58,7 @@ class Report:
             self._set("battery", float(real(self.battery, "battery", 0, LATEST)))
         if self.position is not None and self.task is not None:
             raise InputError("says where the agent is, as does position; give one of them", "task")
-        if self.position is self.task is self.battery is None:
+        if (self.position, self.task, self.battery) == (None, None, None):
             raise InputError("says nothing; give position or task, battery, or both", "agent")
 
     def _set(self, name: str, value: object) -> None:
@@ -107,7 +107,7 @@ class Input:
             return cls(given)
         row = dict(of_type(given, Mapping, "event"))
         kind = row.pop("event", None)
-        kinds = (*EventKind, AGENT_REPORTS)
+        kinds = (*map(str, EventKind), AGENT_REPORTS)
         if not isinstance(kind, str) or kind not in kinds:
             hint = nearest(kind, kinds) if isinstance(kind, str) else f"; it must be one of {', '.join(kinds)}"
             raise InputError("is missing" + hint if kind is None else f"is {shown(kind)}, which is none{hint}", "event")

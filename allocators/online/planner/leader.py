@@ -1,5 +1,6 @@
 """A policy that decides in a thread of its own, so that whoever waits for it need not wait longer than it wants."""
 
+import math
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -23,10 +24,11 @@ class Decision:
     Parameters
     ----------
     until : float
-        When nobody waits for it any more, as `time.perf_counter` says.
 
     Attributes
     ----------
+    until : float
+        When nobody waits for it any more, as `time.perf_counter` says.
     version, seen : int
         Of what was known when it began, and how much had been told; -1 before.
     orders : dict of str to Order
@@ -44,12 +46,12 @@ class Decision:
         self.done = threading.Event()
         self.is_whole = False
         self.problem: str | None = None
-        self._until = until
+        self.until = until
 
     @property
     def is_overdue(self) -> bool:
         """Whether nobody waits for it any more."""
-        return time.perf_counter() > self._until
+        return time.perf_counter() > self.until
 
     def is_stale(self, version: int) -> bool:
         """Return whether it is of no use for who asks now, when this is the version of what is known."""
@@ -93,12 +95,26 @@ class Leader:
         self._agents: dict[str, AgentDecider] = {}
         self.last: Decision | None = None
         self._wanted: SimpleQueue[Decision | None] = SimpleQueue()
+        self._wanted_last: Decision | None = None
         self._thread = threading.Thread(target=self._work, name="alloc-planner", daemon=True)
         self._thread.start()
 
-    def ask(self, decision: Decision) -> None:
-        """Let a decision be made as soon as those before it are; what it is about is looked at then."""
-        self._wanted.put(decision)
+    def ask(self, version: int, until: float) -> Decision:
+        """Return a decision to be made as soon as those before it are; what it is about is looked at then.
+
+        Parameters
+        ----------
+        version : int
+            Of what is known now; a decision about this, or one that has not begun, is asked for only once.
+        until : float
+            When it is of no use any more, as `time.perf_counter` says.
+        """
+        decision = self._wanted_last
+        if decision is None or decision.is_stale(version):
+            decision = self._wanted_last = Decision(until)
+            self._wanted.put(decision)
+        decision.until = max(decision.until, until)
+        return decision
 
     def close(self) -> None:
         """End the thread once the decision in hand is made."""
@@ -149,4 +165,6 @@ class Leader:
 def _order(order: object) -> Order:
     if not isinstance(order, Order):
         raise PolicyError(f"it answered {order!r}, which is no Order")
+    if order.position is not None and not all(math.isfinite(axis) for axis in order.position):
+        raise PolicyError(f"it answered {order!r}, which leads nowhere")
     return order

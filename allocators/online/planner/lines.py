@@ -104,6 +104,8 @@ class Lines:
                 raise InputError("needs a file: start with --state FILE", "request")
             self.save()
         elif name == "pin":
+            if "task" not in fields:
+                raise InputError("is missing; give an id, or null to stay", "task")
             planner.pin(text(fields.get("agent"), "agent"), fields.get("task"))  # type: ignore[arg-type]
         elif name == "unpin":
             planner.unpin(text(fields.get("agent"), "agent"))

@@ -7,6 +7,7 @@ from alloc.allocators.online.planner.checks import check_event, check_hour, chec
 from alloc.allocators.online.planner.inputs import Input
 from alloc.allocators.online.planner.state import LiveState
 from alloc.allocators.online.planner.telemetry import correct
+from alloc.problems.errors import InputError
 from alloc.problems.missions.events import Event, EventKind
 from alloc.problems.missions.mission import Mission
 from alloc.problems.missions.simulation.agenda import Agenda, Arrival, Changes, Completion, Turn
@@ -125,7 +126,10 @@ class Picture:
         if order == agent.order:
             return None
         if order.task is not None:
-            status = self.state.task(order.task).status
+            try:
+                status = self.state.task(order.task).status
+            except InputError as error:
+                return error.message
             if status is not TaskStatus.OPEN:
                 return f"the task is {status}"
         left = agent.task

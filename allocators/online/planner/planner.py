@@ -4,11 +4,12 @@ import math
 import threading
 import time
 from collections.abc import Mapping
-from types import MappingProxyType, TracebackType
-from typing import Self
+from contextlib import AbstractContextManager
+from types import MappingProxyType
 
 from alloc.allocators.online.contract import Policy
 from alloc.allocators.online.planner import saved
+from alloc.allocators.online.planner.checks import check_hour
 from alloc.allocators.online.planner.inputs import Input, Report
 from alloc.allocators.online.planner.leader import Decision, Leader
 from alloc.allocators.online.planner.picture import Picture
@@ -18,6 +19,7 @@ from alloc.allocators.online.registry import load_policy
 from alloc.problems import InputError, Instance, Mission
 from alloc.problems.arguments import of_type, real, text, whole
 from alloc.problems.formats.files import PathLike
+from alloc.problems.formats.json_text import require_object
 from alloc.problems.missions.events import LATEST, Event
 from alloc.problems.missions.simulation.reports import View
 from alloc.problems.missions.simulation.state import STAY, Order, TaskStatus
@@ -27,7 +29,7 @@ RESERVE_MS, RESERVE_SHARE = 8.0, 0.3
 interpreter; and the part of the deadline that this is at the most."""
 
 
-class MissionPlanner:
+class MissionPlanner(AbstractContextManager["MissionPlanner"]):
     """Plans for agents and tasks that it is told of, and answers before a deadline.
 
     It knows what is there at hour 0 of a mission. All that comes later has to be submitted as it happens. Between two
@@ -74,17 +76,11 @@ class MissionPlanner:
         self._pins = Pins(self._picture)
         self._plan, self._version, self._planned = Plan(), 0, -1
         self._told: set[str] = set()
-        self._decision: Decision | None = None
         self._conclude_s = 0.0
         self._is_closed = False
         self._leader = Leader(leader, self._seed, self._deadline_s, self._picture.state, self._look)
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:
@@ -169,7 +165,7 @@ class MissionPlanner:
         Returns
         -------
         Plan
-            Orders that can be followed. Where nothing has happened since the last one it is the same.
+            Orders that can be followed. Where nothing has happened it is the last one.
 
         Raises
         ------
@@ -184,8 +180,8 @@ class MissionPlanner:
                 self._advance(hour)
             if self._planned == self._version:
                 return self._plan
-            decision = self._ask(until)
-        decision.done.wait(None if until == math.inf else max(0.0, until - self._reserve() - time.perf_counter()))
+            decision = self._leader.ask(self._version, until)
+        decision.done.wait(self._patience(until))
         with self._lock:
             return self._conclude(decision)
 
@@ -238,16 +234,13 @@ class MissionPlanner:
         """
         document = saved.read(path)
         with saved.told_of(path):
-            name = document["policy"]
+            name, settings = document["policy"], document["settings"]
             if name is None and policy is None:
                 raise InputError("was an object; give it again", "policy")
-            planner = cls(
-                saved.mission_of(document),
-                policy if policy is not None else text(name, "policy"),
-                document["deadline_ms"],  # type: ignore[arg-type]  # which is checked
-                seed=int(document["seed"]),  # type: ignore[call-overload]
-                **({} if policy is not None else document["settings"]),  # type: ignore[dict-item]
-            )
+            given = {} if policy is not None else require_object(settings, "settings")
+            leader = text(name, "policy") if policy is None else policy
+            deadline_ms, seed = document["deadline_ms"], document["seed"]
+            planner = cls(saved.mission_of(document), leader, deadline_ms, seed=seed, **given)  # type: ignore[arg-type]
             planner._plan = saved.restored(document, planner._picture)
             planner._pins.tasks = dict(document["pins"])  # type: ignore[call-overload]
             planner._told = set(document["told"])  # type: ignore[call-overload]
@@ -256,8 +249,7 @@ class MissionPlanner:
 
     def _advance(self, hour: float) -> None:
         now = float(real(hour, "hour", 0, LATEST))
-        if now < self.hour:
-            raise InputError(f"is {now:g}, but it is hour {self.hour:g} already", "hour")
+        check_hour(self._picture.state, now)
         known, before = self._picture.told, self.hour
         self._picture.advance(now)
         if now > before:
@@ -267,21 +259,16 @@ class MissionPlanner:
 
     def _look(self, decision: Decision) -> View:
         with self._lock:
+            self._pins.lapse()
             decision.version, decision.seen = self._version, self._picture.told
             return self._picture.view(self._pins.tasks)
 
-    def _ask(self, until: float) -> Decision:
-        """Return a decision about what is known now, or about more; one that has not begun will do for many."""
-        decision = self._decision
-        if decision is None or decision.is_stale(self._version):
-            decision = self._decision = Decision(until)
-            self._leader.ask(decision)
-        return decision
-
-    def _reserve(self) -> float:
-        """Return the seconds to keep for what comes after the policy's answer."""
-        assert self._deadline_s is not None
-        return min(RESERVE_SHARE * self._deadline_s, RESERVE_MS / 1000 + 2 * self._conclude_s)
+    def _patience(self, until: float) -> float | None:
+        """Return the seconds to wait for the policy, less than there are: its orders are to be followed after that."""
+        if self._deadline_s is None:
+            return None
+        reserve = min(RESERVE_SHARE * self._deadline_s, RESERVE_MS / 1000 + 2 * self._conclude_s)
+        return max(0.0, until - reserve - time.perf_counter())
 
     def _conclude(self, decision: Decision) -> Plan:
         """Make the next plan of what was decided; of the last one where that is nothing."""

@@ -1,5 +1,6 @@
 """A planner as a file: alloc-planner/1."""
 
+import json
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,7 +12,7 @@ from alloc.problems.errors import InputError
 from alloc.problems.formats.columns import require_format
 from alloc.problems.formats.files import PathLike, named, read_text, write_text_atomically
 from alloc.problems.formats.json_columns import Row
-from alloc.problems.formats.json_text import encode, parse, require_object
+from alloc.problems.formats.json_text import encode, require_object
 from alloc.problems.formats.messages import told
 from alloc.problems.missions.files.document import mission_from_document, mission_to_document
 from alloc.problems.missions.mission import Mission
@@ -66,10 +67,12 @@ def read(path: PathLike) -> Row:
     """Return the document in a file, if it is one of a planner."""
     source = named(path)
     try:
-        document = require_object(parse(read_text(path)))
+        document = require_object(json.loads(read_text(path)))  # whole numbers stay whole: they may be settings
         require_format(document.get("format"), (PLANNER_FORMAT,))
     except InputError as error:
         raise told(error, source) from error.__cause__
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"is no JSON: {error}", source=source) from error
     return document
 
 
@@ -92,7 +95,6 @@ def mission_of(document: Row) -> Mission:
 def restored(document: Row, picture: Picture) -> Plan:
     """Put what was saved into the picture of a new planner of the same mission, and return the plan."""
     state, hour = picture.state, document["hour"]
-    assert isinstance(hour, float)
     for arrival in _rows(document["arrivals"]):
         state.admit(arrival)
     rows = _rows(document["agents"]), _rows(document["tasks"])
@@ -105,7 +107,7 @@ def restored(document: Row, picture: Picture) -> Plan:
         task.workers = {agent.index: agent for agent in workers}
         for agent in workers:
             agent.task = task
-    state.hour = hour
+    state.hour = float(str(hour))
     picture.restore_agenda()
     picture.forget(picture.told)
     for row in _rows(document["news"]):
@@ -169,14 +171,14 @@ def _rows(value: object) -> list[Row]:
 
 
 def _restore_task(task: TaskState, row: Row) -> None:
-    task.status = TaskStatus(row["status"])
+    task.status = TaskStatus(str(row["status"]))
     task.facts = replace(task.facts, appears=float(str(row["appears"])))
     task.begun, task.version = bool(row["begun"]), int(float(str(row["version"])))
     _restore_ledgers(task, row, TASK_LEDGERS)
 
 
 def _restore_agent(picture: Picture, agent: AgentState, row: Row) -> None:
-    agent.status, agent.place = AgentStatus(row["status"]), _to_place(row["place"])
+    agent.status, agent.place = AgentStatus(str(row["status"])), _to_place(row["place"])
     order, flight = _order(row["order"]), row["flight"]
     assert order is not None
     agent.order, agent.flight, agent.task = order, None, None

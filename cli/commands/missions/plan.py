@@ -8,7 +8,7 @@ import threading
 from collections.abc import Iterator
 from pathlib import Path
 from queue import SimpleQueue
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, BinaryIO
 
 import typer
 
@@ -65,11 +65,11 @@ def plan_command(
     ] = None,
     state: Annotated[
         str | None,
-        typer.Option(metavar="FILE", help="Go on from this file if it is there, and save to it at the end."),
+        typer.Option(metavar="FILE", help="Go on from this file if it is there, by its policy; save to it at the end."),
     ] = None,
 ) -> None:
     """Plan for a program in any language: events in, orders out, one line of JSON each."""
-    from alloc.allocators import MissionPlanner
+    from alloc.allocators import MissionPlanner, load_policy
     from alloc.allocators.online.planner.lines import Lines
     from alloc.problems import read_mission
 
@@ -89,6 +89,8 @@ def plan_command(
         planner = MissionPlanner.restore(state)
     elif mission is not None:
         planner = begin(read_mission(mission))
+    else:
+        load_policy(policy, **given)  # what is wrong with it is told now
     serve(Lines(planner, begin, state))
 
 
@@ -110,8 +112,8 @@ def read_lines(arrived: "SimpleQueue[str | None]") -> None:
 
     Without a buffer, whose lock would hold up the end of the process while this thread waits for input.
     """
-    stream = getattr(sys.stdin, "buffer", sys.stdin)
-    source = getattr(stream, "raw", stream)
+    stream: BinaryIO = sys.stdin.buffer
+    source: BinaryIO = getattr(stream, "raw", stream)
     rest = b""
     while chunk := source.read(CHUNK):
         *whole, rest = (rest + chunk).split(b"\n")
