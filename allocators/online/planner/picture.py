@@ -46,12 +46,15 @@ class News:
     text : str
     agent, task : str or None
         Whom or what it is about.
+    is_minor : bool
+        Whether it is one of the reports that come all the time: where an agent is, or what is left of a task.
     """
 
     hour: float
     text: str
     agent: str | None = None
     task: str | None = None
+    is_minor: bool = False
 
 
 class Picture:
@@ -111,13 +114,15 @@ class Picture:
         self.advance(said.hour)
         if isinstance(said, Event):
             self._apply(said)
-            self._tell(WORDS[said.kind], agent=said.agent, task=said.task)
+            is_minor = said.kind is EventKind.TASK_CHANGES
+            self.tell(News(said.hour, WORDS[said.kind], said.agent, said.task, is_minor))
         else:
             agent = self.state.agent(said.agent)
             left = agent.task
             problem = correct(self.state, agent, said)
             self._changes.note_agent(agent, left)
-            self._tell("reported" if problem is None else f"cannot go on: {problem}", agent=said.agent)
+            text = "reported" if problem is None else f"cannot go on: {problem}"
+            self.tell(News(said.hour, text, said.agent, is_minor=problem is None))
         self._changes.balance()
 
     def order(self, name: str, order: Order) -> str | None:

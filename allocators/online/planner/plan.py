@@ -69,12 +69,12 @@ def changes_of(
     changed = [name for name in names if before.get(name) != after.get(name)]
     if not changed:
         return ()
-    about: dict[tuple[str, str], list[str]] = {}
+    about: dict[tuple[str, str], list[News]] = {}
     for one in news:
         for kind, subject in (("agent", one.agent), ("task", one.task)):
             if subject is not None:
-                about.setdefault((kind, subject), []).append(told(one))
-    elsewhere = list(dict.fromkeys(told(one) for one in news))
+                about.setdefault((kind, subject), []).append(one)
+    elsewhere = _told(news)
     more = f" and {len(elsewhere) - MOST_CAUSES} more" if len(elsewhere) > MOST_CAUSES else ""
     general = "; ".join(elsewhere[:MOST_CAUSES]) + more if elsewhere else "a better plan was found"
     return tuple(
@@ -84,13 +84,20 @@ def changes_of(
 
 
 def _cause(
-    name: str, before: Mapping[str, Order], after: Mapping[str, Order], about: Mapping[tuple[str, str], list[str]]
+    name: str, before: Mapping[str, Order], after: Mapping[str, Order], about: Mapping[tuple[str, str], list[News]]
 ) -> str:
     """Return what happened to an agent, or to the tasks that it had and has; nothing where that is none."""
     orders = (before.get(name), after.get(name))
     tasks = [order.task for order in orders if order is not None and order.task is not None]
-    found = [*about.get(("agent", name), ()), *(text for task in tasks for text in about.get(("task", task), ()))]
-    return "; ".join(dict.fromkeys(found))
+    return "; ".join(
+        _told([*about.get(("agent", name), ()), *(one for task in tasks for one in about.get(("task", task), ()))])
+    )
+
+
+def _told(news: Sequence[News]) -> list[str]:
+    """Return news as words, what agents report all the time only where there is nothing else."""
+    major = [one for one in news if not one.is_minor]
+    return list(dict.fromkeys(map(told, major or news)))
 
 
 def told(news: News) -> str:

@@ -143,12 +143,7 @@ class MissionPlanner(AbstractContextManager["MissionPlanner"]):
         Parameters
         ----------
         agent : str
-            Its id.
-
-        Raises
-        ------
-        InputError
-            If it is not pinned.
+            Its id; where it is not pinned that is an `InputError`.
         """
         with self._lock:
             self._pins.remove(agent)
@@ -195,11 +190,7 @@ class MissionPlanner(AbstractContextManager["MissionPlanner"]):
         Parameters
         ----------
         path : str or path
-
-        Raises
-        ------
-        InputError
-            If it cannot be written.
+            Where nothing can be written that is an `InputError`.
         """
         with self._lock:
             name, settings = self._made_of

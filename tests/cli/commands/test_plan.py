@@ -154,7 +154,7 @@ def test_sigterm_is_a_clean_end(pair, tmp_path):
 def test_a_shell_with_jq_can_use_it(pair, tmp_path):
     """A pipe of jq on both sides: events made, orders read."""
     script = (
-        "jq -nc '{request: \"plan\"}, {hour: 2, event: \"agent-fails\", agent: \"ben\"}' | "
+        'jq -nc \'{request: "plan"}, {hour: 2, event: "agent-fails", agent: "ben"}\' | '
         + " ".join([*COMMAND, "pair.json"])
         + " | jq -r '.orders[] | .agent + \" \" + .task'"
     )

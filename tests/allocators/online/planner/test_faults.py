@@ -84,7 +84,11 @@ def test_a_planner_that_was_killed_goes_on_with_the_same_plan(pair, tmp_path):
         planner.plan()
         planner.submit({"event": "agent-joins", "agent": {"id": "cat", "ability": 1, "start_task": "t2", "speed": 1}})
         planner.submit(
-            {"hour": 0.5, "event": "task-appears", "task": {"id": "t3", "workload": 2, "position": [2, 2], "deadline": 9}}
+            {
+                "hour": 0.5,
+                "event": "task-appears",
+                "task": {"id": "t3", "workload": 2, "position": [2, 2], "deadline": 9},
+            }
         )
         planner.pin("cat", "t3")
         planner.plan()
