@@ -128,7 +128,7 @@ class Input:
             return cls(Event(kind=kind, **values))  # type: ignore[arg-type]  # which it checks
         if not isinstance(whole.get("id"), str):
             raise InputError(f"must be a non-empty string, got {shown(whole.get('id'))}", f"{subject}.id")
-        event = Event(kind=kind, **{**values, str(subject): whole["id"]})  # type: ignore[arg-type]
+        event = Event(kind=kind, **{**values, str(subject): whole["id"]})
         return cls(event, dict(whole))
 
     def to_dict(self) -> Row:

@@ -99,13 +99,13 @@ class Leader:
         self._thread = threading.Thread(target=self._work, name="alloc-planner", daemon=True)
         self._thread.start()
 
-    def ask(self, version: int, until: float) -> Decision:
+    def request(self, version: int, until: float) -> Decision:
         """Return a decision to be made as soon as those before it are; what it is about is looked at then.
 
         Parameters
         ----------
         version : int
-            Of what is known now; a decision about this, or one that has not begun, is asked for only once.
+            Of what is known now; a decision about this, or one that has not begun, is requested only once.
         until : float
             When it is of no use any more, as `time.perf_counter` says.
         """

@@ -106,7 +106,7 @@ class Picture:
             assert isinstance(said, Event)
             self.state.admit(given.to_dict())
             if said.task is not None:
-                self._watch_deadline(self.state.task(said.task))
+                self._note_deadline(self.state.task(said.task))
         elif isinstance(said, Event):
             check_event(self.state, said)
         else:
@@ -126,7 +126,7 @@ class Picture:
         self._changes.balance()
 
     def order(self, name: str, order: Order) -> str | None:
-        """Give an agent an order; return why it is not given, None if it is. `settle` comes after the last."""
+        """Give an agent an order; return why it is not given, None if it is. `look_ahead` comes after the last."""
         agent = self.state.agent(name)
         if order == agent.order:
             return None
@@ -143,8 +143,8 @@ class Picture:
             self._changes.note_agent(agent, left)
         return problem
 
-    def settle(self) -> None:
-        """Look ahead after some orders: when flights and work will end."""
+    def look_ahead(self) -> None:
+        """Find out, after some orders, when flights and work will end."""
         self._changes.balance()
 
     def active(self) -> list[AgentState]:
@@ -192,7 +192,7 @@ class Picture:
             if agent.flight is not None:
                 self.agenda.push(agent.flight.arrives, Turn.ARRIVAL, Arrival(agent, agent.flight))
         for task in self.state.tasks:
-            self._watch_deadline(task)
+            self._note_deadline(task)
             if task.workers:
                 hour = completion_hour(self.state, task)
                 if hour < math.inf:
@@ -223,17 +223,17 @@ class Picture:
         task = state.task(event.task)
         if event.kind is EventKind.TASK_APPEARS:
             task.facts = replace(task.facts, appears=event.hour)
-            self._watch_deadline(task)
+            self._note_deadline(task)
         elif event.kind is EventKind.TASK_CHANGES and task.status is TaskStatus.DONE and event.workload:
             task.status, task.since, task.closed = TaskStatus.OPEN, state.hour, math.inf
-            self._watch_deadline(task)
+            self._note_deadline(task)
         workers = tuple(task.workers.values())
         happen(state, event)
         self._changes.note_task(task)
         for agent in workers:
             self._changes.note_agent(agent)
 
-    def _watch_deadline(self, task: TaskState) -> None:
+    def _note_deadline(self, task: TaskState) -> None:
         if task.status in (TaskStatus.TO_COME, TaskStatus.OPEN) and task.facts.deadline < math.inf:
             self.agenda.push(task.facts.deadline, Turn.DEADLINE, task)
 

@@ -175,7 +175,7 @@ class MissionPlanner(AbstractContextManager["MissionPlanner"]):
                 self._advance(hour)
             if self._planned == self._version:
                 return self._plan
-            decision = self._leader.ask(self._version, until)
+            decision = self._leader.request(self._version, until)
         decision.done.wait(self._patience(until))
         with self._lock:
             return self._conclude(decision)
@@ -293,4 +293,4 @@ class MissionPlanner(AbstractContextManager["MissionPlanner"]):
             task = agent.order.task
             if task is not None and picture.state.task(task).status is not TaskStatus.OPEN:
                 picture.order(name, STAY)
-        picture.settle()
+        picture.look_ahead()
