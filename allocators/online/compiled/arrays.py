@@ -1,6 +1,6 @@
 """A mission and its state as arrays."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,21 +39,41 @@ ORDERED, ARRIVED, COMPLETED, MISSED_IT = range(4)
 """Kinds of rows in a log."""
 
 
+Records = NDArray[Any]
+"""A structured array: one record for each agent, task or event."""
+
+_PLACE = ("f8", (3,))
+
+AGENT_FACTS = np.dtype(
+    [("ability", "f8"), ("speed", "f8"), ("rate", "f8"), ("reach", "f8"), ("capacity", "f8"), ("start", *_PLACE)]
+)
+TASK_FACTS = np.dtype(
+    [("workload", "f8"), ("priority", "f8"), ("deadline", "f8"), ("growth", "f8"), ("place", *_PLACE)]
+)
+EVENT = np.dtype([("hour", "f8"), ("kind", "i8"), ("subject", "i8"), ("amount", "f8")])
+AGENT = np.dtype(
+    [(name, "i8") for name in ("status", "order", "works", "flies_to", "drawn", "deciding", "looked")]
+    + [(name, "f8") for name in ("battery", "length", "departs", "arrives", "distance", "energy")]
+    + [(name, *_PLACE) for name in ("position", "source", "goal", "way")]
+)
+TASK = np.dtype(
+    [(name, "i8") for name in ("became", "begun")]
+    + [(name, "f8") for name in ("left", "since", "ability", "completes", "closed")]
+)
+
+
 class Setting(NamedTuple):
     """What does not change in a mission; n agents, m tasks, e events.
 
     Attributes
     ----------
-    ability, speed, rate, reach : ndarray, shape (n,)
-        `rate` is energy per distance, `reach` the range.
+    agent : ndarray of AGENT_FACTS, shape (n,)
+        `rate` is energy per distance, `reach` the range, `capacity` the battery at the start.
+    task : ndarray of TASK_FACTS, shape (m,)
+    event : ndarray of EVENT, shape (e,)
+        The timeline; subjects are agents or tasks by index, amounts energy or work where an event has it.
     allowed : ndarray of bool, shape (n, m)
         By lists of tasks and skills.
-    start, place : ndarray, shape (n, 3) and (m, 3)
-    capacity : ndarray, shape (n,)
-        Battery at the start.
-    workload, priority, deadline, growth : ndarray, shape (m,)
-    hour, kind, subject, amount : ndarray, shape (e,)
-        The timeline; agents and tasks by index, energy or work where an event has it.
     area : ndarray, shape (2, 3)
     limits : ndarray, shape (5,)
         End, sensing radius, radio radius, period and loss.
@@ -62,22 +82,10 @@ class Setting(NamedTuple):
     is_local : bool
     """
 
-    ability: FloatArray
-    speed: FloatArray
-    rate: FloatArray
-    reach: FloatArray
+    agent: Records
+    task: Records
+    event: Records
     allowed: BoolArray
-    start: FloatArray
-    place: FloatArray
-    capacity: FloatArray
-    workload: FloatArray
-    priority: FloatArray
-    deadline: FloatArray
-    growth: FloatArray
-    hour: FloatArray
-    kind: IntArray
-    subject: IntArray
-    amount: FloatArray
     area: FloatArray
     limits: FloatArray
     seeds: NDArray[np.uint64]
@@ -89,59 +97,32 @@ class State(NamedTuple):
 
     Attributes
     ----------
+    agent : ndarray of AGENT, shape (n,)
+        `works` and `flies_to` are tasks, -1 for none; `way` is the place of an order to one; `drawn` counts random
+        numbers; `deciding` and `looked` say whose turn it is, and who has looked around at this hour.
+    task : ndarray of TASK, shape (m,)
+        `ability` is that of all who work there, `completes` when it will be done.
+    seen, seen_before : ndarray, shape (3, n, m)
+        Hour, work left and status of each agent's report of each task; hour -1 where it has none.
+    met, met_before : ndarray, shape (6, n, n)
+        Hour, status, task and position of each agent's report of each agent.
+    here : ndarray, shape (n, 3)
+        Where agents are at this hour.
     now : ndarray, shape (1,)
         The hour.
-    status, order, works, flies_to, drawn : ndarray of int, shape (n,)
-        `works` and `flies_to` are tasks, -1 for none; `drawn` counts random numbers.
-    position, source, goal, way : ndarray, shape (n, 3)
-        `way` is the place of an order to one.
-    battery, length, departs, arrives, distance, energy : ndarray, shape (n,)
-    became : ndarray of int, shape (m,)
-        What has become of each task.
-    left, since, ability, completes, closed : ndarray, shape (m,)
-    begun : ndarray of bool, shape (m,)
-    seen, seen_before : ndarray, shape (n, m, 3)
-        Hour, work left and status of each agent's report of each task; hour -1 where it has none.
-    met, met_before : ndarray, shape (n, n, 6)
-        Hour, status, task and position of each agent's report of each agent.
-    near : ndarray of bool, shape (n, n)
-        Who hears whom.
-    deciding, looked : ndarray of bool, shape (n,)
     counts : ndarray of int, shape (5,)
     log : ndarray, shape (rows, 4)
         Hour, kind, agent and task, as far as there are rows.
     """
 
-    now: FloatArray
-    status: IntArray
-    order: IntArray
-    works: IntArray
-    flies_to: IntArray
-    drawn: IntArray
-    position: FloatArray
-    source: FloatArray
-    goal: FloatArray
-    way: FloatArray
-    battery: FloatArray
-    length: FloatArray
-    departs: FloatArray
-    arrives: FloatArray
-    distance: FloatArray
-    energy: FloatArray
-    became: IntArray
-    left: FloatArray
-    since: FloatArray
-    ability: FloatArray
-    completes: FloatArray
-    closed: FloatArray
-    begun: BoolArray
+    agent: Records
+    task: Records
     seen: FloatArray
     seen_before: FloatArray
     met: FloatArray
     met_before: FloatArray
-    near: BoolArray
-    deciding: BoolArray
-    looked: BoolArray
+    here: FloatArray
+    now: FloatArray
     counts: IntArray
     log: FloatArray
 
@@ -161,33 +142,53 @@ def setting_of(mission: Mission, knowledge: Knowledge, seed: int) -> Setting:
         if tasks is not None:
             allowed[agent] = False
             allowed[agent, tasks] = True
-    amounts = [event.workload if event.amount is None else event.amount for event in mission.timeline]
-    subjects = [
-        instance.task_index[str(event.task)] if event.agent is None else instance.agent_index[event.agent]
-        for event in mission.timeline
-    ]
+    limits = [mission.end, mission.sensing, mission.radio.radius, mission.radio.period, mission.radio.loss]
     return Setting(
-        ability=instance.ability,
-        speed=instance.speed,
-        rate=instance.agent_energy_per_distance,
-        reach=instance.communication_range,
+        agent=_records(
+            AGENT_FACTS,
+            ability=instance.ability,
+            speed=instance.speed,
+            rate=instance.agent_energy_per_distance,
+            reach=instance.communication_range,
+            capacity=instance.battery,
+            start=instance.start_position,
+        ),
+        task=_records(
+            TASK_FACTS,
+            workload=instance.workload,
+            priority=instance.priority,
+            deadline=mission.deadline,
+            growth=mission.growth,
+            place=instance.task_position,
+        ),
+        event=_timeline(mission),
         allowed=allowed,
-        start=instance.start_position,
-        place=instance.task_position,
-        capacity=instance.battery,
-        workload=instance.workload,
-        priority=instance.priority,
-        deadline=mission.deadline,
-        growth=mission.growth,
-        hour=np.array([event.hour for event in mission.timeline]),
-        kind=np.array([KINDS[event.kind] for event in mission.timeline]),
-        subject=np.array(subjects, dtype=np.intp),
-        amount=np.array([0.0 if amount is None else amount for amount in amounts]),
         area=np.array(mission.area),
-        limits=np.array([mission.end, mission.sensing, mission.radio.radius, mission.radio.period, mission.radio.loss]),
+        limits=np.array(limits),
         seeds=np.array([mission.seed, seed], dtype=np.uint64),
         is_local=knowledge is Knowledge.LOCAL,
     )
+
+
+def _records(kind: np.dtype[np.void], **columns: NDArray[np.float64]) -> Records:
+    records = np.zeros(len(next(iter(columns.values()))), dtype=kind)
+    for name, values in columns.items():
+        records[name] = values
+    return records
+
+
+def _timeline(mission: Mission) -> Records:
+    agents, tasks = mission.instance.agent_index, mission.instance.task_index
+    rows = [
+        (
+            event.hour,
+            KINDS[event.kind],
+            tasks[str(event.task)] if event.agent is None else agents[event.agent],
+            event.workload if event.amount is None else event.amount,
+        )
+        for event in mission.timeline
+    ]
+    return np.array([(*row[:3], row[3] or 0.0) for row in rows], dtype=EVENT)
 
 
 def _refuse(mission: Mission) -> None:
@@ -208,27 +209,13 @@ def _refuse(mission: Mission) -> None:
 def state_of(setting: Setting, rows: int) -> State:
     """Return the state before the first event; `rows` that are logged at the most."""
     n, m = setting.allowed.shape
-    whole = [np.full(n, value, dtype=np.intp) for value in (ABSENT, STAY, -1, -1, 0)]
-    seen, met = np.zeros((n, m, 3)), np.zeros((n, n, 6))
-    seen[:, :, 0] = met[:, :, 0] = -1.0
-    return State(
-        np.zeros(1),
-        *whole,
-        *(setting.start.copy() for _ in range(4)),
-        setting.capacity.copy(),
-        *(np.zeros(n) for _ in range(2)),
-        np.full(n, np.inf),
-        *(np.zeros(n) for _ in range(2)),
-        np.full(m, TO_COME, dtype=np.intp),
-        *(np.zeros(m) for _ in range(3)),
-        *(np.full(m, np.inf) for _ in range(2)),
-        np.zeros(m, dtype=np.bool_),
-        seen,
-        seen.copy(),
-        met,
-        met.copy(),
-        np.zeros((n, n), dtype=np.bool_),
-        *(np.zeros(n, dtype=np.bool_) for _ in range(2)),
-        np.zeros(5, dtype=np.intp),
-        np.zeros((rows, 4)),
-    )
+    agent, task = np.zeros(n, dtype=AGENT), np.zeros(m, dtype=TASK)
+    agent["order"], agent["works"], agent["flies_to"] = STAY, -1, -1
+    agent["battery"], agent["arrives"] = setting.agent["capacity"], np.inf
+    for name in ("position", "source", "goal", "way"):
+        agent[name] = setting.agent["start"]
+    task["completes"] = task["closed"] = np.inf
+    seen, met = np.zeros((3, n, m)), np.zeros((6, n, n))
+    seen[0] = met[0] = -1.0
+    counts, log = np.zeros(5, dtype=np.intp), np.zeros((rows, 4))
+    return State(agent, task, seen, seen.copy(), met, met.copy(), np.zeros((n, 3)), np.zeros(1), counts, log)

@@ -3,25 +3,25 @@
 import numpy as np
 
 from alloc.allocators.online.compiled.arrays import HEARD, MESSAGES, TICK, TO_COME, Setting, State
-from alloc.allocators.online.compiled.motion import axis_at, is_active, uniform, work_left
-from alloc.allocators.runtime.compiled import compiled
+from alloc.allocators.online.compiled.motion import is_active, uniform, work_left
+from alloc.allocators.runtime.compiled import compiled, inlined
 from alloc.problems.missions.chance import LOSS
 
 
-@compiled
+@inlined
 def report_agent(state: State, i: int, k: int) -> None:
     """Let agent `i` know what is true of agent `k` now."""
-    report = state.met[i, k]
-    report[0], report[1], report[2] = state.now[0], state.status[k], state.order[k]
+    state.met[0, i, k], state.met[1, i, k] = state.now[0], state.agent[k].status
+    state.met[2, i, k] = state.agent[k].order
     for axis in range(3):
-        report[3 + axis] = axis_at(state, k, axis)
+        state.met[3 + axis, i, k] = state.here[k, axis]
 
 
-@compiled
+@inlined
 def report_task(state: State, setting: Setting, i: int, j: int) -> None:
     """Let agent `i` know what is true of task `j` now."""
-    report = state.seen[i, j]
-    report[0], report[1], report[2] = state.now[0], work_left(state, setting, j), state.became[j]
+    state.seen[0, i, j], state.seen[1, i, j] = state.now[0], work_left(state, setting, j)
+    state.seen[2, i, j] = state.task[j].became
 
 
 @compiled
@@ -29,27 +29,27 @@ def look_around(state: State, setting: Setting, i: int) -> None:
     """Let an agent see what lies within its sensing radius; with full knowledge, everything."""
     n, m = setting.allowed.shape
     square = setting.limits[1] * setting.limits[1] if setting.is_local else np.inf
-    x, y, z = axis_at(state, i, 0), axis_at(state, i, 1), axis_at(state, i, 2)
+    x, y, z = state.here[i, 0], state.here[i, 1], state.here[i, 2]
     for k in range(n):
         if k == i or (is_active(state, k) and _square(state, k, x, y, z) <= square):
             report_agent(state, i, k)
     for j in range(m):
-        if state.became[j] != TO_COME:
-            dx, dy, dz = x - setting.place[j, 0], y - setting.place[j, 1], z - setting.place[j, 2]
+        if state.task[j].became != TO_COME:
+            dx, dy, dz = x - setting.task[j].place[0], y - setting.task[j].place[1], z - setting.task[j].place[2]
             if dx * dx + dy * dy + dz * dz <= square:
                 report_task(state, setting, i, j)
 
 
-@compiled
+@inlined
 def _square(state: State, k: int, x: float, y: float, z: float) -> float:
-    dx, dy, dz = axis_at(state, k, 0) - x, axis_at(state, k, 1) - y, axis_at(state, k, 2) - z
-    return dx * dx + dy * dy + dz * dz
+    dx, dy, dz = state.here[k, 0] - x, state.here[k, 1] - y, state.here[k, 2] - z
+    return float(dx * dx + dy * dy + dz * dz)
 
 
 @compiled
 def talk(state: State, setting: Setting) -> None:
     """Let all agents in the mission tell those within the radius all that they know, at once."""
-    n = len(state.status)
+    n = len(state.agent)
     square = setting.limits[2] * setting.limits[2]
     state.seen_before[:] = state.seen
     state.met_before[:] = state.met
@@ -57,7 +57,7 @@ def talk(state: State, setting: Setting) -> None:
         if not is_active(state, i):
             continue
         state.counts[MESSAGES] += 1
-        x, y, z = axis_at(state, i, 0), axis_at(state, i, 1), axis_at(state, i, 2)
+        x, y, z = state.here[i, 0], state.here[i, 1], state.here[i, 2]
         for k in range(n):
             if (
                 k != i
@@ -74,19 +74,20 @@ def talk(state: State, setting: Setting) -> None:
 def _is_lost(state: State, setting: Setting, sender: int, hearer: int) -> bool:
     if setting.limits[4] == 0:
         return False
-    key = np.array([LOSS, 0, 0, sender, hearer, state.counts[TICK]], dtype=np.uint64)
-    key[1], key[2] = setting.seeds[0], setting.seeds[1]
-    return bool(uniform(key) < setting.limits[4])
+    drawn = uniform(LOSS, setting.seeds[0], setting.seeds[1], sender, hearer, state.counts[TICK])
+    return bool(drawn < setting.limits[4])
 
 
-@compiled
+@inlined
 def hear(state: State, hearer: int, sender: int) -> None:
     """Let an agent take over what is newer in the sender's knowledge, as it was before anybody spoke."""
-    told, known = state.seen_before[sender], state.seen[hearer]
+    told, known = state.seen_before[0, sender], state.seen[0, hearer]
     for j in range(len(told)):
-        if told[j, 0] > known[j, 0]:
-            known[j, 0], known[j, 1], known[j, 2] = told[j, 0], told[j, 1], told[j, 2]
-    told, known = state.met_before[sender], state.met[hearer]
+        if told[j] > known[j]:
+            for part in range(3):
+                state.seen[part, hearer, j] = state.seen_before[part, sender, j]
+    told, known = state.met_before[0, sender], state.met[0, hearer]
     for k in range(len(told)):
-        if told[k, 0] > known[k, 0]:
-            known[k] = told[k]
+        if told[k] > known[k]:
+            for part in range(6):
+                state.met[part, hearer, k] = state.met_before[part, sender, k]

@@ -23,7 +23,18 @@ from alloc.allocators.online.compiled.arrays import (
     State,
 )
 from alloc.allocators.online.compiled.knowledge import look_around, report_agent, talk
-from alloc.allocators.online.compiled.motion import arrive, cancel, change, close, is_active, land, leave, update, write
+from alloc.allocators.online.compiled.motion import (
+    arrive,
+    cancel,
+    change,
+    close,
+    is_active,
+    land,
+    leave,
+    locate,
+    update,
+    write,
+)
 from alloc.allocators.online.compiled.policies import decide
 from alloc.allocators.runtime.compiled import compiled
 from alloc.problems.fields import FloatArray
@@ -42,13 +53,16 @@ def run_mission(state: State, setting: Setting, policy: int, weights: FloatArray
                 state.now[0] = setting.limits[0]
             break
         state.now[0] = hour
-        state.looked[:] = False
+        for i in range(len(state.agent)):
+            state.agent[i].looked = False
         event, is_news = happen(state, setting, event)
+        for i in range(len(state.agent)):
+            locate(state, i)
         if setting.is_local and hour == state.counts[TICK] * setting.limits[3]:
-            for i in range(len(state.status)):
+            for i in range(len(state.agent)):
                 if is_active(state, i):
                     look_around(state, setting, i)
-                    state.looked[i], state.deciding[i] = True, True
+                    state.agent[i].looked, state.agent[i].deciding = True, True
             talk(state, setting)
         give_orders(state, setting, is_news, policy, weights)
     finish(state, setting)
@@ -59,16 +73,16 @@ def run_mission(state: State, setting: Setting, policy: int, weights: FloatArray
 def next_hour(state: State, setting: Setting, event: int) -> float:
     """Return the hour of what comes next."""
     hour = np.inf
-    for j in range(len(state.became)):
-        if state.became[j] == OPEN:
-            hour = min(hour, max(state.completes[j], state.now[0]))
-        if state.became[j] <= OPEN:
-            hour = min(hour, setting.deadline[j])
-    for i in range(len(state.status)):
-        if state.status[i] == FLYING:
-            hour = min(hour, state.arrives[i])
-    if event < len(setting.hour):
-        hour = min(hour, setting.hour[event])
+    for j in range(len(state.task)):
+        if state.task[j].became == OPEN:
+            hour = min(hour, max(state.task[j].completes, state.now[0]))
+        if state.task[j].became <= OPEN:
+            hour = min(hour, setting.task[j].deadline)
+    for i in range(len(state.agent)):
+        if state.agent[i].status == FLYING:
+            hour = min(hour, state.agent[i].arrives)
+    if event < len(setting.event):
+        hour = min(hour, setting.event[event].hour)
     if setting.is_local:
         hour = min(hour, state.counts[TICK] * setting.limits[3])
     return float(hour)
@@ -85,25 +99,25 @@ def happen(state: State, setting: Setting, event: int) -> tuple[int, bool]:
         if pass_deadlines(state, setting):
             is_news = True
             continue
-        if event < len(setting.hour) and setting.hour[event] == hour:
+        if event < len(setting.event) and setting.event[event].hour == hour:
             apply(state, setting, event)
             event, is_news = event + 1, True
             continue
         i = first_arrival(state)
         if i < 0:
             return event, is_news
-        j = state.flies_to[i]
+        j = state.agent[i].flies_to
         arrive(state, setting, i)
         write(state, ARRIVED, i, j)
-        if state.status[i] == IDLE:
-            state.deciding[i], is_news = True, True
+        if state.agent[i].status == IDLE:
+            state.agent[i].deciding, is_news = True, True
 
 
 @compiled
 def complete(state: State, setting: Setting) -> bool:
     """Let one task be done whose work ends now; return whether there was one."""
-    for j in range(len(state.became)):
-        if state.became[j] == OPEN and state.completes[j] <= state.now[0]:
+    for j in range(len(state.task)):
+        if state.task[j].became == OPEN and state.task[j].completes <= state.now[0]:
             close(state, setting, j, DONE)
             return True
     return False
@@ -112,10 +126,10 @@ def complete(state: State, setting: Setting) -> bool:
 @compiled
 def pass_deadlines(state: State, setting: Setting) -> bool:
     """Let one task be missed, or just done, whose deadline is now; return whether there was one."""
-    for j in range(len(state.became)):
-        if state.became[j] == OPEN and setting.deadline[j] <= state.now[0]:
+    for j in range(len(state.task)):
+        if state.task[j].became == OPEN and setting.task[j].deadline <= state.now[0]:
             update(state, setting, j)
-            is_done = state.left[j] <= CLOSE * setting.workload[j]
+            is_done = state.task[j].left <= CLOSE * setting.task[j].workload
             close(state, setting, j, DONE if is_done else MISSED)
             return True
     return False
@@ -124,8 +138,8 @@ def pass_deadlines(state: State, setting: Setting) -> bool:
 @compiled
 def first_arrival(state: State) -> int:
     """Return an agent whose flight ends now, -1 for none."""
-    for i in range(len(state.status)):
-        if state.status[i] == FLYING and state.arrives[i] <= state.now[0]:
+    for i in range(len(state.agent)):
+        if state.agent[i].status == FLYING and state.agent[i].arrives <= state.now[0]:
             return i
     return -1
 
@@ -133,21 +147,21 @@ def first_arrival(state: State) -> int:
 @compiled
 def apply(state: State, setting: Setting, event: int) -> None:
     """Let an event of the mission happen."""
-    kind, subject, amount = setting.kind[event], setting.subject[event], setting.amount[event]
+    kind, subject, amount = setting.event[event].kind, setting.event[event].subject, setting.event[event].amount
     if kind == APPEARS:
-        state.became[subject], state.since[subject] = OPEN, state.now[0]
-        state.left[subject] = setting.workload[subject]
-        if setting.workload[subject] == 0:
+        state.task[subject].became, state.task[subject].since = OPEN, state.now[0]
+        state.task[subject].left = setting.task[subject].workload
+        if setting.task[subject].workload == 0:
             close(state, setting, subject, DONE)
     elif kind < APPEARS:
-        state.deciding[subject] = True
+        state.agent[subject].deciding = True
         if kind in (JOINS, RETURNS):
-            state.status[subject] = IDLE
+            state.agent[subject].status = IDLE
         elif kind == RECHARGES:
-            state.battery[subject] += amount
+            state.agent[subject].battery += amount
         elif kind in (FAILS, RECALLED):
             leave(state, setting, subject, kind == FAILS)
-    elif state.became[subject] == OPEN:
+    elif state.task[subject].became == OPEN:
         if kind == CANCELS:
             cancel(state, setting, subject)
         else:
@@ -157,17 +171,17 @@ def apply(state: State, setting: Setting, event: int) -> None:
 @compiled
 def give_orders(state: State, setting: Setting, is_news: bool, policy: int, weights: FloatArray) -> None:
     """Let all agents decide whose turn it is."""
-    n = len(state.status)
+    n = len(state.agent)
     if is_over(state):
         return
     for i in range(n):
-        turn = state.deciding[i] if setting.is_local else is_news
-        state.deciding[i] = turn and is_active(state, i)
-        if state.deciding[i] and not state.looked[i]:
+        turn = state.agent[i].deciding if setting.is_local else is_news
+        state.agent[i].deciding = turn and is_active(state, i)
+        if state.agent[i].deciding and not state.agent[i].looked:
             look_around(state, setting, i)
     for i in range(n):
-        if state.deciding[i]:
-            state.deciding[i] = False
+        if state.agent[i].deciding:
+            state.agent[i].deciding = False
             report_agent(state, i, i)
             decide(state, setting, i, policy, weights)
             if not setting.is_local:
@@ -179,22 +193,23 @@ def give_orders(state: State, setting: Setting, is_news: bool, policy: int, weig
 def is_over(state: State) -> bool:
     """Whether no task is open or to come, or nobody is left to do one."""
     is_left = False
-    for j in range(len(state.became)):
-        if state.became[j] == OPEN or state.became[j] == TO_COME:
+    for j in range(len(state.task)):
+        if state.task[j].became == OPEN or state.task[j].became == TO_COME:
             is_left = True
     if not is_left:
         return True
-    for i in range(len(state.status)):
-        if state.status[i] != FAILED:
-            return False
-    return True
+    is_anybody = False
+    for i in range(len(state.agent)):
+        if state.agent[i].status != FAILED:
+            is_anybody = True
+    return not is_anybody
 
 
 @compiled
 def finish(state: State, setting: Setting) -> None:
     """Bring all tasks up to date, and let flights end at their goals."""
-    for j in range(len(state.became)):
+    for j in range(len(state.task)):
         update(state, setting, j)
-    for i in range(len(state.status)):
-        if state.status[i] == FLYING:
+    for i in range(len(state.agent)):
+        if state.agent[i].status == FLYING:
             land(state, setting, i, 1.0)

@@ -82,14 +82,14 @@ def run_compiled(
 
 
 def _measured(setting: Setting, state: State) -> FastResult:
-    wanted, done = state.became != CANCELLED, state.became == DONE
-    total = float(setting.priority[wanted].sum())
+    wanted, done = state.task["became"] != CANCELLED, state.task["became"] == DONE
+    total = float(setting.task["priority"][wanted].sum())
     is_done = bool(done[wanted].all())
     return FastResult(
-        mission_time=float(state.closed[done].max(initial=0.0)) if is_done else None,
-        priority_done_share=float(setting.priority[done].sum()) / total if total else float(is_done),
-        energy=float(state.energy.sum()),
-        distance=float(state.distance.sum()),
+        mission_time=float(state.task["closed"][done].max(initial=0.0)) if is_done else None,
+        priority_done_share=float(setting.task["priority"][done].sum()) / total if total else float(is_done),
+        energy=float(state.agent["energy"].sum()),
+        distance=float(state.agent["distance"].sum()),
         switches=int(state.counts[SWITCHES]),
         messages=int(state.counts[MESSAGES]),
     )
