@@ -175,6 +175,7 @@ class MissionPlanner(AbstractContextManager["MissionPlanner"]):
                 self._advance(hour)
             if self._planned == self._version:
                 return self._plan
+            self._follow_late()
             decision = self._leader.request(self._version, until)
         decision.done.wait(self._patience(until))
         with self._lock:
@@ -266,11 +267,7 @@ class MissionPlanner(AbstractContextManager["MissionPlanner"]):
         if decision.is_whole and decision.version <= self._planned:
             return self._plan  # another thread was here with the same
         began = time.perf_counter()
-        late = self._leader.last
-        orders = dict(decision.orders)
-        if not decision.is_whole and late is not None and late.version > self._planned:
-            orders = {**late.orders, **orders}  # of what was known a little earlier
-        self._follow(orders)
+        self._follow(dict(decision.orders))
         picture, before = self._picture, self._plan
         orders = {agent.facts.id: agent.order for agent in picture.active()}
         changes = changes_of(before.orders, orders, picture.news)
@@ -281,7 +278,14 @@ class MissionPlanner(AbstractContextManager["MissionPlanner"]):
         self._conclude_s = max(time.perf_counter() - began, 0.9 * self._conclude_s)
         return self._plan
 
-    def _follow(self, orders: dict[str, Order]) -> None:
+    def _follow_late(self) -> None:
+        """Give orders that came after the deadline of the last plan, of what was known then."""
+        late = self._leader.last
+        if late is not None and self._planned < late.version < self._version:
+            self._follow(late.orders)
+            self._leader.last = None
+
+    def _follow(self, orders: Mapping[str, Order]) -> None:
         """Give the orders that can be followed now, those of pins before all, and end those that lead nowhere."""
         picture = self._picture
         self._pins.lapse()
