@@ -9,6 +9,7 @@ import time
 import numpy as np
 
 from alloc.allocators import MissionPlanner
+from alloc.cli.options import values
 from alloc.problems import Instance
 
 
@@ -71,12 +72,13 @@ def main() -> None:
         parser.add_argument(f"--{name}", type=int, default=default)
     parser.add_argument("--deadline-ms", type=float, default=100.0)
     parser.add_argument("--policy", default="replan")
+    parser.add_argument("--set", metavar="NAME=VALUE", action="append", help="A parameter of the policy.")
     given = parser.parse_args()
     rng = np.random.default_rng(given.seed)
     instance = mission(rng, given.agents, given.tasks)
     events = Events(instance, rng)
     plans, submits, busy, old, changed = [], [], [], 0, 0
-    with MissionPlanner(instance, given.policy, deadline_ms=given.deadline_ms) as planner:
+    with MissionPlanner(instance, given.policy, given.deadline_ms, **values(given.set)) as planner:
         planner.plan()
         for number in range(given.events):
             event = events.draw()
@@ -90,8 +92,8 @@ def main() -> None:
             old += not plan.is_new
             changed += len(plan.changes)
             assert plan.problem is None, plan.problem
-    for name, values in (("submit", submits), ("plan", plans), ("plan, time of processors", busy)):
-        quantiles = " ".join(f"{np.quantile(values, share):.1f}" for share in (0.5, 0.9, 0.99, 0.999, 1))
+    for name, times in (("submit", submits), ("plan", plans), ("plan, time of processors", busy)):
+        quantiles = " ".join(f"{np.quantile(times, share):.1f}" for share in (0.5, 0.9, 0.99, 0.999, 1))
         print(f"{name}: ms at 50, 90, 99, 99.9, 100 %: {quantiles}")
     late = sum(value > given.deadline_ms for value in plans)
     print(f"past the deadline: {late} of {given.events}; last plan instead of a new one: {old}; changes {changed}")

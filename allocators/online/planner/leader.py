@@ -93,6 +93,7 @@ class Leader:
             raise PolicyError(f"policy {policy.info.name!r} is central, but began with a {type(begun).__name__}")
         self._fleet = begun if isinstance(begun, FleetDecider) else None
         self._agents: dict[str, AgentDecider] = {}
+        self._broken_off = ""
         self.last: Decision | None = None
         self._wanted: SimpleQueue[Decision | None] = SimpleQueue()
         self._wanted_last: Decision | None = None
@@ -140,8 +141,13 @@ class Leader:
             return
         agents = dict(view.agents)
         distances, known = self._state.distances, MappingProxyType(agents)
-        for name in view.agents:
+        names = list(view.agents)
+        first, self._broken_off = self._broken_off, ""
+        if first in view.agents:
+            names = [*names[names.index(first) :], *names[: names.index(first)]]
+        for name in names:
             if decision.is_overdue:
+                self._broken_off = name  # the next one begins there, so that everybody's turn comes
                 return
             order = self._decider(name).decide(View(view.hour, name, known, view.tasks, distances))
             if order is not None:

@@ -24,8 +24,8 @@ from alloc.problems.missions.events import LATEST, Event
 from alloc.problems.missions.simulation.reports import View
 from alloc.problems.missions.simulation.state import STAY, Order, TaskStatus
 
-RESERVE_MS, RESERVE_SHARE = 8.0, 0.3
-"""Kept of the deadline, beside the time that it took before to follow orders, as another thread may hold the
+RESERVE_MS, RESERVE_SHARE = 5.0, 0.3
+"""Kept of the deadline, beside what it took before to wake up and to follow orders, as another thread may hold the
 interpreter; and the part of the deadline that this is at the most."""
 
 
@@ -76,8 +76,7 @@ class MissionPlanner(AbstractContextManager["MissionPlanner"]):
         self._pins = Pins(self._picture)
         self._plan, self._version, self._planned = Plan(), 0, -1
         self._told: set[str] = set()
-        self._conclude_s = 0.0
-        self._is_closed = False
+        self._last_s, self._is_closed = 0.0, False
         self._leader = Leader(leader, self._seed, self._deadline_s, self._picture.state, self._look)
 
     def __exit__(self, *_: object) -> None:
@@ -167,7 +166,7 @@ class MissionPlanner(AbstractContextManager["MissionPlanner"]):
         InputError
             If the hour has passed, or the planner is closed.
         """
-        until = math.inf if self._deadline_s is None else time.perf_counter() + self._deadline_s
+        until = self._until()
         with self._lock:
             if self._is_closed:
                 raise InputError("is closed", "planner")
@@ -177,9 +176,12 @@ class MissionPlanner(AbstractContextManager["MissionPlanner"]):
                 return self._plan
             self._follow_late()
             decision = self._leader.request(self._version, until)
-        decision.done.wait(self._patience(until))
+        decision.done.wait(None if until == math.inf else max(0.0, until - time.perf_counter()))
+        woken = min(until, time.perf_counter())
         with self._lock:
-            return self._conclude(decision)
+            plan = self._conclude(decision)
+            self._last_s = max(time.perf_counter() - woken, 0.95 * self._last_s)
+        return plan
 
     def why_changed(self) -> tuple[OrderChange, ...]:
         """Return each order of the last plan that differs from the one before, and what caused it."""
@@ -255,18 +257,17 @@ class MissionPlanner(AbstractContextManager["MissionPlanner"]):
             decision.version, decision.seen = self._version, self._picture.told
             return self._picture.view(self._pins.tasks)
 
-    def _patience(self, until: float) -> float | None:
-        """Return the seconds to wait for the policy, less than there are: its orders are to be followed after that."""
+    def _until(self) -> float:
+        """Return when to wait for the policy no more, as `time.perf_counter` says, so that orders are given in time."""
         if self._deadline_s is None:
-            return None
-        reserve = min(RESERVE_SHARE * self._deadline_s, RESERVE_MS / 1000 + 2 * self._conclude_s)
-        return max(0.0, until - reserve - time.perf_counter())
+            return math.inf
+        reserve = min(RESERVE_SHARE * self._deadline_s, RESERVE_MS / 1000 + 1.5 * self._last_s)
+        return time.perf_counter() + self._deadline_s - reserve
 
     def _conclude(self, decision: Decision) -> Plan:
         """Make the next plan of what was decided; of the last one where that is nothing."""
         if decision.is_whole and decision.version <= self._planned:
             return self._plan  # another thread was here with the same
-        began = time.perf_counter()
         self._follow(dict(decision.orders))
         picture, before = self._picture, self._plan
         orders = {agent.facts.id: agent.order for agent in picture.active()}
@@ -275,7 +276,6 @@ class MissionPlanner(AbstractContextManager["MissionPlanner"]):
         if decision.is_whole:
             self._planned = decision.version
             picture.forget(decision.seen)
-        self._conclude_s = max(time.perf_counter() - began, 0.9 * self._conclude_s)
         return self._plan
 
     def _follow_late(self) -> None:

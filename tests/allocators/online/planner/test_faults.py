@@ -10,7 +10,7 @@ import pytest
 from schema_checks import faults
 
 from alloc.allocators import AgentDecider, Briefing, MissionPlanner, Policy, PolicyInfo, Report
-from alloc.problems import Event, InputError
+from alloc.problems import Event, InputError, Instance
 from alloc.problems.missions.simulation.state import Order
 
 FAIL = {"hour": 2.0, "event": "agent-fails", "agent": "ann"}
@@ -158,6 +158,20 @@ def test_the_deadline_holds_whatever_the_policy_does(pair):
                 break
             time.sleep(0.1)
         assert dict(planner.plan()) == {"ann": Order("t2"), "ben": Order("t2")}
+
+
+def test_everybody_gets_a_turn_with_a_slow_policy():
+    """Where the time is never enough for all agents, each plan begins with those that had no turn in the last one."""
+    many = Instance(ability=[1] * 10, workload=[99, 99], agent_position=[[0, 0]] * 10, task_position=[[9, 9]] * 2)
+    hours = iter(range(1, 99))
+    with MissionPlanner(many, Slow(0.04), deadline_ms=200) as planner:
+        for hour in hours:
+            plan = planner.plan()
+            if all(order.task == "t2" for order in plan.values()):
+                break
+            planner.submit({"hour": hour / 1000, "event": "task-changes", "task": "t1", "workload": 50 + hour})
+            assert hour < 40
+        assert not plan.is_new
 
 
 def test_ten_threads_at_once(pair, tmp_path):
