@@ -150,6 +150,22 @@ def test_sigterm_is_a_clean_end(pair, tmp_path):
     assert orders(answer) == {"ben": saved["plan"]["orders"]["ben"]["task"]}
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+def test_killed_after_it_saved_it_goes_on(alloc, pair, tmp_path):
+    """What was saved by a request is there after SIGKILL; the next run has the same plan."""
+    command = [*COMMAND, str(tmp_path / "pair.json"), "--state", str(tmp_path / "state.json")]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        process.stdin.write(lines({"event": "agent-fails", "agent": "ann", "hour": 1}, {"request": "save"}))
+        process.stdin.flush()
+        found = [json.loads(process.stdout.readline()) for _ in range(2)]
+        process.kill()
+    ran = alloc("plan", "--stdio", "--state", "state.json", stdin=lines({"request": "plan"}))
+    again = answers(ran.out)[0]
+    assert (again["hour"], again["orders"], again["changes"]) == (1, found[1]["orders"], found[1]["changes"])
+
+
 @pytest.mark.skipif(shutil.which("jq") is None, reason="needs jq")
 def test_a_shell_with_jq_can_use_it(pair, tmp_path):
     """A pipe of jq on both sides: events made, orders read."""
