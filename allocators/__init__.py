@@ -36,6 +36,9 @@ if TYPE_CHECKING:
     from alloc.allocators.learned.policy import A2c, Ddpg, Dqn, Gappo, GappoLs, Ppo
     from alloc.allocators.learned.training import train
     from alloc.allocators.online.contract import AgentDecider, Briefing, FleetDecider, Policy, PolicyError, PolicyInfo
+    from alloc.allocators.online.planner.inputs import Report
+    from alloc.allocators.online.planner.plan import OrderChange, Plan
+    from alloc.allocators.online.planner.planner import MissionPlanner
     from alloc.allocators.online.registry import describe_policy, load_policy, policy_names
     from alloc.allocators.online.run import MissionRun, simulate
     from alloc.allocators.plan.files import write_result
@@ -70,14 +73,18 @@ __all__ = [
     "Method",
     "Milp",
     "MissingPackageError",
+    "MissionPlanner",
     "MissionRun",
     "Moves",
+    "OrderChange",
+    "Plan",
     "Policy",
     "PolicyError",
     "PolicyInfo",
     "Ppo",
     "Proposal",
     "RefusedError",
+    "Report",
     "Result",
     "Row",
     "Search",
@@ -116,6 +123,10 @@ _LAZY = {
     "AgentDecider": "alloc.allocators.online.contract",
     "Briefing": "alloc.allocators.online.contract",
     "FleetDecider": "alloc.allocators.online.contract",
+    "MissionPlanner": "alloc.allocators.online.planner.planner",
+    "OrderChange": "alloc.allocators.online.planner.plan",
+    "Plan": "alloc.allocators.online.planner.plan",
+    "Report": "alloc.allocators.online.planner.inputs",
     "MissionRun": "alloc.allocators.online.run",
     "Policy": "alloc.allocators.online.contract",
     "PolicyError": "alloc.allocators.online.contract",

@@ -25,7 +25,7 @@ from alloc.cli.commands import (
     validate,
     whatif,
 )
-from alloc.cli.commands.missions import replay, simulate
+from alloc.cli.commands.missions import plan, replay, simulate
 from alloc.cli.commands.training import train, tune
 from alloc.cli.options import Parameter, examples, option_of
 from alloc.cli.output.console import INTERRUPTED, complain, flush, interrupted, write_out
@@ -64,6 +64,7 @@ COMMANDS = (
     export,
     simulate,
     replay,
+    plan,
     schema,
     methods,
     train,

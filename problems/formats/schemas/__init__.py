@@ -17,6 +17,9 @@ SCHEMAS = {
     "alloc-mission/1": "an instance, and what happens in time",
     "alloc-mission-result/1": "the measures that `alloc simulate --json` prints",
     "alloc-mission-log/1": "the first line of what `alloc simulate --log` writes",
+    "alloc-planner-request/1": "the lines that `alloc plan --stdio` reads",
+    "alloc-planner-orders/1": "the lines that `alloc plan --stdio` writes",
+    "alloc-planner/1": "a planner, as `alloc plan --state` saves it",
 }
 """What each format with a schema is for."""
 
