@@ -6,6 +6,7 @@ import numpy as np
 
 from alloc.problems.instance import FloatArray
 from alloc.problems.missions.course import Awareness, Course, Leg, Level
+from alloc.problems.missions.events import EventKind
 from alloc.problems.missions.files.log_file import MissionLog
 from alloc.problems.missions.replay import replay
 from alloc.problems.missions.simulation.log import Log, Record
@@ -91,14 +92,24 @@ class Recorder:
             self._messages.append((hour, agent.index, len(heard) if isinstance(heard, list) else 0))
         elif kind == "event":
             self._changed += [(hour, one) for one in (agent, named) if one is not None]
+            before = named if agent is None else agent.task
+            if before is not None:
+                self._add_level(before, Level(hour, work_left(self._state, before), before.status))
             if named is not None:
-                self._add_level(named, Level(hour, work_left(self._state, named), named.status))
+                self._note_amount(named, record)
         elif kind in ("order", "arrival") and agent is not None:
             self._note_agent(agent, hour)
         elif named is not None and kind in ("completion", "missed"):
             missed = record.get("work", 0.0)
             self._add_level(named, Level(hour, float(missed) if isinstance(missed, int | float) else 0.0, named.status))
             self._note_task(named, hour)
+
+    def _note_amount(self, task: TaskState, record: Record) -> None:
+        """Note the work of a task that appears or is changed now; what is recorded next may come much later."""
+        amount = task.workload if record["event"] == EventKind.TASK_APPEARS else record.get("workload")
+        is_over = task.status not in (TaskStatus.TO_COME, TaskStatus.OPEN)
+        if isinstance(amount, int | float) and not is_over:
+            self._add_level(task, Level(self._state.hour, float(amount), TaskStatus.OPEN))
 
     def before(self) -> None:
         """Look at what goes on by itself, before a record is made: what agents know, and work at a pace."""
@@ -158,6 +169,7 @@ class Recorder:
     def _note_task(self, task: TaskState, hour: float) -> None:
         self._add_level(task, Level(max(hour, min(task.since, self._state.hour)), task.left, task.status))
         if task.status is not TaskStatus.OPEN:
+            hour = max(hour, min(task.closed, self._state.hour))
             idle, self._workers[task.index] = self._workers[task.index], set()
             for index in sorted(idle):
                 self._note_agent(self._state.agents[index], hour)

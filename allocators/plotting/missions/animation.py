@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 SUFFIXES = (".gif", ".mp4", ".html")
 
-FRAMES, PER_SECOND = 160, 16
+FRAMES, PER_SECOND = 120, 12
 
 DPI = 90
 
@@ -140,7 +140,7 @@ def _move(course: Course, plane: Plane, hour: float, agents: "Artist", trails: "
     for agent, legs in enumerate(course.legs):
         leg = course.leg(agent, hour)
         places.append(plane.point(leg.position(hour)) if leg is not None else (np.nan, np.nan))
-        colours.append(AGENT_COLOURS.get((doing(leg) if leg is not None else None) or "", "white"))
+        colours.append(AGENT_COLOURS.get((doing(leg) if leg is not None else None) or "", "none"))
         since = hour - TRAIL * course.end
         way = [
             plane.point(one.position(max(one.begin, since))) for one in legs if one.end >= since and one.begin <= hour

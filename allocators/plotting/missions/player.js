@@ -206,7 +206,9 @@ function drawAgent(pen, { i, hour, spot, isAged }, rank, crowd) {
   const leg = legAt(agent, hour);
   const state = agentStates[leg[4]];
   const size = (agents.length > 100 ? 2.5 : agents.length > 20 ? 4 : 5.5) * (i === player.followed ? 1.6 : 1);
-  const [angle, away] = [2 * Math.PI * rank / crowd, crowd > 1 ? Math.min(26, 1.6 * size + 0.4 * size * crowd) : 0];
+  const isRing = crowd <= 8; // a crowd is packed like the seeds of a sunflower
+  const angle = isRing ? 2 * Math.PI * rank / crowd : 2.39996 * rank;
+  const away = isRing ? (crowd > 1 ? 1.6 * size + 0.4 * size * crowd : 0) : 1.9 * size * Math.sqrt(rank);
   const [x, y] = [spot[0] + away * Math.cos(angle), spot[1] + away * Math.sin(angle)];
   pen.globalAlpha = isAged ? freshness(hour) : 1;
   if (!state) cross(pen, [x, y], size, colourOf("--text"));
@@ -229,7 +231,7 @@ function drawAgent(pen, { i, hour, spot, isAged }, rank, crowd) {
 // the chart of who did what, and the hour in it
 function drawGantt() {
   const chart = byId("gantt");
-  const row = Math.max(1, Math.min(9, 120 / Math.max(agents.length, 1)));
+  const row = Math.min(9, 120 / Math.max(agents.length, 1));
   chart.style.height = `${Math.max(12, row * agents.length)}px`;
   const pen = sharp(chart);
   const x = d3.scaleLinear([0, end || 1], [0, chart.clientWidth]);
@@ -238,7 +240,7 @@ function drawGantt() {
       if (state < 0) continue;
       pen.globalAlpha = player.followed < 0 || player.followed === i ? 1 : 0.3;
       pen.fillStyle = agentStates[state].colour;
-      pen.fillRect(x(begin), i * row, Math.max(x(until) - x(begin), 0.3), row > 3 ? row - 1 : row);
+      pen.fillRect(x(begin), i * row, Math.max(x(until) - x(begin), 0.3), row > 3 ? row - 1 : Math.max(row, 0.7));
     }
   });
   pen.globalAlpha = 1;
@@ -337,7 +339,11 @@ canvas.addEventListener("click", (event) => {
 });
 byId("play").onclick = () => play(!player.isPlaying);
 byId("hour").max = end || 1;
-byId("hour").oninput = (event) => { play(false); go(Number(event.target.value)); };
+byId("hour").oninput = (event) => {
+  const hour = Number(event.target.value);
+  play(false);
+  go(hour);
+};
 byId("gantt").onclick = (event) => go(d3.pointer(event, byId("gantt"))[0] / byId("gantt").clientWidth * end);
 byId("follow").onchange = (event) => follow(Number(event.target.value));
 byId("truth").onchange = byId("known").onchange = () => { player.showsKnown = byId("known").checked; draw(); };
