@@ -192,6 +192,8 @@ class Recorder:
         for task in state.tasks:
             self._add_level(task, Level(state.hour, task.left, task.status))
         for legs in self._legs:
+            if len(legs) > 1 and legs[-1].begin == state.hour:  # what it would have done next
+                legs.pop()
             for leg in legs[-1:]:
                 leg.goal, leg.end = leg.position(state.hour), state.hour
         known = None if self._knowledge is None else self._knowledge.awareness()

@@ -118,7 +118,8 @@ def draw_gantt(axes: "Axes", course: Course) -> None:
                 spans,
                 (agent - height / 2, height),
                 facecolors=AGENT_COLOURS[state],
-                linewidth=0,
+                edgecolor="white",
+                linewidth=0.7 if n <= MOST_ROWS else 0,
                 rasterized=n > MOST_ROWS,
             )
     axes.set_xlim(0, course.end or 1.0)

@@ -304,7 +304,7 @@ WRONG: dict[str, tuple[str, Callable[[str], object]]] = {
     "another energy": ("fleets", lambda path: plot_whatif(grown(9.0, 6.0), path)),
     "nobody fails": ("mission", lambda path: plot_mission(mission(), path)),
     "nobody is heard": ("mission", lambda path: plot_mission(mission(FAILURE, loss=1.0), path)),
-    "a mission without places": ("mission", lambda path: plot_mission(mission(FAILURE, positions=False), path)),
+    "nobody fails there": ("mission-nowhere", lambda path: plot_mission(mission(positions=False), path)),
     "more than one point": ("one-point", lambda path: plot_front(front(1.3), path)),
 }
 
