@@ -223,18 +223,18 @@ class _Knowledge:
         self._ids = instance.agent_ids, instance.task_ids
         count = max(1, min(instance.n, MOST_REPORTS // (MOST_MOMENTS * (instance.n + instance.m))))
         self._agents = np.unique(np.linspace(0, instance.n - 1, count).astype(np.intp)).tolist()
-        self._apart = simulation.mission.radio.period
+        self._interval = simulation.mission.radio.period
         self._hours: list[float] = []
         self._reports: list[FloatArray] = []
 
     def look(self, hour: float) -> None:
         """Record what agents know at an hour, unless that was recorded shortly before."""
-        if self._hours and hour < self._hours[-1] + 0.999 * self._apart:
+        if self._hours and hour < self._hours[-1] + 0.999 * self._interval:
             return
         self._hours.append(hour)
         self._reports.append(np.array([self._row(agent) for agent in self._agents]))
         if len(self._hours) > MOST_MOMENTS:
-            self._apart *= 2
+            self._interval *= 2
             self._hours, self._reports = self._hours[::2], self._reports[::2]
 
     def _row(self, agent: int) -> list[float]:
@@ -243,7 +243,7 @@ class _Knowledge:
             return [math.nan] * (len(agents) + len(tasks))
         view = self._simulation.view(agents[agent], is_glance=True)
         row = [report.hour if (report := view.agents.get(name)) is not None else math.nan for name in agents]
-        return row + [report.hour if (report := view.tasks.get(name)) is not None else math.nan for name in tasks]
+        return row + [news.hour if (news := view.tasks.get(name)) is not None else math.nan for name in tasks]
 
     def awareness(self) -> Awareness:
         """Return what was recorded."""

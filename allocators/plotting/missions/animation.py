@@ -106,8 +106,8 @@ def _draw(figure: "Figure", course: Course, plane: Plane, hours: np.ndarray) -> 
     n = len(course.legs)
     clock = axes.text(0.985, 0.985, "", transform=axes.transAxes, ha="right", va="top", fontsize=14, zorder=9)
     area, where = task_areas(course), plane.where.tasks
-    edge = axes.scatter(*where.T, s=area, facecolors="white", linewidths=1.6, zorder=3)
-    fill = axes.scatter(*where.T, s=area, linewidths=0, zorder=4)
+    edge = axes.scatter(where[:, 0], where[:, 1], s=area, facecolors="white", linewidths=1.6, zorder=3)
+    fill = axes.scatter(where[:, 0], where[:, 1], s=area, linewidths=0, zorder=4)
     trails = axes.add_collection(
         LineCollection([], colors=agent_colours(n), alpha=0.6 if n <= 50 else 0.3, zorder=2), autolim=False
     )

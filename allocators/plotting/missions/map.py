@@ -120,7 +120,8 @@ def draw_map(axes: "Axes", course: Course, plane: Plane) -> None:
         chosen = np.array([one == state for one in states])
         if chosen.any():
             axes.scatter(
-                *where[chosen].T,
+                where[chosen, 0],
+                where[chosen, 1],
                 s=area[chosen],
                 marker=MARKS.get(state, "o"),
                 facecolors=colour if state in MARKS else "white",
@@ -145,13 +146,22 @@ def _draw_tracks(axes: "Axes", course: Course, plane: Plane) -> None:
     starts = np.array([corners[0] if len(corners) else (np.nan, np.nan) for corners in tracks])
     for agent, name in enumerate(names if is_few else []):
         axes.plot([], [], color=colours[agent], linewidth=2, label=plain_text(name))
-    axes.scatter(*starts.T, s=26 if is_few else 9, marker="s", color=colours, zorder=3, label="start of an agent")
+    axes.scatter(
+        starts[:, 0],
+        starts[:, 1],
+        s=26 if is_few else 9,
+        marker="s",
+        color=colours,
+        zorder=3,
+        label="start of an agent",
+    )
     failed = [
         corners[-1] for legs, corners in zip(course.legs, tracks, strict=True) if legs and _failed(legs[-1].status)
     ]
     if failed:
+        ends = np.array(failed)
         axes.scatter(
-            *np.array(failed).T, s=44, marker="x", color="black", linewidths=1.6, zorder=5, label="agent failed"
+            ends[:, 0], ends[:, 1], s=44, marker="x", color="black", linewidths=1.6, zorder=5, label="agent failed"
         )
 
 

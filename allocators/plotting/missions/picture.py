@@ -47,13 +47,15 @@ def _draw(course: "Course") -> "Figure":
     upper = 6.4 if not plane.is_empty else 1.7 * len(curves)
     figure = new_figure(13, upper + rows + 0.7)
     figure.suptitle(title(course), fontsize=12)
-    above, below = figure.subfigures(2, 1, height_ratios=[upper, rows + 0.7])
+    halves = figure.add_gridspec(2, 1, height_ratios=[upper, rows + 0.7])
+    above, below = figure.add_subfigure(halves[0]), figure.add_subfigure(halves[1])
     gantt = below.subplots()
     draw_gantt(gantt, course)
     if plane.is_empty:
         right = above
     else:
-        left, right = above.subfigures(1, 2, width_ratios=[1.1, 1])
+        sides = above.add_gridspec(1, 2, width_ratios=[1.1, 1])
+        left, right = above.add_subfigure(sides[0]), above.add_subfigure(sides[1])
         sites = left.subplots()
         draw_map(sites, course, plane)
         _explain(sites)

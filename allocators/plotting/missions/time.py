@@ -59,7 +59,7 @@ def draw_tasks(axes: "Axes", course: Course) -> None:
             area.set(hatch="////", edgecolor="white", linewidth=0)
     axes.set_ylim(0, max(1, len(course.levels)) * 1.02)
     axes.set_ylabel("tasks")
-    axes.yaxis.get_major_locator().set_params(integer=True)
+    axes.locator_params(axis="y", integer=True)
     _beside(axes)
 
 

@@ -67,24 +67,15 @@ def simulate_command(
 ) -> None:
     """Let a policy lead the agents of a mission: allocation that goes on in time."""
     from alloc.allocators import load_policy, simulate
-    from alloc.problems import read_mission, write_log
+    from alloc.problems import Recorder, read_mission, write_log
 
-    check_outputs(("--log", log), ("--plot", plot), ("--animate", animate), read=[("MISSION", mission)])
-    check_picture(plot)
-    check_film(animate)
-    for option, path in (("--log", log), ("--plot", plot), ("--animate", animate)):
-        if path is not None and runs > 1:
-            raise typer.BadParameter("is for a single run", param_hint=f"'{option}'")
+    check_files(mission, runs, {"--log": log, "--plot": plot, "--animate": animate})
     if log == STANDARD and json:
         raise typer.BadParameter("cannot go to standard output together with --json", param_hint="'--log'")
     leader = load_policy(policy, **options.values(settings))
     problem = read_mission(mission)
     results: list[MissionResult] = []
-    recorder = None
-    if plot is not None or animate is not None:
-        from alloc.problems import Recorder
-
-        recorder = Recorder(with_knowledge=animate is not None and animate.lower().endswith(".html"))
+    recorder = Recorder(with_knowledge=animate is not None) if plot or animate else None
     for number in range(seed, seed + runs):
         run = simulate(
             problem, leader, knowledge=knowledge, seed=number, deadline_ms=deadline_ms or None, observe=recorder
@@ -92,14 +83,23 @@ def simulate_command(
         results.append(run.result)
         if log is not None:
             write_log(run.log, log)
-    if recorder is not None:
-        draw(recorder.course(results[0]), plot, animate)
     if json:
-        documents = [result.to_dict() for result in results]
-        write_json(documents[0] if runs == 1 else documents)
+        write_json(results[0].to_dict() if runs == 1 else [result.to_dict() for result in results])
     if not quiet:
         tell(results, problem, summary=not json)
+    if recorder is not None:
+        draw(recorder.course(results[0]), plot, animate)
     raise typer.Exit(0 if all(result.is_done for result in results) else 1)
+
+
+def check_files(mission: str, runs: int, written: dict[str, str | None]) -> None:
+    """Raise an error, before anything is simulated, for a file that cannot be written, or not of several runs."""
+    check_outputs(*written.items(), read=[("MISSION", mission)])
+    check_picture(written["--plot"])
+    check_film(written["--animate"])
+    for option, path in written.items():
+        if path is not None and runs > 1:
+            raise typer.BadParameter("is for a single run", param_hint=f"'{option}'")
 
 
 def draw(course: "Course", plot: str | None, animate: str | None) -> None:
