@@ -142,7 +142,7 @@ function drawAxes(pen) {
 }
 function drawReach(pen) {
   const place = placeAt(agents[player.followed], player.hour);
-  if (!place || mission.aspect !== 1) return; // degrees are no lengths
+  if (!place || mission.isFull || mission.aspect !== 1) return; // degrees are no lengths
   for (const [reach, dash] of [[mission.sensing, []], [mission.radius, [5, 4]]]) {
     if (reach === null) continue;
     pen.setLineDash(dash);
