@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from alloc.allocators.online.registry import describe_policy, load_policy, policy_names
     from alloc.allocators.online.run import MissionRun, simulate
     from alloc.allocators.plan.files import write_result
-    from alloc.allocators.plotting import plot, plot_convergence
+    from alloc.allocators.plotting import animate_mission, plot, plot_convergence, plot_mission
 
 __all__ = [
     "A2c",
@@ -93,6 +93,7 @@ __all__ = [
     "TracePoint",
     "TrainingError",
     "WhatIf",
+    "animate_mission",
     "compare",
     "describe",
     "describe_policy",
@@ -104,6 +105,7 @@ __all__ = [
     "pareto",
     "plot",
     "plot_convergence",
+    "plot_mission",
     "policy_names",
     "read_result",
     "reasons_of_moves",
@@ -116,8 +118,10 @@ __all__ = [
 
 _LAZY = {
     **{target.partition(":")[2]: target.partition(":")[0] for target in TARGETS.values()},
+    "animate_mission": "alloc.allocators.plotting",
     "plot": "alloc.allocators.plotting",
     "plot_convergence": "alloc.allocators.plotting",
+    "plot_mission": "alloc.allocators.plotting",
     "train": "alloc.allocators.learned.training",
     "write_result": "alloc.allocators.plan.files",
     "AgentDecider": "alloc.allocators.online.contract",

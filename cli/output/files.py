@@ -169,6 +169,14 @@ def check_picture(path: str | None) -> None:
         check_plot(path)
 
 
+def check_film(path: str | None) -> None:
+    """Raise an `InputError` if there is an animation to write, and its suffix is wrong, or a program for it missing."""
+    if path is not None:
+        from alloc.allocators.plotting import check_animation
+
+        check_animation(path)
+
+
 def check_output(name: str | None) -> None:
     """Raise an `InputError` if the file cannot be written."""
     from alloc.problems import InputError

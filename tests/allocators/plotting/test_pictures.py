@@ -14,10 +14,10 @@ import pytest
 from matplotlib.testing.compare import compare_images
 from PIL import Image
 
-from alloc.allocators import Fleet, Result, StopReason, TracePoint, WhatIf
+from alloc.allocators import Fleet, Result, StopReason, TracePoint, WhatIf, plot_mission, simulate
 from alloc.allocators.pareto import Front
 from alloc.allocators.plotting import plot, plot_convergence, plot_front, plot_whatif
-from alloc.problems import Allocation, Instance, Objective, Units, evaluate
+from alloc.problems import Allocation, Course, Event, Instance, Mission, Objective, Radio, Units, course_of, evaluate
 
 KEPT = Path(__file__).parent / "pictures"
 
@@ -186,6 +186,51 @@ def short(*plans: list[int]) -> WhatIf:
     return WhatIf(instance, ("a1",), tuple(fleets), True)
 
 
+def mission(*events: Event, loss: float = 0.3, positions: bool = True) -> Course:
+    """Return a mission by sight and radio: a task comes later, one is missed, and what `events` say."""
+    places = (
+        {"agent_position": [[0, 0], [4, 0], [0, 3]], "task_position": [[1, 3], [3, 0], [4, 3]]} if positions else {}
+    )
+    instance = Instance(
+        name="mission",
+        ability=[2, 3, 1],
+        speed=[2, 2, 1],
+        workload=[4, 6, 50],
+        units=Units(time="h", distance="km"),
+        **places,  # type: ignore[arg-type]
+    )
+    run = simulate(
+        Mission(
+            instance,
+            appears=[0, 0.6, 0],
+            deadline=[np.inf, np.inf, 3],
+            events=events,
+            horizon=6,
+            knowledge="local" if positions else "full",
+            sensing=2,
+            radio=Radio(radius=2.5, loss=loss),
+        ),
+        "greedy",
+    )
+    return course_of(run.log)
+
+
+def fleet() -> Course:
+    """Return a mission of more agents and tasks than have names."""
+    j = np.arange(60)
+    instance = Instance(
+        name="fleet",
+        ability=1 + j % 3,
+        speed=np.full(60, 2.0),
+        agent_position=np.column_stack([j % 10, j // 10]),
+        workload=5 + j % 7,
+        task_position=np.column_stack([(j * 7) % 10 + 0.5, (j * 3) % 6 + 0.5]),
+    )
+    return course_of(simulate(Mission(instance, appears=(j % 4) / 2), "nearest").log)
+
+
+FAILURE = Event(1.5, "agent-fails", agent="a3")
+
 DRAWN: dict[str, Callable[[str], object]] = {
     "moves": lambda path: plot(moves(), path),
     "times": lambda path: plot(times(), path),
@@ -202,6 +247,9 @@ DRAWN: dict[str, Callable[[str], object]] = {
     "fleets": lambda path: plot_whatif(grown(6.0, 9.0), path),
     "short-fleets": lambda path: plot_whatif(short([-1, -1, -1], [-1, 1, 1]), path),
     "short-point": lambda path: plot_front(Front(two_sites(), (planned(two_sites(), [-1, 1, 1]),), True), path),
+    "mission": lambda path: plot_mission(mission(FAILURE), path),
+    "mission-fleet": lambda path: plot_mission(fleet(), path),
+    "mission-nowhere": lambda path: plot_mission(mission(FAILURE, positions=False), path),
 }
 
 
@@ -278,6 +326,9 @@ WRONG: dict[str, tuple[str, Callable[[str], object]]] = {
     ),
     "all are served": ("short-point", lambda path: plot_front(front(), path)),
     "another number unserved": ("short-fleets", lambda path: plot_whatif(short([-1, 1, 1], [-1, 1, 1]), path)),
+    "nobody fails": ("mission", lambda path: plot_mission(mission(), path)),
+    "nobody is heard": ("mission", lambda path: plot_mission(mission(FAILURE, loss=1.0), path)),
+    "nobody fails there": ("mission-nowhere", lambda path: plot_mission(mission(positions=False), path)),
     "more than one point": ("one-point", lambda path: plot_front(front(1.3), path)),
 }
 
