@@ -178,7 +178,7 @@ def name_tasks(axes: "Axes", course: Course, plane: Plane) -> None:
     names = [plain_text(name) for name in short_names(instance.task_ids, 18)]
     centre = axes.transData.transform(place) * 72 / axes.figure.dpi
     width = np.array([0.62 * size * len(name) for name in names])
-    middle = place_labels(centre, np.sqrt(task_areas(course) / np.pi), width, 1.1 * size)
+    middle = place_labels(centre, np.sqrt(task_areas(course) / np.pi), width, 1.1 * size, np.empty((0, 2, 2)))
     for j in np.flatnonzero(~np.isnan(middle[:, 0])):
         write(axes, names[j], place[j], middle[j] - centre[j], size)
 
