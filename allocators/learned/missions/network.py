@@ -13,8 +13,9 @@ class MissionNetwork(nn.Module):
 
     Options are tasks that the agent knows and can take, looking around, and staying. Each becomes a token; the tokens
     are pooled by attention; the score of an option is read from its token and the pooled one, with a linear part of its
-    features. The critic has layers of its own, so that what it learns does not disturb the scores. Without order and of any number, it is invariant to permutations (Zaheer et al. 2017, arXiv:1703.06114;
-    pooling by attention as in Lee et al. 2019, arXiv:1810.00825).
+    features. Without order and of any number, it is invariant to permutations (Zaheer et al. 2017, arXiv:1703.06114;
+    pooling by attention as in Lee et al. 2019, arXiv:1810.00825). The critic has layers of its own, so that what it
+    learns does not disturb the scores.
     """
 
     def __init__(self) -> None:
