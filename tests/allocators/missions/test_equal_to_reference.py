@@ -31,7 +31,7 @@ def random_events(rng: random.Random, n: int, m: int) -> list[Event]:
     events = []
     for agent in map("a{}".format, range(1, n + 1)):
         if rng.random() < 0.3:
-            events.append(Event(rng.uniform(0, 6), EventKind.AGENT_RECHARGES, agent=agent, amount=rng.uniform(0, 3)))
+            events.append(Event(rng.uniform(0.5, 6), EventKind.AGENT_RECHARGES, agent=agent, amount=rng.uniform(0, 3)))
         if rng.random() < 0.3:
             out = rng.uniform(0.5, 4)
             events.append(Event(out, EventKind.AGENT_RECALLED, agent=agent))
