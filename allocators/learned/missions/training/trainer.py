@@ -35,13 +35,14 @@ from alloc.allocators.runtime.torch_state import plain_torch, torch_threads
 from alloc.problems.missions.files.document import mission_to_document
 
 DEFAULT_PPO = PpoParameters(
-    max_learning_rate=2e-3,
+    learning_rate=3e-4,
+    max_learning_rate=3e-4,
     target_kl=0.012,
     gae_lambda=0.9,
     reward_scale=5.0,
-    minibatch_size=1024,
+    minibatch_size=4096,
 )
-"""Hyperparameters of PPO in missions."""
+"""Hyperparameters of PPO in missions: small steps, as it goes on from what was evolved."""
 
 
 @dataclass(frozen=True)
