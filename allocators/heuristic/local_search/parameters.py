@@ -47,7 +47,7 @@ class LocalSearchParameters(CheckedParameters):
     final_noise: float = bounded(0.007, low=0, above=True)
     short_task_penalty: float = bounded(1.2, low=0)
     shortfall_penalty: float = bounded(5.0, low=0)
-    attempt_noise: tuple[float, ...] = bounded((0.1, 0.01, 0.03), low=0, above=True)
+    attempt_noise: tuple[float, ...] = bounded((0.1, 0.01, 0.03, 0.001), low=0, above=True)
     attempt_final_noise: float = bounded(1e-6, low=0, above=True)
     attempt_iterations: int = bounded(4, low=1)
     attempt_growth: float = bounded(1.2, low=1)
