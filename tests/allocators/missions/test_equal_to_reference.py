@@ -22,6 +22,8 @@ from alloc.problems.missions.simulation.simulation import Simulation
 from alloc.problems.missions.simulation.state import AgentStatus, Order, TaskStatus
 from alloc.problems.vocabulary import Knowledge
 
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]  # loops are compiled first: half a minute, more under load
+
 TASK_STATUS = tuple(TaskStatus)
 AGENT_STATUS = tuple(AgentStatus)
 

@@ -19,6 +19,8 @@ from alloc.problems import InputError
 from alloc.problems.missions.families.draw import random_mission
 from alloc.problems.missions.families.parameters import MissionParameters
 
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]  # loops are compiled first: half a minute, more under load
+
 
 def scored(options: np.ndarray, seed: int) -> np.ndarray:
     """Return the scores that the compiled network gives."""

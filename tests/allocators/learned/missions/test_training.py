@@ -16,6 +16,8 @@ from alloc.allocators.learned.missions.training.run import train_on_missions
 from alloc.allocators.learned.missions.training.trainer import MissionTrainer, MissionTrainingParameters
 from alloc.problems import InputError
 
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]  # loops are compiled first: half a minute, more under load
+
 TINY = MissionTrainingParameters(
     population=2,
     decisions=40,
