@@ -1,44 +1,17 @@
 """The training loop: generation after generation, with all files written after each."""
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
-from typing import Protocol
+from collections.abc import Callable
 
 from alloc.allocators.learned.files.run_files import RunFiles
 from alloc.allocators.learned.files.training_log import TrainingLog
 from alloc.allocators.learned.training.limits import Limits
+from alloc.allocators.learned.training.population import PopulationTraining
 from alloc.allocators.learned.training.report import Report
 from alloc.allocators.parallel.engine import Engine, never_stop
 
 
-class TrainingRun(Protocol):
-    """What is trained generation by generation, such as a `Trainer`."""
-
-    history: list[Report]
-
-    @property
-    def best(self) -> Sequence[object]:
-        """The networks of the best generation, none before the first."""
-
-    @property
-    def best_generation(self) -> int:
-        """The generation with the best networks, 0 before the first."""
-
-    def is_over(self, limits: Limits) -> bool:
-        """Whether a limit is reached."""
-
-    def advance(self, limits: Limits, engine: Engine | None, should_stop: Callable[[], bool]) -> Report | None:
-        """Train, validate and breed one generation; return None if it is not complete."""
-
-    def save(self, path: Path) -> None:
-        """Write a checkpoint of the whole run."""
-
-    def write_policy(self, path: Path) -> None:
-        """Write the best networks up to now to a policy file."""
-
-
 def run_training(
-    trainer: TrainingRun,
+    trainer: PopulationTraining,
     files: RunFiles,
     limits: Limits,
     *,
@@ -53,7 +26,7 @@ def run_training(
 
     Parameters
     ----------
-    trainer : TrainingRun
+    trainer : PopulationTraining
     files : RunFiles
         The policy file gets the networks of all members of the best generation, the best first.
     limits : Limits

@@ -18,7 +18,7 @@ from alloc.allocators.learned.files.policy_file import load_policy
 from alloc.allocators.learned.files.run_files import RunFiles
 from alloc.allocators.learned.network.actor_critic import NetworkSize
 from alloc.allocators.learned.training import member as module_of_members
-from alloc.allocators.learned.training import trainer as module
+from alloc.allocators.learned.training import population as module
 from alloc.allocators.learned.training.curriculum import Curriculum
 from alloc.allocators.learned.training.limits import Limits
 from alloc.allocators.learned.training.loop import run_training
