@@ -45,9 +45,10 @@ def send_all(state: MissionArrays, slot: int) -> bool:
             agents[number].bytes += BYTES_OF_MESSAGE
     heard = state.heard[slot]
     found = find_hearers(head, speaks, state.visible, state.places, heard)
-    keep_tasks(agents, speaks, state.task_hour, state.task_left, state.sent_task_hour[slot], state.sent_task_left[slot])
-    sent = state.sent_agent_hour[slot], state.sent_agent_report[slot]
-    keep_agents(agents, speaks, state.agent_hour, state.agent_report, sent[0], sent[1])
+    of_tasks = state.sent_task_hour[slot], state.sent_task_left[slot]
+    keep(agents, speaks, state.task_hour, state.task_left, of_tasks[0], of_tasks[1], BYTES_OF_TASK)
+    of_agents = state.sent_agent_hour[slot], state.sent_agent_report[slot]
+    keep(agents, speaks, state.agent_hour, state.agent_report, of_agents[0], of_agents[1], BYTES_OF_AGENT)
     if head.has_burst and found:
         lose_in_bursts(head, heard, state.link_number, state.link_bad)
     head.tick += 1
@@ -55,35 +56,25 @@ def send_all(state: MissionArrays, slot: int) -> bool:
 
 
 @compiled
-def keep_tasks(
-    agents: Sequence[Agent], speaks: BoolArray, hour: FloatArray, left: FloatArray, sent: FloatArray, told: FloatArray
+def keep(
+    agents: Sequence[Agent],
+    speaks: BoolArray,
+    hour: FloatArray,
+    known: FloatArray | Numbers,
+    sent_hour: FloatArray,
+    sent: FloatArray | Numbers,
+    size: int,
 ) -> None:
-    """Keep what is sent of tasks, and count its bytes."""
+    """Keep what agents send of tasks, or of agents, and count its bytes: `size` for each of which anything is known."""
     for number in range(len(speaks)):
         if speaks[number]:
-            known = 0
-            hours, works, sent_hours, sent_works = hour[number], left[number], sent[number], told[number]
-            for task in range(len(hours)):
-                sent_hours[task] = hours[task]
-                sent_works[task] = works[task]
-                known += hours[task] >= 0
-            agents[number].bytes += BYTES_OF_TASK * known
-
-
-@compiled
-def keep_agents(
-    agents: Sequence[Agent], speaks: BoolArray, hour: FloatArray, report: Numbers, sent: FloatArray, told: Numbers
-) -> None:
-    """Keep what is sent of agents, and count its bytes."""
-    for number in range(len(speaks)):
-        if speaks[number]:
-            known = 0
-            hours, reports, sent_hours, sent_reports = hour[number], report[number], sent[number], told[number]
-            for agent in range(len(hours)):
-                sent_hours[agent] = hours[agent]
-                sent_reports[agent] = reports[agent]
-                known += hours[agent] >= 0
-            agents[number].bytes += BYTES_OF_AGENT * known
+            count = 0
+            hours, values, sent_hours, sent_values = hour[number], known[number], sent_hour[number], sent[number]
+            for one in range(len(hours)):
+                sent_hours[one] = hours[one]
+                sent_values[one] = values[one]
+                count += hours[one] >= 0
+            agents[number].bytes += size * count
 
 
 @compiled

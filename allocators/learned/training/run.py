@@ -9,8 +9,8 @@ from alloc.allocators.learned.algorithms.registry import method_parameters
 from alloc.allocators.learned.files.policy_header import read_header
 from alloc.allocators.learned.files.run_files import RunFiles
 from alloc.allocators.learned.training.families import check_families
-from alloc.allocators.parallel.engine import Engine, EngineError, never_stop
-from alloc.problems import InputError, Instance, TrainingError
+from alloc.allocators.parallel.engine import Engine, never_stop
+from alloc.problems import InputError, Instance
 from alloc.problems.arguments import real
 
 if TYPE_CHECKING:
@@ -140,11 +140,7 @@ def train(
     if resume:
         trainer.resume(files.checkpoint)
     on_start(trainer, limits)
-    try:
-        run_training(trainer, files, limits, engine=engine, should_stop=should_stop, on_report=on_report)
-    except EngineError as error:
-        kept = f"{files.checkpoint} holds {trainer.generation} generations, and resuming goes on from them"
-        raise TrainingError(f"{error}; {kept}") from error
+    run_training(trainer, files, limits, engine=engine, should_stop=should_stop, on_report=on_report)
     return trainer
 
 

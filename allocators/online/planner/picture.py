@@ -12,7 +12,7 @@ from alloc.problems.missions.events import Event, EventKind
 from alloc.problems.missions.mission import Mission
 from alloc.problems.missions.simulation.agenda import Agenda, Arrival, Changes, Completion, Turn
 from alloc.problems.missions.simulation.changes import happen, land, obey
-from alloc.problems.missions.simulation.motion import CLOSE, bring_up_to_date, close, completion_hour, refusal
+from alloc.problems.missions.simulation.motion import close, completion_hour, refusal, status_at_deadline
 from alloc.problems.missions.simulation.reports import AgentReport, TaskReport, View, report_agent, report_task
 from alloc.problems.missions.simulation.state import (
     ACTIVE,
@@ -249,9 +249,7 @@ class Picture:
             if item.task.status is TaskStatus.OPEN and item.task.version == item.version:
                 self._close(item.task, TaskStatus.DONE)
         elif isinstance(item, TaskState) and item.status is TaskStatus.OPEN:
-            bring_up_to_date(self.state, item)
-            is_done = item.left <= CLOSE * (item.appeared + item.grown)
-            self._close(item, TaskStatus.DONE if is_done else TaskStatus.MISSED)
+            self._close(item, status_at_deadline(self.state, item))
 
     def _close(self, task: TaskState, status: TaskStatus) -> None:
         workers = tuple(task.workers.values())

@@ -12,8 +12,8 @@ from alloc.allocators.learned.missions.training.trainer import DEFAULT_PPO, Miss
 from alloc.allocators.learned.training.limits import Limits
 from alloc.allocators.learned.training.loop import run_training
 from alloc.allocators.learned.training.report import Report
-from alloc.allocators.parallel.engine import Engine, EngineError, never_stop
-from alloc.problems import InputError, TrainingError
+from alloc.allocators.parallel.engine import Engine, never_stop
+from alloc.problems import InputError
 from alloc.problems.arguments import whole
 from alloc.problems.errors import nearest
 from alloc.problems.missions.mission import Mission
@@ -103,11 +103,7 @@ def train_on_missions(
         iterations = DEFAULT_GENERATIONS
     limits = Limits(steps, iterations, minutes, patience)
     on_start(trainer, limits)
-    try:
-        run_training(trainer, files, limits, engine=engine, should_stop=should_stop, on_report=on_report)
-    except EngineError as error:
-        kept = f"{files.checkpoint} holds {trainer.generation} generations, and resuming goes on from them"
-        raise TrainingError(f"{error}; {kept}") from error
+    run_training(trainer, files, limits, engine=engine, should_stop=should_stop, on_report=on_report)
     return trainer
 
 

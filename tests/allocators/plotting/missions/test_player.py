@@ -1,20 +1,16 @@
 """The page that plays a mission: what is in it, and that it plays in a browser."""
 
-import json
 import re
-import shutil
-import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
+from browser import needs_browser, run_in_browser
 
 from alloc.allocators import animate_mission, simulate
 from alloc.allocators.plotting import check_animation
 from alloc.allocators.plotting.missions.player import STEPS, document
 from alloc.problems import Course, Event, InputError, Instance, Mission, Radio, Recorder, course_of
-
-BROWSER = shutil.which("chromium") or shutil.which("google-chrome")
 
 
 def rescue() -> Mission:
@@ -117,20 +113,12 @@ document.body.replaceChildren(JSON.stringify(out));
 """
 
 
-@pytest.mark.skipif(BROWSER is None, reason="no browser is installed")
+@needs_browser
 def test_a_browser_plays_scrubs_and_follows(page: Path, tmp_path: Path) -> None:
     """The page begins at 0, shows another hour when the slider moves, goes on while it plays, and stops; no errors."""
-    assert BROWSER is not None
-    page.write_text(page.read_text(encoding="utf-8").replace("</body>", f"{SCRIPT}</body>"), encoding="utf-8")
-    command = [BROWSER, "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path / 'profile'}"]
-    command += ["--enable-logging=stderr", "--window-size=1200,800", "--dump-dom", page.as_uri()]
-    ran = subprocess.run(command, capture_output=True, text=True, timeout=60)
-    assert "CONSOLE" not in ran.stderr
-    found = re.search(r"<body>(.*?)</body>", ran.stdout, re.DOTALL)
-    assert found is not None, ran.stderr[-2000:]
     failed = "<b> has failed."
     expected = [0, 2, True, failed, False, True, True, "pause", True, "play", 0]
-    assert json.loads(found[1].replace("&lt;", "<").replace("&gt;", ">")) == expected
+    assert run_in_browser(page, SCRIPT, tmp_path) == expected
 
 
 def test_a_log_gives_the_same_course(course: Course) -> None:
