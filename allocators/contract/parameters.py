@@ -3,8 +3,9 @@
 import dataclasses
 import math
 import types
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, get_args, get_origin, get_type_hints
 
 from alloc.problems import InputError
 from alloc.problems.arguments import flag, listed, of_type, real, shown, text, whole
@@ -75,6 +76,28 @@ class CheckedParameters:
         for field in dataclasses.fields(self):
             value = _converted(getattr(self, field.name), hints[field.name], field.name, **field.metadata)
             object.__setattr__(self, field.name, value)
+
+
+class Parameterised(ABC):
+    """A class whose parameters are a frozen dataclass, or none; see `Allocator` and `Policy`."""
+
+    parameters_type: ClassVar[type[Any] | None] = None
+
+    def __init__(self, parameters: object = None, **settings: object) -> None:
+        if self.parameters_type is not None:
+            self.parameters = with_settings(self.parameters_type, parameters, settings)
+        elif parameters is not None or settings:
+            raise InputError(f"{self._title()} has no parameters", next(iter(settings), "parameters"))
+
+    @classmethod
+    def default_parameters(cls) -> dict[str, object]:
+        """Return the default of each parameter, by name; nothing where there are none."""
+        return {} if cls.parameters_type is None else dict(vars(cls.parameters_type()))
+
+    @classmethod
+    @abstractmethod
+    def _title(cls) -> str:
+        """Return what messages call it, such as ``method 'greedy'``."""
 
 
 def _converted(

@@ -81,7 +81,7 @@ def test_methods_survives_a_broken_plugin(alloc, monkeypatch):
     from importlib.metadata import EntryPoint
 
     broken = EntryPoint("broken", "no_such_module:Thing", "alloc.allocators")
-    monkeypatch.setattr("alloc.allocators.registry.entry_points", lambda group: [broken])
+    monkeypatch.setattr("alloc.allocators.contract.plugins.entry_points", lambda group: [broken])
     facts = {fact["name"]: fact for fact in alloc("methods", "--json").json}
     assert "cannot be imported" in facts["broken"]["error"]
     assert alloc("methods").code == 0
@@ -98,7 +98,7 @@ def test_methods_are_prepared_once_for_all(alloc, monkeypatch):
 
     monkeypatch.setattr("alloc.allocators.parallel.processes.ProcessEngine", SerialEngine)
     broken = EntryPoint("broken", "no_such_module:Thing", "alloc.allocators")
-    monkeypatch.setattr("alloc.allocators.registry.entry_points", lambda group: [broken])
+    monkeypatch.setattr("alloc.allocators.contract.plugins.entry_points", lambda group: [broken])
     loaded = []
     monkeypatch.setattr("alloc.allocators.load", loaded.append)
     monkeypatch.setattr(

@@ -19,7 +19,7 @@ from alloc.allocators import (
     simulate,
     solve,
 )
-from alloc.allocators.online import registry
+from alloc.allocators.contract import plugins
 from alloc.problems import Event, Instance, Mission, MissionParameters, evaluate, random_mission
 from alloc.problems.missions.simulation.state import STAY, Order
 
@@ -114,7 +114,7 @@ def test_policies_are_found_by_name(monkeypatch):
             return self.target
 
     points = [EntryPoint("mine", Answers), EntryPoint("broken", int), EntryPoint("nearest", int)]
-    monkeypatch.setattr(registry, "entry_points", lambda group: points if group == "alloc.policies" else [])
+    monkeypatch.setattr(plugins, "entry_points", lambda group: points if group == "alloc.policies" else [])
     assert policy_names()[-2:] == ["mine", "broken"]
     assert describe_policy("mine") is Answers.info
     assert describe_policy("nearest").name == "nearest"
