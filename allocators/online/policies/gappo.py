@@ -41,6 +41,7 @@ class NetworkPolicy(Policy):
     def __init__(self, policy: Path | str | None = None) -> None:
         super().__init__()
         self._weights = compiled_weights(load_network(policy))
+        _compile_loops(self._weights)
 
     def begin(self, briefing: Briefing) -> AgentDecider:
         """Return who decides by the network."""
@@ -88,6 +89,16 @@ class _NetworkDecider(AgentDecider):
         kept = {name: getattr(self._room, name) for name in ("seen", "goal", "decided", "tasks")}
         self._room = fresh._replace(**kept)
         return self._room
+
+
+def _compile_loops(weights: MissionWeights) -> None:
+    """Compile all loops that a decision needs, so that the first one is in time as well."""
+    room, area = room_for(1, 1), np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
+    room.situation.own[:] = 1.0
+    is_due(room, 0, 0.0, 1.0, 1, False)
+    notice(area, 1.0, 0.0, 0.0, 0.0, room.seen[0])
+    consider(room, area, 1.0, 0, 0, 0, weights)
+    centre(area, 0)
 
 
 def _fill(view: View, situation: Situation, tasks: list[TaskReport], span: float) -> None:
