@@ -106,3 +106,38 @@ def test_wrong_names_of_films_are_told_before_the_run(alloc, mission):
     found = alloc("simulate", mission, "--policy", "greedy", "--animate", "x.avi")
     assert (found.code, found.err.strip()) == (2, "alloc: x.avi: must end in .gif, .mp4 or .html")
     assert alloc("plot", mission, "--output", "x.png").code == 2
+
+
+def test_policies_are_compared(alloc, mission):
+    """Each mission and policy has a row, as JSON, CSV and a table, and the policies differ from the first in pairs."""
+    arguments = ("compare", mission, mission, "--policies", "nearest,greedy[stay=2],replan", "--seeds", "2")
+    ran = alloc(*arguments, "--json")
+    rows = ran.json["rows"]
+    assert [(row["policy"], row["runs"], row["number"]) for row in rows[2:4]] == [("replan", 0, 1), ("nearest", 2, 2)]
+    assert "needs full knowledge" in rows[2]["reason"]
+    assert [(one["policy"], one["against"]) for one in ran.json["differences"]] == [
+        ("greedy[stay=2]", "nearest"),
+        ("replan", "nearest"),
+    ]
+    table = alloc(*arguments, "--csv", "table.csv")
+    assert "Against nearest, in the same missions" in table.err
+    header, first, *_ = Path("table.csv").read_text().splitlines()
+    assert dict(zip(header.split(","), first.split(","), strict=True))["mission_time_mean"] == str(
+        rows[0]["mission_time_mean"]
+    )
+    assert (table.code, table.out) == (0, "")
+
+
+def test_policies_and_methods_are_not_mixed(alloc, mission, small):
+    """One line says what goes with what, whether options or files are mixed up."""
+    for arguments, told in (
+        ((mission, "--methods", "greedy"), "`alloc compare --policies` take missions"),
+        ((mission,), "give either --methods, for instances, or --policies, for missions"),
+        ((mission, "--methods", "greedy", "--policies", "greedy"), "give either --methods"),
+        ((mission, "--policies", "greedy", "--iterations", "3"), "'--iterations': goes with --methods only"),
+        (("small.json", "--methods", "greedy", "--knowledge", "full"), "'--knowledge': goes with --policies only"),
+        ((mission, "--policies", "gredy"), "--policies: there is no policy 'gredy'"),
+    ):
+        ran = alloc("compare", *arguments)
+        assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
+        assert told in ran.err
