@@ -141,3 +141,42 @@ def test_policies_and_methods_are_not_mixed(alloc, mission, small):
         ran = alloc("compare", *arguments)
         assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
         assert told in ran.err
+
+
+def test_missions_and_logs_are_validated(alloc, mission, small):
+    """Missions, logs and instances are checked side by side, with the facts of each and what may not be meant."""
+    alloc("simulate", mission, "--policy", "greedy", "--log", "run.jsonl")
+    document = json.loads(Path(mission).read_text())
+    document |= {"knowledge": "full", "horizon": 0.1, "sensing": 1}
+    document["tasks"][0] |= {"deadline": 1e-6}
+    Path("odd.json").write_text(json.dumps(document))
+    ran = alloc("validate", mission, "run.jsonl", "small.json", "odd.json", "--json")
+    assert ran.code == 0
+    first, log, instance, odd = ran.json
+    assert (first["format"], first["agents"], first["tasks"], first["findings"]) == ("alloc-mission/1", 3, 4, [])
+    assert (log["format"], log["policy"], log["status"]) == ("alloc-mission-log/1", "greedy", "done")
+    assert "format" not in instance
+    assert [finding["field"] for finding in odd["findings"]] == ["deadline", "horizon", "sensing"]
+    told = alloc("validate", "-", "run.jsonl", stdin=Path(mission).read_text()).err
+    assert "-: ok, a mission of 3 agents" in told
+    assert "run.jsonl: ok, a log of " in told
+
+
+def test_each_fault_of_a_mission_is_a_line(alloc, mission):
+    """Every fault has a line with file, place and mend, and the code is 2; so has the first false line of a log."""
+    document = json.loads(Path(mission).read_text())
+    document["agents"][0]["ability"] = -1
+    document["radio"]["period"] = 0
+    Path("bad.json").write_text(json.dumps(document))
+    ran = alloc("validate", "bad.json")
+    assert (ran.code, ran.out) == (2, "")
+    assert sorted(line.split(": ")[:3] for line in ran.err.splitlines()) == [
+        ["alloc", "bad.json", "agents[0].ability"],
+        ["alloc", "bad.json", "radio.period"],
+    ]
+    alloc("simulate", mission, "--policy", "greedy", "--log", "run.jsonl")
+    lines = Path("run.jsonl").read_text().splitlines(keepends=True)
+    Path("run.jsonl").write_text("".join([*lines[:3], *lines[4:]]))
+    ran = alloc("validate", "run.jsonl")
+    assert (ran.code, ran.err.count("\n")) == (2, 1)
+    assert "run.jsonl: line 4: is not what comes of the orders before it" in ran.err
