@@ -60,6 +60,12 @@ def complete_policies(incomplete: str) -> list[str]:
     return [name for name in dict.fromkeys(names) if name.startswith(incomplete)]
 
 
+def complete_policy_list(incomplete: str) -> list[str]:
+    """Return the policies that begin with `incomplete`, or continue its list after a comma."""
+    done, comma, last = incomplete.rpartition(",")
+    return [done + comma + name for name in complete_policies(last)]
+
+
 InstanceArgument = Annotated[str, typer.Argument(metavar="INSTANCE", help=f"The instance: {READABLE}.")]
 InstancesArgument = Annotated[list[str], typer.Argument(metavar="INSTANCE...", help=f"Instances, each {READABLE}.")]
 
@@ -116,7 +122,7 @@ def option_of(place: str, parameters: Sequence[Parameter], arguments: Sequence[s
     parameter of a method is the ``--set`` among the `arguments` that names it.
     """
     name = OPTION_NAMES.get(place, place)
-    for known in (name, f"{name}s"):
+    for known in (name, f"{name}s", f"{name.removesuffix('y')}ies"):
         for parameter in parameters:
             if parameter.name == known:
                 is_option = isinstance(parameter, typer.core.TyperOption)

@@ -190,7 +190,7 @@ def require_format(found: object, expected: Sequence[str] = (INSTANCE_FORMAT,)) 
     if found is None:
         raise InputError(f'is missing; add "format": "{expected[0]}"', "format")
     if found not in expected:
-        hint = "; `alloc simulate` runs missions" if found == "alloc-mission/1" else ""
+        hint = "; `alloc simulate` and `alloc compare --policies` take missions" if found == "alloc-mission/1" else ""
         raise InputError(f"must be {' or '.join(map(repr, expected))}, got {described(found)}{hint}", "format")
 
 

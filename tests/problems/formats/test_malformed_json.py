@@ -102,7 +102,7 @@ DOCUMENTS = [
     (
         changed(format="alloc-mission/1"),
         "format",
-        "must be 'alloc-instance/1', got 'alloc-mission/1'; `alloc simulate` runs missions",
+        "must be 'alloc-instance/1', got 'alloc-mission/1'; `alloc simulate` and",
     ),
     (changed(format=1), "format", "got 1"),
     (changed(format=["alloc-instance/1"]), "format", "got a list"),
