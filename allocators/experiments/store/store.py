@@ -24,6 +24,9 @@ LEASE_S = 60.0
 MOST_KEYS = 500
 """Keys in one query: SQLite limits the parameters of a statement."""
 
+CONDITIONS = ("objective", "time_limit_s", "iterations", "target_gap", "threads", "version", "machine")
+"""Fields of a run that are the same for all that is compared, but for the versions of plugins."""
+
 RUN = tuple(field.name for field in fields(Run))
 ENDING = tuple(field.name for field in fields(Ending))
 
@@ -199,6 +202,13 @@ class Store:
                 rows = self._connection.execute(f"SELECT {columns} FROM runs WHERE key IN ({_marks(part)})", part)
                 found |= map(_record, rows)
         return found
+
+    def settings(self) -> dict[tuple[object, ...], int]:
+        """Return under which conditions the runs were made: how many with each combination of `CONDITIONS`."""
+        columns = ", ".join(CONDITIONS)
+        with explained(self.path):
+            rows = self._connection.execute(f"SELECT {columns}, count(*) FROM runs GROUP BY {columns}").fetchall()
+        return {tuple(row[:-1]): int(row[-1]) for row in rows}
 
     def instance_names(self) -> dict[str, str]:
         """Return the name under which each instance was last seen, by its hash."""

@@ -240,18 +240,24 @@ def test_a_read_only_store_is_told(tmp_path):
         Store(tmp_path / "runs.db")
 
 
+@pytest.fixture
+def small_files():
+    """Lets files grow to 200 kB and no further, as on a disk that is full then."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, before[1]))
+    yield
+    resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    signal.signal(signal.SIGXFSZ, handler)
+
+
+@pytest.mark.usefixtures("small_files")
 def test_a_full_disk_loses_nothing(tmp_path):
     """Where there is no room for a row it is told in one line; the rows before are kept, and there is no half row."""
-    with pytest.raises(InputError, match=r"disk is full|is full;"), Store(tmp_path / "runs.db") as store:
+    with Store(tmp_path / "runs.db") as store:
         finish(store, RUNS[0])
-        before = resource.getrlimit(resource.RLIMIT_FSIZE)
-        handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, before[1]))
-        try:
+        with pytest.raises(InputError, match=r"disk is full|is full;"):
             finish(store, RUNS[1], replace(SOLVED, details="x" * 400_000))
-        finally:
-            resource.setrlimit(resource.RLIMIT_FSIZE, before)
-            signal.signal(signal.SIGXFSZ, handler)
     with Store(tmp_path / "runs.db") as store:
         assert store.records().keys() == {KEYS[0]}
         assert store.claim(KEYS).key == KEYS[1]
