@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from alloc.cli import options
-from alloc.cli.options import examples
+from alloc.cli.commands.experiments import options as kept
+from alloc.cli.options import BETWEEN_SETTINGS, examples
 from alloc.cli.output.console import is_terminal, note, say, table, to_json
 from alloc.cli.output.files import check_outputs, save
 from alloc.problems.text import heading, labelled, number, percent
@@ -30,9 +31,6 @@ EXAMPLES = examples(
 
 BETWEEN_METHODS = re.compile(r",(?![^\[]*\])")
 """A comma outside of brackets."""
-
-BETWEEN_SETTINGS = re.compile(r",(?=\s*\w+=)")
-"""A comma before the name of the next parameter; others are part of a value."""
 
 
 def register(app: typer.Typer) -> None:
@@ -62,6 +60,12 @@ def compare_command(
         str | None, typer.Option(metavar="FILE", help="Write the table here as CSV; - is standard output.")
     ] = None,
     json: options.JsonOption = False,
+    store: kept.StoreOption = None,
+    workers: kept.WorkersOption = None,
+    memory: kept.MemoryOption = None,
+    kill_after: kept.KillAfterOption = None,
+    retry: kept.RetryOption = False,
+    report: kept.ReportOption = None,
 ) -> None:
     """Run several methods on several instances and seeds, and print a table."""
     from alloc.allocators import Budget
@@ -69,12 +73,20 @@ def compare_command(
     from alloc.allocators.runtime.interrupts import signals_set
     from alloc.problems.formats import is_standard_output, read_instance
 
+    keeping = kept.checked(store, workers, memory, kill_after, report, retry=retry)
     check_outputs(("--csv", csv), read=[("INSTANCE", instance) for instance in instances])
     if json and csv is not None and is_standard_output(csv):
         raise typer.BadParameter("and --json cannot both be standard output", param_hint="'--csv'")
     wanted, numbers = _methods(methods), _seeds(seeds)
     limit = options.time_limit(time_limit, iterations)
-    Budget(limit, iterations, target_gap)
+    budget = Budget(limit, iterations, target_gap)
+    if keeping is not None:
+        from alloc.cli.commands.experiments.stored import compare_in_store
+
+        variants = {label: (name, settings or {}) for label, (name, settings) in _listed(methods, "--methods").items()}
+        found = compare_in_store(keeping, instances, variants, numbers, objective.value, budget, threads)
+        _print(share_bounds(found.rows), csv, _common_units([one.units for one in found.instances]), json=json)
+        raise typer.Exit(found.conclude())
     problems = [read_instance(instance) for instance in instances]
     units = _common_units([problem.units for problem in problems])
     stop, rows, total = threading.Event(), [], len(problems) * len(wanted)
@@ -100,20 +112,28 @@ def compare_command(
     raise typer.Exit(0 if complete and served else 1)
 
 
+def _listed(text: str, option: str) -> dict[str, tuple[str, dict[str, object] | None]]:
+    """Return names and, where there are brackets, parameters of methods, by how they are written."""
+    found: dict[str, tuple[str, dict[str, object] | None]] = {}
+    for label in dict.fromkeys(part.strip() for part in BETWEEN_METHODS.split(text) if part.strip()):
+        name, bracket, settings = label.partition("[")
+        if bracket and not settings.endswith("]"):
+            raise typer.BadParameter(f"{label!r} must be like ga[population=200]", param_hint=f"'{option}'")
+        found[label] = (name, options.values(BETWEEN_SETTINGS.split(settings[:-1])) if bracket else None)
+    if not found:
+        raise typer.BadParameter("names no method; see `alloc methods`", param_hint=f"'{option}'")
+    return found
+
+
 def _methods(text: str) -> "dict[str, str | Allocator]":
     """Return the methods by how they are written; those with parameters in brackets are loaded with them."""
     from alloc.allocators import describe, load
 
     found: dict[str, str | Allocator] = {}
-    for label in dict.fromkeys(part.strip() for part in BETWEEN_METHODS.split(text) if part.strip()):
-        name, bracket, settings = label.partition("[")
-        if bracket and not settings.endswith("]"):
-            raise typer.BadParameter(f"{label!r} must be like ga[population=200]", param_hint="'--methods'")
+    for label, (name, settings) in _listed(text, "--methods").items():
         if name != "auto":
             describe(name)
-        found[label] = load(name, **options.values(BETWEEN_SETTINGS.split(settings[:-1]))) if bracket else name
-    if not found:
-        raise typer.BadParameter("names no method; see `alloc methods`", param_hint="'--methods'")
+        found[label] = name if settings is None else load(name, **settings)
     return found
 
 
