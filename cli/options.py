@@ -1,5 +1,6 @@
 """Arguments and options that several commands share."""
 
+import re
 from collections.abc import Sequence
 from enum import StrEnum
 from typing import Annotated
@@ -32,6 +33,9 @@ BUILT_IN_POLICIES = ("idle", "random", "nearest", "greedy", "hedonic", "auction"
 """For completion, likewise."""
 
 READABLE = "a .json or .npz file, a folder with agents.csv and tasks.csv, or - for JSON on standard input"
+
+BETWEEN_SETTINGS = re.compile(r",(?=\s*\w+=)")
+"""A comma before the name of the next parameter; others are part of a value."""
 
 PLAN = "A result of `alloc solve`, an allocation, a table of it, or a solver's solution of what `alloc export` wrote"
 """What every command that takes a plan reads."""

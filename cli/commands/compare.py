@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from alloc.cli import options
+from alloc.cli.commands.experiments import options as kept
 from alloc.cli.commands.missions.compare import compare_missions
-from alloc.cli.options import examples
+from alloc.cli.options import BETWEEN_SETTINGS, examples
 from alloc.cli.output.console import note, say, table
 from alloc.cli.output.files import check_outputs
 from alloc.cli.output.rows import show_done, write_rows
@@ -33,9 +34,6 @@ EXAMPLES = examples(
 
 BETWEEN_METHODS = re.compile(r",(?![^\[]*\])")
 """A comma outside of brackets."""
-
-BETWEEN_SETTINGS = re.compile(r",(?=\s*\w+=)")
-"""A comma before the name of the next parameter; others are part of a value."""
 
 MethodsOption = Annotated[
     str | None,
@@ -89,11 +87,18 @@ def compare_command(
         str | None, typer.Option(metavar="FILE", help="Write the table here as CSV; - is standard output.")
     ] = None,
     json: options.JsonOption = False,
+    store: kept.StoreOption = None,
+    workers: kept.WorkersOption = None,
+    memory: kept.MemoryOption = None,
+    kill_after: kept.KillAfterOption = None,
+    retry: kept.RetryOption = False,
+    report: kept.ReportOption = None,
 ) -> None:
     """Run several methods on instances, or policies in missions, with several seeds, and print a table."""
     from alloc.allocators import Budget
     from alloc.problems.formats import is_standard_output
 
+    keeping = kept.checked(store, workers, memory, kill_after, report, retry=retry)
     check_outputs(("--csv", csv), read=[("INSTANCE", instance) for instance in instances])
     if json and csv is not None and is_standard_output(csv):
         raise typer.BadParameter("and --json cannot both be standard output", param_hint="'--csv'")
@@ -102,6 +107,7 @@ def compare_command(
         "--iterations": iterations,
         "--target-gap": target_gap,
         "--threads": threads,
+        "--store": store,
         "--objective": None if objective is options.PlainObjective.MAKESPAN else objective,
     }
     _check_kind(methods, policies, of_methods, {"--knowledge": knowledge, "--deadline-ms": deadline_ms})
@@ -109,9 +115,18 @@ def compare_command(
     if policies is not None:
         listed = _listed(policies, "--policies")
         raise typer.Exit(compare_missions(instances, listed, numbers, knowledge, deadline_ms, csv, json=json))
-    wanted = _methods(methods or "")
+    assert methods is not None
     budget = Budget(options.time_limit(time_limit, iterations), iterations, target_gap)
-    raise typer.Exit(_compare(instances, wanted, numbers, objective, budget, threads, csv, json=json))
+    if keeping is not None:
+        from alloc.allocators.experiments.compare import share_bounds
+        from alloc.cli.commands.experiments.stored import compare_in_store
+        from alloc.problems.units import common_units
+
+        variants = {label: (name, settings or {}) for label, (name, settings) in _listed(methods, "--methods").items()}
+        found = compare_in_store(keeping, instances, variants, numbers, objective.value, budget, threads)
+        _write(share_bounds(found.rows), csv, common_units([one.units for one in found.instances]), json=json)
+        raise typer.Exit(found.conclude())
+    raise typer.Exit(_compare(instances, _methods(methods), numbers, objective, budget, threads, csv, json=json))
 
 
 def _check_kind(
@@ -162,9 +177,7 @@ def _compare(
             rows.append(row)
             outcome = row.reason or f"T {labelled(number(row.makespan_mean), units.time)}, gap {percent(row.gap_mean)}"
             show_done(f"{row.instance}, {row.method}: {outcome}", len(rows), total)
-    rows = share_bounds(rows)
-    document: dict[str, object] = {"format": "alloc-comparison/1", "rows": [row.to_dict() for row in rows]}
-    write_rows(document, _columns(), csv, lambda: _tell(rows, units), json=json)
+    _write(share_bounds(rows), csv, units, json=json)
     if stop.is_set():
         note(f"interrupted after {len(rows)} of {total} rows")
     complete = len(rows) == total and all(row.reason or row.runs == len(seeds) for row in rows)
@@ -211,6 +224,11 @@ def _seeds(text: str) -> list[int]:
     if not 1 <= int(text) <= 100_000:
         raise typer.BadParameter(f"{text} seeds; must be 1 to 100000", param_hint="'--seeds'")
     return list(range(int(text)))
+
+
+def _write(rows: "list[Row]", csv: str | None, units: "Units", *, json: bool) -> None:
+    document: dict[str, object] = {"format": "alloc-comparison/1", "rows": [row.to_dict() for row in rows]}
+    write_rows(document, _columns(), csv, lambda: _tell(rows, units), json=json)
 
 
 def _tell(rows: "list[Row]", units: "Units") -> None:
