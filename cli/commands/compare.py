@@ -52,6 +52,16 @@ PoliciesOption = Annotated[
         "or plugins.",
     ),
 ]
+SeedsOption = Annotated[
+    str, typer.Option(metavar="SEEDS", help="Seeds such as 0,1,2, or one number N for the seeds 0 to N - 1.")
+]
+DeadlineOption = Annotated[
+    float | None,
+    typer.Option(min=0, help="Milliseconds for each decision of a policy; 0 for no limit.", show_default="no limit"),
+]
+CsvOption = Annotated[
+    str | None, typer.Option(metavar="FILE", help="Write the table here as CSV; - is standard output.")
+]
 
 
 def register(app: typer.Typer) -> None:
@@ -66,9 +76,7 @@ def compare_command(
     ],
     methods: MethodsOption = None,
     policies: PoliciesOption = None,
-    seeds: Annotated[
-        str, typer.Option(metavar="SEEDS", help="Seeds such as 0,1,2, or one number N for the seeds 0 to N - 1.")
-    ] = "1",
+    seeds: SeedsOption = "1",
     objective: options.ObjectiveOption = options.PlainObjective.MAKESPAN,
     time_limit: options.TimeLimitOption = None,
     iterations: options.IterationsOption = None,
@@ -77,15 +85,8 @@ def compare_command(
     knowledge: Annotated[
         Knowledge | None, typer.Option(help="What agents in missions know.", show_default="as each mission says")
     ] = None,
-    deadline_ms: Annotated[
-        float | None,
-        typer.Option(
-            min=0, help="Milliseconds for each decision of a policy; 0 for no limit.", show_default="no limit"
-        ),
-    ] = None,
-    csv: Annotated[
-        str | None, typer.Option(metavar="FILE", help="Write the table here as CSV; - is standard output.")
-    ] = None,
+    deadline_ms: DeadlineOption = None,
+    csv: CsvOption = None,
     json: options.JsonOption = False,
     store: kept.StoreOption = None,
     workers: kept.WorkersOption = None,
