@@ -16,7 +16,7 @@ from alloc.cli.output.files import check_outputs, save
 from alloc.problems.text import heading, labelled, number, percent
 
 if TYPE_CHECKING:
-    from alloc.allocators import Allocator
+    from alloc.allocators import Allocator, Budget
     from alloc.allocators.experiments.compare import Row
     from alloc.problems import Units
 
@@ -69,36 +69,71 @@ def compare_command(
 ) -> None:
     """Run several methods on several instances and seeds, and print a table."""
     from alloc.allocators import Budget
-    from alloc.allocators.experiments.compare import compare, share_bounds
-    from alloc.allocators.runtime.interrupts import signals_set
-    from alloc.problems.formats import is_standard_output, read_instance
+    from alloc.problems.formats import is_standard_output
 
     keeping = kept.checked(store, workers, memory, kill_after, report, retry=retry)
-    check_outputs(("--csv", csv), read=[("INSTANCE", instance) for instance in instances])
+    written = [("--csv", csv), *(("--report", file) for file in report or ())]
+    check_outputs(*written, read=[("--store", store), *(("INSTANCE", instance) for instance in instances)])
     if json and csv is not None and is_standard_output(csv):
         raise typer.BadParameter("and --json cannot both be standard output", param_hint="'--csv'")
     wanted, numbers = _methods(methods), _seeds(seeds)
-    limit = options.time_limit(time_limit, iterations)
-    budget = Budget(limit, iterations, target_gap)
+    budget = Budget(options.time_limit(time_limit, iterations), iterations, target_gap)
     if keeping is not None:
-        from alloc.cli.commands.experiments.stored import compare_in_store
+        asked = (instances, methods, numbers, objective, budget, threads, csv)
+        raise typer.Exit(_compare_in_store(keeping, *asked, json=json))
+    raise typer.Exit(_compare(instances, wanted, numbers, objective, budget, threads, csv, json=json))
 
-        variants = {label: (name, settings or {}) for label, (name, settings) in _listed(methods, "--methods").items()}
-        found = compare_in_store(keeping, instances, variants, numbers, objective.value, budget, threads)
-        _print(share_bounds(found.rows), csv, _common_units([one.units for one in found.instances]), json=json)
-        raise typer.Exit(found.conclude())
-    problems = [read_instance(instance) for instance in instances]
+
+def _compare_in_store(
+    keeping: kept.Keeping,
+    files: Sequence[str],
+    methods: str,
+    seeds: list[int],
+    objective: options.PlainObjective,
+    budget: "Budget",
+    threads: int | None,
+    csv: str | None,
+    *,
+    json: bool,
+) -> int:
+    """Make the runs that the store has not yet, print the rows of all, and return the exit code."""
+    from alloc.cli.commands.experiments.stored import compare_in_store
+    from alloc.problems.formats import is_standard_output
+
+    variants = {label: (name, settings or {}) for label, (name, settings) in _listed(methods, "--methods").items()}
+    found = compare_in_store(keeping, files, variants, seeds, objective.value, budget, threads)
+    _print(found.rows, csv, _common_units([one.units for one in found.comparison.instances]), json=json)
+    return found.conclude(keeping.reports, quiet=json or (csv is not None and is_standard_output(csv)))
+
+
+def _compare(
+    files: Sequence[str],
+    methods: "dict[str, str | Allocator]",
+    seeds: list[int],
+    objective: options.PlainObjective,
+    budget: "Budget",
+    threads: int | None,
+    csv: str | None,
+    *,
+    json: bool,
+) -> int:
+    """Run the methods on all instances, print the rows, and return the exit code."""
+    from alloc.allocators.experiments.compare import compare, share_bounds
+    from alloc.allocators.runtime.interrupts import signals_set
+    from alloc.problems.formats import read_instance
+
+    problems = [read_instance(name) for name in files]
     units = _common_units([problem.units for problem in problems])
-    stop, rows, total = threading.Event(), [], len(problems) * len(wanted)
+    stop, rows, total = threading.Event(), list["Row"](), len(problems) * len(methods)
     with signals_set(stop):
         for row in compare(
             problems,
-            wanted,
-            numbers,
+            methods,
+            seeds,
             objective=objective.value,
-            time_limit_s=limit,
-            iterations=iterations,
-            target_gap=target_gap,
+            time_limit_s=budget.time_limit_s,
+            iterations=budget.iterations,
+            target_gap=budget.target_gap,
             threads=threads,
             stop=stop,
         ):
@@ -107,9 +142,9 @@ def compare_command(
     _print(share_bounds(rows), csv, units, json=json)
     if stop.is_set():
         note(f"interrupted after {len(rows)} of {total} rows")
-    complete = len(rows) == total and all(row.reason or row.runs == len(numbers) for row in rows)
+    complete = len(rows) == total and all(row.reason or row.runs == len(seeds) for row in rows)
     served = any(row.runs for row in rows) and not any(row.unserved for row in rows)
-    raise typer.Exit(0 if complete and served else 1)
+    return 0 if complete and served else 1
 
 
 def _listed(text: str, option: str) -> dict[str, tuple[str, dict[str, object] | None]]:
