@@ -100,7 +100,8 @@ def compare_command(
     from alloc.problems.formats import is_standard_output
 
     keeping = kept.checked(store, workers, memory, kill_after, report, retry=retry)
-    check_outputs(("--csv", csv), read=[("INSTANCE", instance) for instance in instances])
+    written = [("--csv", csv), *(("--report", file) for file in report or ())]
+    check_outputs(*written, read=[("--store", store), *(("INSTANCE", instance) for instance in instances)])
     if json and csv is not None and is_standard_output(csv):
         raise typer.BadParameter("and --json cannot both be standard output", param_hint="'--csv'")
     of_methods: dict[str, object] = {
@@ -119,14 +120,8 @@ def compare_command(
     assert methods is not None
     budget = Budget(options.time_limit(time_limit, iterations), iterations, target_gap)
     if keeping is not None:
-        from alloc.allocators.experiments.compare import share_bounds
-        from alloc.cli.commands.experiments.stored import compare_in_store
-        from alloc.problems.units import common_units
-
-        variants = {label: (name, settings or {}) for label, (name, settings) in _listed(methods, "--methods").items()}
-        found = compare_in_store(keeping, instances, variants, numbers, objective.value, budget, threads)
-        _write(share_bounds(found.rows), csv, common_units([one.units for one in found.instances]), json=json)
-        raise typer.Exit(found.conclude())
+        asked = (instances, methods, numbers, objective, budget, threads, csv)
+        raise typer.Exit(_compare_in_store(keeping, *asked, json=json))
     raise typer.Exit(_compare(instances, _methods(methods), numbers, objective, budget, threads, csv, json=json))
 
 
@@ -141,6 +136,29 @@ def _check_kind(
     for option, value in others.items():
         if value is not None:
             raise typer.BadParameter(f"goes with {kind} only", param_hint=f"'{option}'")
+
+
+def _compare_in_store(
+    keeping: kept.Keeping,
+    files: Sequence[str],
+    methods: str,
+    seeds: list[int],
+    objective: options.PlainObjective,
+    budget: "Budget",
+    threads: int | None,
+    csv: str | None,
+    *,
+    json: bool,
+) -> int:
+    """Make the runs that the store has not yet, print the rows of all, and return the exit code."""
+    from alloc.cli.commands.experiments.stored import compare_in_store
+    from alloc.problems.formats import is_standard_output
+    from alloc.problems.units import common_units
+
+    variants = {label: (name, settings or {}) for label, (name, settings) in _listed(methods, "--methods").items()}
+    found = compare_in_store(keeping, files, variants, seeds, objective.value, budget, threads)
+    _write(found.rows, csv, common_units([one.units for one in found.comparison.instances]), json=json)
+    return found.conclude(keeping.reports, quiet=json or (csv is not None and is_standard_output(csv)))
 
 
 def _compare(

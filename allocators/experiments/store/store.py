@@ -91,7 +91,7 @@ class Store:
     def _prepare(self) -> None:
         version = self._checked_version()
         self._connection.execute("PRAGMA journal_mode = WAL")
-        self._connection.execute("PRAGMA synchronous = FULL")  # what has ended survives the loss of power, too
+        self._connection.execute("PRAGMA synchronous = NORMAL")  # a lease need not survive the loss of power
         if version == len(MIGRATIONS):
             return
         with self._transaction():
@@ -176,7 +176,7 @@ class Store:
             False, and nothing is written, if the lease had ended and another process has the run, or ended it.
         """
         key = run.key
-        with self._transaction():
+        with self._transaction(durable=True):
             held = self._connection.execute("SELECT owner FROM leases WHERE key = ?", (key,)).fetchone()
             if held is None or held[0] != self.owner:
                 return False
@@ -221,8 +221,11 @@ class Store:
             return dict(self._connection.execute("SELECT key, owner FROM leases").fetchall())
 
     @contextmanager
-    def _transaction(self) -> Iterator[None]:
+    def _transaction(self, *, durable: bool = False) -> Iterator[None]:
+        """Run a block as one transaction; a durable one survives the loss of power once it has ended."""
         with explained(self.path):
+            if durable:
+                self._connection.execute("PRAGMA synchronous = FULL")
             self._connection.execute("BEGIN IMMEDIATE")
             try:
                 yield
@@ -231,6 +234,9 @@ class Store:
                 if self._connection.in_transaction:  # some errors, such as a full disk, end it themselves
                     self._connection.execute("ROLLBACK")
                 raise
+            finally:
+                if durable:
+                    self._connection.execute("PRAGMA synchronous = NORMAL")
 
     def close(self) -> None:
         """Close the file, and give back what was being run."""

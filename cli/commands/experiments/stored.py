@@ -3,12 +3,12 @@
 import sys
 import threading
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from alloc.cli.commands.experiments.options import Keeping
 from alloc.cli.commands.experiments.sources import gather
-from alloc.cli.output.console import is_terminal, note, say
+from alloc.cli.output.console import is_terminal, note, say, table
 from alloc.problems.text import counted, number
 
 if TYPE_CHECKING:
@@ -16,35 +16,52 @@ if TYPE_CHECKING:
     from alloc.allocators.experiments.compare import Row
     from alloc.allocators.experiments.store.key import Run
     from alloc.allocators.experiments.store.outcome import Ending
-    from alloc.problems import Instance
+    from alloc.allocators.experiments.stored import Comparison, Endings
 
 
-@dataclass
+@dataclass(frozen=True)
 class Found:
     """What a comparison came to.
 
     Attributes
     ----------
-    instances : sequence of Instance
+    comparison : Comparison
+    endings : mapping
+        How its runs ended.
     rows : list of Row
-        From the store, of exactly what was asked for.
+        From the store, of exactly what was asked for, with the gaps against the best bound of any method.
     is_complete : bool
         Whether all runs have ended.
     notes : list of str
         For the user, after the table.
     """
 
-    instances: "Sequence[Instance]"
+    comparison: "Comparison"
+    endings: "Endings"
     rows: "list[Row]"
     is_complete: bool
-    notes: list[str] = field(default_factory=list)
+    notes: list[str]
 
-    def conclude(self) -> int:
-        """Print the notes, and return the exit code."""
+    def conclude(self, reports: Sequence[str], *, quiet: bool) -> int:
+        """Print how methods differ, unless `quiet`, and the notes, write the reports, and return the exit code."""
+        from alloc.allocators.experiments.report.files import write_report
+
+        if not quiet and len(self.endings) > 1:
+            self._tell_differences()
         for one in self.notes:
             note(one)
+        for file in reports:
+            write_report(file, self.comparison, self.endings, self.rows)
         is_served = any(row.runs for row in self.rows) and not any(row.unserved for row in self.rows)
         return 0 if self.is_complete and is_served else 1
+
+    def _tell_differences(self) -> None:
+        from alloc.allocators.experiments.report.tables import difference_tables
+
+        for found in difference_tables(self.comparison, self.endings):
+            say(f"\n{found.title}\n{table(found.header, found.rows)}")
+            for one in found.notes:
+                note(one)
 
 
 def compare_in_store(
@@ -58,11 +75,15 @@ def compare_in_store(
 ) -> Found:
     """Make the runs that are missing, until all are there or a signal comes, and return what the store says of all."""
     from alloc.allocators.experiments.campaign import Campaign, Means
+    from alloc.allocators.experiments.compare import share_bounds
+    from alloc.allocators.experiments.report.files import check_report
     from alloc.allocators.experiments.store.outcome import UNSOLVED
     from alloc.allocators.experiments.store.store import Store
     from alloc.allocators.experiments.stored import planned, rows_of
     from alloc.allocators.runtime.interrupts import signals_set
 
+    for file in keeping.reports:
+        check_report(file)
     instances = gather(list(sources))
     stop = threading.Event()
     with Store(keeping.store, again=UNSOLVED if keeping.retry else ()) as store:
@@ -77,7 +98,7 @@ def compare_in_store(
         notes += [f"{keeping.store} also holds {other}, which do not count here" for other in plan.others(store)]
     if not done:
         notes.insert(0, "interrupted; the same command goes on from here")
-    return Found(instances, rows_of(plan, endings), done, notes)
+    return Found(plan, endings, share_bounds(rows_of(plan, endings)), done, notes)
 
 
 def _count(endings: "Mapping[str, Sequence[Sequence[Ending | None]]]") -> int:

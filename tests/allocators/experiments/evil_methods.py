@@ -89,6 +89,13 @@ def nap(search):
     return answer(search)
 
 
+def busy(search):
+    """Use a processor until the time is up."""
+    while search.stop_reason() is None or search.remaining_s > 0:
+        sum(range(1000))
+    return answer(search)
+
+
 def pid(search):
     """Note who it is in the makespan's stead: in the order of its processes."""
     with Path(os.environ["NAPS"]).open("a") as file:
@@ -98,7 +105,7 @@ def pid(search):
 
 BEHAVIOURS = (
     answer, crash, fail, leave, leave_softly, hang, eat, eat_at_once, garbage, fork, fork_and_leave, killed, refuse,
-    missing, nap, pid,
+    missing, nap, busy, pid,
 )  # fmt: skip
 
 

@@ -75,6 +75,18 @@ def test_other_budgets_are_other_runs(alloc):
     assert "runs.db also holds 1 run with iterations 5, which do not count here" in other.err
 
 
+def test_differences_are_printed_and_reported(alloc):
+    """Below the table stands how methods differ from the first one; a report holds that, or all runs."""
+    words = ("compare", f"{TINY}:0-2", "--methods", "greedy,local-search", *QUICK)
+    ran = alloc(*words, "--report", "table.md", "--report", "runs.csv")
+    assert ran.code == 0
+    assert "Against greedy: T\n" in ran.err
+    assert "Small sample: 3 instances" in ran.err
+    assert "## Against greedy: T" in Path("table.md").read_text()
+    assert Path("runs.csv").read_text().count("\n") == 7
+    assert "Against" not in alloc(*words, "--json").err
+
+
 def test_failures_have_rows_and_are_tried_again_where_asked(alloc, plugin):
     """A failure has a row with the reason; it is run again with --retry alone, which leaves good runs as they are."""
     words = ("compare", f"{TINY}:0", "--methods", "leave,nap", *QUICK)
@@ -128,6 +140,8 @@ def test_wrong_sources_are_one_line(alloc, source, message):
         (("--store", "runs.db", "--kill-after", "0"), "must be more than 0 seconds"),
         (("--store", "runs.db", "--time-limit", "1", "--workers", "999"), "--workers: 999 timed runs"),
         (("--store", "absent/runs.db"), "absent/runs.db: cannot be opened"),
+        (("--store", "runs.db", "--report", "runs.txt"), "runs.txt: must end in .md, .tex, .csv or .parquet"),
+        (("--store", "runs.db", "--csv", "runs.db"), "is --store and --csv at once"),
         (("--store", "text"), "text: is no store of runs"),
     ],
 )
