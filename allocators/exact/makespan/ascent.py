@@ -14,13 +14,13 @@ doi:10.1007/BFb0120697.
 import numpy as np
 
 from alloc.allocators.exact.knapsack import WholeArray
-from alloc.allocators.exact.knapsack_core import cheapest_by_core
+from alloc.allocators.exact.knapsack_states import MAX_STATES, cheapest_by_states, room_for_states
 from alloc.allocators.exact.makespan.configuration import PRICE_SUM
 from alloc.allocators.exact.model import Model
 from alloc.allocators.runtime.compiled import compiled
 from alloc.problems.instance import FloatArray
 
-GRID = 4096
+GRID = 2**40
 """Steps into which the need of a task is divided: weights are rounded up to them."""
 
 MAX_PAIRS = 200_000
@@ -138,19 +138,16 @@ def cheapest_groups(
     need : ndarray of int64, shape (t,)
     used : ndarray, shape (k,)
     """
-    total, classes = 0.0, len(price)
+    total, classes, states = 0.0, len(price), room_for_states(MAX_STATES)
     some, these, cost = np.empty(classes, dtype=np.int64), np.empty(classes, dtype=np.int64), np.empty(classes)
-    copies = np.empty(classes, dtype=np.int64)
+    copies, group = np.empty(classes, dtype=np.int64), np.empty(classes, dtype=np.int64)
     for j in range(len(need)):
-        size, largest = 0, 1
+        size = 0
         for k in range(classes):
             if weight[j, k] > 0:
                 some[size], these[size], cost[size], copies[size] = k, weight[j, k], price[k], count[k]
-                largest = max(largest, weight[j, k])
                 size += 1
-        most = need[j] + largest - 1  # without an agent that can be spared
-        paid, group = cheapest_by_core(these[:size], cost[:size], copies[:size], need[j], most)
-        total += paid
+        total += cheapest_by_states(these[:size], cost[:size], copies[:size], need[j], states, group[:size])
         for q in range(size):
             used[some[q]] += group[q]
     return total
