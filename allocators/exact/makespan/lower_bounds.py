@@ -8,6 +8,9 @@ from alloc.allocators.exact.makespan.set_partitioning import solve_set_partition
 from alloc.allocators.exact.makespan.state import TIGHT, MakespanState
 from alloc.allocators.exact.solver_model import Verdict
 
+FIRST_ASCENT = 0.05
+"""Share of the time of the first ascent: enough, as a rule, for prices that guide the search for plans."""
+
 REPEATABLE_ROUNDS = 60
 """Rounds of one ascent where effort is counted."""
 
@@ -28,10 +31,18 @@ def raise_bound_by_configurations(state: MakespanState, share: float) -> None:
 
 
 def raise_bound_by_relaxation(state: MakespanState) -> None:
-    """Raise the lower bound by linear programmes of single agents, where not all agents can be everywhere at once."""
+    """Raise the lower bound by what fractions of agents could do, where not all agents can be everywhere at once.
+
+    Where travel takes time, prices for whole agents do so sooner than linear programmes.
+    """
     instance = state.search.instance
     if state.ended or state.partial or not (instance.has_travel_time or not instance.reach.is_complete):
         return
+    if instance.has_travel_time:
+        state.ascent = ConfigurationAscent(state.model, state.lower)
+        if state.ascent.is_tractable:
+            _ascend(state, state.search.elapsed_s + state.share_s(FIRST_ASCENT))
+            return
     bound, state.price = relaxed_lower_bound(
         state.model, state.lower, state.upper, state.share_s(0.2), lambda: state.over
     )
@@ -68,8 +79,6 @@ def probe_by_groups(state: MakespanState, time: float, seconds: float) -> Verdic
 
 def _ascend(state: MakespanState, until_s: float) -> None:
     """Raise the lower bound by a subgradient method, where each task has a knapsack of its own."""
-    if state.ascent is None and state.price is not None:
-        state.ascent = ConfigurationAscent(state.model, state.lower, state.price)
     if state.ascent is None or not state.ascent.is_tractable:
         return
     rounds = 0
@@ -78,7 +87,8 @@ def _ascend(state: MakespanState, until_s: float) -> None:
             state.rule_out(state.ascent.proven)
         rounds += 1
         if state.repeatable and rounds >= REPEATABLE_ROUNDS:
-            return
+            break
+    state.price = state.ascent.task_price
 
 
 def _bisect_by_prices(state: MakespanState, configurations: ConfigurationProgramme, until_s: float) -> None:
