@@ -7,7 +7,7 @@ from alloc.allocators.contract.tolerance import PROVEN
 from alloc.allocators.exact.makespan.lower_bounds import raise_bound_by_configurations, raise_bound_by_relaxation
 from alloc.allocators.exact.makespan.probe import Probe, Purpose, probe_makespan
 from alloc.allocators.exact.makespan.quick_plans import descend_in_steps, search_repartitions
-from alloc.allocators.exact.makespan.state import TIGHT, MakespanState
+from alloc.allocators.exact.makespan.state import TIGHT, MakespanState, reweighted
 from alloc.allocators.exact.model import FEW_PAIRS
 from alloc.allocators.exact.solver_model import Solver, Verdict
 
@@ -47,7 +47,7 @@ def least_makespan(search: Search, solver: Solver, min_served: int, until_s: flo
 def take_turns(state: MakespanState) -> None:
     """Find plans and bounds that often meet, so that no solver is needed."""
     for plans, bounds, local in SHARES if state.descent and len(state.model.class_of_pair) > FEW_PAIRS else ():
-        search_repartitions(state, plans)
+        search_repartitions(state, plans + (1 - state.local_weight) * local)
         raise_bound_by_configurations(state, bounds)
         state.search_locally(local)
 
@@ -61,6 +61,7 @@ def bisect(state: MakespanState, solver: Solver) -> None:
     probe = Probe(state.lower, state.share_s(PROBE_SHARE))
     while not state.ended:
         verdict = probe_makespan(state, solver, probe)
+        state.solver_weight = reweighted(state.solver_weight, found=verdict is not Verdict.UNKNOWN)
         if verdict is Verdict.UNKNOWN:
             if probe.purpose is Purpose.LAST or state.would_prove(state.lower):
                 return
@@ -69,7 +70,7 @@ def bisect(state: MakespanState, solver: Solver) -> None:
             if not state.bounds_tried:
                 raise_bound_by_configurations(state, 2 * PROBE_SHARE)
             if state.descent:
-                search_repartitions(state, PROBE_SHARE)
+                search_repartitions(state, PROBE_SHARE * (1.5 - state.local_weight / 2))
                 state.search_locally(PROBE_SHARE / 2)
                 raise_bound_by_configurations(state, PROBE_SHARE / 2)
         probe = _next_probe(state, verdict)
@@ -77,11 +78,11 @@ def bisect(state: MakespanState, solver: Solver) -> None:
 
 def _next_probe(state: MakespanState, last: Verdict) -> Probe:
     """Choose the next T, given the verdict on the last one."""
-    upper, floor = state.upper, max(state.lower, state.unresolved)
+    upper, floor, seconds = state.upper, max(state.lower, state.unresolved), state.share_s(PROBE_SHARE * state.solver_weight, 0.02)
     if state.would_prove(floor) and state.unresolved > state.lower:
         state.unresolved = 0.0
         return Probe(upper * (1 - 0.9 * PROVEN), np.inf, Purpose.LAST)
     if state.would_prove(floor) or (last is Verdict.INFEASIBLE and not state.bounds_tried):
-        return Probe(upper * (1 - TIGHT / 2), state.share_s(PROBE_SHARE), Purpose.BELOW_PLAN)
+        return Probe(upper * (1 - TIGHT / 2), seconds, Purpose.BELOW_PLAN)
     middle = float(np.sqrt(floor * upper)) if upper > 2 * floor else (floor + upper) / 2
-    return Probe(middle, state.share_s(PROBE_SHARE))
+    return Probe(middle, seconds)

@@ -26,8 +26,12 @@ def raise_bound_by_configurations(state: MakespanState, share: float) -> None:
     if first:
         configurations = ConfigurationProgramme(state.model, state.lower)
         state.configurations = configurations if configurations.is_tractable else None
-    if state.configurations is not None:
-        _bisect_by_prices(state, state.configurations, state.search.elapsed_s + state.share_s(share))
+    until_s = state.search.elapsed_s + state.share_s(share)
+    while not state.bounds_converged and state.configurations is not None:
+        if not _bisect_by_prices(state, state.configurations, until_s):
+            return
+        finer = state.configurations.refined(state.lower)
+        state.configurations, state.bounds_converged = finer or state.configurations, finer is None
 
 
 def raise_bound_by_relaxation(state: MakespanState) -> None:
@@ -91,15 +95,16 @@ def _ascend(state: MakespanState, until_s: float) -> None:
     state.price = state.ascent.task_price
 
 
-def _bisect_by_prices(state: MakespanState, configurations: ConfigurationProgramme, until_s: float) -> None:
-    """Bisect on T between the lower bound and the least T that dual prices do not exclude."""
+def _bisect_by_prices(state: MakespanState, configurations: ConfigurationProgramme, until_s: float) -> bool:
+    """Bisect on T between the lower bound and the least T that dual prices do not exclude; return whether that ended."""
     time, possible = state.lower, state.upper
-    while not state.ended and possible > state.lower * (1 + TIGHT):
+    while not state.ended and possible > state.lower * (1 + configurations.precision):
         prices = configurations.dual_prices(time, lambda: state.over or state.search.elapsed_s > until_s)
         if prices is None or not (prices.converged or prices.theta > 1):
-            return
+            return False
         if prices.theta > 1:
             state.rule_out(configurations.largest_infeasible(prices, time, possible))
         else:
             possible = max(state.lower, state.model.earliest_with_same_needs(time))
         time = (state.lower + min(possible, state.upper)) / 2
+    return not state.ended
