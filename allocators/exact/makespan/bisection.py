@@ -11,7 +11,7 @@ from alloc.allocators.exact.makespan.state import TIGHT, MakespanState, reweight
 from alloc.allocators.exact.model import FEW_PAIRS
 from alloc.allocators.exact.solver_model import Solver, Verdict
 
-SHARES = ((0.03, 0.01, 0.02), (0.1, 0.05, 0.05), (0.25, 0.15, 0.1))
+SHARES = ((0.02, 0.02, 0.03), (0.07, 0.05, 0.08), (0.2, 0.15, 0.2))
 """Shares of the time in which repartitions, configurations and local search take turns before the solver."""
 
 PROBE_SHARE = 0.1
@@ -58,7 +58,7 @@ def bisect(state: MakespanState, solver: Solver) -> None:
     The lower bound is probed first, as it is often the optimum. A probe without a verdict raises the lower end of the
     bisection but proves nothing; it is repeated with more time once nothing else is left.
     """
-    probe = Probe(state.lower, state.share_s(PROBE_SHARE))
+    probe = Probe(state.lower, _probe_s(state))
     while not state.ended:
         verdict = probe_makespan(state, solver, probe)
         state.solver_weight = reweighted(state.solver_weight, found=verdict is not Verdict.UNKNOWN)
@@ -78,7 +78,7 @@ def bisect(state: MakespanState, solver: Solver) -> None:
 
 def _next_probe(state: MakespanState, last: Verdict) -> Probe:
     """Choose the next T, given the verdict on the last one."""
-    upper, floor, seconds = state.upper, max(state.lower, state.unresolved), state.share_s(PROBE_SHARE * state.solver_weight, 0.02)
+    upper, floor, seconds = state.upper, max(state.lower, state.unresolved), _probe_s(state)
     if state.would_prove(floor) and state.unresolved > state.lower:
         state.unresolved = 0.0
         return Probe(upper * (1 - 0.9 * PROVEN), np.inf, Purpose.LAST)
@@ -86,3 +86,7 @@ def _next_probe(state: MakespanState, last: Verdict) -> Probe:
         return Probe(upper * (1 - TIGHT / 2), seconds, Purpose.BELOW_PLAN)
     middle = float(np.sqrt(floor * upper)) if upper > 2 * floor else (floor + upper) / 2
     return Probe(middle, seconds)
+
+
+def _probe_s(state: MakespanState) -> float:
+    return state.share_s(PROBE_SHARE * state.solver_weight, 0.02)

@@ -8,8 +8,9 @@ from alloc.allocators.exact.makespan.set_partitioning import solve_set_partition
 from alloc.allocators.exact.makespan.state import TIGHT, MakespanState
 from alloc.allocators.exact.solver_model import Verdict
 
-FIRST_ASCENT = 0.05
-"""Share of the time of the first ascent: enough, as a rule, for prices that guide the search for plans."""
+FIRST_ASCENT, ASCENT = 0.05, 0.5
+"""Share of the time of the first ascent, enough as a rule for prices that guide the search for plans, and the part of
+the time for bounds that later ones take, as they soon gain little."""
 
 REPEATABLE_ROUNDS = 60
 """Rounds of one ascent where effort is counted."""
@@ -21,7 +22,7 @@ def raise_bound_by_configurations(state: MakespanState, share: float) -> None:
     if state.ended or state.partial:
         return
     if state.model.travel_time is not None:
-        _ascend(state, state.search.elapsed_s + state.share_s(share))
+        _ascend(state, state.search.elapsed_s + state.share_s(ASCENT * share))
         return
     if first:
         configurations = ConfigurationProgramme(state.model, state.lower)

@@ -81,7 +81,7 @@ class MakespanState:
     ascent: ConfigurationAscent | None = None
     local_search: LocalSearchPhase | None = None
     local_weight: float = 1.0
-    solver_weight: float = 1.0
+    solver_weight: float = 0.5
 
     @classmethod
     def begin(cls, search: Search, min_served: int, until_s: float, *, descent: bool) -> "MakespanState":

@@ -8,10 +8,10 @@ import numpy as np
 from alloc.allocators.contract.search import Search
 from alloc.allocators.heuristic.local_search.annealing_state import AnnealingState
 from alloc.allocators.heuristic.local_search.clock import Clock
+from alloc.allocators.heuristic.local_search.makespan import MakespanReduction
 from alloc.allocators.heuristic.local_search.parameters import LocalSearchParameters
 from alloc.problems import IDLE, Allocation, Objective, only_allowed
-from alloc.problems.evaluation import RELATIVE_TOLERANCE
-from alloc.problems.instance import FloatArray, IntArray
+from alloc.problems.instance import IntArray
 
 HARD = 100.0
 """Factor on penalties that makes them outweigh any distance."""
@@ -22,9 +22,8 @@ HARD_FROM = 0.95
 FIRST_CYCLE_SHARE = 0.1
 """Part of a long budget for a first annealing cycle, so that a run that is stopped early has a good plan."""
 
-PATIENCE, LEAST_SHARE = 3.0, 0.2
-"""Time without a smaller makespan, as a multiple of the time until then, and share of the time for it, after which the
-energy has its turn."""
+PATIENCE = 3.0
+"""Time without a smaller makespan, as a multiple of the time until then, after which the energy has its turn."""
 
 REPORT_INTERVAL = 20.0
 """Time between two reports, as a multiple of the time that scoring one plan takes."""
@@ -71,9 +70,9 @@ def improve(
         return
     state = AnnealingState(search.instance, search.seed, parameters.neighbours)
     if energy_counts:
-        reduce_makespan(search, state, parameters, clock.part(parameters.makespan_share), patience=PATIENCE)
+        MakespanReduction(search, state, parameters).run(clock.part(parameters.makespan_share), patience=PATIENCE)
     else:
-        reduce_makespan(search, state, parameters, clock)
+        MakespanReduction(search, state, parameters).run(clock)
     if energy_counts and clock.is_long:
         reduce_energy(search, state, parameters, clock.part(FIRST_CYCLE_SHARE))
     if energy_counts:
@@ -85,61 +84,9 @@ def _improve_endlessly(search: Search, parameters: LocalSearchParameters, clock:
     state = AnnealingState(search.instance, search.seed, parameters.neighbours)
     cycle = parameters.first_cycle
     while not clock.is_over:
-        reduce_makespan(search, state, parameters, Clock(search, until_iteration=search.iteration + cycle))
+        MakespanReduction(search, state, parameters).run(Clock(search, until_iteration=search.iteration + cycle))
         reduce_energy(search, state, parameters, Clock(search, until_iteration=search.iteration + cycle))
         cycle *= 2
-
-
-def reduce_makespan(
-    search: Search,
-    state: AnnealingState,
-    parameters: LocalSearchParameters,
-    clock: Clock,
-    *,
-    patience: float | None = None,
-) -> None:
-    """Attempt target makespans between the lower bound and the best, closer to the best after each failure.
-
-    With `patience`, ends early when the last improvement was that many times as long ago as it took, but not in the
-    first `LEAST_SHARE` of the clock.
-    """
-    assert search.fastest is not None
-    state.begin(search.fastest.allocation, search.fastest.evaluation.served_makespan)
-    iterations, fraction, attempts, improved = float(parameters.attempt_iterations), 0.0, 0, 0.0
-    while not clock.is_over and not search.fast_enough:
-        fastest = search.fastest.evaluation
-        best = fastest.served_makespan
-        bound = min(search.lower_bound, best) if fastest.makespan is not None else 0.5 * best
-        if bound >= best * (1 - RELATIVE_TOLERANCE):
-            return
-        if patience is not None and clock.progress > max(LEAST_SHARE, (1 + patience) * improved):
-            return
-        initial = parameters.attempt_noise[attempts % len(parameters.attempt_noise)]
-        noise = state.mean_ability * np.geomspace(initial, parameters.attempt_final_noise, int(iterations) + 1)[1:]
-        reached = _attempt(search, state, clock, bound + fraction * (best - bound), noise, parameters.exchanges)
-        fraction = 0.5 * fraction if reached else min(0.5 * (1 + fraction), 0.999)
-        iterations *= 1.0 if reached else parameters.attempt_growth
-        attempts += 1
-        if search.fastest.evaluation.served_makespan < best:
-            improved = clock.progress
-
-
-def _attempt(
-    search: Search, state: AnnealingState, clock: Clock, makespan: float, noise: FloatArray, exchanges: int
-) -> bool:
-    """Look for a plan within a target makespan, with the noise of each iteration; return whether one was found."""
-    assert search.fastest is not None
-    state.set_target(makespan)
-    for level in noise.tolist():
-        if clock.is_over or not state.n_short:
-            break
-        state.run(exchanges, state.weights(0.0, level, 0.0, 1.0))
-        search.iteration += 1
-    fastest = search.fastest.evaluation.served_makespan
-    # where travel takes time, only the evaluation knows the makespan
-    if not state.n_short or not state.arrays.instant_travel or state.current_makespan < fastest:
-        search.submit(state.allocation)
-    return not state.n_short
 
 
 def reduce_energy(search: Search, state: AnnealingState, parameters: LocalSearchParameters, clock: Clock) -> None:
