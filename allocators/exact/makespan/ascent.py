@@ -26,8 +26,8 @@ GRID = 2**40
 MAX_PAIRS = 1_000_000
 """Pairs of class and task above which there is no such bound."""
 
-FIRST_LEVEL, LAST_LEVEL = 2e-3, 1e-5
-"""How much above its best value the subgradient method wants theta, at first and at the end."""
+FIRST_LEVEL, NEXT_LEVEL, LAST_LEVEL = 1e-2, 5e-4, 1e-5
+"""How much above its best value the subgradient method wants theta: at first, after a new start, and at the end."""
 
 PATIENCE, MAX_PATIENCE = 12, 100
 """Rounds without progress after which it wants half as much; doubled with each start up to the largest."""
@@ -116,7 +116,7 @@ class ConfigurationAscent:
         self._price, self._direction = self._best_price, np.zeros(len(self._count))
         self._level, self._stale = self._level / 2, 0
         if self._level < LAST_LEVEL:
-            self._level, self._patience = FIRST_LEVEL / 4, 2 * self._patience
+            self._level, self._patience = NEXT_LEVEL, 2 * self._patience
             self._time, self._best = (max(self.proven, self._time / 2) + self._time) / 2, 0.0
 
     def _change_prices(self, subgradient: FloatArray, rise: float) -> None:

@@ -27,6 +27,9 @@ UNLIMITED_S = 60.0
 LEAST_WEIGHT = 1 / 8
 """Part of its usual time that a phase which finds nothing still gets."""
 
+TELLING_SHARE = 0.05
+"""Share of the time from which on it tells something that local search finds nothing."""
+
 
 @dataclass(eq=False)
 class MakespanState:
@@ -173,8 +176,9 @@ class MakespanState:
         """Improve the fastest plan by local search for this share of the time, where it is at hand."""
         if self.local_search is not None and not self.ended:
             upper = self.upper
-            self.local_search.turn(self.share_s(share * self.local_weight, 0.05))
-            self.local_weight = reweighted(self.local_weight, found=self.upper < upper)
+            self.local_search.turn(self.share_s(share * self.local_weight, 0.08))
+            if share >= TELLING_SHARE or self.upper < upper:
+                self.local_weight = reweighted(self.local_weight, found=self.upper < upper)
 
     def share_s(self, share: float, least_s: float = 0.1) -> float:
         """Return this share of the stage's time in seconds, at least `least_s`; ``inf`` where effort is counted."""
