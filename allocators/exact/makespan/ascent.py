@@ -38,8 +38,9 @@ DEFLECTION = 0.5
 LEAST_RISE = 1e-6
 """Rise of theta that counts as progress."""
 
-SMALL_RISE = 0.005
-"""Relative rise of T that may take all that theta is above 1; of what is more, a quarter, as travel counts for less."""
+SMALL_RISE, LARGEST_RISE = 0.005, 0.1
+"""Relative rise of T up to which all that theta is above 1 counts, and the largest at once: of more, a quarter counts, as
+theta falls by more than T rises where travel takes long."""
 
 
 class ConfigurationAscent:
@@ -99,10 +100,11 @@ class ConfigurationAscent:
         is_excluded = cost > total  # a comparison of whole numbers
         if is_excluded:
             self.proven = self._time
-            self._time *= 1 + max(min(SMALL_RISE, theta - 1), min(1.0, theta - 1) / 4)
+            self._time *= 1 + max(min(SMALL_RISE, theta - 1), min(LARGEST_RISE, (theta - 1) / 4))
         if is_excluded or theta > self._best + LEAST_RISE:
             self._best, self._best_price, self._stale = min(1.0, theta), self._price, 0
-            self.task_price = costs / self._model.workload
+            if np.isfinite(theta):
+                self.task_price = costs / self._model.workload
         else:
             self._stale += 1
         if self._stale > self._patience:

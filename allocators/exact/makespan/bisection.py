@@ -12,7 +12,7 @@ from alloc.allocators.exact.model import FEW_PAIRS
 from alloc.allocators.exact.solver_model import Solver, Verdict
 
 SHARES = ((0.02, 0.02, 0.03), (0.07, 0.05, 0.08), (0.2, 0.15, 0.2))
-"""Shares of the time in which repartitions, configurations and local search take turns before the solver."""
+"""Shares of the time of repartitions, configurations and local search, which take turns before the solver."""
 
 PROBE_SHARE = 0.1
 """Share of the time of a probe; as much goes to plans after one that stayed open."""
@@ -47,9 +47,9 @@ def least_makespan(search: Search, solver: Solver, min_served: int, until_s: flo
 def take_turns(state: MakespanState) -> None:
     """Find plans and bounds that often meet, so that no solver is needed."""
     for plans, bounds, local in SHARES if state.descent and len(state.model.class_of_pair) > FEW_PAIRS else ():
+        state.search_locally(local)
         search_repartitions(state, plans + (1 - state.local_weight) * local)
         raise_bound_by_configurations(state, bounds)
-        state.search_locally(local)
 
 
 def bisect(state: MakespanState, solver: Solver) -> None:
