@@ -10,7 +10,7 @@ least of those that are no slower. Negative figures are leads of `auto`. A metho
 
 import argparse
 
-from variant_kinds import KINDS, instance
+from variant_kinds import KINDS, clock_of_limits, instance
 
 from alloc.allocators import load, solve
 from alloc.allocators.result import Result
@@ -68,6 +68,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("--first-seed", type=int, default=0)
     parser.add_argument("--threads", type=int, default=1)
+    parser.add_argument("--processor-time", action="store_true", help="limits count the time of this process alone")
     parser.add_argument("--each", action="store_true", help="also a line for each run")
     options = parser.parse_args()
     heads = "".join(f" {'mean %':>8} {'worst %':>8} {'against':>13}" for _ in range(2))
@@ -76,31 +77,31 @@ def main() -> None:
     for kind in options.kinds.split(","):
         for objective in map(Objective, options.objectives.split(",")):
             for limit in map(float, options.time_limits.split(",")):
-                found, picked = [], set()
-                for seed in range(options.first_seed, options.first_seed + options.seeds):
-                    results = {}
-                    for method in ["auto", *options.methods.split(",")]:
-                        result = run(instance(kind, seed), method, objective, limit, options.threads)
-                        if result is None:
-                            continue
-                        results[method] = result
-                        if options.each:
-                            gap_of_energy = result.energy_gap
-                            print(
-                                f"# {kind} {seed} {objective.value} {limit:g} {method} ({result.method}) T"
-                                f" {result.makespan:.9g} gap {result.gap:.2e} E {result.energy:.6g}"
-                                f" gap {-1 if gap_of_energy is None else gap_of_energy:.2e} {result.runtime_s:.2f} s",
-                                flush=True,
-                            )
-                    auto = results.pop("auto")
-                    picked.add(auto.method)
-                    found.append(gaps(auto, results))
-                energy = column([each[1] for each in found]) if objective is Objective.MAKESPAN_ENERGY else f"{'':>32}"
+                with clock_of_limits(processor_time=options.processor_time):
+                    print(row(kind, objective, limit, options), flush=True)
+
+
+def row(kind: str, objective: Objective, limit: float, options: argparse.Namespace) -> str:
+    """Run all methods on the instances of one kind, and return the line of the table."""
+    found, picked = [], set()
+    for seed in range(options.first_seed, options.first_seed + options.seeds):
+        case, results = instance(kind, seed), {}
+        for method in ["auto", *options.methods.split(",")]:
+            result = run(case, method, objective, limit, options.threads)
+            if result is None:
+                continue
+            results[method] = result
+            if options.each:
+                bounds = f"bound {result.lower_bound:.9g} E {result.energy:.6g} bound {result.energy_lower_bound}"
                 print(
-                    f"{kind:>10} {objective.value:>15} {limit:>6g}{column([each[0] for each in found])}{energy}"
-                    f"  {', '.join(sorted(picked))}",
-                    flush=True,
+                    f"# {kind} {seed} {objective.value} {limit:g} {method} T {result.makespan:.9g} {bounds}", flush=True
                 )
+        auto = results.pop("auto")
+        picked.add(auto.method)
+        found.append(gaps(auto, results))
+    makespan = column([each[0] for each in found])
+    energy = column([each[1] for each in found]) if objective is Objective.MAKESPAN_ENERGY else f"{'':>32}"
+    return f"{kind:>10} {objective.value:>15} {limit:>6g}{makespan}{energy}  {', '.join(sorted(picked))}"
 
 
 if __name__ == "__main__":
