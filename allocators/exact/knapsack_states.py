@@ -4,7 +4,7 @@ Agents are sorted by price per weight, and a group that takes them in this order
 state. Around the last agent taken, one after the other is left open: each state may do without the next agent before,
 or with the next one after. A state is dropped where another weighs no less and costs no more, or where the linear
 relaxation of all agents not yet open leaves it no cheaper than the best group known. So the time depends on how many
-agents are worth a second look, and not on the size of the numbers.
+agents nearly pay, and not on the size of the numbers.
 
 References
 ----------

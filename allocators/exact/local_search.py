@@ -11,8 +11,7 @@ from alloc.allocators.contract.tolerance import MakespanTolerance
 from alloc.allocators.exact.solver_model import is_repeatable
 from alloc.allocators.heuristic.local_search.annealing_state import AnnealingState
 from alloc.allocators.heuristic.local_search.clock import Clock
-from alloc.allocators.heuristic.local_search.improve import improve
-from alloc.allocators.heuristic.local_search.makespan import MakespanReduction
+from alloc.allocators.heuristic.local_search.improve import MakespanReduction, improve
 from alloc.allocators.heuristic.local_search.parameters import LocalSearchParameters
 from alloc.allocators.parallel.pool import Pool
 from alloc.problems import Allocation, Objective

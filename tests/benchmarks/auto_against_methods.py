@@ -4,8 +4,9 @@
     python tests/benchmarks/auto_against_methods.py --kinds real --objectives makespan --methods milp --time-limits 20
 
 For each kind, objective and limit a line: by how much the makespan of `auto` exceeds the least of the others, mean and
-worst over the seeds, and which method that is; with the energy in the objective, also by how much its energy exceeds the
-least of those that are no slower. Negative figures are leads of `auto`. A method that refuses an instance is left out.
+worst over the seeds, and which method that is; with the energy in the objective, also by how much its energy exceeds
+the least of those that are no slower. Negative figures are leads of `auto`. A method that refuses an instance is left
+out.
 """
 
 import argparse
@@ -43,7 +44,8 @@ def gap(value: float, others: dict[str, float]) -> Gap:
 
 def gaps(auto: Result, others: dict[str, Result]) -> tuple[Gap, Gap]:
     """Return the gaps of makespan and of energy; the energy counts where a method is no slower than `auto`."""
-    assert auto.makespan is not None and auto.energy is not None
+    assert auto.makespan is not None
+    assert auto.energy is not None
     makespans = {name: each.makespan for name, each in others.items() if each.makespan is not None}
     energies = {
         name: each.energy

@@ -83,8 +83,8 @@ KINDS: dict[str, Callable[[int], Instance]] = {
 }
 """Instances of each kind by seed: 300/40 by ranges or batteries; 200/40 with lists of one to four tasks; 200/30 with
 speeds U(.5, 2) or U(.1, .5); real-valued abilities U(20, 50), 100/40 with equal workloads, and U(1, 100), 90/30; the
-paper's scenarios 1 and 3; machine covering 200/50 with whole abilities U[1, 1000]; many agents, 5000/100, that differ by
-place alone; few tasks, 200/5 with speeds; and 300/30 with ranges, batteries, speeds and lists together."""
+paper's scenarios 1 and 3; machine covering 200/50 with whole abilities U[1, 1000]; many agents, 5000/100, that differ
+by place alone; few tasks, 200/5 with speeds; and 300/30 with ranges, batteries, speeds and lists together."""
 
 
 def instance(kind: str, seed: int) -> Instance:

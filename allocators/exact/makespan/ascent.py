@@ -2,8 +2,8 @@
 
 At first each agent costs the value of its work on its best task. From there prices follow a deflected subgradient:
 agents that the cheapest groups of all tasks use more than once get dearer, unused ones cheaper. As soon as the groups
-together cost more than all agents, T is proven impossible, and the next larger T comes. Once prices have converged below
-a T that stays possible, it starts again halfway to that T, with more patience.
+together cost more than all agents, T is proven impossible, and the next larger T comes. Once prices have converged
+below a T that stays possible, it starts again halfway to that T, with more patience.
 
 References
 ----------
@@ -39,8 +39,8 @@ LEAST_RISE = 1e-6
 """Rise of theta that counts as progress."""
 
 SMALL_RISE, LARGEST_RISE = 0.005, 0.1
-"""Relative rise of T up to which all that theta is above 1 counts, and the largest at once: of more, a quarter counts, as
-theta falls by more than T rises where travel takes long."""
+"""Relative rise of T up to which all that theta is above 1 counts, and the largest at once: of more, a quarter counts,
+as theta falls by more than T rises where travel takes long."""
 
 
 class ConfigurationAscent:
@@ -114,7 +114,7 @@ class ConfigurationAscent:
         return is_excluded
 
     def _restart(self) -> None:
-        """Go back to the best prices: for a smaller rise of theta, or in the end for a smaller T, with more patience."""
+        """Go back to the best prices: for a smaller rise of theta, or at last for a smaller T, with more patience."""
         self._price, self._direction = self._best_price, np.zeros(len(self._count))
         self._level, self._stale = self._level / 2, 0
         if self._level < LAST_LEVEL:

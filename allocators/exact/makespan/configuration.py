@@ -29,7 +29,7 @@ MAX_NEED = 20_000
 """Largest need in units up to which needs are kept as they are."""
 
 GRID, FINE_GRID = 2**13, 2**17
-"""Steps of the largest need otherwise, at first and in the end: weights are rounded up to them, needs are rounded down."""
+"""Steps of the largest need otherwise, at first and in the end: weights are rounded up to them, needs down."""
 
 MAX_CELLS = 30_000_000
 """Agents times steps times tables above which no prices are computed."""
@@ -86,7 +86,7 @@ class ConfigurationProgramme:
     is_tractable : bool
         Whether its tables are of a size that can be computed.
     precision : float
-        Relative difference of T that is worth another solution.
+        Relative difference of T up to which no further solution is sought.
     """
 
     def __init__(self, model: Model, low: float, grid: int = GRID) -> None:

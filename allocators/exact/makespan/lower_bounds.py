@@ -5,7 +5,7 @@ from alloc.allocators.exact.makespan.configuration import ConfigurationProgramme
 from alloc.allocators.exact.makespan.enumeration import enumerate_groups
 from alloc.allocators.exact.makespan.relaxation import relaxed_lower_bound
 from alloc.allocators.exact.makespan.set_partitioning import solve_set_partitioning
-from alloc.allocators.exact.makespan.state import TIGHT, MakespanState
+from alloc.allocators.exact.makespan.state import MakespanState
 from alloc.allocators.exact.solver_model import Verdict
 
 FIRST_ASCENT, ASCENT = 0.05, 0.5
@@ -100,7 +100,7 @@ def _ascend(state: MakespanState, until_s: float) -> None:
 
 
 def _bisect_by_prices(state: MakespanState, configurations: ConfigurationProgramme, until_s: float) -> bool:
-    """Bisect on T between the lower bound and the least T that dual prices do not exclude; return whether that ended."""
+    """Bisect on T between the bound and the least T that dual prices do not exclude; return whether that ended."""
     time, possible = state.lower, state.upper
     while not state.ended and possible > state.lower * (1 + configurations.precision):
         prices = configurations.dual_prices(time, lambda: state.over or state.search.elapsed_s > until_s)
