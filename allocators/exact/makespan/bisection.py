@@ -7,7 +7,7 @@ from alloc.allocators.contract.tolerance import PROVEN
 from alloc.allocators.exact.makespan.lower_bounds import raise_bound_by_configurations, raise_bound_by_relaxation
 from alloc.allocators.exact.makespan.probe import Probe, Purpose, probe_makespan
 from alloc.allocators.exact.makespan.quick_plans import descend_in_steps, search_repartitions
-from alloc.allocators.exact.makespan.state import TIGHT, MakespanState, reweighted
+from alloc.allocators.exact.makespan.state import TIGHT, MakespanState
 from alloc.allocators.exact.model import FEW_PAIRS
 from alloc.allocators.exact.solver_model import Solver, Verdict
 
@@ -58,15 +58,14 @@ def bisect(state: MakespanState, solver: Solver) -> None:
     The lower bound is probed first, as it is often the optimum. A probe without a verdict raises the lower end of the
     bisection but proves nothing; it is repeated with more time once nothing else is left.
     """
-    probe = Probe(state.lower, _probe_s(state))
+    probe = Probe(state.lower, state.share_s(PROBE_SHARE))
     while not state.ended:
         verdict = probe_makespan(state, solver, probe)
-        state.solver_weight = reweighted(state.solver_weight, found=verdict is not Verdict.UNKNOWN)
         if verdict is Verdict.UNKNOWN:
             if probe.purpose is Purpose.LAST or state.would_prove(state.lower):
                 return
             if probe.purpose is Purpose.BISECT:
-                state.unresolved = max(state.unresolved, probe.time)
+                state.unresolved = max(state.unresolved, state.model.next_makespan(probe.time))
             if not state.bounds_tried:
                 raise_bound_by_configurations(state, 2 * PROBE_SHARE)
             if state.descent:
@@ -78,7 +77,7 @@ def bisect(state: MakespanState, solver: Solver) -> None:
 
 def _next_probe(state: MakespanState, last: Verdict) -> Probe:
     """Choose the next T, given the verdict on the last one."""
-    upper, floor, seconds = state.upper, max(state.lower, state.unresolved), _probe_s(state)
+    upper, floor, seconds = state.upper, max(state.lower, state.unresolved), state.share_s(PROBE_SHARE)
     if state.would_prove(floor) and state.unresolved > state.lower:
         state.unresolved = 0.0
         return Probe(upper * (1 - 0.9 * PROVEN), np.inf, Purpose.LAST)
@@ -86,7 +85,3 @@ def _next_probe(state: MakespanState, last: Verdict) -> Probe:
         return Probe(upper * (1 - TIGHT / 2), seconds, Purpose.BELOW_PLAN)
     middle = float(np.sqrt(floor * upper)) if upper > 2 * floor else (floor + upper) / 2
     return Probe(middle, seconds)
-
-
-def _probe_s(state: MakespanState) -> float:
-    return state.share_s(PROBE_SHARE * state.solver_weight, 0.02)

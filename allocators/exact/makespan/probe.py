@@ -10,6 +10,9 @@ from alloc.allocators.exact.makespan.state import MakespanState
 from alloc.allocators.exact.monitor import SolverMonitor
 from alloc.allocators.exact.solver_model import Solver, SolverLimits, SolverModel, Verdict
 
+SOLVER_PART = 0.5
+"""Part of the time of a probe that the solver gets, after groups have had all of it."""
+
 
 class Purpose(Enum):
     """What a probe is for."""
@@ -43,7 +46,7 @@ def probe_makespan(state: MakespanState, solver: Solver, probe: Probe) -> Verdic
         if state.descent and find_plan(state, probe.time):
             return Verdict.FEASIBLE
         verdict = probe_by_groups(state, probe.time, probe.seconds)
-        if verdict is not Verdict.UNKNOWN or _building_s(state, solver) > probe.seconds:
+        if verdict is not Verdict.UNKNOWN or _building_s(state, solver) > SOLVER_PART * probe.seconds:
             return verdict
     return _probe_by_solver(state, solver, demand, probe)
 
@@ -55,7 +58,7 @@ def _building_s(state: MakespanState, solver: Solver) -> float:
 
 def _probe_by_solver(state: MakespanState, solver: Solver, demand: Demand, probe: Probe) -> Verdict:
     search = state.search
-    until_s = min(search.elapsed_s + probe.seconds + _building_s(state, solver), state.until_s)
+    until_s = min(search.elapsed_s + SOLVER_PART * probe.seconds + _building_s(state, solver), state.until_s)
     model = SolverModel(
         demand=demand,
         cost=None,

@@ -51,7 +51,8 @@ class MakespanState:
     lower : float
         Proven: no plan that serves `model.min_served` tasks has a smaller makespan, in hours.
     unresolved : float
-        Largest T whose probe ended without a verdict; no bound, but the lower end of the bisection.
+        Least makespan above the largest T whose probe ended without a verdict; no bound, but the lower end of the
+        bisection.
     bounds_tried : bool
         Whether linear programmes have been used for a bound; after that, a probe tries more before the solver.
     bounds_converged : bool
@@ -64,8 +65,8 @@ class MakespanState:
         None before it is needed.
     local_search : LocalSearchPhase or None
         None where the solver is quick enough by itself, or must find plans alone, or some tasks stay unserved.
-    local_weight, solver_weight : float
-        Part of their usual time that local search and probes get: less after each turn that found nothing.
+    local_weight : float
+        Part of its usual time that local search gets: less after each turn that found nothing.
     """
 
     search: Search
@@ -84,7 +85,6 @@ class MakespanState:
     ascent: ConfigurationAscent | None = None
     local_search: LocalSearchPhase | None = None
     local_weight: float = 1.0
-    solver_weight: float = 0.5
 
     @classmethod
     def begin(cls, search: Search, min_served: int, until_s: float, *, descent: bool) -> "MakespanState":
