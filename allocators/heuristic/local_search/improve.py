@@ -71,9 +71,9 @@ def improve(
         return
     state = AnnealingState(search.instance, search.seed, parameters.neighbours)
     if energy_counts:
-        reduce_makespan(search, state, parameters, clock.part(parameters.makespan_share), patience=PATIENCE)
+        MakespanReduction(search, state, parameters).run(clock.part(parameters.makespan_share), patience=PATIENCE)
     else:
-        reduce_makespan(search, state, parameters, clock)
+        MakespanReduction(search, state, parameters).run(clock)
     if energy_counts and clock.is_long:
         reduce_energy(search, state, parameters, clock.part(FIRST_CYCLE_SHARE))
     if energy_counts:
@@ -85,61 +85,75 @@ def _improve_endlessly(search: Search, parameters: LocalSearchParameters, clock:
     state = AnnealingState(search.instance, search.seed, parameters.neighbours)
     cycle = parameters.first_cycle
     while not clock.is_over:
-        reduce_makespan(search, state, parameters, Clock(search, until_iteration=search.iteration + cycle))
+        MakespanReduction(search, state, parameters).run(Clock(search, until_iteration=search.iteration + cycle))
         reduce_energy(search, state, parameters, Clock(search, until_iteration=search.iteration + cycle))
         cycle *= 2
 
 
-def reduce_makespan(
-    search: Search,
-    state: AnnealingState,
-    parameters: LocalSearchParameters,
-    clock: Clock,
-    *,
-    patience: float | None = None,
-) -> None:
-    """Attempt target makespans between the lower bound and the best, closer to the best after each failure.
+class MakespanReduction:
+    """Attempts at target makespans between the lower bound and the best plan, closer to the best after each failure.
 
-    With `patience`, ends early when the last improvement was that many times as long ago as it took, but not in the
-    first `LEAST_SHARE` of the clock.
+    Parameters
+    ----------
+    search : Search
+        It has a plan.
+    state : AnnealingState
+    parameters : LocalSearchParameters
     """
-    assert search.fastest is not None
-    state.begin(search.fastest.allocation, search.fastest.evaluation.served_makespan)
-    iterations, fraction, attempts, improved = float(parameters.attempt_iterations), 0.0, 0, 0.0
-    while not clock.is_over and not search.fast_enough:
-        fastest = search.fastest.evaluation
-        best = fastest.served_makespan
-        bound = min(search.lower_bound, best) if fastest.makespan is not None else 0.5 * best
-        if bound >= best * (1 - RELATIVE_TOLERANCE):
-            return
-        if patience is not None and clock.progress > max(LEAST_SHARE, (1 + patience) * improved):
-            return
-        initial = parameters.attempt_noise[attempts % len(parameters.attempt_noise)]
-        noise = state.mean_ability * np.geomspace(initial, parameters.attempt_final_noise, int(iterations) + 1)[1:]
-        reached = _attempt(search, state, clock, bound + fraction * (best - bound), noise, parameters.exchanges)
-        fraction = 0.5 * fraction if reached else min(0.5 * (1 + fraction), 0.999)
-        iterations *= 1.0 if reached else parameters.attempt_growth
-        attempts += 1
-        if search.fastest.evaluation.served_makespan < best:
-            improved = clock.progress
 
+    def __init__(self, search: Search, state: AnnealingState, parameters: LocalSearchParameters) -> None:
+        self._search, self._state, self._parameters = search, state, parameters
+        self._iterations, self._fraction, self._attempts = float(parameters.attempt_iterations), 0.0, 0
+        self._known: Allocation | None = None
 
-def _attempt(
-    search: Search, state: AnnealingState, clock: Clock, makespan: float, noise: FloatArray, exchanges: int
-) -> bool:
-    """Look for a plan within a target makespan, with the noise of each iteration; return whether one was found."""
-    assert search.fastest is not None
-    state.set_target(makespan)
-    for level in noise.tolist():
-        if clock.is_over or not state.n_short:
-            break
-        state.run(exchanges, state.weights(0.0, level, 0.0, 1.0))
-        search.iteration += 1
-    fastest = search.fastest.evaluation.served_makespan
-    # where travel takes time, only the evaluation knows the makespan
-    if not state.n_short or not state.arrays.instant_travel or state.current_makespan < fastest:
-        search.submit(state.allocation)
-    return not state.n_short
+    def run(self, clock: Clock, *, patience: float | None = None) -> None:
+        """Go on until the clock ends, from where the last run ended or from a better plan found elsewhere.
+
+        With `patience`, ends early when the last improvement was that many times as long ago as it took, but not in the
+        first `LEAST_SHARE` of the clock.
+        """
+        search, parameters, improved = self._search, self._parameters, 0.0
+        assert search.fastest is not None
+        if search.fastest.allocation is not self._known:
+            self._state.begin(search.fastest.allocation, search.fastest.evaluation.served_makespan)
+            self._iterations, self._fraction = float(parameters.attempt_iterations), 0.0
+        while not clock.is_over and not search.fast_enough:
+            fastest = search.fastest.evaluation
+            best = fastest.served_makespan
+            bound = min(search.lower_bound, best) if fastest.makespan is not None else 0.5 * best
+            if bound >= best * (1 - RELATIVE_TOLERANCE):
+                return
+            if patience is not None and clock.progress > max(LEAST_SHARE, (1 + patience) * improved):
+                return
+            reached = self._attempt(clock, bound + self._fraction * (best - bound), self._noise())
+            self._fraction = 0.5 * self._fraction if reached else min(0.5 * (1 + self._fraction), 0.999)
+            self._iterations *= 1.0 if reached else parameters.attempt_growth
+            self._attempts += 1
+            if search.fastest.evaluation.served_makespan < best:
+                improved = clock.progress
+        self._known = search.fastest.allocation
+
+    def _noise(self) -> FloatArray:
+        """Return the noise of each iteration of the next attempt."""
+        noises, last = self._parameters.attempt_noise, self._parameters.attempt_final_noise
+        initial = noises[self._attempts % len(noises)]
+        return self._state.mean_ability * np.geomspace(initial, last, int(self._iterations) + 1)[1:]
+
+    def _attempt(self, clock: Clock, makespan: float, noise: FloatArray) -> bool:
+        """Look for a plan within a target makespan, with the noise of each iteration; return whether one was found."""
+        search, state = self._search, self._state
+        assert search.fastest is not None
+        state.set_target(makespan)
+        for level in noise.tolist():
+            if clock.is_over or not state.n_short:
+                break
+            state.run(self._parameters.exchanges, state.weights(0.0, level, 0.0, 1.0))
+            search.iteration += 1
+        fastest = search.fastest.evaluation.served_makespan
+        # where travel takes time, only the evaluation knows the makespan
+        if not state.n_short or not state.arrays.instant_travel or state.current_makespan < fastest:
+            search.submit(state.allocation)
+        return not state.n_short
 
 
 def reduce_energy(search: Search, state: AnnealingState, parameters: LocalSearchParameters, clock: Clock) -> None:
