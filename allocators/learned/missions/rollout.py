@@ -7,7 +7,7 @@ import numpy as np
 
 from alloc.allocators.learned.missions.feature_names import FEATURES
 from alloc.allocators.learned.missions.network_arrays import MissionWeights, Singles
-from alloc.allocators.learned.missions.play import Room, act, consider, wants
+from alloc.allocators.learned.missions.play import Room, act, consider, talk, wants
 from alloc.allocators.missions.advance import advance
 from alloc.allocators.missions.chance import first_key, fraction, keyed
 from alloc.allocators.missions.layout import IDLE, MESSAGES, MISSED, OVER, WORKING, MissionArrays
@@ -142,6 +142,7 @@ def rollout(state: MissionArrays, room: Room, weights: MissionWeights, seed: int
             record.total[0] += missed_cost(state, record.total[1])
             return
         if wanted == MESSAGES:
+            talk(state, room)
             continue
         missed = missed_cost(state, record.total[1])
         for place in range(head.deciding):

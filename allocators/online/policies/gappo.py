@@ -9,14 +9,18 @@ from alloc.allocators.learned.missions.exploring import centre, notice
 from alloc.allocators.learned.missions.network import compiled_weights
 from alloc.allocators.learned.missions.network_arrays import MissionWeights
 from alloc.allocators.learned.missions.options import WAIT
-from alloc.allocators.learned.missions.play import Room, consider, is_due, room_for
+from alloc.allocators.learned.missions.play import Room, consider, is_due, note_choice, room_for
 from alloc.allocators.learned.missions.policy_file import load_network
 from alloc.allocators.learned.missions.situation import MEMORY, Situation
+from alloc.allocators.learned.missions.talking import is_to_send
 from alloc.allocators.missions.layout import NOBODY
 from alloc.allocators.online.contract import AgentDecider, Briefing, Policy, PolicyInfo
-from alloc.problems.missions.simulation.reports import AgentReport, TaskReport, View
+from alloc.problems.missions.simulation.reports import AgentReport, Message, TaskReport, View
 from alloc.problems.missions.simulation.state import ACTIVE, STAY, AgentStatus, Order, TaskStatus
 from alloc.problems.vocabulary import Knowledge
+
+REMEMBERED = ("seen", "goal", "decided", "tasks", "saved", "counted", "news", "told")
+"""What a decider keeps from decision to decision; all else is scratch."""
 
 NOWHERE = (math.nan, math.nan, math.nan)
 
@@ -73,6 +77,7 @@ class _NetworkDecider(AgentDecider):
         _fill(view, room.situation, tasks, self._span)
         count = consider(room, self._area, self._sensing, self._seed, self._number, 0, self._weights)
         choice = int(room.choice[np.argmax(room.scores[:count])])
+        note_choice(room, 0, choice)
         if choice >= 0:
             return Order(names[choice])
         if choice == WAIT:
@@ -82,10 +87,15 @@ class _NetworkDecider(AgentDecider):
         x, y, z = centre(self._area, int(room.goal[0]))
         return Order(position=(float(x), float(y), float(z)))
 
+    def message(self, view: View) -> Message | None:
+        tasks = sum(task.status is TaskStatus.OPEN for task in view.tasks.values())
+        room, tick = self._room, round(view.hour / self._period)
+        return view.message() if is_to_send(room.saved, room.counted, room.news, room.told, 0, tick, tasks) else None
+
     def _with_room(self, n: int, m: int) -> Room:
         """Return room for what is known now, with what the agent remembers."""
         fresh = room_for(n, m)
-        kept = {name: getattr(self._room, name) for name in ("seen", "goal", "decided", "tasks")}
+        kept = {name: getattr(self._room, name) for name in REMEMBERED}
         self._room = fresh._replace(**kept)
         return self._room
 

@@ -32,14 +32,14 @@ from alloc.allocators.runtime.torch_state import plain_torch, torch_threads
 from alloc.problems.missions.files.document import mission_to_document
 
 DEFAULT_PPO = PpoParameters(
-    learning_rate=3e-4,
-    max_learning_rate=3e-4,
+    learning_rate=3e-3,
+    max_learning_rate=3e-3,
     target_kl=0.012,
     gae_lambda=0.9,
     reward_scale=5.0,
-    minibatch_size=4096,
+    minibatch_size=1024,
 )
-"""Hyperparameters of PPO in missions: small steps, as it goes on from what was evolved."""
+"""Hyperparameters of PPO in missions; at a tenth of this rate the policy does not move at all (a divergence of 1e-5)."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class MissionTrainingParameters:
     validations : int
         Missions on which networks are compared.
     evolved : int
-        Generations at the beginning in which the linear part of the network is evolved; then PPO goes on from it.
+        Generations at the beginning in which scores are evolved; then PPO goes on from there.
     candidates : int
         Of each of those.
     learner : PpoParameters
@@ -71,7 +71,7 @@ class MissionTrainingParameters:
     decisions: int = 60_000
     missions: int = 12
     validations: int = 24
-    evolved: int = 100
+    evolved: int = 150
     candidates: int = 16
     learner: PpoParameters = DEFAULT_PPO
     breeding: BreedingParameters = field(default_factory=BreedingParameters)
@@ -151,7 +151,7 @@ class MissionTrainer(PopulationTraining):
         return engine.map(train_member, jobs, should_stop)
 
     def _evolve(self, progress: float, engine: Engine, should_stop: Callable[[], bool]) -> list[MemberResult] | None:
-        """Evolve the linear part of the network for a generation; all members then begin with it."""
+        """Evolve the scores for a generation; all members then begin with them."""
         parameters = self.parameters
         weights = self.evolution.advance(parameters.curriculum, self._mixed_seed(0), progress, engine, should_stop)
         if weights is None:
