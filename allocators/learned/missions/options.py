@@ -83,7 +83,9 @@ def in_turn(rank: IntArray, target: IntArray, tasks: int) -> tuple[IntArray, Int
 
 
 @inlined
-def done_with(situation: Situation, first: int, following: IntArray, arrival: float, left: float, since: float) -> float:
+def done_with(
+    situation: Situation, first: int, following: IntArray, arrival: float, left: float, since: float
+) -> float:
     """Return the hour at which a task is done if the agent arrives at an hour, with others who come there in turn."""
     arrives, strength, ability = (
         situation.other[known.ARRIVES],
@@ -227,7 +229,7 @@ def fill_crowding(situation: Situation, tasks: IntArray, options: Singles) -> No
         for place in range(len(tasks)):
             dx, dy, dz = x[place] - at_x, y[place] - at_y, z[place] - at_z
             found += dx * dx + dy * dy + dz * dz < near
-        is_near_itself = 0.0 < near and at_x == at_x
+        is_near_itself = near > 0.0 and at_x == at_x
         options[row, names.CROWDING] = squashed((found - is_near_itself) / 3.0)
 
 

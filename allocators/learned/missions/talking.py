@@ -9,12 +9,14 @@ PERIODS = 10
 MOST_SAVED = 3 * PERIODS
 """Periods that it saves at the most."""
 
-MOST_SILENT = 2 * PERIODS
-"""Saved periods at which it sends without any news, so that others know that it is there."""
+RESERVE = PERIODS
+"""Periods that stay saved for news where it sends without any, so that others know that it is there."""
 
 
 @compiled
-def is_to_send(saved: IntArray, counted: IntArray, news: IntArray, told: IntArray, row: int, tick: int, tasks: int) -> bool:
+def is_to_send(
+    saved: IntArray, counted: IntArray, news: IntArray, told: IntArray, row: int, tick: int, tasks: int
+) -> bool:
     """Whether an agent sends now; what is remembered of that is brought up to date.
 
     Parameters
@@ -32,7 +34,7 @@ def is_to_send(saved: IntArray, counted: IntArray, news: IntArray, told: IntArra
     saved[row] = min(MOST_SAVED, saved[row] + tick - counted[row])
     counted[row] = tick
     has_news = news[row] != 0 or tasks != told[row]
-    if saved[row] < (PERIODS if has_news else MOST_SILENT):
+    if saved[row] < PERIODS + (0 if has_news else RESERVE):
         return False
     saved[row] -= PERIODS
     news[row], told[row] = 0, tasks

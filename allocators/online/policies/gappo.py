@@ -1,7 +1,9 @@
-"""The policy `gappo`: a network scores what an agent knows of tasks and of its neighbours."""
+"""The policies `gappo` and `ppo`: a network scores what an agent knows of tasks and of its neighbours."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
@@ -10,7 +12,7 @@ from alloc.allocators.learned.missions.network import compiled_weights
 from alloc.allocators.learned.missions.network_arrays import MissionWeights
 from alloc.allocators.learned.missions.options import WAIT
 from alloc.allocators.learned.missions.play import Room, consider, is_due, note_choice, room_for
-from alloc.allocators.learned.missions.policy_file import load_network
+from alloc.allocators.learned.missions.policy_file import SHIPPED, SHIPPED_PPO, load_network
 from alloc.allocators.learned.missions.situation import MEMORY, Situation
 from alloc.allocators.learned.missions.talking import is_to_send
 from alloc.allocators.missions.layout import NOBODY
@@ -42,13 +44,33 @@ class NetworkPolicy(Policy):
         citation="Fang et al. (2025), doi:10.20944/preprints202502.0192.v1",
     )
 
+    shipped: ClassVar[Path] = SHIPPED
+
     def __init__(self, policy: Path | str | None = None) -> None:
         super().__init__()
-        self._weights = compiled_weights(load_network(policy))
+        self._weights = compiled_weights(load_network(self.shipped if policy is None else policy))
 
     def begin(self, briefing: Briefing) -> AgentDecider:
         """Return who decides by the network."""
         return _NetworkDecider(briefing, self._weights)
+
+
+class PpoPolicy(NetworkPolicy):
+    """The same network, trained by PPO alone: what `gappo` is to be compared with.
+
+    Parameters
+    ----------
+    policy : Path or str, optional
+        Policy file by ``alloc train ppo --missions``; the shipped one by default.
+    """
+
+    info = replace(
+        NetworkPolicy.info,
+        name="ppo",
+        summary="the network of gappo, trained by PPO alone",
+        citation="Schulman et al. (2017), arXiv:1707.06347",
+    )
+    shipped: ClassVar[Path] = SHIPPED_PPO
 
 
 class _NetworkDecider(AgentDecider):

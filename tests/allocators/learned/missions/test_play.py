@@ -12,6 +12,7 @@ from alloc.allocators.learned.missions.network import compiled_weights, first_ne
 from alloc.allocators.learned.missions.network_arrays import HIDDEN
 from alloc.allocators.learned.missions.play import play, room_for
 from alloc.allocators.learned.missions.policy_file import load_network, save_network
+from alloc.allocators.learned.missions.talking import is_to_send
 from alloc.allocators.missions.pack import begun, measure, pack
 from alloc.allocators.online.policies.gappo import NetworkPolicy
 from alloc.allocators.online.run import simulate
@@ -63,6 +64,17 @@ def test_policy_is_the_same_in_both_simulations(tmp_path: Path, family: str, kno
     for name in ("mission_time", "tasks_done", "tasks_missed", "energy", "distance", "switches", "messages", "bytes"):
         value = getattr(expected, name)
         assert getattr(found, name) == (None if value is None else pytest.approx(value, rel=1e-9)), name
+
+
+def test_agents_send_seldom_and_sooner_with_news() -> None:
+    """Nobody sends more than every tenth time; news goes out as soon as that allows; one message is kept for it."""
+    saved, counted, news, told = (np.zeros(1, np.intp) for _ in range(4))
+    sent = []
+    for tick in range(100):
+        news[0] |= 15 <= tick < 60
+        if is_to_send(saved, counted, news, told, 0, tick, 0):
+            sent.append(tick)
+    assert sent == [15, 20, 30, 40, 50, 60, 80, 90]
 
 
 def test_policy_file_for_missions_is_checked(tmp_path: Path) -> None:
