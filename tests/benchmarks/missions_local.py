@@ -5,8 +5,9 @@
 
 Half of the missions are of the family `steady`, half of `failures`; all policies meet the same. `gappo`, `ppo`,
 `greedy` and `nearest` run in the compiled simulation, in twins that reach the same measures as the policies
-(`--check`), the others in the reference. The table has the mean difference of mission times in per cent with its 95 % interval, and
-means of energy, switches and messages per agent; missions that either policy leaves unfinished are counted apart.
+(`--check`), the others in the reference. The table has the mean difference of mission times in per cent with its 95 %
+interval, and means of energy, switches and messages per agent; missions that either policy leaves unfinished are
+counted apart.
 """
 
 import argparse

@@ -72,7 +72,7 @@ def expect(situation: Situation, rank: IntArray, others: IntArray, rate: FloatAr
 
 @compiled
 def in_turn(rank: IntArray, target: IntArray, tasks: int) -> tuple[IntArray, IntArray]:
-    """Return who comes to each task first, shape (tasks,), and who comes there after each other agent; -1 for nobody."""
+    """Return who comes to each task first, and who comes there after each other agent; -1 for nobody."""
     first, following = np.full(tasks, -1), np.full(len(rank), -1)
     for place in range(len(rank) - 1, -1, -1):
         i = rank[place]

@@ -22,7 +22,7 @@ STEP = 1.0
 """Initial standard deviation of a weight."""
 
 EVOLVED = ("skip.weight", "out.weight")
-"""What is evolved: the linear weights of features, and those of the last layer, whose inputs stay as they were drawn."""
+"""What is evolved: the weights of features, and those of the last layer, whose inputs stay as they were drawn."""
 
 STATE = ("centroid", "sigma", "pc", "ps", "C", "diagD", "B", "BD", "update_count")
 """What changes of DEAP's strategy from generation to generation."""
