@@ -211,7 +211,7 @@ def rivals(situation: Situation, rank: IntArray, j: int, distance: float) -> flo
     other, found = situation.other, 0.0
     x, y, z = situation.task[known.TASK_X, j], situation.task[known.TASK_Y, j], situation.task[known.TASK_Z, j]
     for place in range(len(rank) - 1, -1, -1):
-        if rank[place] >= 0:
+        if rank[place] >= -1:
             break
         i = -2 - rank[place]
         dx, dy, dz = other[known.OTHER_X, i] - x, other[known.OTHER_Y, i] - y, other[known.OTHER_Z, i] - z

@@ -53,7 +53,8 @@ class Room(NamedTuple):
         Hour at which it last considered its options.
     tasks : ndarray of int, shape (n,)
         Open tasks that it knew then.
-    saved, counted, news, told : ndarray of int, shape (n,)
+    periods : int
+    saved, counted, news : ndarray of int, shape (n,)
         See `is_to_send`.
     """
 
@@ -71,14 +72,14 @@ class Room(NamedTuple):
     goal: IntArray
     decided: FloatArray
     tasks: IntArray
+    periods: int
     saved: IntArray
     counted: IntArray
     news: IntArray
-    told: IntArray
 
 
-def room_for(n: int, m: int) -> Room:
-    """Return room for the decisions of n agents on m tasks."""
+def room_for(n: int, m: int, periods: int = 1) -> Room:
+    """Return room for the decisions of n agents on m tasks, who send a message every so many radio periods."""
     return Room(
         situation=empty(n, m),
         options=np.zeros((m + 2, FEATURES), np.float32),
@@ -94,10 +95,10 @@ def room_for(n: int, m: int) -> Room:
         goal=np.full(n, -1),
         decided=np.full(n, -np.inf),
         tasks=np.zeros(n, np.intp),
+        periods=periods,
         saved=np.zeros(n, np.intp),
         counted=np.zeros(n, np.intp),
         news=np.zeros(n, np.intp),
-        told=np.zeros(n, np.intp),
     )
 
 
@@ -171,8 +172,7 @@ def talk(state: MissionArrays, room: Room) -> None:
         agent = state.agents[number]
         agent.speaks = 0
         if IDLE <= agent.status <= WORKING and not (head.silences and is_silent(state, number)):
-            tasks = open_tasks(state, number)
-            agent.speaks = is_to_send(room.saved, room.counted, room.news, room.told, number, head.tick, tasks)
+            agent.speaks = is_to_send(room.periods, room.saved, room.counted, room.news, number, head.tick)
 
 
 @inlined

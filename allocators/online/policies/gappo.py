@@ -1,12 +1,13 @@
 """The policies `gappo` and `ppo`: a network scores what an agent knows of tasks and of its neighbours."""
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
 
+from alloc.allocators.contract.parameters import CheckedParameters, bounded
 from alloc.allocators.learned.missions.exploring import centre, notice
 from alloc.allocators.learned.missions.network import compiled_weights
 from alloc.allocators.learned.missions.network_arrays import MissionWeights
@@ -21,10 +22,23 @@ from alloc.problems.missions.simulation.reports import AgentReport, Message, Tas
 from alloc.problems.missions.simulation.state import ACTIVE, STAY, AgentStatus, Order, TaskStatus
 from alloc.problems.vocabulary import Knowledge
 
-REMEMBERED = ("seen", "goal", "decided", "tasks", "saved", "counted", "news", "told")
+REMEMBERED = ("seen", "goal", "decided", "tasks", "periods", "saved", "counted", "news")
 """What a decider keeps from decision to decision; all else is scratch."""
 
 NOWHERE = (math.nan, math.nan, math.nan)
+
+
+@dataclass(frozen=True)
+class NetworkParameters(CheckedParameters):
+    """Parameters of a policy that is a network.
+
+    Attributes
+    ----------
+    periods : int
+        Radio periods that an agent saves up for each message; one message is kept back for when its order changes.
+    """
+
+    periods: int = bounded(1, low=1)
 
 
 class NetworkPolicy(Policy):
@@ -32,8 +46,11 @@ class NetworkPolicy(Policy):
 
     Parameters
     ----------
+    parameters : NetworkParameters, optional
     policy : Path or str, optional
         Policy file by ``alloc train gappo --missions``; the shipped one by default.
+    **settings
+        Single parameters by name.
     """
 
     info = PolicyInfo(
@@ -44,15 +61,18 @@ class NetworkPolicy(Policy):
         citation="Fang et al. (2025), doi:10.20944/preprints202502.0192.v1",
     )
 
+    parameters_type: ClassVar[type] = NetworkParameters
     shipped: ClassVar[Path] = SHIPPED
 
-    def __init__(self, policy: Path | str | None = None) -> None:
-        super().__init__()
+    def __init__(
+        self, parameters: NetworkParameters | None = None, *, policy: Path | str | None = None, **settings: object
+    ) -> None:
+        super().__init__(parameters, **settings)
         self._weights = compiled_weights(load_network(self.shipped if policy is None else policy))
 
     def begin(self, briefing: Briefing) -> AgentDecider:
         """Return who decides by the network."""
-        return _NetworkDecider(briefing, self._weights)
+        return _NetworkDecider(briefing, self._weights, self.parameters.periods)
 
 
 class PpoPolicy(NetworkPolicy):
@@ -60,8 +80,11 @@ class PpoPolicy(NetworkPolicy):
 
     Parameters
     ----------
+    parameters : NetworkParameters, optional
     policy : Path or str, optional
         Policy file by ``alloc train ppo --missions``; the shipped one by default.
+    **settings
+        Single parameters by name.
     """
 
     info = replace(
@@ -74,13 +97,13 @@ class PpoPolicy(NetworkPolicy):
 
 
 class _NetworkDecider(AgentDecider):
-    def __init__(self, briefing: Briefing, weights: MissionWeights) -> None:
+    def __init__(self, briefing: Briefing, weights: MissionWeights, periods: int) -> None:
         self._weights, self._area = weights, np.array(briefing.area)
         self._span, self._period = math.dist(*briefing.area), briefing.radio.period
         is_blind = briefing.knowledge is Knowledge.LOCAL
         self._sensing = briefing.sensing if is_blind else math.inf
         self._seed, self._number = briefing.seed[0], briefing.seed[1] - 1
-        self._room = room_for(1, 0)
+        self._room = room_for(1, 0, periods)
 
     def decide(self, view: View) -> Order | None:
         room, own = self._room, view.own
@@ -110,9 +133,8 @@ class _NetworkDecider(AgentDecider):
         return Order(position=(float(x), float(y), float(z)))
 
     def message(self, view: View) -> Message | None:
-        tasks = sum(task.status is TaskStatus.OPEN for task in view.tasks.values())
         room, tick = self._room, round(view.hour / self._period)
-        return view.message() if is_to_send(room.saved, room.counted, room.news, room.told, 0, tick, tasks) else None
+        return view.message() if is_to_send(room.periods, room.saved, room.counted, room.news, 0, tick) else None
 
     def _with_room(self, n: int, m: int) -> Room:
         """Return room for what is known now, with what the agent remembers."""

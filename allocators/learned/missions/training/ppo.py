@@ -103,7 +103,9 @@ class MissionPpo:
     def _play(self, mission: PackedMission, seed: int) -> Record:
         n, m = len(mission.arrays.agents), len(mission.arrays.tasks)
         record = record_for(n, m, MOST_DECISIONS, mission.ideal)
-        rollout(begun(mission.arrays, seed), room_for(n, m), compiled_weights(self.network), seed, record)
+        rollout(
+            begun(mission.arrays, seed), room_for(n, m, mission.periods), compiled_weights(self.network), seed, record
+        )
         return record
 
     @torch.no_grad()

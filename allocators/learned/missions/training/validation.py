@@ -31,7 +31,7 @@ def validate(network: MissionNetwork, missions: list[tuple[PackedMission, int]])
     weights, rows = compiled_weights(network), []
     for mission, seed in missions:
         state = begun(mission.arrays, seed)
-        play(state, room_for(len(state.agents), len(state.tasks)), weights, seed)
+        play(state, room_for(len(state.agents), len(state.tasks), mission.periods), weights, seed)
         rows.append(figures(state, mission.ideal))
     time, unserved, undone, distance = np.array(rows).mean(axis=0).tolist()
     cost = cost_of(time, unserved, undone, distance)
