@@ -14,7 +14,7 @@ from alloc.problems.missions.simulation.state import Order
 
 @dataclass(frozen=True)
 class GreedyParameters(CheckedParameters):
-    """Parameters of the utility.
+    """Parameters of the utility; the defaults are tuned on missions as `gappo` is evolved on.
 
     Attributes
     ----------
@@ -30,11 +30,11 @@ class GreedyParameters(CheckedParameters):
         How fast utility falls with the hours of the flight.
     """
 
-    stay: float = bounded(1.25, low=0)
-    memory: float = bounded(2.0, low=0)
-    missed: float = bounded(0.05, low=0)
-    crowding: float = bounded(0.0, low=0)
-    flight: float = bounded(0.0, low=0)
+    stay: float = bounded(2.3, low=0)
+    memory: float = bounded(1.8, low=0)
+    missed: float = bounded(0.025, low=0)
+    crowding: float = bounded(0.05, low=0)
+    flight: float = bounded(0.07, low=0)
 
 
 class GreedyUtility(Policy):
