@@ -141,12 +141,13 @@ class Campaign:
 
     def _open_slots(self) -> None:
         """Take processors as long as there are too few slots; other commands may free some later."""
-        if len(self._slots) >= min(self._size, len(self._slots) + len(self._pending)):
+        wanted = min(self._size, len(self._slots) + len(self._pending))
+        if len(self._slots) >= wanted:
             return
         if time.monotonic() - self._opened_at < OTHERS_S:
             return
         self._opened_at = time.monotonic()
-        while len(self._slots) < self._size:
+        while len(self._slots) < wanted:
             cores = take(self._threads) if self._is_pinned else Cores()
             if cores is None:
                 break

@@ -25,6 +25,7 @@ EXAMPLES = examples(
     "alloc compare instances/*.json --methods ga,gappo --seeds 5 --time-limit 3 --csv table.csv",
     "alloc compare demo.json --methods 'ga[population=40],ga[population=400]' --time-limit 1",
     "alloc compare demo.json --methods milp,gappo --objective makespan-energy --seeds 7,8,9 --json",
+    "alloc compare paper-1:0-99 --methods greedy,gappo --seeds 3 --time-limit 5 --store runs.db --report table.tex",
     closing="A method that refuses an instance has a row with the reason. Ctrl-C prints the finished rows, with exit "
     "code 1.",
 )
@@ -76,12 +77,12 @@ def compare_command(
     check_outputs(*written, read=[("--store", store), *(("INSTANCE", instance) for instance in instances)])
     if json and csv is not None and is_standard_output(csv):
         raise typer.BadParameter("and --json cannot both be standard output", param_hint="'--csv'")
-    wanted, numbers = _methods(methods), _seeds(seeds)
+    numbers = _seeds(seeds)
     budget = Budget(options.time_limit(time_limit, iterations), iterations, target_gap)
     if keeping is not None:
         asked = (instances, methods, numbers, objective, budget, threads, csv)
         raise typer.Exit(_compare_in_store(keeping, *asked, json=json))
-    raise typer.Exit(_compare(instances, wanted, numbers, objective, budget, threads, csv, json=json))
+    raise typer.Exit(_compare(instances, _methods(methods), numbers, objective, budget, threads, csv, json=json))
 
 
 def _compare_in_store(

@@ -84,6 +84,8 @@ def compare_in_store(
 
     for file in keeping.reports:
         check_report(file)
+    for name, settings in methods.values():
+        _check_method(name, settings)
     instances = gather(list(sources))
     stop = threading.Event()
     with Store(keeping.store, again=UNSOLVED if keeping.retry else ()) as store:
@@ -99,6 +101,16 @@ def compare_in_store(
     if not done:
         notes.insert(0, "interrupted; the same command goes on from here")
     return Found(plan, endings, share_bounds(rows_of(plan, endings)), done, notes)
+
+
+def _check_method(name: str, settings: Mapping[str, object]) -> None:
+    """Raise an error if there is no such method, or it does not take these parameters."""
+    from alloc.allocators import describe, load
+
+    if settings:
+        load(name, **settings)
+    elif name != "auto":
+        describe(name)
 
 
 def _count(endings: "Mapping[str, Sequence[Sequence[Ending | None]]]") -> int:
