@@ -114,6 +114,8 @@ def _difference_table(found: Sequence[Difference]) -> Table:
         f"Differences of {score} in the same instances, relative, with {percent(CONFIDENCE)} BCa bootstrap intervals "
         "of the mean; p of Wilcoxon's signed-rank test, two-sided, and corrected by Holm's procedure."
     ]
+    if score == "energy":
+        notes.append("Each at the makespan that the method found: less energy at a longer makespan is not better.")
     smallest = min(one.instances for one in found)
     if smallest < LEAST:
         notes.append(f"Fewer than {LEAST} instances allow neither interval nor test.")
