@@ -51,6 +51,8 @@ class Killed:
 
 def kill_often(folder, *, seeds, kills, nap_s, workers=2, gap_s=(0.0, 3.0), signals=SIGNALS, seed=0):
     """Compare with two commands until all is done, after so many of them were killed, and check what is left."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in the background of a shell, and then in all commands
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     plugin = folder / "plugin"
     plugin.mkdir()
     evil_methods.install(plugin)

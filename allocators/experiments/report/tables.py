@@ -19,7 +19,7 @@ from alloc.allocators.experiments.statistics import (
     targets_reached,
 )
 from alloc.allocators.experiments.store.outcome import Outcome
-from alloc.allocators.experiments.stored import Comparison, Endings
+from alloc.allocators.experiments.stored import Comparison, Endings, doubts
 from alloc.problems import Objective
 from alloc.problems.text import counted, number, percent
 
@@ -93,6 +93,7 @@ def _methods(comparison: Comparison, endings: Endings, rows: Sequence[Row]) -> T
             f"{counted(len(comparison.instances), 'instance')}, {counted(len(comparison.seeds), 'seed')}; "
             f"{run.objective}; {budget or 'no limit'}, {counted(run.threads, 'thread')}; {run.version}; {run.machine}.",
             "Means over the instances on which all runs of the method served all tasks, each the mean over its seeds.",
+            *doubts(endings),
         ],
     )
 
