@@ -157,5 +157,21 @@ def test_a_campaign_that_is_stopped_gives_its_runs_back(plugin, monkeypatch):
         jobs = [job("nap", seed) for seed in range(9)]
         assert not Campaign(store, jobs, Means(workers=1), on_end=lambda run, ending: stop.set()).run(stop)
         assert len(store.records()) == 1
-    with Store(plugin / "runs.db") as store:
         assert store.leases() == {}
+        assert Campaign(store, jobs[:2], Means(workers=1)).run(threading.Event())
+        assert len(store.records()) == 2
+
+
+def test_a_store_that_fails_leaves_no_process_behind(plugin, monkeypatch):
+    """Where a row cannot be written the campaign ends with that error, and so do all of its processes."""
+
+    def fail(self, run, ending):
+        raise InputError("the disk is full", source="runs.db")
+
+    jobs = [job("pid", seed) for seed in range(3)]
+    with Store(plugin / "runs.db") as store:
+        monkeypatch.setattr(Store, "finish", fail)
+        with pytest.raises(InputError, match="the disk is full"):
+            Campaign(store, jobs, Means(workers=1)).run(threading.Event())
+        assert store.leases() == {}
+    assert not is_there(int((plugin / "naps").read_text().split()[0]))
