@@ -2,6 +2,7 @@
 
 import os
 import random
+import signal
 import sqlite3
 import subprocess
 import sys
@@ -11,6 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import evil_methods
+
+SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
 
 
 @dataclass(frozen=True)
@@ -46,8 +49,10 @@ class Killed:
     seconds: float
 
 
-def kill_often(folder, *, seeds, kills, nap_s, workers=2, gap_s=(0.0, 3.0), seed=0):
+def kill_often(folder, *, seeds, kills, nap_s, workers=2, gap_s=(0.0, 3.0), signals=SIGNALS, seed=0):
     """Compare with two commands until all is done, after so many of them were killed, and check what is left."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in the background of a shell, and then in all commands
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     plugin = folder / "plugin"
     plugin.mkdir()
     evil_methods.install(plugin)
@@ -67,7 +72,7 @@ def kill_often(folder, *, seeds, kills, nap_s, workers=2, gap_s=(0.0, 3.0), seed
         time.sleep(draw.uniform(*gap_s))
         victim = draw.randrange(2)
         if running[victim].poll() is None:
-            running[victim].kill()
+            running[victim].send_signal(draw.choice(signals))
             done += 1
         elif running[victim].returncode != 0:
             raise RuntimeError(running[victim].stderr.read().decode())

@@ -1,5 +1,6 @@
 """A campaign: all runs of a comparison that a store has not yet, several at a time, each in a process of its own."""
 
+import contextlib
 import math
 import pickle
 import threading
@@ -141,12 +142,13 @@ class Campaign:
 
     def _open_slots(self) -> None:
         """Take processors as long as there are too few slots; other commands may free some later."""
-        if len(self._slots) >= min(self._size, len(self._slots) + len(self._pending)):
+        wanted = min(self._size, len(self._slots) + len(self._pending))
+        if len(self._slots) >= wanted:
             return
         if time.monotonic() - self._opened_at < OTHERS_S:
             return
         self._opened_at = time.monotonic()
-        while len(self._slots) < self._size:
+        while len(self._slots) < wanted:
             cores = take(self._threads) if self._is_pinned else Cores()
             if cores is None:
                 break
@@ -194,10 +196,10 @@ class Campaign:
         figures = slot.worker.figures()
         if figures is None:
             return
-        run, worker, slot.worker = slot.job.run, slot.worker, None
-        ending = self._ending(slot, figures)
+        run, worker, ending = slot.job.run, slot.worker, self._ending(slot, figures)
         if self._store.finish(run, ending):
             self._on_end(run, ending)
+        slot.worker = None
         if not worker.is_reusable:
             worker.end()
             return
@@ -225,7 +227,11 @@ class Campaign:
 
     def _close(self) -> None:
         for slot in self._slots:
-            for worker in [*slot.idle.values(), *([slot.worker] if slot.worker is not None else [])]:
+            if slot.worker is not None and slot.job is not None:
+                slot.worker.end()
+                with contextlib.suppress(InputError):  # what is wrong with the file is what led here
+                    self._store.release(slot.job.run.key)
+            for worker in slot.idle.values():
                 worker.end()
             slot.cores.free()
 

@@ -11,7 +11,13 @@ from alloc.allocators.experiments.store.outcome import Ending, Outcome
 from alloc.allocators.experiments.store.store import Store
 from alloc.allocators.request import checked_objective, checked_seed, checked_threads
 from alloc.problems import Instance, Objective
-from alloc.problems.text import counted
+from alloc.problems.text import counted, percent
+
+ENOUGH = 0.9
+"""Share of a processor below which the time that a run was given is not to be believed."""
+
+LONG_S = 0.1
+"""Seconds from which on a run's processor time says how much of a processor it had."""
 
 Variants = Mapping[str, tuple[str, Mapping[str, object]]]
 """Name and parameters of a method, by the name that it has in the rows."""
@@ -187,3 +193,14 @@ def reason(ending: Ending, seed: int) -> str:
     if ending.outcome in (Outcome.REFUSED, Outcome.MISSING_PACKAGE):
         return ending.reason
     return f"{ending.outcome} with seed {seed}: {ending.reason}"
+
+
+def doubts(endings: Endings) -> list[str]:
+    """Return why the figures may not be what they should, in a sentence each: runs that had to share processors."""
+    runs = [ending for lists in endings.values() for some in lists for ending in some if ending is not None]
+    timed = [one for one in runs if one.cores and one.cpu_s is not None and (one.runtime_s or 0.0) >= LONG_S]
+    poor = sum((one.cpu_s or 0.0) < ENOUGH * (one.runtime_s or 0.0) for one in timed)
+    if not poor:
+        return []
+    share = f"{poor} of {counted(len(timed), 'timed run')}"
+    return [f"{share} had less than {percent(ENOUGH)} of a processor: was the machine busy, or does the method wait?"]

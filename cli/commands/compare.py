@@ -27,6 +27,7 @@ EXAMPLES = examples(
     "alloc compare instances/*.json --methods ga,gappo --seeds 5 --time-limit 3 --csv table.csv",
     "alloc compare demo.json --methods 'ga[population=40],ga[population=400]' --time-limit 1",
     "alloc compare demo.json --methods milp,gappo --objective makespan-energy --seeds 7,8,9 --json",
+    "alloc compare paper-1:0-99 --methods greedy,gappo --seeds 3 --time-limit 5 --store runs.db --report table.tex",
     "alloc compare missions/*.json --policies nearest,greedy,gappo --seeds 3",
     closing="A method or policy that refuses has a row with the reason. Ctrl-C prints the finished rows, with exit "
     "code 1.",

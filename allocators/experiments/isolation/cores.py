@@ -8,6 +8,9 @@ from dataclasses import dataclass, field
 
 CAN_PIN = sys.platform == "linux"
 
+LOCK = "\0alloc-core-"
+"""Beginning of the names by which processors are taken, on one machine."""
+
 
 @dataclass(frozen=True)
 class Cores:
@@ -49,7 +52,7 @@ def take(count: int) -> Cores | None:
 def _locked(number: int) -> socket.socket | None:
     lock = socket.socket(socket.AF_UNIX)
     with contextlib.suppress(OSError):
-        lock.bind(f"\0alloc-core-{number}")
+        lock.bind(f"{LOCK}{number}")
         return lock
     lock.close()
     return None

@@ -19,7 +19,7 @@ from alloc.allocators.experiments.statistics import (
     targets_reached,
 )
 from alloc.allocators.experiments.store.outcome import Outcome
-from alloc.allocators.experiments.stored import Comparison, Endings
+from alloc.allocators.experiments.stored import Comparison, Endings, doubts
 from alloc.problems import Objective
 from alloc.problems.text import counted, number, percent
 
@@ -93,6 +93,7 @@ def _methods(comparison: Comparison, endings: Endings, rows: Sequence[Row]) -> T
             f"{counted(len(comparison.instances), 'instance')}, {counted(len(comparison.seeds), 'seed')}; "
             f"{run.objective}; {budget or 'no limit'}, {counted(run.threads, 'thread')}; {run.version}; {run.machine}.",
             "Means over the instances on which all runs of the method served all tasks, each the mean over its seeds.",
+            *doubts(endings),
         ],
     )
 
@@ -114,6 +115,8 @@ def _difference_table(found: Sequence[Difference]) -> Table:
         f"Differences of {score} in the same instances, relative, with {percent(CONFIDENCE)} BCa bootstrap intervals "
         "of the mean; p of Wilcoxon's signed-rank test, two-sided, and corrected by Holm's procedure."
     ]
+    if score == "energy":
+        notes.append("Each at the makespan that the method found: less energy at a longer makespan is not better.")
     smallest = min(one.instances for one in found)
     if smallest < LEAST:
         notes.append(f"Fewer than {LEAST} instances allow neither interval nor test.")

@@ -17,7 +17,8 @@ StoreOption = Annotated[
     typer.Option(
         "--store",
         metavar="FILE",
-        help="Keep every run in this file, each made in a process of its own, and run only what it has not yet.",
+        help="Keep every run in this file, each made in a process of its own, with one thread unless --threads says "
+        "otherwise, and make only those that it has not yet.",
     ),
 ]
 WorkersOption = Annotated[

@@ -79,11 +79,13 @@ def compare_in_store(
     from alloc.allocators.experiments.report.files import check_report
     from alloc.allocators.experiments.store.outcome import UNSOLVED
     from alloc.allocators.experiments.store.store import Store
-    from alloc.allocators.experiments.stored import planned, rows_of
+    from alloc.allocators.experiments.stored import doubts, planned, rows_of
     from alloc.allocators.runtime.interrupts import signals_set
 
     for file in keeping.reports:
         check_report(file)
+    for name, settings in methods.values():
+        _check_method(name, settings)
     instances = gather(list(sources))
     stop = threading.Event()
     with Store(keeping.store, again=UNSOLVED if keeping.retry else ()) as store:
@@ -96,9 +98,20 @@ def compare_in_store(
         endings = plan.endings(store)
         notes = [f"{counted(progress.made, 'run')} made; {keeping.store} has {_count(endings)} of {len(plan.jobs)}"]
         notes += [f"{keeping.store} also holds {other}, which do not count here" for other in plan.others(store)]
+        notes += doubts(endings)
     if not done:
         notes.insert(0, "interrupted; the same command goes on from here")
     return Found(plan, endings, share_bounds(rows_of(plan, endings)), done, notes)
+
+
+def _check_method(name: str, settings: Mapping[str, object]) -> None:
+    """Raise an error if there is no such method, or it does not take these parameters."""
+    from alloc.allocators import describe, load
+
+    if settings:
+        load(name, **settings)
+    elif name != "auto":
+        describe(name)
 
 
 def _count(endings: "Mapping[str, Sequence[Sequence[Ending | None]]]") -> int:

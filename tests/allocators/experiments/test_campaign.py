@@ -1,17 +1,14 @@
 """Campaigns: what becomes of runs that crash, hang, eat memory or leave processes behind."""
 
-import contextlib
 import os
 import threading
-import time
 from pathlib import Path
 
 import evil_methods
 import pytest
 
-from alloc.allocators.experiments import campaign as campaign_module
 from alloc.allocators.experiments.campaign import Campaign, Job, Means
-from alloc.allocators.experiments.isolation.cores import take
+from alloc.allocators.experiments.isolation import cores
 from alloc.allocators.experiments.store.key import Run, fingerprint, versions
 from alloc.allocators.experiments.store.outcome import Outcome
 from alloc.allocators.experiments.store.store import Store
@@ -120,18 +117,29 @@ def test_runs_of_a_method_share_a_process_until_one_ends_badly(plugin):
     assert len(set((plugin / "naps").read_text().splitlines())) == 1
 
 
-@pytest.mark.skipif(not campaign_module.CAN_PIN, reason="this system does not pin processes")
-def test_timed_runs_have_processors_of_their_own(plugin):
-    """A run with a time limit is pinned to a processor that no other command can have meanwhile."""
-    while (held := take(len(os.sched_getaffinity(0)))) is None:
-        time.sleep(0.05)  # another test has one
-    with contextlib.ExitStack() as stack:
-        stack.callback(held.free)
-        store = stack.enter_context(Store(plugin / "runs.db"))
-        Campaign(store, [job("pid", time_limit_s=1.0)], Means(workers=1), on_wait=held.free).run(threading.Event())
+@pytest.mark.skipif(not cores.CAN_PIN, reason="this system does not pin processes")
+def test_timed_runs_have_processors_of_their_own(plugin, monkeypatch):
+    """A run with a time limit waits until a processor is free, and is pinned to it."""
+    monkeypatch.setattr(cores, "LOCK", f"\0alloc-test-{os.getpid()}-")
+    every = sorted(os.sched_getaffinity(0))
+    held = cores.take(len(every))
+    assert held.numbers == tuple(every)
+    assert cores.take(1) is None
+    waited = []
+
+    def free():
+        waited.append(True)
+        held.free()
+
+    with Store(plugin / "runs.db") as store:
+        Campaign(store, [job("pid", time_limit_s=1.0)], Means(workers=1), on_wait=free).run(threading.Event())
         (record,) = store.records().values()
+    assert waited == [True]
     assert (plugin / "naps").read_text().split(maxsplit=1)[1].strip() == f"[{record.ending.cores}]"
     assert record.ending.at_once == 1
+    taken = cores.take(len(every))
+    taken.free()
+    assert taken.numbers == tuple(every)
 
 
 def test_more_timed_runs_than_processors_are_refused(plugin):
@@ -149,5 +157,21 @@ def test_a_campaign_that_is_stopped_gives_its_runs_back(plugin, monkeypatch):
         jobs = [job("nap", seed) for seed in range(9)]
         assert not Campaign(store, jobs, Means(workers=1), on_end=lambda run, ending: stop.set()).run(stop)
         assert len(store.records()) == 1
-    with Store(plugin / "runs.db") as store:
         assert store.leases() == {}
+        assert Campaign(store, jobs[:2], Means(workers=1)).run(threading.Event())
+        assert len(store.records()) == 2
+
+
+def test_a_store_that_fails_leaves_no_process_behind(plugin, monkeypatch):
+    """Where a row cannot be written the campaign ends with that error, and so do all of its processes."""
+
+    def fail(self, run, ending):
+        raise InputError("the disk is full", source="runs.db")
+
+    jobs = [job("pid", seed) for seed in range(3)]
+    with Store(plugin / "runs.db") as store:
+        monkeypatch.setattr(Store, "finish", fail)
+        with pytest.raises(InputError, match="the disk is full"):
+            Campaign(store, jobs, Means(workers=1)).run(threading.Event())
+        assert store.leases() == {}
+    assert not is_there(int((plugin / "naps").read_text().split()[0]))

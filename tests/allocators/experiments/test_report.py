@@ -14,7 +14,7 @@ from alloc.allocators.experiments.report.tables import Table, report_tables
 from alloc.allocators.experiments.store.key import Run
 from alloc.allocators.experiments.store.outcome import Ending, Outcome
 from alloc.allocators.experiments.store.store import Store
-from alloc.allocators.experiments.stored import planned, rows_of
+from alloc.allocators.experiments.stored import doubts, planned, rows_of
 from alloc.problems import InputError, Instance, MissingPackageError
 
 TRACE = ((0.25, None, 3.0, None), (0.5, 1.0, 2.0, 1.0))
@@ -66,6 +66,16 @@ def test_tables_tell_what_was_compared_and_how_it_ended(compared):
     assert "Up to 1 instance left out" in notes
     assert tables["Performance profiles"].rows[1][1:] == ["0 %"] * 6 + ["75 %"] * 2
     assert tables["Targets over time"].rows[0][-1] == "100 %"
+
+
+def test_runs_that_had_to_share_processors_are_told():
+    """Timed runs with little processor time cast doubt on the figures; short, untimed and quick ones do not."""
+    poor = ending(1.0, cores="0", runtime_s=1.0, cpu_s=0.5)
+    fine = ending(1.0, cores="0", runtime_s=1.0, cpu_s=0.99)
+    others = [ending(1.0, cores="0", runtime_s=0.01, cpu_s=0.001), ending(1.0, runtime_s=1.0, cpu_s=0.1), None]
+    (told,) = doubts({"a": [[poor, fine], others]})
+    assert told.startswith("1 of 2 timed runs had less than 90 % of a processor")
+    assert doubts({"a": [[fine], others]}) == []
 
 
 def test_markdown_and_latex_hold_the_same_cells(compared, tmp_path):

@@ -131,6 +131,22 @@ def test_wrong_sources_are_one_line(alloc, source, message):
 
 
 @pytest.mark.parametrize(
+    ("methods", "message"),
+    [
+        ("ga[populatoin=3]", "populatoin"),
+        ("gredy", "there is no method 'gredy' (did you mean 'greedy'?)"),
+        ("ga[population=3", "must be like ga[population=200]"),
+    ],
+)
+def test_wrong_methods_are_one_line(alloc, methods, message):
+    """A method or a parameter that is none is told before anything runs."""
+    ran = alloc("compare", f"{TINY}:0", "--methods", methods, *QUICK)
+    assert ran.code == 2
+    assert message in ran.err
+    assert not Path("runs.db").exists()
+
+
+@pytest.mark.parametrize(
     ("words", "message"),
     [
         (("--memory", "4G"), "'--memory': goes with --store only"),
