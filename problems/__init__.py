@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     from alloc.problems.missions.files.mission_file import read_mission, write_mission
     from alloc.problems.missions.mission import Mission
     from alloc.problems.missions.radio import Burst, Pace, Radio
+    from alloc.problems.missions.readers.options import RecordOptions
+    from alloc.problems.missions.readers.read import import_mission
     from alloc.problems.missions.recorder import Recorder, course_of
     from alloc.problems.missions.replay import replay
     from alloc.problems.missions.simulation.measures import MissionResult
@@ -63,6 +65,7 @@ __all__ = [
     "Pace",
     "Radio",
     "Reach",
+    "RecordOptions",
     "Recorder",
     "RefusedError",
     "Shortage",
@@ -76,6 +79,7 @@ __all__ = [
     "evaluate",
     "fewest_unserved",
     "find_shortage",
+    "import_mission",
     "lp_makespan_lower_bound",
     "machine_covering",
     "makespan_lower_bound",
@@ -121,6 +125,7 @@ _MODULE_OF = {
     "Pace": "missions.radio",
     "Radio": "missions.radio",
     "Reach": "distances.reach",
+    "RecordOptions": "missions.readers.options",
     "Recorder": "missions.recorder",
     "RefusedError": "errors",
     "Shortage": "matching.shortage",
@@ -134,6 +139,7 @@ _MODULE_OF = {
     "evaluate": "evaluation",
     "fewest_unserved": "matching.unservable",
     "find_shortage": "matching.shortage",
+    "import_mission": "missions.readers.read",
     "lp_makespan_lower_bound": "bounds",
     "machine_covering": "generate.covering",
     "makespan_lower_bound": "bounds",
