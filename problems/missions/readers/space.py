@@ -124,9 +124,9 @@ class _Config:
         """Return a finite number from `low`; `above`: `low` itself is out."""
         value = self._value(place)
         value = default if value is None else value
-        is_number = isinstance(value, int | float) and not isinstance(value, bool)
-        if is_number and low <= value < math.inf and (value > low or not above):
-            return float(value)
+        number = float(value) if isinstance(value, int | float) and not isinstance(value, bool) else math.nan
+        if low <= number < math.inf and (number > low or not above):
+            return number
         least = "" if low == -math.inf else f" {'>' if above else '>='} {low:g}"
         problem = "is missing; it" if value is None else f"is {described(value)}, but"
         raise self.error(f"{problem} must be a number{least}", place)
