@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from alloc.problems.matching.unservable import fewest_unserved, minimal_unservable_set
     from alloc.problems.missions.course import Course
     from alloc.problems.missions.events import Event
+    from alloc.problems.missions.families.cfstp import random_cfstp
     from alloc.problems.missions.families.draw import random_mission
     from alloc.problems.missions.families.parameters import MissionParameters
     from alloc.problems.missions.files.log_file import MissionLog, read_log, write_log
@@ -87,6 +88,7 @@ __all__ = [
     "only_allowed",
     "paper",
     "paper_like",
+    "random_cfstp",
     "random_instance",
     "random_mission",
     "read_allocation",
@@ -147,6 +149,7 @@ _MODULE_OF = {
     "only_allowed": "matching.serving",
     "paper": "generate.paper_scenarios",
     "paper_like": "generate.paper_scenarios",
+    "random_cfstp": "missions.families.cfstp",
     "random_instance": "generate.random_family",
     "random_mission": "missions.families.draw",
     "read_allocation": "formats.allocation_file",

@@ -6,16 +6,11 @@ import numpy as np
 
 from alloc.problems.errors import InputError
 from alloc.problems.formats.files import named, read_text
-from alloc.problems.instance import Instance
+from alloc.problems.missions.families.cfstp import cfstp_mission
 from alloc.problems.missions.mission import Mission
-from alloc.problems.missions.radio import Pace
-from alloc.problems.units import Units
 
 PLACE = re.compile(r"(task|agent)\[\s*(\d+)\] (?:starting )?at \(\s*(-?\d+),\s*(-?\d+)\)")
 DEMANDS = re.compile(r"task\[\s*(\d+)\] has demands \[\s*(\d+),\s*(\d+)\]")
-
-PACE = Pace(low=1.0, high=2.0, period=1.0)
-"""A coalition does as much work a step as it has agents, times a number from 1 to 2 that is drawn anew each step."""
 
 
 def read_cfstp(path: str, name: str, seed: int) -> Mission:
@@ -55,29 +50,3 @@ def read_cfstp(path: str, name: str, seed: int) -> Mission:
         np.array([demands[task] for task in tasks]),
         seed,
     )
-
-
-def cfstp_mission(name: str, agents: np.ndarray, tasks: np.ndarray, demands: np.ndarray, seed: int) -> Mission:
-    """Return the mission of a CFSTP: time in steps, one cell of the grid per step, agents alike.
-
-    Parameters
-    ----------
-    name : str
-    agents, tasks : ndarray, shape (n, 2) and (m, 2)
-        Cells of the grid.
-    demands : ndarray, shape (m, 2)
-        Deadline and workload of each task.
-    seed : int
-        Of the pace.
-    """
-    instance = Instance(
-        name=name,
-        ability=np.ones(len(agents)),
-        agent_position=agents,
-        speed=np.ones(len(agents)),
-        workload=demands[:, 1],
-        task_position=tasks,
-        metric="manhattan",
-        units=Units(time="steps"),
-    )
-    return Mission(instance, deadline=demands[:, 0], pace=PACE, seed=seed)

@@ -182,6 +182,15 @@ def test_each_fault_of_a_mission_is_a_line(alloc, mission):
     assert "run.jsonl: line 4: is not what comes of the orders before it" in ran.err
 
 
+def test_cfstp_is_generated(alloc):
+    """A CFSTP takes numbers of agents and tasks, and no option of other families."""
+    ran = alloc("generate", "cfstp", "--agents", "2", "--tasks", "3", "--seed", "1", "--output", "-")
+    assert (len(ran.json["agents"]), len(ran.json["tasks"]), ran.json["metric"]) == (2, 3, "manhattan")
+    ran = alloc("generate", "cfstp", "--loss", "0.1")
+    assert (ran.code, ran.err.count("\n")) == (2, 1)
+    assert "'--loss': is for mission, not for cfstp" in ran.err
+
+
 def test_files_of_others_are_imported(alloc):
     """The example files become missions that validate; options of records are refused for others, in one line."""
     folder = Path(__file__).parents[3] / "examples" / "records"
