@@ -180,3 +180,40 @@ def test_each_fault_of_a_mission_is_a_line(alloc, mission):
     ran = alloc("validate", "run.jsonl")
     assert (ran.code, ran.err.count("\n")) == (2, 1)
     assert "run.jsonl: line 4: is not what comes of the orders before it" in ran.err
+
+
+def test_cfstp_is_generated(alloc):
+    """A CFSTP takes numbers of agents and tasks, and no option of other families."""
+    ran = alloc("generate", "cfstp", "--agents", "2", "--tasks", "3", "--seed", "1", "--output", "-")
+    assert (len(ran.json["agents"]), len(ran.json["tasks"]), ran.json["metric"]) == (2, 3, "manhattan")
+    ran = alloc("generate", "cfstp", "--loss", "0.1")
+    assert (ran.code, ran.err.count("\n")) == (2, 1)
+    assert "'--loss': is for mission, not for cfstp" in ran.err
+
+
+def test_files_of_others_are_imported(alloc):
+    """The example files become missions that validate; options of records are refused for others, in one line."""
+    folder = Path(__file__).parents[3] / "examples" / "records"
+    for kind, name in (
+        ("london", "calls.csv"),
+        ("new-brunswick", "fires.csv"),
+        ("space", "space.yaml"),
+        ("cfstp", "cfstp.txt"),
+    ):
+        ran = alloc("import-mission", kind, str(folder / name), "--output", f"{kind}.json")
+        assert (ran.code, ran.out) == (0, "")
+        assert f"wrote {kind}.json: " in ran.err
+    assert alloc("validate", "london.json", "new-brunswick.json", "space.json", "cfstp.json").code == 0
+    dated = ("--from", "2021-07-06", "--until", "2021-07-06", "--compress", "24", "--output", "-")
+    ran = alloc("import-mission", "london", str(folder / "calls.csv"), *dated)
+    assert len(ran.json["tasks"]) == 3
+    for arguments, told in (
+        (("space", str(folder / "space.yaml"), "--compress", "2"), "'--compress': is for records, not for space"),
+        (("london", str(folder / "calls.csv"), "--until", "soon"), "'--until'"),
+        (("london", str(folder / "calls.csv"), "--compress", "0"), "--compress: must be a finite number > 0"),
+        (("london", str(folder / "calls.csv"), "--from", "2022-01-01", "--until", "2021-01-01"), "--until: must not"),
+        (("london", str(folder / "cfstp.txt")), "has no column 'IncidentNumber'"),
+    ):
+        ran = alloc("import-mission", *arguments, "--output", "x.json", "--quiet")
+        assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
+        assert told in ran.err
