@@ -36,8 +36,7 @@ class Killed:
     leases : int
         Leases that are left.
     stubborn : int
-        Commands that went on for `PATIENCE_S` after a signal, and were killed then: Python loses a Ctrl-C that comes
-        within a destructor or a callback, as there are many while it loads modules.
+        Commands that went on for `PATIENCE_S` after a signal, and were killed then.
     begun : int
         Runs that were begun, among them those that were killed.
     seconds : float
