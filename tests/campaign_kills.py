@@ -13,6 +13,8 @@ from pathlib import Path
 
 import evil_methods
 
+PATIENCE_S = 20.0
+
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
 
 
@@ -33,6 +35,8 @@ class Killed:
         Runs that were begun again after their row was written.
     leases : int
         Leases that are left.
+    stubborn : int
+        Commands that went on for `PATIENCE_S` after a signal, and were killed then.
     begun : int
         Runs that were begun, among them those that were killed.
     seconds : float
@@ -45,6 +49,7 @@ class Killed:
     overlapping: int
     again: int
     leases: int
+    stubborn: int
     begun: int
     seconds: float
 
@@ -66,7 +71,7 @@ def kill_often(folder, *, seeds, kills, nap_s, workers=2, gap_s=(0.0, 3.0), sign
         quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
         return subprocess.Popen(command, env=environment, start_new_session=True, **quiet)
 
-    draw, begin, done = random.Random(seed), time.monotonic(), 0
+    draw, begin, done, stubborn = random.Random(seed), time.monotonic(), 0, 0
     running = [start(), start()]
     while done < kills:
         time.sleep(draw.uniform(*gap_s))
@@ -78,15 +83,20 @@ def kill_often(folder, *, seeds, kills, nap_s, workers=2, gap_s=(0.0, 3.0), sign
             raise RuntimeError(running[victim].stderr.read().decode())
         elif running[1 - victim].poll() == 0:
             break  # all runs are there
-        running[victim].communicate()
+        try:
+            running[victim].communicate(timeout=PATIENCE_S)
+        except subprocess.TimeoutExpired:
+            stubborn += 1
+            running[victim].kill()
+            running[victim].communicate()
         running[victim] = start()
     errors = [process.communicate()[1].decode() for process in running]
     if any(process.returncode for process in running):
         raise RuntimeError("\n".join(errors))
-    return _judged(folder, 4 * seeds, done, time.monotonic() - begin)
+    return _judged(folder, 4 * seeds, done, stubborn, time.monotonic() - begin)
 
 
-def _judged(folder, wanted, kills, seconds):
+def _judged(folder, wanted, kills, stubborn, seconds):
     store = sqlite3.connect(folder / "runs.db")
     outcomes = Counter(outcome for (outcome,) in store.execute("SELECT outcome FROM runs"))
     names = "SELECT name, seed, started_at, finished_at FROM runs JOIN instances USING (instance)"
@@ -109,6 +119,7 @@ def _judged(folder, wanted, kills, seconds):
         overlapping=_overlapping(begun, ended),
         again=again,
         leases=leases,
+        stubborn=stubborn,
         begun=len(begun),
         seconds=seconds,
     )
