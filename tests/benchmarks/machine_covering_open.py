@@ -20,7 +20,7 @@ from variant_kinds import clock_of_limits
 from alloc.allocators import load, solve
 from alloc.problems import Instance, machine_covering
 
-OTHERS = ("milp", "local-search", "lp-round", "ga")
+OTHERS = ("local-search",)
 
 
 def restricted(
@@ -41,7 +41,6 @@ def restricted(
 FAMILIES: dict[str, Callable[[int], Instance]] = {
     "real (100,40) U[20,50] equal": lambda seed: machine_covering(100, 40, 20, 50, seed, whole=False),
     "real (100,40) U[20,50] unequal": lambda seed: machine_covering(100, 40, 20, 50, seed, equal=False, whole=False),
-    "real (60,24) U[12,30] equal": lambda seed: machine_covering(60, 24, 12, 30, seed, whole=False),
     "real (90,30) U[1,100] unequal": lambda seed: machine_covering(90, 30, 1, 100, seed, equal=False, whole=False),
     "restricted (100,40) U[20,50] equal": lambda seed: restricted(100, 40, 20, 50, seed),
     "restricted (150,30) U[1,100] unequal": lambda seed: restricted(150, 30, 1, 100, seed, equal=False),
