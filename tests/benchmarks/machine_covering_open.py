@@ -91,11 +91,16 @@ def main() -> None:
         for row in rows(family, options.seeds, options.time_limit, processor_time=options.processor_time):
             found.append(row)
             print(*(value for name, value in row.items() if name != "plan"), sep=", ", flush=True)
-    if options.publish is not None:
-        with options.publish.open("w", newline="") as text:
-            writer = csv.DictWriter(text, list(found[0]), lineterminator="\n")
-            writer.writeheader()
-            writer.writerows(found)
+            if options.publish is not None:
+                write(found, options.publish)
+
+
+def write(found: list[dict[str, object]], file: Path) -> None:
+    """Write the table so far."""
+    with file.open("w", newline="") as text:
+        writer = csv.DictWriter(text, list(found[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(found)
 
 
 if __name__ == "__main__":

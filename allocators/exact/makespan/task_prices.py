@@ -9,10 +9,13 @@ import time
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from alloc.allocators.runtime.compiled import compiled
 from alloc.problems import Instance
 from alloc.problems.instance import FloatArray, IntArray
+
+Int32Array = NDArray[np.int32]
 
 SAFETY = 1e-9
 """Part by which the value of all agents must fall short before that counts as a proof: rounding of a million terms."""
@@ -78,7 +81,7 @@ def bound_by_task_prices(instance: Instance, low: float, high: float, end: float
 @compiled
 def value_of_agents(
     first: IntArray,
-    task: IntArray,
+    task: Int32Array,
     distance: FloatArray,
     origin: IntArray,
     ability: FloatArray,
