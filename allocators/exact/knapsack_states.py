@@ -147,7 +147,8 @@ def cheapest_by_states(
                 continue
             if used + live > len(states.weight):
                 write_group(states, best, agent, taken, group)
-                return np.floor(relaxed - CHEAPER)
+                bound: float = np.floor(relaxed - CHEAPER)
+                return bound
             item = high if is_after else low - 1
             low, high = low - (1 - is_after), high + is_after
             k, sign = agent[item], 2 * is_after - 1
@@ -159,7 +160,8 @@ def cheapest_by_states(
                 states, live, used, item, sign * weight[k], sign * price[k], need, best, before, after
             )
     write_group(states, best, agent, taken, group)
-    return states.cost[best]
+    cost: float = states.cost[best]
+    return cost
 
 
 @compiled

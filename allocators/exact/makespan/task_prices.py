@@ -9,19 +9,22 @@ import time
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from alloc.allocators.runtime.compiled import compiled
 from alloc.problems import Instance
 from alloc.problems.instance import FloatArray, IntArray
 
+Int32Array = NDArray[np.int32]
+
 SAFETY = 1e-9
 """Part by which the value of all agents must fall short before that counts as a proof: rounding of a million terms."""
 
 FIRST_STEP, LAST_STEP = 2e-3, 1e-5
-"""Relative change of a price whose task lacks or has in excess all that it needs, at first and at the end."""
+"""Relative change of a price whose task is short of, or has in excess, all that it needs, at first and at the end."""
 
-LARGEST_LACK = 3.0
-"""Lack or excess beyond which a price changes no faster."""
+LARGEST_SHORTFALL = 3.0
+"""Shortfall or excess beyond which a price changes no faster."""
 
 PATIENCE = 8
 """Passes without progress after which steps are halved."""
@@ -68,9 +71,9 @@ def bound_by_task_prices(instance: Instance, low: float, high: float, end: float
             price, step, stale = best_price, step / 2, 0
             direction[:] = 0.0
             continue
-        lack = np.where(some, 1 - done * at / np.where(some, work, 1.0), 0.0)
-        direction = lack + INERTIA * direction
-        price = price * np.exp(step * np.clip(direction, -LARGEST_LACK, LARGEST_LACK))
+        shortfall = np.where(some, 1 - done * at / np.where(some, work, 1.0), 0.0)
+        direction = shortfall + INERTIA * direction
+        price = price * np.exp(step * np.clip(direction, -LARGEST_SHORTFALL, LARGEST_SHORTFALL))
         price /= price.mean()
     return min(low, high)
 
@@ -78,7 +81,7 @@ def bound_by_task_prices(instance: Instance, low: float, high: float, end: float
 @compiled
 def value_of_agents(
     first: IntArray,
-    task: IntArray,
+    task: Int32Array,
     distance: FloatArray,
     origin: IntArray,
     ability: FloatArray,
