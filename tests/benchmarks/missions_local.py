@@ -125,16 +125,25 @@ def in_compiled_loops(mission: Mission, policy: str, seed: int) -> MissionResult
         if policy == "nearest":
             lead_nearest(state, room_for(n, m), seed, np.zeros(n, np.intp))
         else:
-            play(state, room_for(n, m), weights(policy), seed)
+            name, periods = with_periods(policy)
+            play(state, room_for(n, m, periods), weights(name), seed)
     return measure(mission, state, policy, seed)
 
 
 def in_reference(mission: Mission, policy: str, seed: int) -> MissionResult:
     """Return the measures of a mission under any policy."""
-    return simulate(mission, policy, seed=seed).result
+    name, periods = with_periods(policy)
+    settings = {"periods": periods} if periods > 1 else {}
+    return simulate(mission, name, seed=seed, **settings).result
 
 
-TWINS = ("gappo", "ppo", "greedy", "nearest")
+def with_periods(policy: str) -> tuple[str, int]:
+    """Return the name of a policy, and the radio periods for each message, as in ``gappo[periods=10]``."""
+    name, _, periods = policy.rstrip("]").partition("[periods=")
+    return name, int(periods or 1)
+
+
+TWINS = ("gappo", "gappo[periods=10]", "ppo", "greedy", "nearest")
 
 
 def run(row: Row, policy: str, missions: int) -> list[MissionResult]:
@@ -176,7 +185,7 @@ def main() -> None:
     """Print the table, or check twins."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--missions", type=int, default=20)
-    parser.add_argument("--policies", default="greedy,gappo,ppo,nearest,hedonic,auction")
+    parser.add_argument("--policies", default="greedy,gappo,gappo[periods=10],ppo,nearest,hedonic,auction")
     parser.add_argument("--rows", default=",".join(ROWS))
     parser.add_argument("--rival", default="greedy")
     parser.add_argument("--check", action="store_true")

@@ -44,7 +44,7 @@ class MissionNetwork(nn.Module):
         attention = self.query(token).squeeze(-1).masked_fill(~is_option, -torch.inf).softmax(-1)
         pooled = (attention.unsqueeze(-1) * token).sum(-2)
         both = nn.functional.leaky_relu(self.own(token) + self.context(pooled).unsqueeze(-2), 0.1)
-        scores = (self.out(both) + self.skip(options)).squeeze(-1)
+        scores: Tensor = (self.out(both) + self.skip(options)).squeeze(-1)
         return scores.masked_fill(~is_option, -torch.inf)
 
 

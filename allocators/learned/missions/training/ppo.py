@@ -1,7 +1,7 @@
 """PPO in missions: agents' decisions, as they come, under one network.
 
-Each mission is played several times, with the same events and the same luck of the radio. What a decision is worth is
-what all agents lost soon after it, beside what they lost in the other plays in the same hours. A critic in place of the
+Each mission is played several times, with the same events and the same luck of the radio. The advantage of a
+decision is how much less all agents lost soon after it than in the other plays in the same hours. A critic in place of the
 other plays explained less than a quarter of that, and under it mission times did not improve.
 
 References

@@ -84,7 +84,7 @@ def test_curriculum_grows_harder() -> None:
 
 
 def test_advantages_are_what_a_play_gained_beside_the_others() -> None:
-    """What a decision is worth is what other plays lost more in the same hours; on average that is nothing."""
+    """The advantage of a decision is what other plays lost more in the same hours, 0 on average."""
     group = [record_for(1, 1, 2, ideal=4.0) for _ in range(3)]
     for record, lost in zip(group, (0.0, 1.0, 2.0), strict=True):
         record.length[0], record.asked[0] = 2, 10.0
