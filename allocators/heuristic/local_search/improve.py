@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from alloc.allocators.contract.clock import Clock
 from alloc.allocators.contract.search import Search
 from alloc.allocators.heuristic.local_search.annealing_state import AnnealingState
-from alloc.allocators.contract.clock import Clock
 from alloc.allocators.heuristic.local_search.parameters import LocalSearchParameters
 from alloc.allocators.heuristic.local_search.parts import MOST_STATES, Parts, Team
 from alloc.allocators.parallel.pool import side_by_side
