@@ -32,6 +32,8 @@ class Greedy(Allocator):
     """List scheduling for machine covering: the task with the lowest W / h next, ties to the largest workload.
 
     With travel times, an agent counts with what it does until the lower bound on the makespan. It has no parameters.
+    From 50,000 agents on, where not all reach every task at once, threads share the ablest nine tenths of them: each
+    serves all tasks by some agents of every size, and the other agents even out what is left.
 
     References
     ----------

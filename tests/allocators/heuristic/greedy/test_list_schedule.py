@@ -120,7 +120,7 @@ def test_alone_it_looks_ahead_as_far_as_in_a_run() -> None:
 
 def test_threads_share_the_agents() -> None:
     """Threads that assign agents side by side leave tasks about as even as one does, and no agent out."""
-    instance = random_instance(Family(agents=3000, tasks=50, communication_range=0.4), 0)
+    instance = random_instance(Family(agents=6000, tasks=20, communication_range=0.8), 0)
     with patch.multiple(list_schedule, LEAST_SHARED=500, MOST_SCANNED=0):
         plans = [
             greedy(instance, Search(instance, Objective.MAKESPAN, Budget(None), threads=threads))

@@ -55,7 +55,7 @@ def test_joined_plan_is_what_its_parts_made_of_it(instance: Instance) -> None:
     score = evaluate(instance, found)
     assert not score.violations
     assert score.makespan <= state.makespan * (1 + 1e-9)
-    assert score.cost == pytest.approx(best)
+    assert score.cost == pytest.approx(best * instance.reach.energy_per_distance)
     assert best < before
 
 
