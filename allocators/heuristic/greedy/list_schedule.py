@@ -22,7 +22,7 @@ SLICE = 4_096
 """Agents that compiled code assigns between two checks of the clock."""
 
 LEAST_SHARED = 25_000
-"""Agents from which on a thread is worth having."""
+"""Agents that each thread has at least."""
 
 SHARED = 0.9
 """Part of the agents, the ablest, that several threads assign; the others make up for what is uneven then."""

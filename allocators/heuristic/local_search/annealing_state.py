@@ -1,6 +1,6 @@
 """The state of simulated annealing: a plan, its target makespan, and the arrays for the compiled loops."""
 
-from copy import copy
+from copy import copy, deepcopy
 
 import numpy as np
 
@@ -14,7 +14,6 @@ from alloc.allocators.heuristic.local_search.plan import (
     FULL_GROUP,
     N_MOVES,
     N_SHORT,
-    Plan,
     Weights,
     group_slots,
     idle_plan,
@@ -113,7 +112,7 @@ class AnnealingState:
         part_of_task, part_of_agent : ndarray of int, shape (m,) and (n,)
             Agents belong to the part of their task; idle ones to any. At least one task is of another part.
         """
-        plan, idle = Plan(*(array.copy() for array in whole.plan)), self.instance.m
+        plan, idle = deepcopy(whole.plan), self.instance.m
         self.makespan, self._least_slots = whole.makespan, whole._least_slots
         elsewhere = np.flatnonzero(part_of_task != part)
         plan.demand[elsewhere] = 0.0  # no exchange is made with tasks that need nothing
