@@ -6,13 +6,14 @@ from types import TracebackType
 
 import numpy as np
 
+from alloc.allocators.contract.clock import Clock
 from alloc.allocators.contract.search import Search
 from alloc.allocators.contract.tolerance import MakespanTolerance
 from alloc.allocators.exact.solver_model import is_repeatable
 from alloc.allocators.heuristic.local_search.annealing_state import AnnealingState
-from alloc.allocators.heuristic.local_search.clock import Clock
 from alloc.allocators.heuristic.local_search.improve import MakespanReduction, improve
 from alloc.allocators.heuristic.local_search.parameters import LocalSearchParameters
+from alloc.allocators.heuristic.local_search.parts import Team
 from alloc.allocators.parallel.pool import Pool
 from alloc.problems import Allocation, Objective
 
@@ -87,7 +88,7 @@ class LocalSearchPhase:
         if self._reduction is None:
             parameters = LocalSearchParameters()
             state = AnnealingState(part.instance, part.seed, parameters.neighbours)
-            self._reduction = MakespanReduction(part, state, parameters)
+            self._reduction = MakespanReduction(part, Team([state], map), parameters)
         self._reduction.run(Clock(part, until_s, part.iteration + iterations))
 
     def exchange(self) -> None:

@@ -1,8 +1,10 @@
 """The state of simulated annealing: a plan, its target makespan, and the arrays for the compiled loops."""
 
+from copy import copy, deepcopy
+
 import numpy as np
 
-from alloc.allocators.heuristic.local_search.annealing import anneal
+from alloc.allocators.heuristic.local_search.annealing import SMALLEST_GAIN, anneal
 from alloc.allocators.heuristic.local_search.candidates import arrays_and_candidates, mean_candidate_cost
 from alloc.allocators.heuristic.local_search.instance_arrays import Int32Array
 from alloc.allocators.heuristic.local_search.moves import recompute
@@ -18,6 +20,7 @@ from alloc.allocators.heuristic.local_search.plan import (
     workspace,
 )
 from alloc.problems import IDLE, Allocation, Instance
+from alloc.problems.instance import IntArray
 
 PRICE_DECAY = 0.99
 """Power by which the prices of tasks fall towards 1 in each run in which the cost counts."""
@@ -58,6 +61,14 @@ class AnnealingState:
         self.mean_ability = float(self.arrays.ability.mean())
         self._integer_ability = float(self.arrays.ability.max()) if self.arrays.integer_ability else np.inf
 
+    def twin(self, seed: int | list[int]) -> "AnnealingState":
+        """Return another state for the same instance, with the same arrays and random numbers of its own."""
+        twin = copy(self)
+        twin.workspace = workspace(seed)
+        random = np.random.default_rng(seed).integers(1, 2**63, 1, dtype=np.uint64)
+        twin.plan = idle_plan(self.instance.n, self.instance.m, random)
+        return twin
+
     @property
     def n_short(self) -> int:
         """Number of tasks with a shortfall."""
@@ -89,6 +100,50 @@ class AnnealingState:
     def weights(self, cost: float, noise: float, short_task: float, shortfall: float) -> Weights:
         """Return the weights of exchanges; see `Weights`."""
         return Weights(cost, noise, short_task, shortfall, 2.0, self._integer_ability)
+
+    def begin_part(self, whole: "AnnealingState", part: int, part_of_task: IntArray, part_of_agent: IntArray) -> None:
+        """Continue from another state, with some of its tasks and agents; those of other parts stay as they are.
+
+        Parameters
+        ----------
+        whole : AnnealingState
+        part : int
+            The number of this part.
+        part_of_task, part_of_agent : ndarray of int, shape (m,) and (n,)
+            Agents belong to the part of their task; idle ones to any. At least one task is of another part.
+        """
+        plan, idle = deepcopy(whole.plan), self.instance.m
+        self.makespan, self._least_slots = whole.makespan, whole._least_slots
+        elsewhere = np.flatnonzero(part_of_task != part)
+        plan.demand[elsewhere] = 0.0  # no exchange is made with tasks that need nothing
+        spare = plan.slot[plan.begin[idle] : plan.begin[idle] + plan.size[idle]].copy()
+        mine = spare[part_of_agent[spare] == part]
+        plan.group_of_agent[spare[part_of_agent[spare] != part]] = elsewhere[0]
+        plan.slot[plan.begin[idle] : plan.begin[idle] + len(mine)] = mine
+        plan.size[idle], plan.position[mine] = len(mine), np.arange(len(mine))
+        short = np.flatnonzero(plan.group_ability[:-1] < plan.demand[:-1])
+        plan.short_task[: len(short)], plan.counter[N_SHORT] = short, len(short)
+        plan.short_position[:] = -1
+        plan.short_position[short] = np.arange(len(short))
+        plan.best_group[:], plan.counter[N_MOVES] = plan.group_of_agent, 0
+        plan.cost[BEST] = np.inf if len(short) else plan.cost[CURRENT]
+        self.plan = plan._replace(random=self.plan.random)
+
+    def join(self, parts: "list[AnnealingState]", part_of_task: IntArray, part_of_agent: IntArray) -> None:
+        """Take over the plans of parts that began from this state; see `begin_part`."""
+        group, best = self.plan.group_of_agent.copy(), self.plan.group_of_agent.copy()
+        cost = self.cost
+        for number, part in enumerate(parts):
+            is_mine, tasks = part_of_agent == number, np.flatnonzero(part_of_task == number)
+            group[is_mine], best[is_mine] = part.plan.group_of_agent[is_mine], part.plan.best_group[is_mine]
+            self.plan.price[tasks] = part.plan.price[tasks]
+            self._least_slots = np.maximum(self._least_slots, part._least_slots)
+            cost += part.best_cost - self.cost
+        if cost < self.best_cost * (1 - SMALLEST_GAIN):
+            self.plan.best_group[:], self.plan.cost[BEST] = best, cost
+        self._set_groups(group)
+        self.recompute()
+        self.plan.counter[N_MOVES] = self.instance.n + 1  # the journal of moves is that of no plan
 
     def run(self, steps: int, weights: Weights, cooling: float = 1.0) -> float:
         """Make exchanges; return the last noise."""
