@@ -86,6 +86,13 @@ class AnnealingState:
         self.plan.cost[BEST] = np.inf
         self.plan.counter[N_MOVES] = self.instance.n + 1  # so that all of the first best plan is written
 
+    def return_to_best(self) -> None:
+        """Continue from `best`, if there is one, with the prices as they are."""
+        if self.best_cost < np.inf:
+            self._set_groups(self.plan.best_group.copy())
+            self.recompute()
+            self.plan.counter[N_MOVES] = 0
+
     def weights(self, cost: float, noise: float, short_task: float, shortfall: float) -> Weights:
         """Return the weights of exchanges; see `Weights`."""
         return Weights(cost, noise, short_task, shortfall, 2.0, self._integer_ability)

@@ -9,6 +9,7 @@ from alloc.allocators.contract.search import Search
 from alloc.allocators.heuristic.local_search.annealing_state import AnnealingState
 from alloc.allocators.heuristic.local_search.clock import Clock
 from alloc.allocators.heuristic.local_search.parameters import LocalSearchParameters
+from alloc.allocators.heuristic.local_search.penalty import PenaltyFactor
 from alloc.problems import IDLE, Allocation, Objective, only_allowed
 from alloc.problems.evaluation import RELATIVE_TOLERANCE
 from alloc.problems.instance import FloatArray, IntArray
@@ -160,12 +161,14 @@ def reduce_energy(search: Search, state: AnnealingState, parameters: LocalSearch
     exchanges = parameters.exchanges * clock.iterations_left / search.instance.n
     initial = parameters.initial_noise if plan is None else MOVES_NOISE
     initial *= parameters.noise_reduction(exchanges)
+    factor = PenaltyFactor(state, parameters.exchanges)
     while not clock.is_over:
         progress = clock.progress
         noise = initial * (final / initial) ** progress
         is_hard = initial <= final * 1.001 or progress > HARD_FROM
-        state.run(parameters.exchanges, parameters.weights(state, noise, HARD if is_hard else 1.0))
+        state.run(parameters.exchanges, parameters.weights(state, noise, HARD if is_hard else factor.value))
         search.iteration += 1
+        factor.update()
         report()
     report(at_once=True)
 
