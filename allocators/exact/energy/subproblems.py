@@ -5,6 +5,7 @@ import numpy as np
 from alloc.allocators.exact.energy.energy_model import EnergyModel
 from alloc.allocators.exact.knapsack import WholeArray, fill_table, read_group
 from alloc.allocators.exact.knapsack_core import cheapest_by_core
+from alloc.allocators.exact.knapsack_states import cheapest_by_states
 from alloc.allocators.runtime.compiled import compiled
 from alloc.problems.instance import FloatArray
 
@@ -28,11 +29,35 @@ def solve_subproblems(
     ndarray, shape (p,) or (0,)
         Excess: how much dearer the best group with an agent of the pair is, or less than that.
     float
-        What all groups cost; ``inf`` if a task has none, the arrays then meaning nothing.
+        What all groups cost, or less than that; ``inf`` if a task has none, the arrays then meaning nothing.
     """
     group, excess = np.zeros(len(price), dtype=np.int64), np.zeros(len(price) if compare else 0)
+    if not model.is_whole:
+        total = solve_in_floats(model.first, model.weight, model.copies, price, model.need, group, excess)
+        return group, excess, total
     total = solve_all(model.first, model.weight, model.copies, price, model.need, model.max_weight, group, excess)
     return group, excess, total
+
+
+@compiled
+def solve_in_floats(
+    first: WholeArray,
+    weight: FloatArray,
+    copies: WholeArray,
+    price: FloatArray,
+    need: FloatArray,
+    group: WholeArray,
+    excess: FloatArray,
+) -> float:
+    """Do the work of `solve_subproblems` where weights and needs are floats."""
+    total = 0.0
+    for j in range(len(need)):
+        a, b = first[j], first[j + 1]
+        cost = cheapest_by_states(weight[a:b], price[a:b], copies[a:b], need[j], group[a:b], excess[a:b])
+        if not np.isfinite(cost):
+            return np.inf
+        total += cost
+    return total
 
 
 @compiled
