@@ -161,7 +161,7 @@ def reduce_energy(search: Search, state: AnnealingState, parameters: LocalSearch
     exchanges = parameters.exchanges * clock.iterations_left / search.instance.n
     initial = parameters.initial_noise if plan is None else MOVES_NOISE
     initial *= parameters.noise_reduction(exchanges)
-    factor = PenaltyFactor(state, parameters.exchanges)
+    factor = PenaltyFactor(state, parameters.exchanges, exchanges)
     while not clock.is_over:
         progress = clock.progress
         noise = initial * (final / initial) ** progress

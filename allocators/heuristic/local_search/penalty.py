@@ -4,6 +4,8 @@ Where the makespan leaves much room, a low penalty lets shortfalls pass from tas
 least makespan few plans have none, and a search that has lost them seldom finds another: it returns to the best one.
 """
 
+import math
+
 from alloc.allocators.heuristic.local_search.annealing_state import AnnealingState
 
 RISE, FALL = 1.2, 0.9
@@ -14,6 +16,9 @@ LOWEST, HIGHEST = 0.1, 100.0
 
 EXCHANGES_PER_AGENT = 5.0
 """Length of a period."""
+
+LEAST_EXCHANGES = 250.0
+"""Exchanges per agent that the budget must allow, for it takes many periods."""
 
 PATIENCE = 3
 """Periods in a row that end with a shortfall, after one more of which the search returns to the best plan."""
@@ -27,15 +32,17 @@ class PenaltyFactor:
     state : AnnealingState
     exchanges : int
         Exchanges in an iteration.
+    allowed : float
+        Exchanges per agent that the budget allows.
 
     Attributes
     ----------
     value : float
     """
 
-    def __init__(self, state: AnnealingState, exchanges: int) -> None:
+    def __init__(self, state: AnnealingState, exchanges: int, allowed: float) -> None:
         self.value, self._state = 1.0, state
-        self._period = EXCHANGES_PER_AGENT * state.instance.n / exchanges
+        self._period = EXCHANGES_PER_AGENT * state.instance.n / exchanges if allowed >= LEAST_EXCHANGES else math.inf
         self._iterations, self._short_periods = 0, 0
 
     def update(self) -> None:
