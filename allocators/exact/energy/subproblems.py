@@ -32,10 +32,12 @@ def solve_subproblems(
         What all groups cost, or less than that; ``inf`` if a task has none, the arrays then meaning nothing.
     """
     group, excess = np.zeros(len(price), dtype=np.int64), np.zeros(len(price) if compare else 0)
-    if not model.is_whole:
-        total = solve_in_floats(model.first, model.weight, model.copies, price, model.need, group, excess)
-        return group, excess, total
-    total = solve_all(model.first, model.weight, model.copies, price, model.need, model.max_weight, group, excess)
+    if model.is_whole:
+        weight, need = model.weight.astype(np.int64, copy=False), model.need.astype(np.int64, copy=False)
+        total = solve_all(model.first, weight, model.copies, price, need, model.max_weight, group, excess)
+    else:
+        part, whole = model.weight.astype(np.float64, copy=False), model.need.astype(np.float64, copy=False)
+        total = solve_in_floats(model.first, part, model.copies, price, whole, group, excess)
     return group, excess, total
 
 
