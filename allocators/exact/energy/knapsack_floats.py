@@ -22,7 +22,7 @@ MAX_STATES = 50_000
 
 
 @compiled
-def cheapest_by_states(
+def cheapest_in_floats(
     weight: FloatArray, price: FloatArray, copies: WholeArray, need: float, group: WholeArray, excess: FloatArray
 ) -> float:
     """Return a lower bound on the cost of a group with a sum of weights of at least `need`, nearly always the least.
