@@ -3,9 +3,9 @@
 import numpy as np
 
 from alloc.allocators.exact.energy.energy_model import EnergyModel
+from alloc.allocators.exact.energy.knapsack_floats import cheapest_in_floats
 from alloc.allocators.exact.knapsack import WholeArray, fill_table, read_group
 from alloc.allocators.exact.knapsack_core import cheapest_by_core
-from alloc.allocators.exact.energy.knapsack_floats import cheapest_in_floats
 from alloc.allocators.runtime.compiled import compiled
 from alloc.problems.instance import FloatArray
 
