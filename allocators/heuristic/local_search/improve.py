@@ -6,10 +6,9 @@ import time
 import numpy as np
 
 from alloc.allocators.contract.search import Search
-from alloc.allocators.heuristic.local_search.annealing_state import AnnealingState
+from alloc.allocators.heuristic.local_search.annealing_state import AnnealingState, PenaltyFactor
 from alloc.allocators.heuristic.local_search.clock import Clock
 from alloc.allocators.heuristic.local_search.parameters import LocalSearchParameters
-from alloc.allocators.heuristic.local_search.penalty import PenaltyFactor
 from alloc.problems import IDLE, Allocation, Objective, only_allowed
 from alloc.problems.evaluation import RELATIVE_TOLERANCE
 from alloc.problems.instance import FloatArray, IntArray

@@ -4,9 +4,15 @@ import numpy as np
 import pytest
 
 from alloc.allocators.heuristic.greedy.list_schedule import greedy
-from alloc.allocators.heuristic.local_search import penalty
-from alloc.allocators.heuristic.local_search.annealing_state import AnnealingState
-from alloc.allocators.heuristic.local_search.penalty import FALL, LOWEST, PATIENCE, RISE, PenaltyFactor
+from alloc.allocators.heuristic.local_search.annealing_state import (
+    FALL,
+    LEAST_EXCHANGES,
+    LOWEST,
+    PATIENCE,
+    RISE,
+    AnnealingState,
+    PenaltyFactor,
+)
 from alloc.problems import evaluate
 from alloc.problems.generate import paper
 
@@ -59,7 +65,7 @@ def test_the_search_returns_to_its_best_plan(state):
 
 def test_a_short_budget_leaves_the_penalty_alone(state):
     """Where the budget allows few exchanges for each agent, nothing adapts."""
-    factor = PenaltyFactor(state, 10**9, penalty.LEAST_EXCHANGES - 1)
+    factor = PenaltyFactor(state, 10**9, LEAST_EXCHANGES - 1)
     for _ in range(10):
         factor.update()
     assert factor.value == 1.0
