@@ -1,5 +1,6 @@
-"""The state of simulated annealing: a plan, its target makespan, and the arrays for the compiled loops."""
+"""The state of simulated annealing: a plan, its target makespan, arrays for the loops, and penalties that adapt."""
 
+import math
 from copy import copy, deepcopy
 
 import numpy as np
@@ -27,6 +28,21 @@ PRICE_DECAY = 0.99
 
 ROUNDING = 1e-12
 """Relative part by which demands are lowered, against rounding errors of sums."""
+
+RISE, FALL = 1.2, 0.9
+"""Factors by which the penalty changes after a period that ends with a shortfall, and without one."""
+
+LOWEST, HIGHEST = 0.1, 100.0
+"""Limits of the factor; 1 to begin with."""
+
+EXCHANGES_PER_AGENT = 5.0
+"""Length of a period."""
+
+LEAST_EXCHANGES = 250.0
+"""Exchanges per agent that the budget must allow, for it takes many periods."""
+
+PATIENCE = 3
+"""Periods in a row that end with a shortfall, after one more of which the search returns to the best plan."""
 
 
 class AnnealingState:
@@ -96,6 +112,13 @@ class AnnealingState:
         self.recompute()
         self.plan.cost[BEST] = np.inf
         self.plan.counter[N_MOVES] = self.instance.n + 1  # so that all of the first best plan is written
+
+    def return_to_best(self) -> None:
+        """Continue from `best`, if there is one, with the prices as they are."""
+        if self.best_cost < np.inf:
+            self._set_groups(self.plan.best_group.copy())
+            self.recompute()
+            self.plan.counter[N_MOVES] = 0
 
     def weights(self, cost: float, noise: float, short_task: float, shortfall: float) -> Weights:
         """Return the weights of exchanges; see `Weights`."""
@@ -200,6 +223,45 @@ class AnnealingState:
         is_full = self.plan.size >= capacity
         self._least_slots = np.where(is_full, np.minimum(2 * capacity, self.instance.n), capacity)
         self._set_groups(self.plan.group_of_agent.copy())
+
+
+class PenaltyFactor:
+    """Strategic oscillation: the factor on the penalties of shortfalls, and the returns to the best plan.
+
+    The factor rises where plans stay short, and falls where none is. Where the makespan leaves much room, a low penalty
+    lets shortfalls pass from task to task for less energy. At the very least makespan few plans have none, and a search
+    that has lost them seldom finds another: it returns to the best one.
+
+    Parameters
+    ----------
+    state : AnnealingState
+    exchanges : int
+        Exchanges in an iteration.
+    allowed : float
+        Exchanges per agent that the budget allows.
+
+    Attributes
+    ----------
+    value : float
+    """
+
+    def __init__(self, state: AnnealingState, exchanges: int, allowed: float) -> None:
+        self.value, self._state = 1.0, state
+        self._period = EXCHANGES_PER_AGENT * state.instance.n / exchanges if allowed >= LEAST_EXCHANGES else math.inf
+        self._iterations, self._short_periods = 0, 0
+
+    def update(self, iterations: int) -> None:
+        """Take note of so many iterations more."""
+        self._iterations += iterations
+        if self._iterations < self._period:
+            return
+        self._iterations = 0
+        is_short = self._state.n_short > 0
+        self.value = min(HIGHEST, max(LOWEST, self.value * (RISE if is_short else FALL)))
+        self._short_periods = self._short_periods + 1 if is_short else 0
+        if self._short_periods > PATIENCE:
+            self._state.return_to_best()
+            self._short_periods = 0
 
 
 def _as_allocation(group: Int32Array, idle: int) -> Allocation:

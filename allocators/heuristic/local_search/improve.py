@@ -8,7 +8,7 @@ import numpy as np
 
 from alloc.allocators.contract.clock import Clock
 from alloc.allocators.contract.search import Search
-from alloc.allocators.heuristic.local_search.annealing_state import AnnealingState
+from alloc.allocators.heuristic.local_search.annealing_state import AnnealingState, PenaltyFactor
 from alloc.allocators.heuristic.local_search.parameters import LocalSearchParameters
 from alloc.allocators.heuristic.local_search.parts import MOST_STATES, Parts, Team
 from alloc.allocators.parallel.pool import side_by_side
@@ -49,9 +49,7 @@ def improve(
     iterations: float = math.inf,
     parameters: LocalSearchParameters | None = None,
 ) -> None:
-    """Improve ``search.best``, which must exist, and submit better plans.
-
-    Ends when the search should stop, and before that at either limit.
+    """Improve ``search.best``, which must exist, and submit better plans until the search or a limit ends.
 
     Parameters
     ----------
@@ -133,9 +131,8 @@ class MakespanReduction:
             fastest = search.fastest.evaluation
             best = fastest.served_makespan
             bound = min(search.lower_bound, best) if fastest.makespan is not None else 0.5 * best
-            if bound >= best * (1 - RELATIVE_TOLERANCE):
-                return
-            if patience is not None and clock.progress > max(LEAST_SHARE, (1 + patience) * improved):
+            has_waited = patience is not None and clock.progress > max(LEAST_SHARE, (1 + patience) * improved)
+            if has_waited or bound >= best * (1 - RELATIVE_TOLERANCE):
                 return
             self._attempt(clock, bound, best)
             if search.fastest.evaluation.served_makespan < best:
@@ -207,23 +204,24 @@ def reduce_energy(search: Search, team: Team, parameters: LocalSearchParameters,
     if clock.is_over or best.evaluation.cost == 0:
         return
     plan = _plan_in_force(search)
-    state.begin(
-        best.allocation if plan is None else _serving(plan, best.allocation, search.instance.m), search.makespan_limit
-    )
+    start = best.allocation if plan is None else _serving(plan, best.allocation, search.instance.m)
+    state.begin(start, search.makespan_limit)
     clock = Clock(search, clock.until_s, clock.until_iteration)
     report, parts = _Reporter(search, state), Parts(team, search.seed)
     final = parameters.final_noise
-    # measures the pace
-    search.iteration += parts.run(parts.count, parameters.exchanges, parameters.weights(state, final, HARD))
+    search.iteration += parts.run(parts.count, parameters.exchanges, parameters.weights(state, final, HARD))  # the pace
     exchanges = parameters.exchanges * clock.iterations_left / search.instance.n
     initial = parameters.initial_noise if plan is None else MOVES_NOISE
     initial *= parameters.noise_reduction(exchanges)
+    factor = PenaltyFactor(state, parameters.exchanges, exchanges)
     while not clock.is_over:
         progress = clock.progress
         noise = initial * (final / initial) ** progress
         is_hard = initial <= final * 1.001 or progress > HARD_FROM
-        weights = parameters.weights(state, noise, HARD if is_hard else 1.0)
-        search.iteration += parts.run(clock.until_iteration - search.iteration, parameters.exchanges, weights)
+        weights = parameters.weights(state, noise, HARD if is_hard else factor.value)
+        made = parts.run(clock.until_iteration - search.iteration, parameters.exchanges, weights)
+        search.iteration += made
+        factor.update(made)
         report()
     report(at_once=True)
 
@@ -240,8 +238,7 @@ class _Reporter:
 
     def __call__(self, *, at_once: bool = False) -> None:
         """Submit the best plan if it is new, and if it is time to or `at_once`."""
-        is_new = self.state.best_cost < self.submitted_cost
-        if not is_new or not (at_once or self._is_due()):
+        if self.state.best_cost >= self.submitted_cost or not (at_once or self._is_due()):
             return
         begin = time.monotonic()
         self.submitted_cost = self.state.best_cost
