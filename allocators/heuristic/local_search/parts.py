@@ -19,13 +19,13 @@ LEAST_TASKS = 8
 DRAWS = 1.3
 """Exchanges that are drawn for each one that is to be made: some are with tasks of other parts."""
 
-WHOLE = 6
+WHOLE = 8
 """Exchanges in each part for each one that is then made anywhere in the whole plan."""
 
-RUNS = 1
+RUNS = 2
 """Runs of each part in a round; longer rounds would settle each part for itself."""
 
-AGENTS_PER_RUN = 4_000
+AGENTS_PER_RUN = 2_000
 """Agents for each of which a round has one run more: dividing and joining a plan takes time by its size."""
 
 
@@ -80,14 +80,13 @@ class Parts:
             return 1
         parts = self._parts
         part_of_task, part_of_agent = self._divide()
-        for number, part in enumerate(parts):
-            part.begin_part(self.state, number, part_of_task, part_of_agent)
 
-        def work(part: AnnealingState) -> None:
+        def work(number: int) -> None:
+            parts[number].begin_part(self.state, number, part_of_task, part_of_agent)
             for _ in range(runs):
-                part.run(int(steps * self.count * DRAWS), weights)  # one in `count` agents is in the part
+                parts[number].run(int(steps * self.count * DRAWS), weights)  # one in `count` agents is in the part
 
-        list(self.team.run_all(work, parts))
+        list(self.team.run_all(work, range(self.count)))
         self.state.join(parts, part_of_task, part_of_agent)
         self.state.run(runs * steps // WHOLE, weights)  # shortfalls in one part may need a surplus in another
         return runs * self.count

@@ -7,7 +7,7 @@ from alloc.allocators import Budget, Search, load, solve
 from alloc.allocators.heuristic.greedy.list_schedule import greedy
 from alloc.allocators.heuristic.local_search.improve import HARD
 from alloc.allocators.heuristic.local_search.parameters import LocalSearchParameters
-from alloc.allocators.heuristic.local_search.parts import LEAST_TASKS, Parts, Team
+from alloc.allocators.heuristic.local_search.parts import LEAST_TASKS, RUNS, Parts, Team
 from alloc.problems import Instance, Objective, evaluate
 from alloc.problems.generate import Family, random_instance
 from alloc.problems.vocabulary import OBJECTIVES
@@ -45,7 +45,7 @@ def test_joined_plan_is_what_its_parts_made_of_it(instance: Instance) -> None:
     parts = parts_of(instance, 3)
     state, weights = parts.state, LocalSearchParameters().weights(parts.state, 0.01, HARD)
     before = state.cost
-    assert sum(parts.run(np.inf, 200, weights) for _ in range(10)) == 10 * parts.count
+    assert sum(parts.run(np.inf, 200, weights) for _ in range(10)) == 10 * RUNS * parts.count
     cost, ability, best = state.cost, state.plan.group_ability.copy(), state.best_cost
     state.recompute()
     assert state.cost == pytest.approx(cost)
