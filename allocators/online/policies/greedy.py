@@ -14,7 +14,7 @@ from alloc.problems.missions.simulation.state import Order
 
 @dataclass(frozen=True)
 class GreedyParameters(CheckedParameters):
-    """Parameters of the utility; the defaults are tuned on missions as `gappo` is evolved on.
+    """Parameters of the utility; the defaults are tuned by the optimiser of `gappo`, for a shorter time.
 
     Attributes
     ----------
