@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from alloc.allocators.contract.budget import Budget
 from alloc.allocators.contract.improvement import Improvement
 from alloc.allocators.contract.tolerance import EXACT, MakespanTolerance
+from alloc.allocators.parallel.processors import available_threads
 from alloc.allocators.result import Result
 from alloc.problems import Allocation, InputError, Instance, Objective
 from alloc.problems.allocation import CarriedOver, require_fit
@@ -86,6 +87,12 @@ def checked_seed(seed: int, name: str = "seed") -> int:
 def checked_threads(threads: int | None) -> int | None:
     """Return the number of threads, or None if none is given."""
     return None if threads is None else whole(threads, "threads", 1, MOST_THREADS)
+
+
+def default_threads(budget: Budget) -> int:
+    """Return the number of processors; 1 where iterations alone are counted, as the answer may depend on it."""
+    is_counted = budget.iterations is not None and budget.time_limit_s is None
+    return 1 if is_counted else available_threads()
 
 
 def checked_objective(objective: Objective | str) -> Objective:

@@ -18,7 +18,6 @@ from alloc.allocators.contract.improvement import Improvement
 from alloc.allocators.contract.search import Search
 from alloc.allocators.decomposition import Decomposition
 from alloc.allocators.heuristic.greedy.list_schedule import load_compiled
-from alloc.allocators.parallel.processors import available_threads
 from alloc.allocators.refusal import refuse
 from alloc.allocators.registry import load
 from alloc.allocators.replanning.plan import concluded, replanning
@@ -30,6 +29,7 @@ from alloc.allocators.request import (
     checked_seed,
     checked_threads,
     checked_tolerance,
+    default_threads,
 )
 from alloc.allocators.result import Result
 from alloc.allocators.runtime.interrupts import ended_with_process, signals_set
@@ -86,7 +86,8 @@ def solve(
         A warm start; the answer is never worse. A dict gives the task id of each agent id, None for idle. Agents and
         tasks that have gone since are left out.
     threads : int, optional
-        Threads that the method may use; as many as there are processors by default.
+        Threads that the method may use. By default as many as there are processors; one, if the budget is a number of
+        iterations without a time limit, so that the answer is the same on every machine.
     makespan_slack, makespan_limit : float
         Relative excess over the fastest allocation found, and hours, up to which makespans are equally good, so that
         the energy decides; for the objective ``makespan-energy``. See `MakespanTolerance`.
@@ -125,14 +126,15 @@ def solve(
     price = float(real(move_price, "move_price"))
     tell = function(on_improvement, "on_improvement")
     plan_in_force = replanning(instance, goal, plan, carried, price, checked_pins(pins))
+    budget = Budget(time_limit_s, iterations, target_gap)
     request = Request(
         instance=plan_in_force.priced_instance,
         objective=plan_in_force.method_objective,
-        budget=Budget(time_limit_s, iterations, target_gap),
+        budget=budget,
         tolerance=checked_tolerance(makespan_slack, makespan_limit, goal),
         seed=checked_seed(seed),
         start=None if plan is None else plan_in_force.completed(plan),
-        threads=checked_threads(threads) or available_threads(),
+        threads=checked_threads(threads) or default_threads(budget),
         on_improvement=None if tell is None else lambda improvement: tell(plan_in_force.told(improvement)),
         stop=event(stop, "stop") or threading.Event(),
         pinned=bool(plan_in_force.pinned.any()),

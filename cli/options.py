@@ -95,7 +95,10 @@ IterationsOption = Annotated[
 TargetGapOption = Annotated[float | None, typer.Option(help="Stop at this relative gap of the makespan; 0.01 is 1 %.")]
 SeedOption = Annotated[int, typer.Option(min=0, max=2**63 - 1, help="Seed of all random numbers.")]
 ThreadsOption = Annotated[
-    int | None, typer.Option(min=1, max=1024, help="Threads that share the work.", show_default="all processors")
+    int | None,
+    typer.Option(
+        min=1, max=1024, help="Threads that share the work.", show_default="all processors; 1 with --iterations alone"
+    ),
 ]
 PlotOption = Annotated[str | None, typer.Option(metavar="FILE", help="Draw it as .png, .svg or .pdf.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON to standard output.")]

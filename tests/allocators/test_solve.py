@@ -19,6 +19,7 @@ from alloc.allocators import (
     load,
     solve,
 )
+from alloc.allocators.parallel.processors import available_threads
 from alloc.problems import Allocation, InputError, Instance, Objective
 
 
@@ -53,6 +54,22 @@ def test_scores_what_is_proposed(instance: Instance) -> None:
         StopReason.FINISHED,
     )
     assert poor.gap == pytest.approx(0.25)
+
+
+def test_counted_runs_have_one_thread(instance: Instance) -> None:
+    """Iterations without a time limit mean the same on every machine: one thread unless more are asked for."""
+    seen = []
+
+    class Counts(Answers):
+        def allocate(self, search: Search) -> Proposal:
+            seen.append(search.threads)
+            return self.proposal
+
+    counts = Counts(Proposal(Allocation([0, 1, 0])))
+    solve(instance, counts, iterations=5, time_limit_s=None)
+    solve(instance, counts, iterations=5, time_limit_s=None, threads=3)
+    solve(instance, counts, iterations=5, time_limit_s=1)
+    assert seen == [1, 3, available_threads()]
 
 
 def test_serves_what_was_left_unserved(instance: Instance) -> None:
