@@ -196,8 +196,8 @@ class PenaltyFactor:
         self._period = EXCHANGES_PER_AGENT * state.instance.n / exchanges if allowed >= LEAST_EXCHANGES else math.inf
         self._iterations, self._short_periods = 0, 0
 
-    def update(self, iterations: int = 1) -> None:
-        """Take note of iterations made."""
+    def update(self, iterations: int) -> None:
+        """Take note of so many iterations more."""
         self._iterations += iterations
         if self._iterations < self._period:
             return
