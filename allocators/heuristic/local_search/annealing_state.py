@@ -196,9 +196,9 @@ class PenaltyFactor:
         self._period = EXCHANGES_PER_AGENT * state.instance.n / exchanges if allowed >= LEAST_EXCHANGES else math.inf
         self._iterations, self._short_periods = 0, 0
 
-    def update(self, iterations: int) -> None:
-        """Take note of so many iterations more."""
-        self._iterations += iterations
+    def update(self) -> None:
+        """Take note of an iteration."""
+        self._iterations += 1
         if self._iterations < self._period:
             return
         self._iterations = 0

@@ -167,7 +167,7 @@ def reduce_energy(search: Search, state: AnnealingState, parameters: LocalSearch
         is_hard = initial <= final * 1.001 or progress > HARD_FROM
         state.run(parameters.exchanges, parameters.weights(state, noise, HARD if is_hard else factor.value))
         search.iteration += 1
-        factor.update(1)
+        factor.update()
         report()
     report(at_once=True)
 

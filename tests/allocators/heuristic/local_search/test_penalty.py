@@ -41,10 +41,10 @@ def lose(state):
 def test_the_penalty_falls_without_shortfalls_down_to_a_limit(state):
     """Periods that end without a shortfall lower it, and it stays above the limit."""
     factor = PenaltyFactor(state, 10**9, 1e9)
-    factor.update(1)
+    factor.update()
     assert factor.value == pytest.approx(FALL)
     for _ in range(100):
-        factor.update(1)
+        factor.update()
     assert factor.value == LOWEST
 
 
@@ -53,9 +53,9 @@ def test_the_search_returns_to_its_best_plan(state):
     factor, best = PenaltyFactor(state, 10**9, 1e9), state.best
     lose(state)
     for _ in range(PATIENCE):
-        factor.update(1)
+        factor.update()
         assert state.n_short > 0
-    factor.update(1)
+    factor.update()
     assert state.allocation == best
     assert state.n_short == 0
     assert factor.value == pytest.approx(RISE ** (PATIENCE + 1))
@@ -67,5 +67,5 @@ def test_a_short_budget_leaves_the_penalty_alone(state):
     """Where the budget allows few exchanges for each agent, nothing adapts."""
     factor = PenaltyFactor(state, 10**9, LEAST_EXCHANGES - 1)
     for _ in range(10):
-        factor.update(1)
+        factor.update()
     assert factor.value == 1.0
