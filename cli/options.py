@@ -27,7 +27,7 @@ BUILT_IN_METHODS = (
 )
 """For completion, which must not load numpy; a test compares them with the registry."""
 
-BUILT_IN_POLICIES = ("idle", "random", "nearest", "greedy", "hedonic", "auction", "replan")
+BUILT_IN_POLICIES = ("idle", "random", "nearest", "greedy", "hedonic", "auction", "replan", "routes", "clairvoyant")
 """For completion, likewise."""
 
 READABLE = "a .json or .npz file, a folder with agents.csv and tasks.csv, or - for JSON on standard input"

@@ -18,6 +18,8 @@ POLICIES = {
     "hedonic": "alloc.allocators.online.policies.hedonic:HedonicCoalitions",
     "auction": "alloc.allocators.online.policies.auction:ConsensusAuction",
     "replan": "alloc.allocators.online.policies.replan:Replan",
+    "routes": "alloc.allocators.online.policies.routes:Routes",
+    "clairvoyant": "alloc.allocators.online.policies.clairvoyant:Clairvoyant",
 }
 
 

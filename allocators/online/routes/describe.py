@@ -1,0 +1,202 @@
+"""A situation as arrays, from what is known of a mission."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from alloc.allocators.online.routes.situation import EUCLIDEAN, FIXED, MANHATTAN, Bools, Floats, Ints, Situation
+from alloc.problems.distances.metric import distance_table, distances, manhattan_distances
+from alloc.problems.missions.simulation.places import Place
+from alloc.problems.missions.simulation.reports import AgentReport, TaskReport, View
+from alloc.problems.missions.simulation.state import ACTIVE, AgentStatus, TaskStatus
+from alloc.problems.vocabulary import GEOGRAPHIC
+from alloc.problems.vocabulary import MANHATTAN as MANHATTAN_METRIC
+
+NEAR = 24
+"""Tasks that count as near another one."""
+
+PRIORITY_OF_NONE = 1e-3
+"""Priority that tasks without any count by, over the greatest, as they have to be done as well."""
+
+
+@dataclass(frozen=True)
+class Foresight:
+    """What is known to come.
+
+    Attributes
+    ----------
+    tasks : mapping of str to TaskReport
+        Those that will appear; their status is that they are to come.
+    agents : mapping of str to AgentReport
+        Those that will join.
+    events : sequence of (hour, kind, id, amount)
+        In the order of time.
+    """
+
+    tasks: Mapping[str, TaskReport] = field(default_factory=dict)
+    agents: Mapping[str, AgentReport] = field(default_factory=dict)
+    events: Sequence[tuple[float, int, str, float]] = ()
+
+
+@dataclass(frozen=True)
+class Described:
+    """A situation, and whom and what its rows stand for."""
+
+    situation: Situation
+    agents: list[AgentReport]
+    tasks: list[TaskReport]
+    nearest: Ints
+
+
+class Describer:
+    """Describes the situations of one mission; it remembers which growing tasks were begun, and their distances.
+
+    Parameters
+    ----------
+    end : float
+        Hour at which the mission ends.
+    pace : float
+        Work of a group per hour over its ability, on average.
+    price : float
+        Of a switch, in units of the hours that all work would take without flights.
+    """
+
+    def __init__(self, end: float, pace: float, price: float) -> None:
+        self._end, self._pace, self._price = end, pace, price
+        self._begun: set[str] = set()
+        self._seen: dict[str, float] = {}
+        self._ways: dict[tuple[str, str], float] = {}
+
+    def describe(self, view: View, foresight: Foresight) -> Described | None:
+        """Return the situation that a view shows; None where nobody can come, or nothing is left."""
+        coming = {name for _, kind, name, _ in foresight.events if kind == 1}
+        known = {**view.agents, **foresight.agents}
+        agents = [one for name, one in known.items() if one.status in ACTIVE or name in coming]
+        tasks = [one for one in view.tasks.values() if one.status is TaskStatus.OPEN]
+        self._note_begun(agents, tasks)
+        tasks += [one for name, one in foresight.tasks.items() if name not in view.tasks]
+        if not agents or not tasks:
+            return None
+        situation = self._situation(view, agents, tasks, foresight)
+        near = min(NEAR, len(tasks) - 1)
+        nearest = np.argpartition(situation.distance, near, axis=1)[:, : near + 1].astype(np.int64)
+        return Described(situation, agents, tasks, nearest)
+
+    def _note_begun(self, agents: list[AgentReport], tasks: list[TaskReport]) -> None:
+        """A growing task is begun when somebody works there, or it no longer grows."""
+        self._begun.update(str(one.task) for one in agents if one.status is AgentStatus.WORKING)
+        for task in tasks:
+            if task.facts.growth > 0:
+                name = task.facts.id
+                if task.left <= self._seen.get(name, -math.inf):
+                    self._begun.add(name)
+                self._seen[name] = task.left
+
+    def _situation(
+        self, view: View, agents: list[AgentReport], tasks: list[TaskReport], foresight: Foresight
+    ) -> Situation:
+        row = {one.facts.id: i for i, one in enumerate(agents)}
+        column = {one.facts.id: j for j, one in enumerate(tasks)}
+        place, site = _positions([one.place for one in agents]), _positions([one.facts.place for one in tasks])
+        ability, left = _array([one.facts.ability for one in agents]), _array([one.left for one in tasks])
+        active = np.array([one.status in ACTIVE for one in agents])
+        aim = np.array([column.get(one.task or "", -1) for one in agents])
+        works = np.array([one.status is AgentStatus.WORKING for one in agents])
+        events = [
+            (hour, kind, (row if kind < 3 else column)[name], amount)
+            for hour, kind, name, amount in foresight.events
+            if name in row or name in column
+        ]
+        hours, kinds, indices, amounts = zip(*events, strict=True) if events else ((), (), (), ())
+        is_fixed = view.has_table or view.metric == GEOGRAPHIC
+        return Situation(
+            hour=float(view.hour),
+            end=float(self._end),
+            ability=ability,
+            speed=_array([one.facts.speed for one in agents]),
+            consumption=_array([one.facts.energy_per_distance for one in agents]),
+            reach=_array([one.facts.range for one in agents]),
+            battery=_array([one.battery for one in agents]),
+            free=np.full(len(agents), view.hour, np.float64),
+            active=active,
+            at=np.where(works, aim, -1),
+            aim=aim,
+            left=left,
+            growth=_array([one.facts.growth for one in tasks]),
+            weight=_weights(_array([one.facts.priority for one in tasks])),
+            deadline=_array([one.facts.deadline for one in tasks]),
+            appears=_array([one.facts.appears for one in tasks]),
+            is_open=np.array([one.status is TaskStatus.OPEN for one in tasks]),
+            begun=np.array([one.facts.id in self._begun for one in tasks]),
+            allowed=_allowed(agents, tasks),
+            start_distance=self._starts(view, agents, tasks) if is_fixed else _by_metric(view.metric, place, site),
+            distance=self._between(view, tasks) if is_fixed else _by_metric(view.metric, site, site),
+            home=_home(view, agents, tasks),
+            place=place,
+            site=site,
+            metric=FIXED if is_fixed else MANHATTAN if view.metric == MANHATTAN_METRIC else EUCLIDEAN,
+            pace=float(self._pace),
+            event_hour=np.array(hours, np.float64),
+            event_amount=np.array(amounts, np.float64),
+            event_kind=np.array(kinds, np.int64),
+            event_index=np.array(indices, np.int64),
+            has_missed=any(one.status is TaskStatus.MISSED for one in view.tasks.values()),
+            price=float(self._price),
+            scale=max(1e-9, float(left.sum() / (ability.sum() * self._pace))),
+        )
+
+    def _starts(self, view: View, agents: list[AgentReport], tasks: list[TaskReport]) -> Floats:
+        return np.array([[view.distance(agent, task) for task in tasks] for agent in agents])
+
+    def _between(self, view: View, tasks: list[TaskReport]) -> Floats:
+        table = np.zeros((len(tasks), len(tasks)))
+        for i, one in enumerate(tasks):
+            for j, other in enumerate(tasks):
+                pair = one.facts.id, other.facts.id
+                if pair not in self._ways:
+                    self._ways[pair] = view.between(one, other)
+                table[i, j] = self._ways[pair]
+        return table
+
+
+def _array(values: list[float]) -> Floats:
+    return np.array(values, np.float64)
+
+
+def _positions(places: list[Place]) -> Floats:
+    return np.array([place.position or (math.nan,) * 3 for place in places], np.float64)
+
+
+def _by_metric(metric: str, sources: Floats, goals: Floats) -> Floats:
+    table = distance_table(sources, goals, manhattan_distances if metric == MANHATTAN_METRIC else distances)
+    return np.ascontiguousarray(table, np.float64)
+
+
+def _weights(priority: Floats) -> Floats:
+    """Return priorities that sum to 1, with a little for tasks that have none."""
+    greatest = float(priority.max())
+    weight = np.maximum(priority, PRIORITY_OF_NONE * greatest) if greatest > 0 else np.ones(len(priority))
+    return np.asarray(weight / weight.sum(), np.float64)
+
+
+def _allowed(agents: list[AgentReport], tasks: list[TaskReport]) -> Bools:
+    allowed = np.ones((len(agents), len(tasks)), np.bool_)
+    for i, agent in enumerate(agents):
+        names = agent.facts.tasks
+        if names is not None:
+            allowed[i] = [task.facts.id in names for task in tasks]
+    if any(task.facts.needs for task in tasks):
+        allowed &= np.array([[task.facts.needs <= agent.facts.skills for task in tasks] for agent in agents])
+    return allowed
+
+
+def _home(view: View, agents: list[AgentReport], tasks: list[TaskReport]) -> Floats:
+    home = np.zeros((len(tasks), len(agents)))
+    for i, agent in enumerate(agents):
+        if agent.facts.returns:
+            for j, task in enumerate(tasks):
+                there = AgentReport(agent.facts, view.hour, agent.status, agent.facts.start, 0.0, None)
+                home[j, i] = view.distance(there, task)
+    return home

@@ -1,0 +1,171 @@
+"""Where a task fits best into routes: by one agent, or by a coalition where one is too slow."""
+
+import numpy as np
+
+from alloc.allocators.online.routes.schedule import Schedule
+from alloc.allocators.online.routes.situation import Floats, Ints, Situation
+from alloc.allocators.runtime.compiled import compiled
+
+
+@compiled
+def tidy(r: Schedule, routes: Ints, lengths: Ints) -> None:
+    """Take visits off routes that come to nothing."""
+    for i in range(len(lengths)):
+        kept = 0
+        for p in range(lengths[i]):
+            if not np.isnan(r.arrive[i, p]):
+                routes[i, kept], r.arrive[i, kept] = routes[i, p], r.arrive[i, p]
+                r.leave[i, kept] = r.leave[i, p]
+                kept += 1
+        lengths[i] = kept
+
+
+@compiled
+def find_slack(s: Situation, r: Schedule, routes: Ints, lengths: Ints, slack: Floats, i: int) -> None:
+    """Fill in by how much each visit of an agent may come later before a deadline is missed."""
+    least = np.inf
+    for p in range(lengths[i] - 1, -1, -1):
+        leave = r.leave[i, p]
+        if np.isnan(leave):
+            leave = r.arrive[i, p]
+        least = min(least, min(s.deadline[routes[i, p]], s.end) - leave)
+        slack[i, p] = least
+
+
+@compiled
+def hours_of_work(s: Situation, j: int, arrives: float, ability: float) -> float:
+    """Return how long a task takes that is begun at an hour."""
+    left = s.left[j]
+    if s.growth[j] > 0 and not s.begun[j]:
+        left += s.growth[j] * (arrives - max(s.hour, s.appears[j]))
+    return left / (ability * s.pace)
+
+
+@compiled
+def place_between(
+    s: Situation, r: Schedule, routes: Ints, lengths: Ints, slack: Floats, i: int, p: int, j: int
+) -> tuple[float, float, float]:
+    """Return when an agent would be at a task that is its visit `p`, when it must leave, and what the detour adds.
+
+    The first is ``inf`` where it cannot.
+    """
+    if p == 0:
+        begins, there, before = max(s.hour, s.free[i]), s.start_distance[i, j], -1
+    else:
+        before = routes[i, p - 1]
+        begins, there = r.leave[i, p - 1], s.distance[before, j]
+        if np.isnan(begins):
+            return np.inf, 0.0, 0.0
+    detour, latest = there, s.end
+    if p < lengths[i]:
+        after = routes[i, p]
+        direct = s.start_distance[i, after] if before < 0 else s.distance[before, after]
+        detour += s.distance[j, after] - direct
+        latest = r.arrive[i, p] + slack[i, p] - s.distance[j, after] / s.speed[i]
+    energy = s.consumption[i] * detour
+    if there > s.reach[i] or (energy > 0 and energy + s.consumption[i] * 0.0 > r.fuel[i]):
+        return np.inf, 0.0, 0.0
+    arrives = max(begins + there / s.speed[i], s.appears[j] if not s.is_open[j] else s.hour)
+    return arrives, latest, detour
+
+
+@compiled
+def insert(
+    s: Situation, r: Schedule, routes: Ints, lengths: Ints, slack: Floats, i: int, p: int, j: int, leaves: float
+) -> None:
+    """Put a task into a route, which it is left at an hour; what comes later is put off."""
+    arrives, _, detour = place_between(s, r, routes, lengths, slack, i, p, j)
+    r.fuel[i] -= s.consumption[i] * detour
+    delay = 0.0
+    if p < lengths[i]:
+        delay = max(0.0, leaves + s.distance[j, routes[i, p]] / s.speed[i] - r.arrive[i, p])
+    for q in range(lengths[i], p, -1):
+        routes[i, q] = routes[i, q - 1]
+        r.arrive[i, q], r.leave[i, q] = r.arrive[i, q - 1] + delay, r.leave[i, q - 1] + delay
+    routes[i, p], r.arrive[i, p], r.leave[i, p] = j, arrives, leaves
+    lengths[i] += 1
+    find_slack(s, r, routes, lengths, slack, i)
+
+
+@compiled
+def insert_best(
+    s: Situation, r: Schedule, routes: Ints, lengths: Ints, slack: Floats, j: int, balance: float, blink: float
+) -> bool:
+    """Put a task where the least time is lost, into one route or, where none can do it in time, into several.
+
+    Parameters
+    ----------
+    balance : float
+        What the end of a route counts beside the time that the task takes from it.
+    blink : float
+        Share of the places that are passed over.
+
+    Returns
+    -------
+    bool
+        Whether there was a place.
+    """
+    best, best_i, best_p, best_leaves = np.inf, -1, -1, 0.0
+    for i in range(len(lengths)):
+        count = lengths[i]
+        if not s.allowed[i, j] or count >= routes.shape[1]:
+            continue
+        if count == 0:
+            end = max(s.hour, s.free[i])
+        else:
+            end = r.leave[i, count - 1]
+        for p in range(count + 1):
+            arrives, latest, detour = place_between(s, r, routes, lengths, slack, i, p, j)
+            if arrives >= s.deadline[j]:
+                if arrives < np.inf:
+                    break
+                continue
+            hours = hours_of_work(s, j, arrives, s.ability[i])
+            leaves = arrives + hours
+            if leaves > s.deadline[j] or leaves > latest:
+                continue
+            lost = hours + detour / s.speed[i]
+            cost = lost + balance * (max(end, leaves) if p == count else end + lost)
+            if cost < best and np.random.random() >= blink:
+                best, best_i, best_p, best_leaves = cost, i, p, leaves
+    if best_i >= 0:
+        insert(s, r, routes, lengths, slack, best_i, best_p, j, best_leaves)
+        return True
+    return s.deadline[j] < np.inf and _insert_coalition(s, r, routes, lengths, slack, j)
+
+
+@compiled
+def _insert_coalition(s: Situation, r: Schedule, routes: Ints, lengths: Ints, slack: Floats, j: int) -> bool:
+    """Let as few agents as can do it in time meet at a task: those first that have most time for it."""
+    n = len(lengths)
+    window, place, arrival, limit = np.zeros(n), np.zeros(n, np.int64), np.zeros(n), np.zeros(n)
+    for i in range(n):
+        if not s.allowed[i, j] or lengths[i] >= routes.shape[1]:
+            continue
+        for p in range(lengths[i] + 1):
+            arrives, latest, _ = place_between(s, r, routes, lengths, slack, i, p, j)
+            if arrives >= s.deadline[j]:
+                if arrives < np.inf:
+                    break
+                continue
+            until = min(latest, s.deadline[j])
+            if (until - arrives) * s.ability[i] > window[i]:
+                window[i] = (until - arrives) * s.ability[i]
+                place[i], arrival[i], limit[i] = p, arrives, until
+    order = np.argsort(-window)
+    ability, late, until, first = 0.0, 0.0, np.inf, np.inf
+    for k in range(n):
+        i = order[k]
+        if window[i] <= 0:
+            return False
+        ability += s.ability[i]
+        late += s.ability[i] * arrival[i]
+        until, first = min(until, limit[i]), min(first, arrival[i])
+        work = hours_of_work(s, j, first, 1.0)
+        end = (work + late) / ability
+        if end <= until:
+            for member in order[: k + 1]:
+                if arrival[member] < end:
+                    insert(s, r, routes, lengths, slack, member, place[member], j, end)
+            return True
+    return False
