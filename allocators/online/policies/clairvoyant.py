@@ -31,9 +31,7 @@ class Clairvoyant(Routes):
     what the pace will be it does not know.
     """
 
-    info = PolicyInfo(
-        name="clairvoyant", summary="routes, knowing all that is to come", central=True, clairvoyant=True
-    )
+    info = PolicyInfo(name="clairvoyant", summary="routes, knowing all that is to come", central=True, clairvoyant=True)
     parameters_type: ClassVar[type] = RoutesParameters
 
     def begin(self, briefing: Briefing) -> FleetDecider:

@@ -105,7 +105,9 @@ class RoutePlanner(FleetDecider):
         }
         return dict(self._orders(view, described, first_tasks(described.situation, routes, lengths)))
 
-    def _orders(self, view: View, described: Described, first: np.ndarray[tuple[int], np.dtype[np.int64]]) -> list[tuple[str, Order]]:
+    def _orders(
+        self, view: View, described: Described, first: np.ndarray[tuple[int], np.dtype[np.int64]]
+    ) -> list[tuple[str, Order]]:
         orders = []
         for agent, j in zip(described.agents, first.tolist(), strict=True):
             if agent.status not in ACTIVE:
@@ -117,6 +119,8 @@ class RoutePlanner(FleetDecider):
                 if task.status is TaskStatus.TO_COME:
                     site = task.facts.place
                     is_there = view.distance_to_place(agent, site) == 0
-                    order = STAY if site.position is None or view.has_table or is_there else Order(position=site.position)
+                    order = (
+                        STAY if site.position is None or view.has_table or is_there else Order(position=site.position)
+                    )
             orders.append((agent.facts.id, order))
         return orders

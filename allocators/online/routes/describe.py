@@ -6,7 +6,21 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from alloc.allocators.online.routes.situation import EUCLIDEAN, FIXED, MANHATTAN, Bools, Floats, Ints, Situation
+from alloc.allocators.online.routes.situation import (
+    AGENT,
+    EUCLIDEAN,
+    EVENT,
+    FIXED,
+    IN,
+    MANHATTAN,
+    OPENS,
+    TASK,
+    Bools,
+    Floats,
+    Ints,
+    Situation,
+    records,
+)
 from alloc.problems.distances.metric import distance_table, distances, manhattan_distances
 from alloc.problems.missions.simulation.places import Place
 from alloc.problems.missions.simulation.reports import AgentReport, TaskReport, View
@@ -71,7 +85,7 @@ class Describer:
 
     def describe(self, view: View, foresight: Foresight) -> Described | None:
         """Return the situation that a view shows; None where nobody can come, or nothing is left."""
-        coming = {name for _, kind, name, _ in foresight.events if kind == 1}
+        coming = {name for _, kind, name, _ in foresight.events if kind == IN}
         known = {**view.agents, **foresight.agents}
         agents = [one for name, one in known.items() if one.status in ACTIVE or name in coming]
         tasks = [one for one in view.tasks.values() if one.status is TaskStatus.OPEN]
@@ -101,35 +115,44 @@ class Describer:
         column = {one.facts.id: j for j, one in enumerate(tasks)}
         place, site = _positions([one.place for one in agents]), _positions([one.facts.place for one in tasks])
         ability, left = _array([one.facts.ability for one in agents]), _array([one.left for one in tasks])
-        active = np.array([one.status in ACTIVE for one in agents])
         aim = np.array([column.get(one.task or "", -1) for one in agents])
         works = np.array([one.status is AgentStatus.WORKING for one in agents])
+        rows = records(
+            AGENT,
+            len(agents),
+            ability=ability,
+            speed=[one.facts.speed for one in agents],
+            consumption=[one.facts.energy_per_distance for one in agents],
+            reach=[one.facts.range for one in agents],
+            battery=[one.battery for one in agents],
+            free=view.hour,
+            active=[one.status in ACTIVE for one in agents],
+            at=np.where(works, aim, -1),
+            aim=aim,
+        )
+        columns = records(
+            TASK,
+            len(tasks),
+            left=left,
+            growth=[one.facts.growth for one in tasks],
+            weight=_weights(_array([one.facts.priority for one in tasks])),
+            deadline=[one.facts.deadline for one in tasks],
+            appears=[one.facts.appears for one in tasks],
+            is_open=[one.status is TaskStatus.OPEN for one in tasks],
+            begun=[one.facts.id in self._begun for one in tasks],
+        )
         events = [
-            (hour, kind, (row if kind < 3 else column)[name], amount)
+            (hour, amount, kind, (row if kind < OPENS else column)[name])
             for hour, kind, name, amount in foresight.events
             if name in row or name in column
         ]
-        hours, kinds, indices, amounts = zip(*events, strict=True) if events else ((), (), (), ())
         is_fixed = view.has_table or view.metric == GEOGRAPHIC
         return Situation(
             hour=float(view.hour),
             end=float(self._end),
-            ability=ability,
-            speed=_array([one.facts.speed for one in agents]),
-            consumption=_array([one.facts.energy_per_distance for one in agents]),
-            reach=_array([one.facts.range for one in agents]),
-            battery=_array([one.battery for one in agents]),
-            free=np.full(len(agents), view.hour, np.float64),
-            active=active,
-            at=np.where(works, aim, -1),
-            aim=aim,
-            left=left,
-            growth=_array([one.facts.growth for one in tasks]),
-            weight=_weights(_array([one.facts.priority for one in tasks])),
-            deadline=_array([one.facts.deadline for one in tasks]),
-            appears=_array([one.facts.appears for one in tasks]),
-            is_open=np.array([one.status is TaskStatus.OPEN for one in tasks]),
-            begun=np.array([one.facts.id in self._begun for one in tasks]),
+            agents=rows,
+            tasks=columns,
+            events=np.array(events, EVENT),
             allowed=_allowed(agents, tasks),
             start_distance=self._starts(view, agents, tasks) if is_fixed else _by_metric(view.metric, place, site),
             distance=self._between(view, tasks) if is_fixed else _by_metric(view.metric, site, site),
@@ -138,10 +161,6 @@ class Describer:
             site=site,
             metric=FIXED if is_fixed else MANHATTAN if view.metric == MANHATTAN_METRIC else EUCLIDEAN,
             pace=float(self._pace),
-            event_hour=np.array(hours, np.float64),
-            event_amount=np.array(amounts, np.float64),
-            event_kind=np.array(kinds, np.int64),
-            event_index=np.array(indices, np.int64),
             has_missed=any(one.status is TaskStatus.MISSED for one in view.tasks.values()),
             price=float(self._price),
             scale=max(1e-9, float(left.sum() / (ability.sum() * self._pace))),

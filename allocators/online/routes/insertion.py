@@ -28,16 +28,16 @@ def find_slack(s: Situation, r: Schedule, routes: Ints, lengths: Ints, slack: Fl
         leave = r.leave[i, p]
         if np.isnan(leave):
             leave = r.arrive[i, p]
-        least = min(least, min(s.deadline[routes[i, p]], s.end) - leave)
+        least = min(least, min(s.tasks[routes[i, p]].deadline, s.end) - leave)
         slack[i, p] = least
 
 
 @compiled
 def hours_of_work(s: Situation, j: int, arrives: float, ability: float) -> float:
     """Return how long a task takes that is begun at an hour."""
-    left = s.left[j]
-    if s.growth[j] > 0 and not s.begun[j]:
-        left += s.growth[j] * (arrives - max(s.hour, s.appears[j]))
+    left = s.tasks[j].left
+    if s.tasks[j].growth > 0 and not s.tasks[j].begun:
+        left += s.tasks[j].growth * (arrives - max(s.hour, s.tasks[j].appears))
     return left / (ability * s.pace)
 
 
@@ -50,7 +50,7 @@ def place_between(
     The first is ``inf`` where it cannot.
     """
     if p == 0:
-        begins, there, before = max(s.hour, s.free[i]), s.start_distance[i, j], -1
+        begins, there, before = max(s.hour, s.agents[i].free), s.start_distance[i, j], -1
     else:
         before = routes[i, p - 1]
         begins, there = r.leave[i, p - 1], s.distance[before, j]
@@ -61,11 +61,11 @@ def place_between(
         after = routes[i, p]
         direct = s.start_distance[i, after] if before < 0 else s.distance[before, after]
         detour += s.distance[j, after] - direct
-        latest = r.arrive[i, p] + slack[i, p] - s.distance[j, after] / s.speed[i]
-    energy = s.consumption[i] * detour
-    if there > s.reach[i] or (energy > 0 and energy + s.consumption[i] * 0.0 > r.fuel[i]):
+        latest = r.arrive[i, p] + slack[i, p] - s.distance[j, after] / s.agents[i].speed
+    energy = s.agents[i].consumption * detour
+    if there > s.agents[i].reach or (energy > 0 and energy + s.agents[i].consumption * 0.0 > r.agents[i].fuel):
         return np.inf, 0.0, 0.0
-    arrives = max(begins + there / s.speed[i], s.appears[j] if not s.is_open[j] else s.hour)
+    arrives = max(begins + there / s.agents[i].speed, s.tasks[j].appears if not s.tasks[j].is_open else s.hour)
     return arrives, latest, detour
 
 
@@ -75,10 +75,10 @@ def insert(
 ) -> None:
     """Put a task into a route, which it is left at an hour; what comes later is put off."""
     arrives, _, detour = place_between(s, r, routes, lengths, slack, i, p, j)
-    r.fuel[i] -= s.consumption[i] * detour
+    r.agents[i].fuel -= s.agents[i].consumption * detour
     delay = 0.0
     if p < lengths[i]:
-        delay = max(0.0, leaves + s.distance[j, routes[i, p]] / s.speed[i] - r.arrive[i, p])
+        delay = max(0.0, leaves + s.distance[j, routes[i, p]] / s.agents[i].speed - r.arrive[i, p])
     for q in range(lengths[i], p, -1):
         routes[i, q] = routes[i, q - 1]
         r.arrive[i, q], r.leave[i, q] = r.arrive[i, q - 1] + delay, r.leave[i, q - 1] + delay
@@ -111,27 +111,27 @@ def insert_best(
         if not s.allowed[i, j] or count >= routes.shape[1]:
             continue
         if count == 0:
-            end = max(s.hour, s.free[i])
+            end = max(s.hour, s.agents[i].free)
         else:
             end = r.leave[i, count - 1]
         for p in range(count + 1):
             arrives, latest, detour = place_between(s, r, routes, lengths, slack, i, p, j)
-            if arrives >= s.deadline[j]:
+            if arrives >= s.tasks[j].deadline:
                 if arrives < np.inf:
                     break
                 continue
-            hours = hours_of_work(s, j, arrives, s.ability[i])
+            hours = hours_of_work(s, j, arrives, s.agents[i].ability)
             leaves = arrives + hours
-            if leaves > s.deadline[j] or leaves > latest:
+            if leaves > s.tasks[j].deadline or leaves > latest:
                 continue
-            lost = hours + detour / s.speed[i]
+            lost = hours + detour / s.agents[i].speed
             cost = lost + balance * (max(end, leaves) if p == count else end + lost)
             if cost < best and np.random.random() >= blink:
                 best, best_i, best_p, best_leaves = cost, i, p, leaves
     if best_i >= 0:
         insert(s, r, routes, lengths, slack, best_i, best_p, j, best_leaves)
         return True
-    return s.deadline[j] < np.inf and _insert_coalition(s, r, routes, lengths, slack, j)
+    return s.tasks[j].deadline < np.inf and _insert_coalition(s, r, routes, lengths, slack, j)
 
 
 @compiled
@@ -144,13 +144,13 @@ def _insert_coalition(s: Situation, r: Schedule, routes: Ints, lengths: Ints, sl
             continue
         for p in range(lengths[i] + 1):
             arrives, latest, _ = place_between(s, r, routes, lengths, slack, i, p, j)
-            if arrives >= s.deadline[j]:
+            if arrives >= s.tasks[j].deadline:
                 if arrives < np.inf:
                     break
                 continue
-            until = min(latest, s.deadline[j])
-            if (until - arrives) * s.ability[i] > window[i]:
-                window[i] = (until - arrives) * s.ability[i]
+            until = min(latest, s.tasks[j].deadline)
+            if (until - arrives) * s.agents[i].ability > window[i]:
+                window[i] = (until - arrives) * s.agents[i].ability
                 place[i], arrival[i], limit[i] = p, arrives, until
     order = np.argsort(-window)
     ability, late, until, first = 0.0, 0.0, np.inf, np.inf
@@ -158,8 +158,8 @@ def _insert_coalition(s: Situation, r: Schedule, routes: Ints, lengths: Ints, sl
         i = order[k]
         if window[i] <= 0:
             return False
-        ability += s.ability[i]
-        late += s.ability[i] * arrival[i]
+        ability += s.agents[i].ability
+        late += s.agents[i].ability * arrival[i]
         until, first = min(until, limit[i]), min(first, arrival[i])
         work = hours_of_work(s, j, first, 1.0)
         end = (work + late) / ability

@@ -100,7 +100,7 @@ def _latest(r: Schedule, routes: Ints, lengths: Ints) -> int:
     last, hour = routes[0, 0], -np.inf
     for i in range(len(lengths)):
         for p in range(lengths[i]):
-            finish = r.finish[routes[i, p]]
+            finish = r.tasks[routes[i, p]].finish
             if finish > hour:
                 last, hour = routes[i, p], finish
     return last

@@ -8,7 +8,7 @@ import numpy as np
 from alloc.allocators.online.routes.describe import Described
 from alloc.allocators.online.routes.schedule import new_schedule, play
 from alloc.allocators.online.routes.search import improve
-from alloc.allocators.online.routes.situation import EUCLIDEAN, Ints, Situation
+from alloc.allocators.online.routes.situation import AGENT, EUCLIDEAN, EVENT, TASK, Ints, Situation, records
 
 PORTION = 25
 """Changes between two looks at the clock."""
@@ -44,11 +44,12 @@ def improved(
         kept = [column[name] for name in before.get(agent.facts.id, ()) if name in column][: routes.shape[1]]
         routes[i, : len(kept)] = kept
         lengths[i] = len(kept)
+    schedule = new_schedule(n, m, routes.shape[1], len(situation.events))
     planned = {j for i in range(n) for j in routes[i, : lengths[i]].tolist()}
     is_new, done = len(planned) < m, 0
     while is_new or done < iterations:
         portion = iterations if until is None else min(PORTION, iterations - done)
-        improve(situation, described.nearest, routes, lengths, portion, (seed + 7919 * done) % 2**31, is_new)
+        improve(situation, schedule, described.nearest, routes, lengths, portion, (seed + 7919 * done) % 2**31, is_new)
         is_new, done = False, done + portion
         if until is not None and time.perf_counter() >= until:
             break
@@ -57,22 +58,20 @@ def improved(
 
 def first_tasks(situation: Situation, routes: Ints, lengths: Ints) -> Ints:
     """Return the task to which each agent goes first, -1 for none."""
-    schedule = new_schedule(*situation.start_distance.shape, routes.shape[1], len(situation.event_hour))
+    schedule = new_schedule(*situation.start_distance.shape, routes.shape[1], len(situation.events))
     play(situation, schedule, routes, lengths)
-    return schedule.first
+    return schedule.agents["first"]
 
 
 def warm_up() -> None:
     """Compile the loops, or read them from their cache."""
-    one, site = np.ones(1), np.zeros((1, 3))
-    yes, none = np.ones(1, np.bool_), np.full(1, -1)
-    numbers, indices = np.zeros(0), np.zeros(0, np.int64)
-    table = np.zeros((1, 1))
+    table, site = np.zeros((1, 1)), np.zeros((1, 3))
+    agents = records(AGENT, 1, ability=1, speed=1, reach=1, battery=1, active=1, at=-1, aim=-1)
+    tasks = records(TASK, 1, left=1, weight=1, deadline=9, is_open=1)
+    allowed, events = np.ones((1, 1), np.bool_), records(EVENT, 0)
     situation = Situation(
-        0.0, 9.0, one, one, one, one, one, one, yes, none, none, one, one, one, one, one, yes, yes,
-        np.ones((1, 1), np.bool_), table, table, table, site, site, EUCLIDEAN, 1.0,
-        numbers, numbers, indices, indices, False, 0.0, 1.0,
-    )  # fmt: skip
+        0.0, 9.0, agents, tasks, events, allowed, table, table, table, site, site, EUCLIDEAN, 1.0, False, 0.0, 1.0
+    )
     routes, lengths = np.zeros((1, 1), np.int64), np.zeros(1, np.int64)
-    improve(situation, np.zeros((1, 1), np.int64), routes, lengths, 1, 0, True)
+    improve(situation, new_schedule(1, 1, 1, 0), np.zeros((1, 1), np.int64), routes, lengths, 1, 0, True)
     first_tasks(situation, routes, lengths)

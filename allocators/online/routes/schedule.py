@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from alloc.allocators.online.routes.queue import drop_first, push
+from alloc.allocators.online.routes.queue import ENTRY, drop_first, push
 from alloc.allocators.online.routes.situation import (
     CANCELLED,
     CHANGED,
@@ -19,9 +19,9 @@ from alloc.allocators.online.routes.situation import (
     FIXED,
     OPENS,
     OUT,
-    Bools,
     Floats,
     Ints,
+    Records,
     Situation,
 )
 from alloc.allocators.runtime.compiled import compiled
@@ -33,83 +33,58 @@ KIND = 1 << 40
 """Items of the queue are a kind times this, plus an index: completions, deadlines, events, arrivals."""
 
 
+AGENT = np.dtype(
+    [
+        *((name, np.int64) for name in ("first", "pointer", "target", "state", "node", "version", "following")),
+        *((name, np.float64) for name in ("fuel", "departs", "arrives", "way")),
+    ]
+)
+TASK = np.dtype(
+    [
+        *((name, np.int64) for name in ("closed", "is_open", "begun", "edition", "head")),
+        *((name, np.float64) for name in ("left", "since", "rate", "finish")),
+    ]
+)
+
+
 class Schedule(NamedTuple):
     """A schedule in the making, and what is recorded of it.
 
     Attributes
     ----------
-    first : ndarray of int, shape (n,)
-        Task to which each agent goes first, -1 for none.
+    agents, tasks : ndarray of `AGENT` and `TASK`, shape (n,) and (m,)
+        Among others ``first``, the task to which each agent goes first, -1 for none, and ``finish``, the hour at which
+        each task is done, ``inf`` if it is not.
+    point : ndarray, shape (n, 3)
+        Where an agent is that was diverted in flight.
     arrive, leave : ndarray, shape (n, c)
         Hours of each visit of the routes; NaN where there is none.
-    finish : ndarray, shape (m,)
-        Hour at which each task is done; ``inf`` if it is not.
     totals : ndarray, shape (5,)
         Weight of what is not done, hour of the last completion, weighted hours from appearance to completion, energy,
         hours of flight.
+    queue : ndarray of `ENTRY`
+        What comes next.
     """
 
-    first: Ints
+    agents: Records
+    tasks: Records
+    point: Floats
     arrive: Floats
     leave: Floats
-    finish: Floats
     totals: Floats
-    pointer: Ints
-    target: Ints
-    state: Ints
-    node: Ints
-    point: Floats
-    fuel: Floats
-    departs: Floats
-    arrives: Floats
-    way: Floats
-    version: Ints
-    following: Ints
-    left: Floats
-    since: Floats
-    rate: Floats
-    closed: Ints
-    is_open: Bools
-    begun: Bools
-    edition: Ints
-    head: Ints
-    hours: Floats
-    items: Ints
-    versions: Ints
+    queue: Records
 
 
-@compiled
 def new_schedule(n: int, m: int, capacity: int, events: int) -> Schedule:
     """Return room for the schedules of plans of one size."""
-    room = 2 * n * capacity + 3 * events + 2 * n + m + 16
     return Schedule(
-        np.empty(n, np.int64),
-        np.empty((n, capacity)),
-        np.empty((n, capacity)),
-        np.empty(m),
-        np.empty(5),
-        np.empty(n, np.int64),
-        np.empty(n, np.int64),
-        np.empty(n, np.int64),
-        np.empty(n, np.int64),
+        np.zeros(n, AGENT),
+        np.zeros(m, TASK),
         np.empty((n, 3)),
-        np.empty(n),
-        np.empty(n),
-        np.empty(n),
-        np.empty(n),
-        np.empty(n, np.int64),
-        np.empty(n, np.int64),
-        np.empty(m),
-        np.empty(m),
-        np.empty(m),
-        np.empty(m, np.int64),
-        np.empty(m, np.bool_),
-        np.empty(m, np.bool_),
-        np.empty(m, np.int64),
-        np.empty(m, np.int64),
-        np.empty(room),
-        np.empty(room, np.int64),
-        np.empty(room, np.int64),
+        np.empty((n, capacity)),
+        np.empty((n, capacity)),
+        np.empty(5),
+        np.zeros(2 * n * capacity + 3 * events + 2 * n + m + 16, ENTRY),
     )
 
 
@@ -127,52 +102,59 @@ def play(s: Situation, r: Schedule, routes: Ints, lengths: Ints) -> None:
     lengths : ndarray of int, shape (n,)
     """
     size = _begin(s, r, routes, lengths)
-    for i in range(len(s.ability)):
-        r.first[i] = r.target[i]
-    while size > 0 and r.hours[0] <= s.end:
-        hour, item, version = r.hours[0], r.items[0], r.versions[0]
-        size = drop_first(r.hours, r.items, r.versions, size)
+    for i in range(len(s.agents)):
+        r.agents[i].first = r.agents[i].target
+    while size > 0 and r.queue[0].hour <= s.end:
+        hour, item, version = r.queue[0].hour, r.queue[0].item, r.queue[0].version
+        size = drop_first(r.queue, size)
         kind, index = item // KIND, item % KIND
         if kind == 3:
-            if version == r.version[index]:
+            if version == r.agents[index].version:
                 size = _arrive(s, r, routes, lengths, index, hour, size)
         elif kind == 2:
             size = _happen(s, r, routes, lengths, index, hour, size)
-        elif version == r.edition[index] and r.closed[index] == 0:
+        elif version == r.tasks[index].edition and r.tasks[index].closed == 0:
             size = _close(s, r, routes, lengths, index, DONE if kind == 0 else OVER, hour, size)
 
 
 @compiled
 def _begin(s: Situation, r: Schedule, routes: Ints, lengths: Ints) -> int:
     """Begin at the hour of the situation; return the size of the queue."""
-    n, m, size = len(s.ability), len(s.left), 0
+    n, m, size = len(s.agents), len(s.tasks), 0
     r.totals[:] = 0.0
     for j in range(m):
-        r.left[j], r.since[j], r.rate[j], r.closed[j] = s.left[j], s.hour, 0.0, 0
-        r.is_open[j], r.begun[j], r.edition[j], r.head[j], r.finish[j] = s.is_open[j], s.begun[j], 0, -1, np.inf
-        r.totals[0] += s.weight[j]
-    for k in range(len(s.event_hour)):
-        size = push(r.hours, r.items, r.versions, size, s.event_hour[k], 2 * KIND + k, 0)
+        r.tasks[j].left, r.tasks[j].since, r.tasks[j].rate, r.tasks[j].closed = s.tasks[j].left, s.hour, 0.0, 0
+        r.tasks[j].is_open, r.tasks[j].begun = s.tasks[j].is_open, s.tasks[j].begun
+        r.tasks[j].edition, r.tasks[j].head, r.tasks[j].finish = 0, -1, np.inf
+        r.totals[0] += s.tasks[j].weight
+    for k in range(len(s.events)):
+        size = push(r.queue, size, s.events[k].hour, 2 * KIND + k, 0)
     for i in range(n):
-        r.pointer[i], r.target[i], r.node[i], r.fuel[i], r.version[i] = 0, -1, -1, s.battery[i], 0
-        r.state[i] = IDLE if s.active[i] else AWAY
+        r.agents[i].pointer, r.agents[i].target, r.agents[i].node, r.agents[i].fuel, r.agents[i].version = (
+            0,
+            -1,
+            -1,
+            s.agents[i].battery,
+            0,
+        )
+        r.agents[i].state = IDLE if s.agents[i].active else AWAY
         for p in range(lengths[i]):
             r.arrive[i, p] = r.leave[i, p] = np.nan
     for i in range(n):
-        if s.active[i] and lengths[i] > 0 and s.at[i] >= 0 and routes[i, 0] == s.at[i]:
-            j = s.at[i]
-            r.target[i], r.state[i], r.node[i], r.arrive[i, 0] = j, PRESENT, j, s.hour
-            r.following[i], r.head[j] = r.head[j], i
+        if s.agents[i].active and lengths[i] > 0 and s.agents[i].at >= 0 and routes[i, 0] == s.agents[i].at:
+            j = s.agents[i].at
+            r.agents[i].target, r.agents[i].state, r.agents[i].node, r.arrive[i, 0] = j, PRESENT, j, s.hour
+            r.agents[i].following, r.tasks[j].head = r.tasks[j].head, i
             size = _join(s, r, i, j, s.hour, size)
     for i in range(n):
-        if r.state[i] == IDLE:
-            size = _depart(s, r, routes, lengths, i, max(s.hour, s.free[i]), size)
+        if r.agents[i].state == IDLE:
+            size = _depart(s, r, routes, lengths, i, max(s.hour, s.agents[i].free), size)
     return size
 
 
 @compiled
 def _distance(s: Situation, r: Schedule, i: int, j: int) -> float:
-    node = r.node[i]
+    node = r.agents[i].node
     if node == -1:
         return s.start_distance[i, j]
     if node >= 0:
@@ -186,108 +168,110 @@ def _distance(s: Situation, r: Schedule, i: int, j: int) -> float:
 @compiled
 def _depart(s: Situation, r: Schedule, routes: Ints, lengths: Ints, i: int, hour: float, size: int) -> int:
     """Let an agent go to the next task of its route that it can do; return the size of the queue."""
-    while r.pointer[i] < lengths[i]:
-        j = routes[i, r.pointer[i]]
-        if r.closed[j] == 0 and s.allowed[i, j]:
+    while r.agents[i].pointer < lengths[i]:
+        j = routes[i, r.agents[i].pointer]
+        if r.tasks[j].closed == 0 and s.allowed[i, j]:
             way = _distance(s, r, i, j)
-            arrives = hour + way / s.speed[i]
-            needed = s.consumption[i] * (way + s.home[j, i])
-            if way <= s.reach[i] + TOLERANCE and needed <= r.fuel[i] + TOLERANCE and arrives < s.deadline[j]:
-                r.target[i], r.state[i], r.way[i] = j, FLYING, way
-                r.departs[i], r.arrives[i] = hour, arrives
-                r.version[i] += 1
-                r.following[i], r.head[j] = r.head[j], i
-                return push(r.hours, r.items, r.versions, size, arrives, 3 * KIND + i, r.version[i])
-        r.pointer[i] += 1
-    r.target[i], r.state[i] = -1, IDLE
+            arrives = hour + way / s.agents[i].speed
+            needed = s.agents[i].consumption * (way + s.home[j, i])
+            if (
+                way <= s.agents[i].reach + TOLERANCE
+                and needed <= r.agents[i].fuel + TOLERANCE
+                and arrives < s.tasks[j].deadline
+            ):
+                r.agents[i].target, r.agents[i].state, r.agents[i].way = j, FLYING, way
+                r.agents[i].departs, r.agents[i].arrives = hour, arrives
+                r.agents[i].version += 1
+                r.agents[i].following, r.tasks[j].head = r.tasks[j].head, i
+                return push(r.queue, size, arrives, 3 * KIND + i, r.agents[i].version)
+        r.agents[i].pointer += 1
+    r.agents[i].target, r.agents[i].state = -1, IDLE
     return size
 
 
 @compiled
 def _land(s: Situation, r: Schedule, i: int, hour: float) -> bool:
     """End a flight where the agent is, if it can be ended there; return whether it is."""
-    j = r.target[i]
-    length = r.arrives[i] - r.departs[i]
-    share = 1.0 if length <= 0 or hour >= r.arrives[i] else max(0.0, (hour - r.departs[i]) / length)
+    j = r.agents[i].target
+    length = r.agents[i].arrives - r.agents[i].departs
+    share = 1.0 if length <= 0 or hour >= r.agents[i].arrives else max(0.0, (hour - r.agents[i].departs) / length)
     if share < 1 and s.metric == FIXED:
         return False
-    r.fuel[i] -= s.consumption[i] * share * r.way[i]
-    r.totals[3] += s.consumption[i] * share * r.way[i]
+    r.agents[i].fuel -= s.agents[i].consumption * share * r.agents[i].way
+    r.totals[3] += s.agents[i].consumption * share * r.agents[i].way
     r.totals[4] += share * length
     if share == 1:
-        r.node[i] = j
+        r.agents[i].node = j
     elif share > 0:
         for axis in range(3):
-            node = r.node[i]
+            node = r.agents[i].node
             begin = s.place[i, axis] if node == -1 else (s.site[node, axis] if node >= 0 else r.point[i, axis])
             r.point[i, axis] = begin + share * (s.site[j, axis] - begin)
-        r.node[i] = -2
-    r.version[i] += 1
+        r.agents[i].node = -2
+    r.agents[i].version += 1
     return True
 
 
 @compiled
 def _arrive(s: Situation, r: Schedule, routes: Ints, lengths: Ints, i: int, hour: float, size: int) -> int:
-    j = r.target[i]
+    j = r.agents[i].target
     _land(s, r, i, hour)
-    if r.closed[j] != 0:
-        r.pointer[i] += 1
+    if r.tasks[j].closed != 0:
+        r.agents[i].pointer += 1
         return _depart(s, r, routes, lengths, i, hour, size)
-    r.state[i] = PRESENT
-    r.arrive[i, r.pointer[i]] = hour
-    return _join(s, r, i, j, hour, size) if r.is_open[j] else size
+    r.agents[i].state = PRESENT
+    r.arrive[i, r.agents[i].pointer] = hour
+    return _join(s, r, i, j, hour, size) if r.tasks[j].is_open else size
 
 
 @compiled
 def _update(s: Situation, r: Schedule, j: int, hour: float) -> None:
-    if r.is_open[j] and not r.begun[j]:
-        r.left[j] += s.growth[j] * (hour - r.since[j])
-    elif r.is_open[j]:
-        r.left[j] = max(0.0, r.left[j] - r.rate[j] * (hour - r.since[j]))
-    r.since[j] = hour
+    if r.tasks[j].is_open and not r.tasks[j].begun:
+        r.tasks[j].left += s.tasks[j].growth * (hour - r.tasks[j].since)
+    elif r.tasks[j].is_open:
+        r.tasks[j].left = max(0.0, r.tasks[j].left - r.tasks[j].rate * (hour - r.tasks[j].since))
+    r.tasks[j].since = hour
 
 
 @compiled
 def _join(s: Situation, r: Schedule, i: int, j: int, hour: float, size: int) -> int:
     _update(s, r, j, hour)
-    r.begun[j] = True
-    r.rate[j] += s.ability[i] * s.pace
+    r.tasks[j].begun = True
+    r.tasks[j].rate += s.agents[i].ability * s.pace
     return _announce(s, r, j, hour, size)
 
 
 @compiled
 def _announce(s: Situation, r: Schedule, j: int, hour: float, size: int) -> int:
     """Put the end of a task's work into the queue, or its deadline where that comes first."""
-    r.edition[j] += 1
-    end = hour + r.left[j] / r.rate[j] if r.rate[j] > 0 else np.inf
-    is_missed = end > s.deadline[j]
-    end = min(end, s.deadline[j])
+    r.tasks[j].edition += 1
+    end = hour + r.tasks[j].left / r.tasks[j].rate if r.tasks[j].rate > 0 else np.inf
+    is_missed = end > s.tasks[j].deadline
+    end = min(end, s.tasks[j].deadline)
     if end == np.inf:
         return size
-    return push(r.hours, r.items, r.versions, size, end, (KIND if is_missed else 0) + j, r.edition[j])
+    return push(r.queue, size, end, (KIND if is_missed else 0) + j, r.tasks[j].edition)
 
 
 @compiled
-def _close(
-    s: Situation, r: Schedule, routes: Ints, lengths: Ints, j: int, how: int, hour: float, size: int
-) -> int:
+def _close(s: Situation, r: Schedule, routes: Ints, lengths: Ints, j: int, how: int, hour: float, size: int) -> int:
     """End a task; all who are there or on their way go on."""
-    r.closed[j] = how
+    r.tasks[j].closed = how
     if how == DONE:
-        r.finish[j] = hour
-        r.totals[0] -= s.weight[j]
+        r.tasks[j].finish = hour
+        r.totals[0] -= s.tasks[j].weight
         r.totals[1] = max(r.totals[1], hour)
-        r.totals[2] += s.weight[j] * (hour - s.appears[j])
-    i = r.head[j]
-    r.head[j] = -1
+        r.totals[2] += s.tasks[j].weight * (hour - s.tasks[j].appears)
+    i = r.tasks[j].head
+    r.tasks[j].head = -1
     while i >= 0:
-        after = r.following[i]
-        if r.state[i] == PRESENT:
-            r.leave[i, r.pointer[i]] = hour
-            r.pointer[i] += 1
+        after = r.agents[i].following
+        if r.agents[i].state == PRESENT:
+            r.leave[i, r.agents[i].pointer] = hour
+            r.agents[i].pointer += 1
             size = _depart(s, r, routes, lengths, i, hour, size)
         elif _land(s, r, i, hour):
-            r.pointer[i] += 1
+            r.agents[i].pointer += 1
             size = _depart(s, r, routes, lengths, i, hour, size)
         i = after
     return size
@@ -296,18 +280,18 @@ def _close(
 @compiled
 def _happen(s: Situation, r: Schedule, routes: Ints, lengths: Ints, k: int, hour: float, size: int) -> int:
     """Let happen what is known to come."""
-    kind, index = s.event_kind[k], s.event_index[k]
+    kind, index = s.events[k].kind, s.events[k].index
     if kind == CHARGED:
-        r.fuel[index] += s.event_amount[k]
+        r.agents[index].fuel += s.events[k].amount
     elif kind == OUT:
         return _leave(s, r, index, hour, size)
     elif kind == IN:
-        if r.state[index] == AWAY:
+        if r.agents[index].state == AWAY:
             return _depart(s, r, routes, lengths, index, hour, size)
-    elif r.closed[index] != 0:
+    elif r.tasks[index].closed != 0:
         return size
     elif kind == CANCELLED:
-        r.totals[0] -= s.weight[index]
+        r.totals[0] -= s.tasks[index].weight
         return _close(s, r, routes, lengths, index, OVER, hour, size)
     else:
         return _change(s, r, routes, lengths, k, hour, size)
@@ -317,19 +301,19 @@ def _happen(s: Situation, r: Schedule, routes: Ints, lengths: Ints, k: int, hour
 @compiled
 def _change(s: Situation, r: Schedule, routes: Ints, lengths: Ints, k: int, hour: float, size: int) -> int:
     """Let a task open, or its work change."""
-    j = s.event_index[k]
+    j = s.events[k].index
     _update(s, r, j, hour)
-    if s.event_kind[k] == OPENS:
-        r.is_open[j] = True
-        r.left[j] = s.left[j]
-        i = r.head[j]
+    if s.events[k].kind == OPENS:
+        r.tasks[j].is_open = True
+        r.tasks[j].left = s.tasks[j].left
+        i = r.tasks[j].head
         while i >= 0:
-            if r.state[i] == PRESENT:
+            if r.agents[i].state == PRESENT:
                 size = _join(s, r, i, j, hour, size)
-            i = r.following[i]
+            i = r.agents[i].following
     else:
-        r.left[j] = s.event_amount[k]
-    if r.left[j] == 0:
+        r.tasks[j].left = s.events[k].amount
+    if r.tasks[j].left == 0:
         return _close(s, r, routes, lengths, j, DONE, hour, size)
     return _announce(s, r, j, hour, size)
 
@@ -337,25 +321,25 @@ def _change(s: Situation, r: Schedule, routes: Ints, lengths: Ints, k: int, hour
 @compiled
 def _leave(s: Situation, r: Schedule, i: int, hour: float, size: int) -> int:
     """Let an agent leave the mission, for good or for a while."""
-    j = r.target[i]
-    if j >= 0 and r.closed[j] != 0:  # on a way to a task that is over
-        r.version[i] += 1
+    j = r.agents[i].target
+    if j >= 0 and r.tasks[j].closed != 0:  # on a way to a task that is over
+        r.agents[i].version += 1
     elif j >= 0:
-        if r.head[j] == i:
-            r.head[j] = r.following[i]
+        if r.tasks[j].head == i:
+            r.tasks[j].head = r.agents[i].following
         else:
-            before = r.head[j]
-            while r.following[before] != i:
-                before = r.following[before]
-            r.following[before] = r.following[i]
-        if r.state[i] == FLYING:
+            before = r.tasks[j].head
+            while r.agents[before].following != i:
+                before = r.agents[before].following
+            r.agents[before].following = r.agents[i].following
+        if r.agents[i].state == FLYING:
             if not _land(s, r, i, hour):
-                r.version[i] += 1
-        elif r.is_open[j]:
+                r.agents[i].version += 1
+        elif r.tasks[j].is_open:
             _update(s, r, j, hour)
-            r.rate[j] -= s.ability[i] * s.pace
-            if r.rate[j] < 1e-12:
-                r.rate[j] = 0.0
+            r.tasks[j].rate -= s.agents[i].ability * s.pace
+            if r.tasks[j].rate < 1e-12:
+                r.tasks[j].rate = 0.0
             size = _announce(s, r, j, hour, size)
-    r.target[i], r.state[i] = -1, AWAY
+    r.agents[i].target, r.agents[i].state = -1, AWAY
     return size

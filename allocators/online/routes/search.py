@@ -4,7 +4,7 @@ import numpy as np
 
 from alloc.allocators.online.routes.insertion import find_slack, insert_best, tidy
 from alloc.allocators.online.routes.moves import change
-from alloc.allocators.online.routes.schedule import Schedule, new_schedule, play
+from alloc.allocators.online.routes.schedule import Schedule, play
 from alloc.allocators.online.routes.situation import Ints, Situation
 from alloc.allocators.runtime.compiled import compiled
 
@@ -24,10 +24,10 @@ MOST_OUT, MOST_WAITING = 9, 30
 @compiled
 def value(s: Situation, r: Schedule) -> float:
     """Return what a schedule is worth, less being better: undone weight, then time, then flights and switches."""
-    n, undone = len(s.ability), max(0.0, r.totals[0])
+    n, undone = len(s.agents), max(0.0, r.totals[0])
     switches = 0
     for i in range(n):
-        if s.active[i] and s.aim[i] >= 0 and r.first[i] != s.aim[i]:
+        if s.agents[i].active and s.agents[i].aim >= 0 and r.agents[i].first != s.agents[i].aim:
             switches += 1
     cost = UNDONE * undone + s.price * switches + 1e-9 * r.totals[3]
     if undone < 1e-12 and not s.has_missed:
@@ -42,7 +42,7 @@ def rebuild(
     s: Situation, r: Schedule, nearest: Ints, routes: Ints, lengths: Ints, slack: np.ndarray, most: int
 ) -> None:
     """Take some tasks near each other out of all routes, and put them and unplanned tasks where they fit best."""
-    m = len(s.left)
+    m = len(s.tasks)
     out = np.zeros(m, np.bool_)
     if most > 0:
         seed = np.random.randint(m)
@@ -74,23 +74,23 @@ def rebuild(
     count, chance, order = 0, 1.0, np.random.randint(4)
     unplanned = 0
     for j in range(m):
-        if not planned[j] and s.weight[j] > 0:
+        if not planned[j] and s.tasks[j].weight > 0:
             unplanned += 1
-        if s.deadline[j] < np.inf:
+        if s.tasks[j].deadline < np.inf:
             has_deadline = True
     if most > 0 and unplanned > MOST_WAITING:
         chance = MOST_WAITING / unplanned
     for j in range(m):
-        if planned[j] or s.weight[j] <= 0 or (not out[j] and np.random.random() >= chance):
+        if planned[j] or s.tasks[j].weight <= 0 or (not out[j] and np.random.random() >= chance):
             continue
         waiting[count] = j
         draw = np.random.random()
         if order == 0:
             key[count] = draw
         elif order == 1:
-            key[count] = s.deadline[j] if has_deadline else -s.left[j]
+            key[count] = s.tasks[j].deadline if has_deadline else -s.tasks[j].left
         elif order == 2:
-            key[count] = s.left[j] / s.weight[j] * (0.5 + draw)
+            key[count] = s.tasks[j].left / s.tasks[j].weight * (0.5 + draw)
         else:
             key[count] = s.start_distance[np.random.randint(len(lengths)), j]
         count += 1
@@ -101,13 +101,15 @@ def rebuild(
 
 @compiled
 def improve(
-    s: Situation, nearest: Ints, routes: Ints, lengths: Ints, iterations: int, seed: int, is_new: bool
+    s: Situation, r: Schedule, nearest: Ints, routes: Ints, lengths: Ints, iterations: int, seed: int, is_new: bool
 ) -> float:
     """Improve routes in place; return their value.
 
     Parameters
     ----------
     s : Situation
+    r : Schedule
+        With room for the routes.
     nearest : ndarray of int, shape (m, k)
         Tasks near each task, nearest first.
     routes : ndarray of int, shape (n, c)
@@ -119,13 +121,12 @@ def improve(
         Whether tasks without a place are to be put into the routes first.
     """
     np.random.seed(seed)
-    n, m = len(s.ability), len(s.left)
-    r = new_schedule(n, m, routes.shape[1], len(s.event_hour))
+    n = len(s.agents)
     slack = np.zeros(routes.shape)
     now, now_lengths = routes.copy(), lengths.copy()
     trial, trial_lengths = routes.copy(), lengths.copy()
     play(s, r, routes, lengths)
-    best = current = value(s, r)
+    best = value(s, r)
     for step in range(-3 if is_new else 0, iterations):
         for i in range(n):
             trial_lengths[i] = now_lengths[i]
@@ -142,7 +143,6 @@ def improve(
             tidy(r, trial, trial_lengths)
             now, trial = trial, now
             now_lengths, trial_lengths = trial_lengths, now_lengths
-            current = reached
             if reached < best:
                 best = reached
                 lengths[:] = now_lengths

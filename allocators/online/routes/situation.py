@@ -3,11 +3,12 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
+Records = NDArray[np.void]
 
 EUCLIDEAN, MANHATTAN, FIXED = 0, 1, 2
 """How agents may be diverted in flight: by a metric, or not before the end of their way."""
@@ -16,23 +17,34 @@ OUT, IN, CHARGED, OPENS, CHANGED, CANCELLED = range(6)
 """Kinds of events that a plan may know of: an agent leaves, comes, gains energy; a task opens, changes, is over."""
 
 
+AGENT = np.dtype(
+    [
+        *((name, np.float64) for name in ("ability", "speed", "consumption", "reach", "battery", "free")),
+        *((name, np.int64) for name in ("active", "at", "aim")),
+    ]
+)
+"""Work and distance per hour, energy per distance, longest flight, energy, and the hour from which an agent can fly;
+whether it is in the mission, the task where it works, and that to which it goes or where it works, -1 for none."""
+
+TASK = np.dtype(
+    [
+        *((name, np.float64) for name in ("left", "growth", "weight", "deadline", "appears")),
+        *((name, np.int64) for name in ("is_open", "begun")),
+    ]
+)
+
+EVENT = np.dtype([("hour", np.float64), ("amount", np.float64), ("kind", np.int64), ("index", np.int64)])
+
+
 class Situation(NamedTuple):
-    """Agents and tasks at an hour; `n` agents, `m` tasks.
+    """Agents and tasks at an hour; `n` agents, `m` tasks. Records, as compiled code passes on few arrays faster.
 
     Attributes
     ----------
     hour, end : float
         Now, and when the mission ends.
-    ability, speed, consumption, reach, battery : ndarray, shape (n,)
-        Work and distance per hour, energy per distance, longest flight, energy.
-    free : ndarray, shape (n,)
-        Hour from which each agent can fly from `place`.
-    active : ndarray of bool, shape (n,)
-        Whether it is in the mission now.
-    at, aim : ndarray of int, shape (n,)
-        Task where it works, and where it goes or works; -1 for none.
-    left, growth, weight, deadline, appears : ndarray, shape (m,)
-    is_open, begun : ndarray of bool, shape (m,)
+    agents, tasks, events : ndarray of `AGENT`, `TASK` and `EVENT`
+        Events are those that are known to come, in the order of time.
     allowed : ndarray of bool, shape (n, m)
         Who may work where, skills included.
     start_distance : ndarray, shape (n, m)
@@ -45,9 +57,6 @@ class Situation(NamedTuple):
         `EUCLIDEAN`, `MANHATTAN` or `FIXED`.
     pace : float
         Work of a group per hour over its ability, on average.
-    event_hour, event_amount : ndarray, shape (k,)
-    event_kind, event_index : ndarray of int, shape (k,)
-        What is known to come, in the order of time.
     has_missed : bool
         Whether a deadline was missed already, so that hours count instead of mission time.
     price : float
@@ -58,22 +67,9 @@ class Situation(NamedTuple):
 
     hour: float
     end: float
-    ability: Floats
-    speed: Floats
-    consumption: Floats
-    reach: Floats
-    battery: Floats
-    free: Floats
-    active: Bools
-    at: Ints
-    aim: Ints
-    left: Floats
-    growth: Floats
-    weight: Floats
-    deadline: Floats
-    appears: Floats
-    is_open: Bools
-    begun: Bools
+    agents: Records
+    tasks: Records
+    events: Records
     allowed: Bools
     start_distance: Floats
     distance: Floats
@@ -82,10 +78,14 @@ class Situation(NamedTuple):
     site: Floats
     metric: int
     pace: float
-    event_hour: Floats
-    event_amount: Floats
-    event_kind: Ints
-    event_index: Ints
     has_missed: bool
     price: float
     scale: float
+
+
+def records(kind: np.dtype[np.void], size: int, **columns: ArrayLike) -> Records:
+    """Return records with these columns, whose other fields are 0."""
+    table = np.zeros(size, kind)
+    for name, values in columns.items():
+        table[name] = values
+    return table
