@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from alloc.allocators.online.routes.schedule import Schedule
+from alloc.allocators.online.routes.record import Schedule
 from alloc.allocators.online.routes.situation import Floats, Ints, Situation
-from alloc.allocators.runtime.compiled import compiled
+from alloc.allocators.runtime.compiled import compiled, inlined
 
 
 @compiled
@@ -32,7 +32,7 @@ def find_slack(s: Situation, r: Schedule, routes: Ints, lengths: Ints, slack: Fl
         slack[i, p] = least
 
 
-@compiled
+@inlined
 def hours_of_work(s: Situation, j: int, arrives: float, ability: float) -> float:
     """Return how long a task takes that is begun at an hour."""
     left = s.tasks[j].left
@@ -41,7 +41,7 @@ def hours_of_work(s: Situation, j: int, arrives: float, ability: float) -> float
     return left / (ability * s.pace)
 
 
-@compiled
+@inlined
 def place_between(
     s: Situation, r: Schedule, routes: Ints, lengths: Ints, slack: Floats, i: int, p: int, j: int
 ) -> tuple[float, float, float]:
@@ -63,7 +63,7 @@ def place_between(
         detour += s.distance[j, after] - direct
         latest = r.arrive[i, p] + slack[i, p] - s.distance[j, after] / s.agents[i].speed
     energy = s.agents[i].consumption * detour
-    if there > s.agents[i].reach or (energy > 0 and energy + s.agents[i].consumption * 0.0 > r.agents[i].fuel):
+    if there > s.agents[i].reach or (energy > 0 and energy > r.agents[i].fuel):
         return np.inf, 0.0, 0.0
     arrives = max(begins + there / s.agents[i].speed, s.tasks[j].appears if not s.tasks[j].is_open else s.hour)
     return arrives, latest, detour

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from alloc.allocators.online.routes.schedule import Schedule
+from alloc.allocators.online.routes.record import Schedule
 from alloc.allocators.online.routes.situation import Ints, Situation
 from alloc.allocators.runtime.compiled import compiled
 

@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from alloc.allocators.online.routes.describe import Described
-from alloc.allocators.online.routes.schedule import new_schedule, play
+from alloc.allocators.online.routes.record import new_schedule
+from alloc.allocators.online.routes.schedule import play
 from alloc.allocators.online.routes.search import improve
 from alloc.allocators.online.routes.situation import AGENT, EUCLIDEAN, EVENT, TASK, Ints, Situation, records
 

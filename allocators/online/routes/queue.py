@@ -3,9 +3,20 @@
 import numpy as np
 
 from alloc.allocators.online.routes.situation import Records
-from alloc.allocators.runtime.compiled import compiled
+from alloc.allocators.runtime.compiled import compiled, inlined
 
 ENTRY = np.dtype([("hour", np.float64), ("item", np.int64), ("version", np.int64)])
+
+
+@inlined
+def _is_before(queue: Records, index: int, hour: float, item: int) -> bool:
+    return queue[index].hour < hour or (queue[index].hour == hour and queue[index].item <= item)
+
+
+@inlined
+def _copy(queue: Records, to: int, source: int) -> None:
+    queue[to].hour, queue[to].item = queue[source].hour, queue[source].item
+    queue[to].version = queue[source].version
 
 
 @compiled
@@ -41,14 +52,3 @@ def drop_first(queue: Records, size: int) -> int:
         parent = child
     _copy(queue, parent, size)
     return size
-
-
-@compiled
-def _is_before(queue: Records, index: int, hour: float, item: int) -> bool:
-    return queue[index].hour < hour or (queue[index].hour == hour and queue[index].item <= item)
-
-
-@compiled
-def _copy(queue: Records, to: int, source: int) -> None:
-    queue[to].hour, queue[to].item = queue[source].hour, queue[source].item
-    queue[to].version = queue[source].version

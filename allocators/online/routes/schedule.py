@@ -5,11 +5,10 @@ works with those who are there. A flight to a task that is done meanwhile is bro
 where it is over, too far, or cannot be reached before its deadline.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
-from alloc.allocators.online.routes.queue import ENTRY, drop_first, push
+from alloc.allocators.online.routes.queue import drop_first, push
+from alloc.allocators.online.routes.record import Schedule
 from alloc.allocators.online.routes.situation import (
     CANCELLED,
     CHANGED,
@@ -19,73 +18,16 @@ from alloc.allocators.online.routes.situation import (
     FIXED,
     OPENS,
     OUT,
-    Floats,
     Ints,
-    Records,
     Situation,
 )
-from alloc.allocators.runtime.compiled import compiled
+from alloc.allocators.runtime.compiled import compiled, inlined
 from alloc.problems.distances.reach import TOLERANCE
 
 IDLE, FLYING, PRESENT, AWAY = 0, 1, 2, 3
 DONE, OVER = 1, 2
 KIND = 1 << 40
 """Items of the queue are a kind times this, plus an index: completions, deadlines, events, arrivals."""
-
-
-AGENT = np.dtype(
-    [
-        *((name, np.int64) for name in ("first", "pointer", "target", "state", "node", "version", "following")),
-        *((name, np.float64) for name in ("fuel", "departs", "arrives", "way")),
-    ]
-)
-TASK = np.dtype(
-    [
-        *((name, np.int64) for name in ("closed", "is_open", "begun", "edition", "head")),
-        *((name, np.float64) for name in ("left", "since", "rate", "finish")),
-    ]
-)
-
-
-class Schedule(NamedTuple):
-    """A schedule in the making, and what is recorded of it.
-
-    Attributes
-    ----------
-    agents, tasks : ndarray of `AGENT` and `TASK`, shape (n,) and (m,)
-        Among others ``first``, the task to which each agent goes first, -1 for none, and ``finish``, the hour at which
-        each task is done, ``inf`` if it is not.
-    point : ndarray, shape (n, 3)
-        Where an agent is that was diverted in flight.
-    arrive, leave : ndarray, shape (n, c)
-        Hours of each visit of the routes; NaN where there is none.
-    totals : ndarray, shape (5,)
-        Weight of what is not done, hour of the last completion, weighted hours from appearance to completion, energy,
-        hours of flight.
-    queue : ndarray of `ENTRY`
-        What comes next.
-    """
-
-    agents: Records
-    tasks: Records
-    point: Floats
-    arrive: Floats
-    leave: Floats
-    totals: Floats
-    queue: Records
-
-
-def new_schedule(n: int, m: int, capacity: int, events: int) -> Schedule:
-    """Return room for the schedules of plans of one size."""
-    return Schedule(
-        np.zeros(n, AGENT),
-        np.zeros(m, TASK),
-        np.empty((n, 3)),
-        np.empty((n, capacity)),
-        np.empty((n, capacity)),
-        np.empty(5),
-        np.zeros(2 * n * capacity + 3 * events + 2 * n + m + 16, ENTRY),
-    )
 
 
 @compiled
@@ -152,7 +94,7 @@ def _begin(s: Situation, r: Schedule, routes: Ints, lengths: Ints) -> int:
     return size
 
 
-@compiled
+@inlined
 def _distance(s: Situation, r: Schedule, i: int, j: int) -> float:
     node = r.agents[i].node
     if node == -1:
@@ -189,7 +131,7 @@ def _depart(s: Situation, r: Schedule, routes: Ints, lengths: Ints, i: int, hour
     return size
 
 
-@compiled
+@inlined
 def _land(s: Situation, r: Schedule, i: int, hour: float) -> bool:
     """End a flight where the agent is, if it can be ended there; return whether it is."""
     j = r.agents[i].target
@@ -224,7 +166,7 @@ def _arrive(s: Situation, r: Schedule, routes: Ints, lengths: Ints, i: int, hour
     return _join(s, r, i, j, hour, size) if r.tasks[j].is_open else size
 
 
-@compiled
+@inlined
 def _update(s: Situation, r: Schedule, j: int, hour: float) -> None:
     if r.tasks[j].is_open and not r.tasks[j].begun:
         r.tasks[j].left += s.tasks[j].growth * (hour - r.tasks[j].since)
@@ -233,7 +175,7 @@ def _update(s: Situation, r: Schedule, j: int, hour: float) -> None:
     r.tasks[j].since = hour
 
 
-@compiled
+@inlined
 def _join(s: Situation, r: Schedule, i: int, j: int, hour: float, size: int) -> int:
     _update(s, r, j, hour)
     r.tasks[j].begun = True
@@ -241,7 +183,7 @@ def _join(s: Situation, r: Schedule, i: int, j: int, hour: float, size: int) -> 
     return _announce(s, r, j, hour, size)
 
 
-@compiled
+@inlined
 def _announce(s: Situation, r: Schedule, j: int, hour: float, size: int) -> int:
     """Put the end of a task's work into the queue, or its deadline where that comes first."""
     r.tasks[j].edition += 1

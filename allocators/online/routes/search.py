@@ -4,8 +4,9 @@ import numpy as np
 
 from alloc.allocators.online.routes.insertion import find_slack, insert_best, tidy
 from alloc.allocators.online.routes.moves import change
-from alloc.allocators.online.routes.schedule import Schedule, play
-from alloc.allocators.online.routes.situation import Ints, Situation
+from alloc.allocators.online.routes.schedule import play
+from alloc.allocators.online.routes.record import Schedule
+from alloc.allocators.online.routes.situation import Floats, Ints, Situation
 from alloc.allocators.runtime.compiled import compiled
 
 UNDONE = 1e4
@@ -14,11 +15,11 @@ UNDONE = 1e4
 HOURS, FLIGHT, MISSED_HOURS, MISSED_FLIGHT = 0.02, 0.02, 0.02, 0.5
 """What hours to completion and hours of flight count beside: where all is done, and where something is missed."""
 
-RUIN, BLINK, TOLERATED = 0.3, 0.02, 2e-3
+RUIN, BLINK, TOLERATED = 0.5, 0.02, 2e-3
 """Share of the changes that rebuild, share of the places passed over, and how much worse than the best plan may be."""
 
-MOST_OUT, MOST_WAITING = 9, 30
-"""Most tasks taken out at once, and most unplanned tasks tried with them."""
+MOST_OUT, MOST_WAITING, BY_TIME = 7, 8, 0.6
+"""Most tasks of a stretch, unplanned tasks tried with those near it, and share of the stretches in time."""
 
 
 @compiled
@@ -38,50 +39,63 @@ def value(s: Situation, r: Schedule) -> float:
 
 
 @compiled
-def rebuild(
-    s: Situation, r: Schedule, nearest: Ints, routes: Ints, lengths: Ints, slack: np.ndarray, most: int
-) -> None:
-    """Take some tasks near each other out of all routes, and put them and unplanned tasks where they fit best."""
-    m = len(s.tasks)
-    out = np.zeros(m, np.bool_)
-    if most > 0:
-        seed = np.random.randint(m)
-        wanted, taken = 1 + np.random.randint(most), 1
-        out[seed] = True
-        for k in range(nearest.shape[1]):
-            if taken >= wanted:
-                break
-            if np.random.random() < 0.7:
-                out[nearest[seed, k]] = True
-                taken += 1
-    planned = np.zeros(m, np.bool_)
-    for i in range(len(lengths)):
+def _take_out(r: Schedule, nearest: Ints, routes: Ints, lengths: Ints, near: Ints) -> None:
+    """Take out a stretch of a route and what others do at that time, or tasks near each other in space.
+
+    `near` is set to 1 for tasks that are taken out or lie near one of those, for all others it is left as it is.
+    """
+    i = np.random.randint(len(lengths))
+    if lengths[i] == 0:
+        return
+    p = np.random.randint(lengths[i])
+    seed, most = routes[i, p], 1 + np.random.randint(MOST_OUT)
+    by_time = np.random.random() < BY_TIME
+    begin, end = r.arrive[i, p], r.arrive[i, min(p + most, lengths[i]) - 1]
+    share = 1.0 if np.random.random() < 0.5 else 0.3
+    for k in range(nearest.shape[1]):
+        near[nearest[seed, k]] = 2 if not by_time and k < most else 1
+    for k in range(len(lengths)):
+        is_in = k == i or np.random.random() < share * 2 / len(lengths)
         kept = 0
-        for p in range(lengths[i]):
-            if not out[routes[i, p]]:
-                routes[i, kept] = routes[i, p]
+        for q in range(lengths[k]):
+            j = routes[k, q]
+            hour = r.arrive[k, q]
+            if (by_time and is_in and begin <= hour <= end) or (not by_time and (near[j] == 2 or j == seed)):
+                near[j] = 2
+                for other in range(min(6, nearest.shape[1])):
+                    near[nearest[j, other]] = max(1, near[nearest[j, other]])
+            else:
+                routes[k, kept] = j
                 kept += 1
-        lengths[i] = kept
+        lengths[k] = kept
+
+
+@compiled
+def rebuild(
+    s: Situation, r: Schedule, nearest: Ints, routes: Ints, lengths: Ints, slack: Floats, is_partial: bool
+) -> None:
+    """Take some tasks out of all routes, and put them and unplanned tasks where they fit best."""
+    m = len(s.tasks)
+    near, planned = np.zeros(m, np.int64), np.zeros(m, np.bool_)
+    if is_partial:
+        play(s, r, routes, lengths)
+        tidy(r, routes, lengths)
+        _take_out(r, nearest, routes, lengths, near)
     play(s, r, routes, lengths)
     tidy(r, routes, lengths)
-    has_deadline = False
     for i in range(len(lengths)):
         find_slack(s, r, routes, lengths, slack, i)
         for p in range(lengths[i]):
             planned[routes[i, p]] = True
-    waiting = np.empty(m, np.int64)
-    key = np.empty(m)
-    count, chance, order = 0, 1.0, np.random.randint(4)
-    unplanned = 0
+    has_deadline, unplanned = False, 0
     for j in range(m):
-        if not planned[j] and s.tasks[j].weight > 0:
-            unplanned += 1
-        if s.tasks[j].deadline < np.inf:
-            has_deadline = True
-    if most > 0 and unplanned > MOST_WAITING:
-        chance = MOST_WAITING / unplanned
+        unplanned += not planned[j] and near[j] != 2
+        has_deadline = has_deadline or s.tasks[j].deadline < np.inf
+    chance = min(1.0, MOST_WAITING / max(1, unplanned)) if is_partial else 1.0
+    waiting, key = np.empty(m, np.int64), np.empty(m)
+    count, order = 0, np.random.randint(4)
     for j in range(m):
-        if planned[j] or s.tasks[j].weight <= 0 or (not out[j] and np.random.random() >= chance):
+        if planned[j] or (near[j] == 0 and np.random.random() >= chance):
             continue
         waiting[count] = j
         draw = np.random.random()
@@ -89,10 +103,10 @@ def rebuild(
             key[count] = draw
         elif order == 1:
             key[count] = s.tasks[j].deadline if has_deadline else -s.tasks[j].left
-        elif order == 2:
-            key[count] = s.tasks[j].left / s.tasks[j].weight * (0.5 + draw)
         else:
-            key[count] = s.start_distance[np.random.randint(len(lengths)), j]
+            key[count] = s.tasks[j].left / s.tasks[j].weight * (0.7 + 0.6 * draw)
+            if not has_deadline:
+                key[count] = -key[count]
         count += 1
     balance = 0.02 if has_deadline else 1.0
     for k in np.argsort(key[:count]):
@@ -132,9 +146,9 @@ def improve(
             trial_lengths[i] = now_lengths[i]
             trial[i, : now_lengths[i]] = now[i, : now_lengths[i]]
         if step < 0:
-            rebuild(s, r, nearest, trial, trial_lengths, slack, 0)
+            rebuild(s, r, nearest, trial, trial_lengths, slack, False)
         elif np.random.random() < RUIN:
-            rebuild(s, r, nearest, trial, trial_lengths, slack, MOST_OUT)
+            rebuild(s, r, nearest, trial, trial_lengths, slack, True)
         elif not change(s, r, nearest, trial, trial_lengths):
             continue
         play(s, r, trial, trial_lengths)

@@ -42,6 +42,16 @@ class TestReplan(PolicyConformance):
     settings = {"method": "greedy", "iterations": 1}  # noqa: RUF012
 
 
+class TestRoutes(PolicyConformance):
+    name = "routes"
+    settings = {"iterations": 50, "first_iterations": 50}  # noqa: RUF012
+
+
+class TestClairvoyant(PolicyConformance):
+    name = "clairvoyant"
+    settings = {"iterations": 50, "first_iterations": 50}  # noqa: RUF012
+
+
 class Defective(Policy):
     """The nearest task, but for what `decider` does."""
 
