@@ -80,7 +80,7 @@ class Describer:
     def __init__(self, end: float, pace: float, price: float) -> None:
         self._end, self._pace, self._price = end, pace, price
         self._begun: set[str] = set()
-        self._seen: dict[str, float] = {}
+        self._seen: dict[str, tuple[float, float]] = {}
         self._ways: dict[tuple[str, str], float] = {}
 
     def describe(self, view: View, foresight: Foresight) -> Described | None:
@@ -89,7 +89,7 @@ class Describer:
         known = {**view.agents, **foresight.agents}
         agents = [one for name, one in known.items() if one.status in ACTIVE or name in coming]
         tasks = [one for one in view.tasks.values() if one.status is TaskStatus.OPEN]
-        self._note_begun(agents, tasks)
+        self._note_begun(view.hour, agents, tasks)
         tasks += [one for name, one in foresight.tasks.items() if name not in view.tasks]
         if not agents or not tasks:
             return None
@@ -98,15 +98,16 @@ class Describer:
         nearest = np.argpartition(situation.distance, near, axis=1)[:, : near + 1].astype(np.int64)
         return Described(situation, agents, tasks, nearest)
 
-    def _note_begun(self, agents: list[AgentReport], tasks: list[TaskReport]) -> None:
+    def _note_begun(self, hour: float, agents: list[AgentReport], tasks: list[TaskReport]) -> None:
         """A growing task is begun when somebody works there, or it no longer grows."""
         self._begun.update(str(one.task) for one in agents if one.status is AgentStatus.WORKING)
         for task in tasks:
             if task.facts.growth > 0:
                 name = task.facts.id
-                if task.left <= self._seen.get(name, -math.inf):
+                before, left = self._seen.get(name, (hour, 0.0))
+                if before < hour and task.left <= left:
                     self._begun.add(name)
-                self._seen[name] = task.left
+                self._seen[name] = hour, task.left
 
     def _situation(
         self, view: View, agents: list[AgentReport], tasks: list[TaskReport], foresight: Foresight

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from alloc.allocators.online.routes.cheapest import insert_cheapest
 from alloc.allocators.online.routes.insertion import find_slack, insert_best, tidy
 from alloc.allocators.online.routes.moves import change
 from alloc.allocators.online.routes.schedule import play
@@ -15,8 +16,9 @@ UNDONE = 1e4
 HOURS, FLIGHT, MISSED_HOURS, MISSED_FLIGHT = 0.02, 0.02, 0.02, 0.5
 """What hours to completion and hours of flight count beside: where all is done, and where something is missed."""
 
-RUIN, BLINK, TOLERATED = 0.5, 0.02, 2e-3
-"""Share of the changes that rebuild, share of the places passed over, and how much worse than the best plan may be."""
+RUIN, BLINK, TOLERATED = 0.5, 0.02, 0.02
+"""Share of the changes that rebuild, share of the places passed over, and by what share a plan may
+be worse than the best at first."""
 
 MOST_OUT, MOST_WAITING, BY_TIME = 7, 8, 0.6
 """Most tasks of a stretch, unplanned tasks tried with those near it, and share of the stretches in time."""
@@ -109,8 +111,12 @@ def rebuild(
                 key[count] = -key[count]
         count += 1
     balance = 0.02 if has_deadline else 1.0
-    for k in np.argsort(key[:count]):
-        insert_best(s, r, routes, lengths, slack, waiting[k], balance, BLINK)
+    waiting = waiting[:count][np.argsort(key[:count])]
+    if has_deadline and (not is_partial or np.random.random() < 0.5):
+        insert_cheapest(s, r, routes, lengths, slack, waiting, balance)
+    for j in waiting:
+        if j >= 0:
+            insert_best(s, r, routes, lengths, slack, j, balance, BLINK)
 
 
 @compiled
@@ -140,8 +146,8 @@ def improve(
     now, now_lengths = routes.copy(), lengths.copy()
     trial, trial_lengths = routes.copy(), lengths.copy()
     play(s, r, routes, lengths)
-    best = value(s, r)
-    for step in range(-3 if is_new else 0, iterations):
+    best, undone = value(s, r), max(0.0, r.totals[0])
+    for step in range(-1 if is_new else 0, iterations):
         for i in range(n):
             trial_lengths[i] = now_lengths[i]
             trial[i, : now_lengths[i]] = now[i, : now_lengths[i]]
@@ -153,12 +159,13 @@ def improve(
             continue
         play(s, r, trial, trial_lengths)
         reached = value(s, r)
-        if reached < best + TOLERATED:
+        share = TOLERATED * (1 - max(0, step) / max(1, iterations))
+        if reached < best + share * (best - UNDONE * undone):
             tidy(r, trial, trial_lengths)
             now, trial = trial, now
             now_lengths, trial_lengths = trial_lengths, now_lengths
             if reached < best:
-                best = reached
+                best, undone = reached, max(0.0, r.totals[0])
                 lengths[:] = now_lengths
                 for i in range(n):
                     routes[i, : lengths[i]] = now[i, : lengths[i]]
