@@ -16,9 +16,8 @@ UNDONE = 1e4
 HOURS, FLIGHT, MISSED_HOURS, MISSED_FLIGHT = 0.02, 0.02, 0.02, 0.5
 """What hours to completion and hours of flight count beside: where all is done, and where something is missed."""
 
-RUIN, BLINK, TOLERATED = 0.5, 0.02, 0.02
-"""Share of the changes that rebuild, share of the places passed over, and by what share a plan may
-be worse than the best at first."""
+RUIN, BLINK, TOLERATED = 0.5, 0.02, 0.05
+"""Share of the changes that rebuild, share of the places passed over, and by what share a plan may be worse at first."""
 
 MOST_OUT, MOST_WAITING, BY_TIME = 7, 8, 0.6
 """Most tasks of a stretch, unplanned tasks tried with those near it, and share of the stretches in time."""
