@@ -2,10 +2,8 @@
 
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
-
-import numpy as np
 
 from alloc.allocators.contract.parameters import CheckedParameters, bounded
 from alloc.allocators.online.contract import Briefing, FleetDecider, Policy, PolicyInfo
@@ -39,7 +37,7 @@ class RoutesParameters(CheckedParameters):
 
 
 class Routes(Policy):
-    """Each agent has a sequence of tasks, coalitions meet at tasks, and the whole is improved whenever something happens.
+    """Each agent has a sequence of tasks, coalitions meet at tasks, and the plan is improved at every event.
 
     Raises
     ------
@@ -105,9 +103,7 @@ class RoutePlanner(FleetDecider):
         }
         return dict(self._orders(view, described, first_tasks(described.situation, routes, lengths)))
 
-    def _orders(
-        self, view: View, described: Described, first: np.ndarray[tuple[int], np.dtype[np.int64]]
-    ) -> list[tuple[str, Order]]:
+    def _orders(self, view: View, described: Described, first: Ints) -> list[tuple[str, Order]]:
         orders = []
         for agent, j in zip(described.agents, first.tolist(), strict=True):
             if agent.status not in ACTIVE:

@@ -1,5 +1,7 @@
 """Tasks put into routes one by one, always the one that takes least time for its weight."""
 
+# ruff: noqa: NPY002 - compiled code seeds numba's own generator
+
 import numpy as np
 
 from alloc.allocators.online.routes.insertion import hours_of_work, insert, place_between

@@ -1,5 +1,7 @@
 """Where a task fits best into routes: by one agent, or by a coalition where one is too slow."""
 
+# ruff: noqa: NPY002 - compiled code seeds numba's own generator
+
 import numpy as np
 
 from alloc.allocators.online.routes.record import Schedule
@@ -110,10 +112,7 @@ def insert_best(
         count = lengths[i]
         if not s.allowed[i, j] or count >= routes.shape[1]:
             continue
-        if count == 0:
-            end = max(s.hour, s.agents[i].free)
-        else:
-            end = r.leave[i, count - 1]
+        end = max(s.hour, s.agents[i].free) if count == 0 else r.leave[i, count - 1]
         for p in range(count + 1):
             arrives, latest, detour = place_between(s, r, routes, lengths, slack, i, p, j)
             if arrives >= s.tasks[j].deadline:

@@ -1,5 +1,7 @@
 """Small changes of routes: visits moved, swapped, added and dropped, tails exchanged, parts reversed."""
 
+# ruff: noqa: NPY002 - compiled code seeds numba's own generator
+
 import numpy as np
 
 from alloc.allocators.online.routes.record import Schedule

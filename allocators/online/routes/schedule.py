@@ -11,11 +11,10 @@ from alloc.allocators.online.routes.queue import drop_first, push
 from alloc.allocators.online.routes.record import Schedule
 from alloc.allocators.online.routes.situation import (
     CANCELLED,
-    CHANGED,
     CHARGED,
+    FIXED,
     IN,
     MANHATTAN,
-    FIXED,
     OPENS,
     OUT,
     Ints,

@@ -1,12 +1,14 @@
 """Local search over routes: small changes, and tasks taken out near each other and put back where they fit best."""
 
+# ruff: noqa: NPY002 - compiled code seeds numba's own generator
+
 import numpy as np
 
 from alloc.allocators.online.routes.cheapest import insert_cheapest
 from alloc.allocators.online.routes.insertion import find_slack, insert_best, tidy
 from alloc.allocators.online.routes.moves import change
-from alloc.allocators.online.routes.schedule import play
 from alloc.allocators.online.routes.record import Schedule
+from alloc.allocators.online.routes.schedule import play
 from alloc.allocators.online.routes.situation import Floats, Ints, Situation
 from alloc.allocators.runtime.compiled import compiled
 
@@ -17,7 +19,7 @@ HOURS, FLIGHT, MISSED_HOURS, MISSED_FLIGHT = 0.02, 0.02, 0.02, 0.5
 """What hours to completion and hours of flight count beside: where all is done, and where something is missed."""
 
 RUIN, BLINK, TOLERATED = 0.5, 0.02, 0.05
-"""Share of the changes that rebuild, share of the places passed over, and by what share a plan may be worse at first."""
+"""Share of the changes that rebuild, share of the places passed over, by what share a plan may be worse at first."""
 
 MOST_OUT, MOST_WAITING, BY_TIME = 7, 8, 0.6
 """Most tasks of a stretch, unplanned tasks tried with those near it, and share of the stretches in time."""
