@@ -9,6 +9,7 @@ from alloc.allocators.contract.parameters import CheckedParameters, bounded
 from alloc.allocators.online.contract import Briefing, FleetDecider, Policy, PolicyInfo
 from alloc.allocators.online.routes.describe import Described, Describer, Foresight
 from alloc.allocators.online.routes.plan import first_tasks, improved, warm_up
+from alloc.allocators.online.routes.situation import Ints
 from alloc.problems.missions.simulation.reports import View
 from alloc.problems.missions.simulation.state import ACTIVE, STAY, Order, TaskStatus
 
