@@ -2,7 +2,9 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-PIP := PYTHONWARNINGS=ignore $(BIN)/python -m pip --quiet --disable-pip-version-check
+# pip compiles modules one by one; here all processors do. Some packages hold files that no Python 3 compiles.
+COMPILE := $(BIN)/python -m compileall -q -j 0 $(VENV)/lib > /dev/null || true
+INSTALL := PYTHONWARNINGS=ignore $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 # A process of tests for each processor, each with one thread in torch, and most of a gigabyte of memory.
 PARALLEL := -n logical --maxprocesses 8 --dist worksteal
 CODE := pyproject.toml $(shell find problems allocators cli -name '*.py' -o -name '*.safetensors')
@@ -14,8 +16,8 @@ solve: $(VENV)/.installed  ## allocate the agents of a real instance with GAPPO,
 	@mkdir -p out
 	$(BIN)/alloc solve $(EXAMPLE) --method gappo --objective makespan-energy --output out/alaska-result.json --plot out/alaska.png
 
-test: $(VENV)/.tested  ## run the tests, on all processors
-	OMP_NUM_THREADS=1 $(BIN)/python -m pytest $(PARALLEL)
+test: $(VENV)/.tested  ## run the tests but slow ones, on all processors; CI runs all of them
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest $(PARALLEL) -m 'not slow'
 
 check: $(VENV)/.checked  ## lint, format, imports and types
 	$(BIN)/ruff check .
@@ -55,19 +57,22 @@ clean:  ## remove what the other targets made
 $(VENV)/bin/python:
 	$(PYTHON) -c 'import sys; sys.exit("alloc needs Python 3.11 or newer; call make PYTHON=...") if sys.version_info < (3, 11) else None'
 	$(PYTHON) -m venv $(VENV)
-	$(PIP) install --upgrade pip
+	$(INSTALL) --upgrade pip
 
 $(VENV)/.installed: $(VENV)/bin/python $(CODE)
-	$(PIP) install --editable .
+	$(INSTALL) --editable .
+	$(COMPILE)
 	$(BIN)/alloc methods --prepare
 	@touch $@
 
 # An installation anew makes compiled loops stale: on a fresh machine, one for the tests is all that they need.
 $(VENV)/.tested: $(VENV)/bin/python $(CODE)
-	$(PIP) install --editable '.[test]'
+	$(INSTALL) --editable '.[test]'
+	$(COMPILE)
 	$(BIN)/alloc methods --prepare
 	@touch $(VENV)/.installed $@
 
 $(VENV)/.checked: $(VENV)/.tested
-	$(PIP) install --editable '.[dev]'
+	$(INSTALL) --editable '.[dev]'
+	$(COMPILE)
 	@touch $@

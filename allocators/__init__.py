@@ -36,10 +36,13 @@ if TYPE_CHECKING:
     from alloc.allocators.learned.policy import A2c, Ddpg, Dqn, Gappo, GappoLs, Ppo
     from alloc.allocators.learned.training import train
     from alloc.allocators.online.contract import AgentDecider, Briefing, FleetDecider, Policy, PolicyError, PolicyInfo
+    from alloc.allocators.online.planner.inputs import Report
+    from alloc.allocators.online.planner.plan import OrderChange, Plan
+    from alloc.allocators.online.planner.planner import MissionPlanner
     from alloc.allocators.online.registry import describe_policy, load_policy, policy_names
     from alloc.allocators.online.run import MissionRun, simulate
     from alloc.allocators.plan.files import write_result
-    from alloc.allocators.plotting import plot, plot_convergence
+    from alloc.allocators.plotting import animate_mission, plot, plot_convergence, plot_mission
 
 __all__ = [
     "A2c",
@@ -70,14 +73,18 @@ __all__ = [
     "Method",
     "Milp",
     "MissingPackageError",
+    "MissionPlanner",
     "MissionRun",
     "Moves",
+    "OrderChange",
+    "Plan",
     "Policy",
     "PolicyError",
     "PolicyInfo",
     "Ppo",
     "Proposal",
     "RefusedError",
+    "Report",
     "Result",
     "Row",
     "Search",
@@ -86,6 +93,7 @@ __all__ = [
     "TracePoint",
     "TrainingError",
     "WhatIf",
+    "animate_mission",
     "compare",
     "describe",
     "describe_policy",
@@ -97,6 +105,7 @@ __all__ = [
     "pareto",
     "plot",
     "plot_convergence",
+    "plot_mission",
     "policy_names",
     "read_result",
     "reasons_of_moves",
@@ -109,13 +118,19 @@ __all__ = [
 
 _LAZY = {
     **{target.partition(":")[2]: target.partition(":")[0] for target in TARGETS.values()},
+    "animate_mission": "alloc.allocators.plotting",
     "plot": "alloc.allocators.plotting",
     "plot_convergence": "alloc.allocators.plotting",
+    "plot_mission": "alloc.allocators.plotting",
     "train": "alloc.allocators.learned.training",
     "write_result": "alloc.allocators.plan.files",
     "AgentDecider": "alloc.allocators.online.contract",
     "Briefing": "alloc.allocators.online.contract",
     "FleetDecider": "alloc.allocators.online.contract",
+    "MissionPlanner": "alloc.allocators.online.planner.planner",
+    "OrderChange": "alloc.allocators.online.planner.plan",
+    "Plan": "alloc.allocators.online.planner.plan",
+    "Report": "alloc.allocators.online.planner.inputs",
     "MissionRun": "alloc.allocators.online.run",
     "Policy": "alloc.allocators.online.contract",
     "PolicyError": "alloc.allocators.online.contract",

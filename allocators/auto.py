@@ -1,10 +1,14 @@
 """The method that `auto` picks for an instance, and why.
 
-The thresholds were measured on two cores. For the makespan, exact methods pay off as long as the solver's model
-can be built at all, at 60,000 pairs a second. For the energy, they prove a gap of about 1 % up to some 1,000 pairs for
-each second, and match the local search up to 5,000, with a far better bound. Beyond, the local search finds better
-allocations in the same time.
+Exact methods have local search in them, in turns with their own searches and bounds, so that the pick decides how the
+time is shared. The thresholds were measured on two cores. For the makespan, exact methods pay off as long as the
+solver's model can be built at all, at 60,000 pairs a second. For the energy, they prove a gap of about 1 % up to some
+1,000 pairs for each second, and match local search alone up to 5,000, with a far better bound. Beyond, local search
+alone finds better allocations in the same time where the least makespan is easy: where all agents can do all tasks
+from the start and abilities are whole numbers.
 """
+
+import numpy as np
 
 from alloc.allocators.contract.budget import Budget
 from alloc.problems import Instance, Objective, count_classes
@@ -25,7 +29,8 @@ def choose(instance: Instance, objective: Objective, budget: Budget) -> tuple[st
     pairs = count_classes(instance, by_place=energy) * tasks
     seconds = min(UNHURRIED_S, UNHURRIED_S if budget.time_limit_s is None else budget.time_limit_s)
     searchable = max(15_000, int(MAKESPAN_PAIRS_PER_SECOND * seconds))
-    limit = max(1_000, int(ENERGY_PAIRS_PER_SECOND * seconds)) if energy else searchable
+    is_easy = instance.reach.is_complete and not instance.has_travel_time and _are_whole(instance)
+    limit = max(1_000, int(ENERGY_PAIRS_PER_SECOND * seconds)) if energy and is_easy else searchable
     size = f"{pairs} pairs of agent class and task"
     time = "without a time limit" if budget.time_limit_s is None else f"in {budget.time_limit_s:g} s"
     if pairs <= limit and instance.n * instance.m <= MOST_PAIRS_SEARCHED:
@@ -39,3 +44,8 @@ def choose(instance: Instance, objective: Objective, budget: Budget) -> tuple[st
             f"{instance.n} agents and {instance.m} tasks are too many for the search of exact methods",
         )
     return "local-search", f"{size} are too many for a proof {time} (more than {limit})"
+
+
+def _are_whole(instance: Instance) -> bool:
+    """Whether abilities are whole numbers."""
+    return bool((instance.ability == np.round(instance.ability)).all())

@@ -4,11 +4,14 @@ import sys
 import time
 from collections.abc import Callable
 
+import numpy as np
+
 from alloc.allocators.contract.base import Proposal
 from alloc.allocators.contract.search import Search
 from alloc.allocators.contract.tolerance import PROVEN
 from alloc.allocators.runtime.interrupts import run_native
-from alloc.problems import Objective, energy_lower_bound, lp_makespan_lower_bound
+from alloc.problems import Objective, agent_classes, count_classes, energy_lower_bound, lp_makespan_lower_bound
+from alloc.problems.bounds import LP_PAIRS_PER_SECOND, LP_SIZE_LIMIT
 
 UNLIMITED_S = 30.0
 """Time limit of the linear programme before a run without one; so long that the clock does not decide."""
@@ -21,9 +24,32 @@ def raise_bound_before(search: Search) -> None:
 
 
 def raise_makespan_bound(search: Search, end: float) -> None:
-    """Raise the bound on the makespan by a linear programme that ends at `end` on the monotonic clock."""
+    """Raise the bound on the makespan by linear programmes that end at `end` on the monotonic clock."""
     seconds = max(0.0, end - time.monotonic())
-    search.raise_bound(_unless_interrupted(search, lambda: lp_makespan_lower_bound(search.instance, seconds)) or 0.0)
+    prove = _bound_below_plan if search.fastest is not None and search.gap < 1 else _bound_without_plan
+    search.raise_bound(_unless_interrupted(search, lambda: prove(search, seconds)) or 0.0)
+
+
+def _bound_without_plan(search: Search, seconds: float) -> float | None:
+    """Return the bound by one linear programme, for where there is no plan yet."""
+    return lp_makespan_lower_bound(search.instance, seconds)
+
+
+def _bound_below_plan(search: Search, seconds: float) -> float | None:
+    """Return the bound by the linear programmes of exact methods, which know travel times and whole abilities."""
+    instance = search.instance
+    pairs = count_classes(instance, by_place=False) * instance.m
+    if pairs > min(LP_SIZE_LIMIT, LP_PAIRS_PER_SECOND * seconds) or not (instance.workload > 0).any():
+        return None
+    from alloc.allocators.exact.makespan.relaxation import relaxed_lower_bound  # loads scipy
+    from alloc.allocators.exact.model import Model
+
+    assert search.fastest is not None
+    makespan = search.fastest.evaluation.served_makespan
+    classes = agent_classes(instance, by_place=False)
+    model = Model.build(instance, classes, int(np.count_nonzero(instance.workload)))
+    low, stopped = min(search.lower_bound, makespan), lambda: search.interrupted
+    return relaxed_lower_bound(model, low, makespan, seconds, stopped)[0]
 
 
 def bounds_after(search: Search, proposal: Proposal) -> float | None:

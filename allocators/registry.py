@@ -1,15 +1,15 @@
 """Methods by name, imported on first use; third parties add theirs by entry point."""
 
-import importlib
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
 from inspect import signature
 from typing import cast
 
 from alloc.allocators.contract.base import Allocator
 from alloc.allocators.contract.built_in import BUILT_IN
 from alloc.allocators.contract.method import Method
+from alloc.allocators.contract.plugins import imported, plugin_class, plugins, require_installed
 from alloc.allocators.runtime.interrupts import ended_with_process
-from alloc.problems import InputError, MissingPackageError
+from alloc.problems import InputError
 from alloc.problems.arguments import text
 from alloc.problems.errors import nearest
 
@@ -92,7 +92,7 @@ def load(name: str, parameters: object = None, **settings: object) -> Allocator:
     """
     method = describe(name)
     given = {key: value for key, value in settings.items() if value is not None}
-    _require_installed(method)
+    require_installed(method.missing, f"method {name!r}", "method")
     if "policy" in given and "policy" in method.options:
         from alloc.allocators.learned.files.policy_header import read_header
 
@@ -130,27 +130,18 @@ def method_parameters(name: str) -> dict[str, object]:
         If what it requires is not installed.
     """
     method = describe(name)
-    _require_installed(method)
+    require_installed(method.missing, f"method {name!r}", "method")
     kind = _class(name)
     arguments = signature(kind).parameters
     options = {key: arguments[key].default for key in method.options if key in arguments}
     return {**options, **kind.default_parameters()}
 
 
-def _require_installed(method: Method) -> None:
-    if method.missing:
-        modules = " ".join(method.missing)
-        message = f"method {method.name!r} needs {modules}; install with: pip install {modules}"
-        raise MissingPackageError(message, "method")
-
-
 def _class(name: str) -> type[Allocator]:
     """Import the class of a method."""
     if name not in BUILT_IN:
         return _plugin_class(name)
-    module, _, attribute = TARGETS[name].partition(":")
-    kind: type[Allocator] = getattr(importlib.import_module(module), attribute)
-    return kind
+    return cast("type[Allocator]", imported(TARGETS[name]))
 
 
 def _hint(key: str, method: Method, kind: type[Allocator]) -> str:
@@ -163,20 +154,13 @@ def _hint(key: str, method: Method, kind: type[Allocator]) -> str:
 
 
 def _plugins() -> dict[str, EntryPoint]:
-    """Return the entry points of other packages; the name of a built-in method cannot be taken."""
-    return {entry.name: entry for entry in entry_points(group=ENTRY_POINT_GROUP) if entry.name not in BUILT_IN}
+    return plugins(ENTRY_POINT_GROUP, BUILT_IN)
 
 
 def _plugin_class(name: str) -> type[Allocator]:
-    plugins = _plugins()
+    found = _plugins()
     if name == "auto":
         raise InputError("'auto' is no method but picks one for an instance; call solve(instance, 'auto')", "method")
-    if name not in plugins:
-        raise InputError(f"there is no method {name!r}{nearest(name, [*BUILT_IN, *plugins, 'auto'])}", "method")
-    try:
-        plugin = plugins[name].load()
-    except Exception as error:
-        raise InputError(f"plugin {name!r} ({plugins[name].value}) cannot be imported: {error}", "method") from error
-    if not (isinstance(plugin, type) and issubclass(plugin, Allocator) and hasattr(plugin, "method")):
-        raise InputError(f"plugin {name!r} ({plugins[name].value}) is not an Allocator with a `method`", "method")
-    return plugin
+    if name not in found:
+        raise InputError(f"there is no method {name!r}{nearest(name, [*BUILT_IN, *found, 'auto'])}", "method")
+    return plugin_class(found, name, Allocator, "method", "an Allocator with a `method`", "method")  # type: ignore[type-abstract]

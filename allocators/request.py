@@ -35,6 +35,8 @@ class Request:
     threads : int
     on_improvement : callable or None
     stop : threading.Event
+    pinned : bool
+        Whether agents are pinned.
     """
 
     instance: Instance
@@ -46,6 +48,7 @@ class Request:
     threads: int
     on_improvement: Callable[[Improvement], None] | None
     stop: threading.Event
+    pinned: bool = False
 
 
 def checked_tolerance(slack: float, limit: float | None, objective: Objective) -> MakespanTolerance:
@@ -70,7 +73,8 @@ def checked_tolerance(slack: float, limit: float | None, objective: Objective) -
     )
     if objective is Objective.MAKESPAN and tolerance != EXACT:
         name = "makespan_slack" if slack else "makespan_limit"
-        raise InputError(f"leaves room for less energy; it is for the objective {Objective.MAKESPAN_ENERGY}", name)
+        goals = f"{Objective.MAKESPAN_ENERGY} or {Objective.MAKESPAN_MOVES}"
+        raise InputError(f"leaves room for less energy or fewer moves; it is for the objective {goals}", name)
     return tolerance
 
 

@@ -10,13 +10,13 @@ from alloc.allocators.contract.status import Status
 from alloc.allocators.contract.tolerance import EXACT, PROVEN, MakespanTolerance, relative_gap
 from alloc.allocators.plan.table import AgentRow, agent_rows
 from alloc.allocators.replanning.moves import Moves
-from alloc.allocators.result_document import moves_document, read_document, result_fields
+from alloc.allocators.result_document import moves_document, result_fields
 from alloc.allocators.summary import summary
 from alloc.problems import Allocation, Evaluation, InputError, Instance, MissingPackageError, Objective
 from alloc.problems.diagnosis.unserved import Unserved, why_unserved
 from alloc.problems.evaluation import RELATIVE_TOLERANCE
-from alloc.problems.formats.allocation_file import RESULT_FORMAT
-from alloc.problems.formats.files import PathLike, named
+from alloc.problems.formats.allocation_file import RESULT_FORMAT, parse_result
+from alloc.problems.formats.files import PathLike, named, read_text
 from alloc.problems.formats.messages import told
 
 if TYPE_CHECKING:
@@ -88,7 +88,20 @@ class Result:
         """Why tasks are unserved: the ten most urgent ones."""
         if self.allocation is None or self.evaluation is None or not self.evaluation.unserved_tasks:
             return ()
-        return why_unserved(self.instance, self.allocation)
+        pinned = {self.instance.agent_index[name] for name in self.pins}
+        return why_unserved(self.instance, self.allocation, pinned=pinned)
+
+    @property
+    def served_makespan(self) -> float | None:
+        """Hours until the last of the tasks that are served is done; None where there is no allocation."""
+        if self.makespan is not None or self.evaluation is None:
+            return self.makespan
+        return self.evaluation.served_makespan
+
+    @property
+    def unserved_count(self) -> int:
+        """Number of tasks that are unserved, 0 where there is no allocation."""
+        return 0 if self.evaluation is None else len(self.evaluation.unserved_tasks)
 
     @property
     def energy(self) -> float | None:
@@ -267,8 +280,7 @@ def read_result(path: PathLike, instance: Instance) -> Result:
     InputError
         If the file cannot be read, or as `Result.from_dict` does.
     """
-    document = read_document(path)
     try:
-        return Result.from_dict(document, instance)
+        return Result.from_dict(parse_result(read_text(path)), instance)
     except InputError as error:
         raise told(error, named(path)) from error.__cause__

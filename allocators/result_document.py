@@ -1,6 +1,5 @@
 """The document of a result (alloc-result/1), read back: its fields checked against the scores of its allocation."""
 
-import json
 import math
 from collections.abc import Mapping
 from typing import TypedDict
@@ -13,17 +12,11 @@ from alloc.allocators.replanning.moves import Moves
 from alloc.problems import Allocation, Evaluation, InputError, Instance, Objective, evaluate
 from alloc.problems.arguments import choice, of_type, real, shown, text, whole
 from alloc.problems.evaluation import RELATIVE_TOLERANCE
-from alloc.problems.formats import json_text, read_text
 from alloc.problems.formats.allocation_file import RESULT_FORMAT
 from alloc.problems.formats.columns import require_format
-from alloc.problems.formats.files import PathLike, named
-from alloc.problems.formats.messages import told
 
 SCORES = ("makespan", "served_makespan", "energy", "distance", "battery_remaining_percent", "reward")
 """Fields that must be what `evaluate` says of the allocation."""
-
-LARGEST_EXACT = 2**53
-"""Beyond it, floats skip whole numbers."""
 
 
 class ResultFields(TypedDict):
@@ -43,26 +36,6 @@ class ResultFields(TypedDict):
     tolerance: MakespanTolerance
     moves: Moves | None
     pins: dict[str, str | None]
-
-
-def read_document(path: PathLike) -> dict[str, object]:
-    """Return the object in a JSON file; ``-`` is standard input.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read, or is no JSON object.
-    """
-    source = named(path)
-    try:
-        content = read_text(path)
-        document = json_text.require_object(json_text.parse(content))
-    except InputError as error:
-        raise told(error, source) from error.__cause__
-    seed = document.get("seed")
-    if isinstance(seed, float) and seed >= LARGEST_EXACT:
-        document["seed"] = json.loads(content, parse_int=lambda digits: int(digits[:20]))["seed"]
-    return document
 
 
 def result_fields(document: Mapping[str, object], instance: Instance) -> ResultFields:

@@ -135,6 +135,7 @@ def solve(
         threads=checked_threads(threads) or available_threads(),
         on_improvement=None if tell is None else lambda improvement: tell(plan_in_force.told(improvement)),
         stop=event(stop, "stop") or threading.Event(),
+        pinned=bool(plan_in_force.pinned.any()),
     )
     handle_signals = flag(handle_signals, "handle_signals")
     carried_notes = [f"since the plan was made, {carried}"] if str(carried) else []
@@ -169,7 +170,7 @@ def _prepared(
         given = ", ".join(settings) or "parameters"
         raise InputError(f"is an allocator with its own parameters; set {given} where it is made", "method")
     allocator = load(method, parameters, **settings) if isinstance(method, str) else method
-    if request.instance.reach.move is not None:
+    if _is_repaired(request.instance):
         from alloc.allocators.heuristic.local_search.annealing_state import compile_loops
 
         compile_loops()  # for the repair; loading is not part of the run
@@ -183,6 +184,12 @@ def _prepared(
     if request.budget.target_gap is not None:
         importlib.import_module("scipy.optimize")  # for the bound before the run
     return allocator, notes, spent_s
+
+
+def _is_repaired(instance: Instance) -> bool:
+    """Whether moves have a price, so that the plan is repaired in the end: pins alone leave nothing to repair."""
+    move = instance.reach.move
+    return move is not None and bool(move.price.any())
 
 
 def _is_matched(instance: Instance) -> bool:
@@ -221,7 +228,7 @@ def _run(allocator: Allocator, request: Request, notes: list[str], spent_s: floa
     proposal, stop_reason = (Proposal(), None) if part is None else _propose(allocator, part)
     if decomposition is not None:
         decomposition.conclude()
-    return conclude(search, decomposition, allocator.method.name, proposal, stop_reason, notes)
+    return conclude(search, decomposition, allocator.method.name, proposal, stop_reason, notes, pinned=request.pinned)
 
 
 def _propose(allocator: Allocator, search: Search) -> tuple[Proposal, StopReason | None]:
@@ -236,8 +243,7 @@ def _propose(allocator: Allocator, search: Search) -> tuple[Proposal, StopReason
         end = time.monotonic() + max(REPAIR_S, search.remaining_s)
         search.submit(serve_all(search.instance, search.best.allocation, lambda: end - time.monotonic()))
     search.raise_bound(proposal.makespan_lower_bound or 0.0)
-    move = search.instance.reach.move
-    if search.best is not None and move is not None and move.price.any():
+    if search.best is not None and _is_repaired(search.instance):
         from alloc.allocators.heuristic.local_search.improve import repair
 
         limit = search.budget.time_limit_s

@@ -28,6 +28,9 @@ STOPS = {
 MOST_REASONS = 5
 """Unserved tasks whose reason is given."""
 
+MOST_LOOKED_AT = 1000
+"""Unserved tasks up to which it is told how many of them nobody can do."""
+
 LESS = {
     Objective.MAKESPAN: "less energy",
     Objective.MAKESPAN_ENERGY: "less energy",
@@ -64,7 +67,6 @@ def _headline(result: "Result") -> str:
 
 
 def _status(result: "Result") -> str:
-    unserved = 0 if result.evaluation is None else len(result.evaluation.unserved_tasks)
     if result.status is Status.OPTIMAL:
         less = LESS[result.objective]
         if result.makespan_limit is not None:
@@ -74,8 +76,19 @@ def _status(result: "Result") -> str:
     if result.status is Status.FEASIBLE:
         return "every task is served; not proven to be the best"
     if result.status is Status.INFEASIBLE:
-        return f"{unserved} of {counted(result.instance.m, 'task')} cannot be served along with the others"
+        return _shortage(result)
     return "no allocation found"
+
+
+def _shortage(result: "Result") -> str:
+    """Return how many tasks are left, and how many of them nobody can do."""
+    instance, tasks = result.instance, () if result.evaluation is None else result.evaluation.unserved_tasks
+    unserved = f"{len(tasks)} of {counted(instance.m, 'task')}"
+    lost = sum(not len(instance.reach.agents_of(task)) for task in tasks) if len(tasks) <= MOST_LOOKED_AT else 0
+    if lost == len(tasks):
+        return f"{unserved} can be served by nobody"
+    nobody = f", {lost} of them by nobody at all" if lost else ""
+    return f"{unserved} cannot be served along with the others{nobody}"
 
 
 def figures(result: "Result") -> list[str]:

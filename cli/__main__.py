@@ -2,6 +2,6 @@
 
 import sys
 
-from alloc.cli.main import main
+from alloc.cli.start import start
 
-sys.exit(main())
+sys.exit(start())

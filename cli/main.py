@@ -25,19 +25,16 @@ from alloc.cli.commands import (
     validate,
     whatif,
 )
-from alloc.cli.commands.missions import replay, simulate
+from alloc.cli.commands.missions import plan, replay, simulate
 from alloc.cli.commands.training import train, tune
 from alloc.cli.options import Parameter, examples, option_of
-from alloc.cli.output.console import complain, flush, write_out
+from alloc.cli.output.console import INTERRUPTED, complain, flush, interrupted, write_out
 
 SERVED, UNSERVED, BAD_INPUT = 0, 1, 2
 """Exit codes: every task is served; a task is unserved; bad usage or bad input."""
 
 DEFECT = 70
 """Exit code of a defect of the program (EX_SOFTWARE)."""
-
-INTERRUPTED = 130
-"""Exit code after Ctrl-C, unless it ended a run that has an answer."""
 
 _USAGE_ERROR = typer.BadParameter.__mro__[1]  # its base has moved between versions of typer
 
@@ -67,6 +64,7 @@ COMMANDS = (
     export,
     simulate,
     replay,
+    plan,
     schema,
     methods,
     train,
@@ -110,11 +108,13 @@ def _run(arguments: Sequence[str] | None) -> int:
             args=None if arguments is None else list(arguments), prog_name="alloc", standalone_mode=False
         )
     except (KeyboardInterrupt, typer.Abort):
-        return INTERRUPTED
+        return interrupted()
     except Exception as error:
         if os.environ.get("ALLOC_TRACEBACK"):
             raise
         return _explain(error, sys.argv[1:] if arguments is None else arguments)
+    if code == INTERRUPTED:  # typer turns Ctrl-C within a command into it
+        return interrupted()
     return code if isinstance(code, int) else SERVED
 
 
@@ -143,7 +143,8 @@ def _explain(error: Exception, arguments: Sequence[str]) -> int:
     """Turn `error` into one line on standard error and an exit code."""
     if isinstance(error, _USAGE_ERROR):
         command = error.ctx.command_path if error.ctx else "alloc"  # type: ignore[attr-defined]
-        complain(f"{error.format_message().rstrip('.')}; see {command!r} --help".replace("'" + " --help", " --help'"))  # type: ignore[attr-defined]
+        words = error.format_message().rstrip(".").replace(": Value error, ", ": ")  # type: ignore[attr-defined]
+        complain(f"{words}; see {command!r} --help".replace("'" + " --help", " --help'"))
         return BAD_INPUT
     from alloc.problems import AllocError, InputError
 

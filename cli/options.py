@@ -1,6 +1,7 @@
 """Arguments and options that several commands share."""
 
 from collections.abc import Sequence
+from enum import StrEnum
 from typing import Annotated
 
 import typer
@@ -27,10 +28,24 @@ BUILT_IN_METHODS = (
 )
 """For completion, which must not load numpy; a test compares them with the registry."""
 
-BUILT_IN_POLICIES = ("idle", "random", "nearest", "greedy", "hedonic", "auction", "replan", "routes", "clairvoyant")
+BUILT_IN_POLICIES = (
+    "idle",
+    "random",
+    "nearest",
+    "greedy",
+    "hedonic",
+    "auction",
+    "gappo",
+    "replan",
+    "routes",
+    "clairvoyant",
+)
 """For completion, likewise."""
 
 READABLE = "a .json or .npz file, a folder with agents.csv and tasks.csv, or - for JSON on standard input"
+
+PLAN = "A result of `alloc solve`, an allocation, a table of it, or a solver's solution of what `alloc export` wrote"
+"""What every command that takes a plan reads."""
 
 
 def examples(*lines: str, closing: str = "") -> str:
@@ -58,22 +73,27 @@ def complete_policies(incomplete: str) -> list[str]:
 
 InstanceArgument = Annotated[str, typer.Argument(metavar="INSTANCE", help=f"The instance: {READABLE}.")]
 InstancesArgument = Annotated[list[str], typer.Argument(metavar="INSTANCE...", help=f"Instances, each {READABLE}.")]
+
+
+class PlainObjective(StrEnum):
+    """What can be optimised where no plan is in force, so that nothing counts as a move."""
+
+    MAKESPAN = Objective.MAKESPAN.value
+    MAKESPAN_ENERGY = Objective.MAKESPAN_ENERGY.value
+
+
 ObjectiveOption = Annotated[
-    Objective,
-    typer.Option(
-        help="What is minimised, after the number of unserved tasks: the makespan, then the energy or the moves."
-    ),
+    PlainObjective,
+    typer.Option(help="What is minimised, after the number of unserved tasks: the makespan, then the energy."),
 ]
 TimeLimitOption = Annotated[
     float | None,
-    typer.Option(min=0, help="Seconds for one run.", show_default="10; none where --iterations is given"),
+    typer.Option(help="Seconds for one run.", show_default="10; none where --iterations is given"),
 ]
 IterationsOption = Annotated[
     int | None, typer.Option(min=0, help="Iterations of one run, in the method's own unit: the same on any machine.")
 ]
-TargetGapOption = Annotated[
-    float | None, typer.Option(min=0, help="Stop at this relative gap of the makespan; 0.01 is 1 %.")
-]
+TargetGapOption = Annotated[float | None, typer.Option(help="Stop at this relative gap of the makespan; 0.01 is 1 %.")]
 SeedOption = Annotated[int, typer.Option(min=0, max=2**63 - 1, help="Seed of all random numbers.")]
 ThreadsOption = Annotated[int | None, typer.Option(min=1, max=1024, help="Threads.", show_default="all processors")]
 PlotOption = Annotated[str | None, typer.Option(metavar="FILE", help="Draw it as .png, .svg or .pdf.")]

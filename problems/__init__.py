@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from alloc.problems.matching.serving import only_allowed, serve_all
     from alloc.problems.matching.shortage import Shortage, find_shortage
     from alloc.problems.matching.unservable import fewest_unserved, minimal_unservable_set
+    from alloc.problems.missions.course import Course
     from alloc.problems.missions.events import Event
     from alloc.problems.missions.families.draw import random_mission
     from alloc.problems.missions.families.parameters import MissionParameters
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from alloc.problems.missions.files.mission_file import read_mission, write_mission
     from alloc.problems.missions.mission import Mission
     from alloc.problems.missions.radio import Burst, Pace, Radio
+    from alloc.problems.missions.recorder import Recorder, course_of
     from alloc.problems.missions.replay import replay
     from alloc.problems.missions.simulation.measures import MissionResult
     from alloc.problems.missions.snapshot import snapshot_at
@@ -45,6 +47,7 @@ __all__ = [
     "AllocError",
     "Allocation",
     "Burst",
+    "Course",
     "DistanceTable",
     "Evaluation",
     "Event",
@@ -60,6 +63,7 @@ __all__ = [
     "Pace",
     "Radio",
     "Reach",
+    "Recorder",
     "RefusedError",
     "Shortage",
     "TrainingError",
@@ -67,6 +71,7 @@ __all__ = [
     "Violation",
     "agent_classes",
     "count_classes",
+    "course_of",
     "energy_lower_bound",
     "evaluate",
     "fewest_unserved",
@@ -99,6 +104,7 @@ _MODULE_OF = {
     "AllocError": "errors",
     "Allocation": "allocation",
     "Burst": "missions.radio",
+    "Course": "missions.course",
     "DistanceTable": "distances.given",
     "Evaluation": "evaluation",
     "Event": "missions.events",
@@ -115,6 +121,7 @@ _MODULE_OF = {
     "Pace": "missions.radio",
     "Radio": "missions.radio",
     "Reach": "distances.reach",
+    "Recorder": "missions.recorder",
     "RefusedError": "errors",
     "Shortage": "matching.shortage",
     "TrainingError": "errors",
@@ -122,6 +129,7 @@ _MODULE_OF = {
     "Violation": "evaluation",
     "agent_classes": "classes",
     "count_classes": "classes",
+    "course_of": "missions.recorder",
     "energy_lower_bound": "bounds",
     "evaluate": "evaluation",
     "fewest_unserved": "matching.unservable",

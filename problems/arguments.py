@@ -17,14 +17,15 @@ Kind = TypeVar("Kind")
 Choice = TypeVar("Choice", bound=StrEnum)
 
 
-def whole(value: object, name: str, low: int = 0, high: int | None = None) -> int:
-    """Return a whole number from `low` to `high` as an int."""
+def whole(value: object, name: str, low: int | None = 0, high: int | None = None) -> int:
+    """Return a whole number from `low` to `high` as an int; None is no limit."""
     if isinstance(value, Integral) and not isinstance(value, bool):
         number = int(value)
-        if low <= number and (high is None or number <= high):
+        if (low is None or low <= number) and (high is None or number <= high):
             return number
-    ends = f">= {low}" if high is None else f"from {low} to {high}"
-    raise InputError(f"must be a whole number {ends}, got {shown(value)}", name)
+    least, most = "" if low is None else f" >= {low}", "" if high is None else f" and at most {high}"
+    ends = f" from {low} to {high}" if low is not None and high is not None else least + most
+    raise InputError(f"must be a whole number{ends}, got {shown(value)}", name)
 
 
 def real(value: object, name: str, low: float = 0.0, high: float = math.inf, *, above: bool = False) -> float:
@@ -32,10 +33,11 @@ def real(value: object, name: str, low: float = 0.0, high: float = math.inf, *, 
     if isinstance(value, Real) and not isinstance(value, bool | np.bool_):
         plain: Real = value.item() if isinstance(value, np.generic) else value
         number = plain if isinstance(plain, int | float) else float(plain)
-        if (low < number if above else low <= number) and number <= high and number < math.inf:
+        if (low < number if above else low <= number) and number <= high and -math.inf < number < math.inf:
             return number
-    ends = f"{'>' if above else '>='} {low:g}" + (f" and at most {high:g}" if high < math.inf else "")
-    raise InputError(f"must be a finite number {ends}, got {shown(value)}", name)
+    least = "" if low == -math.inf else f" {'>' if above else '>='} {low:g}"
+    ends = least + (f"{' and' if least else ''} at most {high:g}" if high < math.inf else "")
+    raise InputError(f"must be a finite number{ends}, got {shown(value)}", name)
 
 
 def flag(value: object, name: str) -> bool:

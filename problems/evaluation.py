@@ -249,11 +249,20 @@ def reason_of(instance: Instance, agent: int, task: int) -> str:
         return f"the agent lacks {', '.join(map(repr, lacking))}"
     bound_to = reach.list_of[origin[0]]
     if bound_to >= 0 and task not in reach.lists[bound_to]:
-        return "there is no way to it in the table of distances"
+        given = reach.geometry.given
+        is_given = given is not None and task in given.chosen(origin).task
+        home = f"from it back to {_return_name(instance, agent)}" if is_given else "to it"
+        return f"there is no way {home} in the table of distances"
     if away[0] > instance.communication_range[agent] + TOLERANCE:
         return f"distance {away[0]:g} exceeds the range {instance.communication_range[agent]:g}"
     needed = reach.energy_per_distance * reach.flown(origin, goal, away)[0]
-    return f"energy {needed:g} exceeds the battery {instance.battery[agent]:g}"
+    back = f" (with the flight back to {_return_name(instance, agent)})" if instance.returns[agent] else ""
+    return f"energy {needed:g} exceeds the battery {instance.battery[agent]:g}{back}"
+
+
+def _return_name(instance: Instance, agent: int) -> str:
+    base = instance.return_base[agent]
+    return instance.bases.ids[base] if base >= 0 else "its start"
 
 
 def _lacking(instance: Instance, agent: int, task: int) -> list[str]:

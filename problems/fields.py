@@ -157,22 +157,23 @@ def indices(values: ArrayLike, field_name: str, message: str = "must be a list o
     return array.astype(np.intp)
 
 
-def starts(values: ArrayLike | None, n: int, m: int) -> IntArray:
-    """Return the index of the task where each agent begins; -1 for none, which None and NaN stand for."""
+def references(values: ArrayLike | None, field_name: str, n: int, kind: str, count: int) -> IntArray:
+    """Return the index of a task or a base for each agent; -1 for none, which None and NaN stand for."""
     if values is None:
         return np.full(n, IDLE, dtype=np.intp)
-    message = f"must be a list of {n} task indices, -1 for none"
+    message = f"must be a list of {n} {kind} indices, -1 for none"
     given = np.asarray(values)
     if given.dtype.kind not in "iu":  # missing values make floats or objects of a column of whole numbers
-        given = numbers(given, "start_task", message)
+        given = numbers(given, field_name, message)
         given[np.isnan(given)] = IDLE
-    array = indices(given, "start_task", message)
+    array = indices(given, field_name, message)
     if array.shape != (n,):
-        raise InputError(message, "start_task")
-    wrong = (array < IDLE) | (array >= m)
+        raise InputError(message, field_name)
+    wrong = (array < IDLE) | (array >= count)
     if wrong.any():
         row = int(np.argmax(wrong))
-        raise InputError(f"is {array[row]}, but tasks run from 0 to {m - 1}", f"agents[{row}].start_task")
+        known = f"{kind}s run from 0 to {count - 1}" if count else f"there are no {kind}s"
+        raise InputError(f"is {array[row]}, but {known}", f"agents[{row}].{field_name}")
     return array
 
 

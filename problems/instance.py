@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from alloc.problems import eligibility, fields
 from alloc.problems.arguments import of_type, real, text
 from alloc.problems.changes import add, move, remove
+from alloc.problems.distances.bases import Bases, returning
 from alloc.problems.distances.build import build_reach
 from alloc.problems.distances.geodesic import METRES
 from alloc.problems.distances.given import DistanceTable
@@ -64,7 +65,9 @@ class Instance(fields.ReadOnly):
     agent_energy_per_distance : array_like, shape (n,), optional
         That of each agent; `energy_per_distance` where it is None or NaN.
     returns : array_like of bool, shape (n,), optional
-        Whether the agent's flight back to its start counts for battery, distance and energy.
+        Whether the agent's flight back counts for battery, distance and energy; by default if it has a `return_base`.
+    return_base : array_like of int, shape (n,), optional
+        Index of the base to which the agent returns, -1 where it returns to its start.
     skills : sequence of (iterable of str, or None), optional
         What each agent can do.
     needs : sequence of (iterable of str, or None), optional
@@ -73,7 +76,9 @@ class Instance(fields.ReadOnly):
         Distances as in (1), along the axes, or along the surface of the earth; with the last, positions are longitude
         and latitude in degrees and, if given, altitude in metres, and distances are in km or in `units.distance`.
     distances : DistanceTable or iterable of (str, str, float), optional
-        Distances of one's own, by the ids of agents and tasks; see `DistanceTable.of`.
+        Distances of one's own, by the ids of agents, tasks and bases; see `DistanceTable.of`.
+    bases : Bases, or mapping from str to 2 or 3 numbers or None, optional
+        Ids and places to which agents return.
     units : Units, optional
         Labels of the units.
 
@@ -104,10 +109,12 @@ class Instance(fields.ReadOnly):
     energy_per_distance: float
     agent_energy_per_distance: FloatArray
     returns: BoolArray
+    return_base: IntArray
     skills: tuple[eligibility.Names, ...] | None
     needs: tuple[eligibility.Names, ...] | None
     metric: str
     distances: DistanceTable | None
+    bases: Bases
     units: Units
 
     def __init__(
@@ -130,10 +137,12 @@ class Instance(fields.ReadOnly):
         energy_per_distance: float = 1.0,
         agent_energy_per_distance: ArrayLike | None = None,
         returns: ArrayLike | None = None,
+        return_base: ArrayLike | None = None,
         skills: Sequence[Iterable[str] | None] | None = None,
         needs: Sequence[Iterable[str] | None] | None = None,
         metric: str = "euclidean",
         distances: DistanceTable | Iterable[tuple[str, str, float]] | None = None,
+        bases: Bases | Mapping[str, Sequence[float] | None] | None = None,
         units: Units | None = None,
     ) -> None:
         w, h = fields.vector(ability, "ability"), fields.vector(workload, "workload")
@@ -141,6 +150,7 @@ class Instance(fields.ReadOnly):
         if n == 0 or m == 0:
             raise InputError("an instance needs at least one agent and one task", "tasks" if n else "agents")
         agents, tasks = fields.ids(agent_ids, n, "a", "agent"), fields.ids(task_ids, m, "t", "task")
+        places = Bases.fitting(bases)
         values: dict[str, object] = {
             "ability": w,
             "workload": h,
@@ -149,7 +159,7 @@ class Instance(fields.ReadOnly):
             "task_ids": tasks,
             "agent_position": fields.positions(agent_position, n, "agent"),
             "task_position": fields.positions(task_position, m, "task"),
-            "start_task": fields.starts(start_task, n, m),
+            "start_task": fields.references(start_task, "start_task", n, "task", m),
             "battery": fields.limits(battery, "battery", n),
             "communication_range": fields.limits(communication_range, "communication_range", n),
             "speed": fields.limits(speed, "speed", n),
@@ -158,18 +168,15 @@ class Instance(fields.ReadOnly):
             "tau": fields.unit_share(tau),
             "energy_per_distance": float(real(energy_per_distance, "energy_per_distance")),
             "agent_energy_per_distance": fields.rates(agent_energy_per_distance, energy_per_distance, n),
-            "returns": fields.flags(returns, "returns", n),
+            **returning(returns, return_base, n, places),
             "skills": eligibility.name_sets(skills, n, "agent", "skills"),
             "needs": eligibility.name_sets(needs, m, "task", "needs"),
             "metric": fields.metric(metric),
-            "distances": None if distances is None else DistanceTable.fitting(distances, agents, tasks),
+            "distances": None if distances is None else DistanceTable.fitting(distances, agents, tasks, places.ids),
+            "bases": places,
             "units": Units() if units is None else of_type(units, Units, "units"),
         }
-        for key, value in values.items():
-            if isinstance(value, np.ndarray):
-                value.setflags(write=False)
-            object.__setattr__(self, key, value)
-        self._check()
+        self._set(values)
 
     @classmethod
     def from_tables(
@@ -177,25 +184,26 @@ class Instance(fields.ReadOnly):
     ) -> "Instance":
         """Return the instance that data frames, dicts of columns or lists of dicts describe.
 
-        Options are `columns`, `units`, `decimal`, `missing`, `name` and `report`; see `tables.reading.read_tables`.
+        Options are those of `tables.reading.read_tables`: `columns`, `units`, `decimal`, `missing`, `bases` and others.
         """
         return read_tables(agents, tasks, distances, **options).built(cls)
+
+    def _set(self, values: Mapping[str, object]) -> None:
+        for key, value in values.items():
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)
+            object.__setattr__(self, key, value)
+        self._check()
 
     def _check(self) -> None:
         agents, tasks = ("agent", self.agent_ids), ("task", self.task_ids)
         fields.require(
             np.isfinite(self.ability) & (self.ability > 0), self.ability, "ability", "a finite number > 0", agents
         )
-        fields.require(
-            np.isfinite(self.workload) & (self.workload >= 0), self.workload, "workload", "a finite number >= 0", tasks
-        )
-        fields.require(
-            np.isfinite(self.priority) & (self.priority >= 0), self.priority, "priority", "a finite number >= 0", tasks
-        )
-        fields.require(self.battery >= 0, self.battery, "battery", "a number >= 0, or null", agents)
-        fields.require(
-            self.communication_range >= 0, self.communication_range, "range", "a number >= 0, or null", agents
-        )
+        for values, name, owner in ((self.workload, "workload", tasks), (self.priority, "priority", tasks)):
+            fields.require(np.isfinite(values) & (values >= 0), values, name, "a finite number >= 0", owner)
+        for values, name in ((self.battery, "battery"), (self.communication_range, "range")):
+            fields.require(values >= 0, values, name, "a number >= 0, or null", agents)
         fields.require(self.speed > 0, self.speed, "speed", "a number > 0, or null", agents)
         fields.require_magnitude(self.ability, "ability", agents)
         fields.require_magnitude(self.workload, "workload", tasks)
@@ -203,17 +211,13 @@ class Instance(fields.ReadOnly):
         if self.energy_per_distance and not fields.LEAST <= self.energy_per_distance <= fields.MOST:
             rule = f"0 or from {fields.LEAST:g} to {fields.MOST:g}"
             raise InputError(f"must be {rule}, got {self.energy_per_distance:g}", "energy_per_distance")
-        fields.require(
-            np.isfinite(self.agent_energy_per_distance) & (self.agent_energy_per_distance >= 0),
-            self.agent_energy_per_distance,
-            "energy_per_distance",
-            "a finite number >= 0",
-            agents,
-        )
-        fields.require_magnitude(self.agent_energy_per_distance, "energy_per_distance", agents)
+        rate, name = self.agent_energy_per_distance, "energy_per_distance"
+        fields.require(np.isfinite(rate) & (rate >= 0), rate, name, "a finite number >= 0", agents)
+        fields.require_magnitude(rate, name, agents)
         if self.metric == GEOGRAPHIC:
             fields.require_geographic(self.agent_position, "agent")
             fields.require_geographic(self.task_position, "task")
+            fields.require_geographic(self.bases.position, "base")
             if self.units.distance and self.units.distance not in METRES:
                 raise InputError(f"must be one of {', '.join(METRES)} with geographic positions", "units.distance")
 

@@ -62,14 +62,14 @@ def _scored_plans(
 
 
 def reachable(instance: Instance) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Return distances (1), shape (n, m), and who can take what, agent by agent."""
+    """Return distances (1), shape (n, m), and who can take what, agent by agent, and be back at its base."""
     distance, able = np.zeros((instance.n, instance.m)), np.ones((instance.n, instance.m), dtype=bool)
     for i in range(instance.n):
         for j in range(instance.m):
             away, given = _distance(instance, i, j)
             distance[i, j] = away
             if instance.distances is not None and instance.distances.missing == "unreachable":
-                able[i, j] = given
+                able[i, j] = given and (instance.return_base[i] < 0 or _way_home(instance, i, j)[1])
             if instance.allowed_tasks is not None and instance.allowed_tasks[i] is not None:
                 able[i, j] &= j in instance.allowed_tasks[i]
             if instance.needs is not None:
@@ -84,9 +84,23 @@ def flight_energies(instance: Instance, distance: FloatArray) -> FloatArray:
     energy = np.zeros((instance.n, instance.m))
     for i in range(instance.n):
         for j in range(instance.m):
-            back = _distance(instance, i, j, back=True)[0] if instance.returns[i] else 0.0
+            back = _way_home(instance, i, j)[0] if instance.returns[i] else 0.0
             energy[i, j] = instance.agent_energy_per_distance[i] * (distance[i, j] + back)
     return energy
+
+
+def _way_home(instance: Instance, i: int, j: int) -> tuple[float, bool]:
+    """Return how far it is from task j to where agent i returns, and whether a table gives that."""
+    base, table = int(instance.return_base[i]), instance.distances
+    if base < 0:
+        return _distance(instance, i, j, back=True)
+    if table is not None:
+        rows = dict(zip(zip(table.source.tolist(), table.target.tolist(), strict=True), table.distance, strict=True))
+        node, task = table.n + table.m + base, table.n + j
+        for pair in ((task, node), (node, task)):
+            if pair in rows:
+                return float(rows[pair]), True
+    return _by_metric(instance, instance.bases.position[base], instance.task_position[j]), False
 
 
 def _distance(instance: Instance, i: int, j: int, *, back: bool = False) -> tuple[float, bool]:
@@ -104,16 +118,20 @@ def _distance(instance: Instance, i: int, j: int, *, back: bool = False) -> tupl
                     return float(rows[pair]), True
         if start == j:
             return 0.0, True
-    goal = instance.task_position[j]
+    return _by_metric(instance, place, instance.task_position[j]), False
+
+
+def _by_metric(instance: Instance, place: FloatArray, goal: FloatArray) -> float:
+    """Return the distance of two places, 0 where one is unknown."""
     if np.isnan(place).any() or np.isnan(goal).any():
-        return 0.0, False
+        return 0.0
     if instance.metric == "manhattan":
-        return float(np.abs(place - goal).sum()), False
+        return float(np.abs(place - goal).sum())
     if instance.metric == "geographic":
         metres = Geod(ellps="WGS84").inv(place[0], place[1], goal[0], goal[1])[2]
         metres_in = {"m": 1.0, "km": 1e3, "mi": 1609.344, "nmi": 1852.0}[instance.units.distance or "km"]
-        return float(np.hypot(metres, place[2] - goal[2]) / metres_in), False
-    return float(np.linalg.norm(place - goal)), False
+        return float(np.hypot(metres, place[2] - goal[2]) / metres_in)
+    return float(np.linalg.norm(place - goal))
 
 
 def _score(

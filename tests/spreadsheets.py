@@ -21,6 +21,7 @@ class Case:
     agents: Content = "id,ability\na1,4\na2,2\n"
     tasks: Content = "id,workload\nt1,5\nt2,7\n"
     distances: Content | None = None
+    bases: Content | None = None
     options: dict[str, object] = field(default_factory=dict)
     fields: dict[str, object] = field(default_factory=dict)
     error: str = ""
@@ -28,13 +29,14 @@ class Case:
     merged: tuple[str, ...] = ()
     sheet: str = ""
 
-    def write(self, folder: Path) -> tuple[str, str, str | None]:
+    def write(self, folder: Path) -> tuple[str, str, str | None, str | None]:
         """Write the tables, and return their paths."""
         distances = None if self.distances is None else _write(folder / "distances", self.distances)
         return (
             _write(folder / "agents", self.agents, self.merged, self.sheet),
             _write(folder / "tasks", self.tasks),
             distances,
+            None if self.bases is None else _write(folder / "bases", self.bases),
         )
 
 
@@ -392,7 +394,8 @@ VALUES = [
     Case(
         "neither yes nor no",
         "id,ability,returns\na,1,maybe\n",
-        error="agents.csv: line 2, column 'returns': must be yes or no, got 'maybe'",
+        error="agents.csv: line 2, column 'returns': must be yes, no or the id of a base, got 'maybe'; "
+        "give the bases with --bases",
     ),
     Case(
         "lists with bars, in other letters",
@@ -670,6 +673,7 @@ WORKBOOKS = [
         "a first column that is empty, and a title over all",
         [["Fleet"], [None, "Drone", "Battery %", "Payload"], [None, "d1", 80, 4], [None, "Total", 80, 4]],
         merged=("A1:D1",),
+        options={"units": Units(energy="%")},
         fields={"agent_ids": ("d1",), "battery": [80], "units.energy": "%"},
     ),
     Case(
@@ -702,4 +706,86 @@ WORKBOOKS = [
     ),
 ]
 
-TEXTS = [*SEPARATORS_AND_ENCODINGS, *NUMBERS, *HEADERS, *ROWS, *VALUES, *PLACES, *DISTANCES]
+PERCENT = (
+    "is in percent, but of which energy? Add a column such as 'Battery capacity [Wh]', or name one with the energy "
+    "itself by --map battery=...; where consumption is in percent, too, give --units energy=%"
+)
+
+ENERGIES = [
+    Case(
+        "what is used per distance, by its unit",
+        "id,ability,battery [Wh],use [Wh/km]\na,1,700,20\nb,1,900,\n",
+        fields={"agent_energy_per_distance": [20, 1], "units.energy": "Wh", "units.distance": "km"},
+        lines=("agents.csv: use [Wh/km] -> energy_per_distance",),
+    ),
+    Case(
+        "use and battery in two units",
+        "id,ability,battery [kWh],draw_Wh/km\na,1,0.7,20\n",
+        fields={"agent_energy_per_distance": [20], "battery": [700], "units.energy": "Wh"},
+    ),
+    Case(
+        "batteries in percent of nothing",
+        "id,ability,battery [%]\na,1,80\n",
+        error=f"agents.csv: column 'battery [%]': {PERCENT}",
+    ),
+    Case(
+        "batteries in percent of a capacity",
+        "id,ability,battery [%],battery capacity [Wh]\na,1,80,500\nb,1,,500\n",
+        fields={"battery": [400, INF], "units.energy": "Wh"},
+        lines=(
+            "agents.csv: battery [%] is taken of battery capacity [Wh]",
+            "agents.csv: battery capacity [Wh] -> capacity of the battery",
+        ),
+    ),
+    Case(
+        "batteries and consumption in percent",
+        "id,ability,battery [%],consumption [%/km]\na,1,80,2\n",
+        fields={"battery": [80], "agent_energy_per_distance": [2], "units.energy": "%"},
+    ),
+    Case(
+        "capacity in energy beside a load",
+        "id,payload [kg],capacity [Wh]\na,4,500\n",
+        fields={"ability": [4], "battery": [500], "units.energy": "Wh"},
+    ),
+    Case(
+        "longitudes to the east of the date line",
+        "id,ability,lat,lon\na,1,52,190.5\nb,1,52,-170\n",
+        fields={"agent_position": [[-169.5, 52, 0], [-170, 52, 0]]},
+        lines=("agents.csv: longitudes beyond 180 are west: 190.5 is -169.5",),
+    ),
+    Case(
+        "units in the name and in the row below",
+        "id,ability,range [km]\n,,[km]\na,1,5\n",
+        fields={"communication_range": [5], "units.distance": "km"},
+        lines=("agents.csv: range [km] -> range",),
+    ),
+    Case(
+        "bases to return to",
+        "id,ability,x,y,returns to\na,1,0,0,North\nb,1,1,0,yes\nc,1,2,0,\n",
+        "id,workload,x,y\nt1,5,1,1\n",
+        bases="Base;x;y\nNorth;0,5;2\n",
+        distances="from,to,distance\na,t1,3\nt1,North,4\nNorth,a,9\n",
+        fields={
+            "returns": [True, True, False],
+            "return_base": [0, -1, -1],
+            "bases": {"North": [0.5, 2, 0]},
+            "distances": [("a", "t1", 3), ("t1", "North", 4)],
+        },
+    ),
+    Case(
+        "a base that is not among the bases",
+        "id,ability,x,y,home base\na,1,0,0,South\n",
+        "id,workload,x,y\nt1,5,1,1\n",
+        bases="Base,x,y\nNorth,0,2\n",
+        error="agents.csv: line 2, column 'home base': must be yes, no or the id of a base, got 'South'; "
+        "give the bases with --bases",
+    ),
+    Case(
+        "bases in a plane among places on earth",
+        "id,ability,lat,lon\na,1,0,0\n",
+        bases="Base,x,y\nNorth,0,2\n",
+        error="bases.csv: gives places by x and y, but agents.csv by latitude and longitude; give both alike",
+    ),
+]
+
+TEXTS = [*ENERGIES, *SEPARATORS_AND_ENCODINGS, *NUMBERS, *HEADERS, *ROWS, *VALUES, *PLACES, *DISTANCES]

@@ -103,7 +103,7 @@ OLD_NAMES = (
 
 ALLOWED = (
     r"Markov chains?",  # the term of the field
-    r"ground (station|truth)s?",  # likewise
+    r"ground[ _](station|truth)s?",  # likewise
     r"survey drones?",  # the agents of an example
     r"world[ _-]size",  # side of the square or cube of generated instances, an option
     r"--lesson",  # former name of an option, still accepted

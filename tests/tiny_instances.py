@@ -2,10 +2,14 @@
 
 from collections.abc import Callable, Collection
 from itertools import count, islice
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from alloc.problems import DistanceTable, Instance, fewest_unserved
+
+FloatArray = NDArray[np.float64]
 
 
 def tiny_instance(seed: int) -> Instance:
@@ -65,7 +69,7 @@ def _drawn_scarce(rng: np.random.Generator, name: str) -> Instance:
     )
 
 
-FIELDS = ("metric", "distances", "rates", "returns", "skills", "speeds", "limits")
+FIELDS = ("metric", "distances", "rates", "returns", "skills", "speeds", "limits", "bases")
 """What `varied_instance` can give an instance beyond abilities, workloads and places."""
 
 
@@ -85,6 +89,9 @@ def varied_instance(seed: int, fields: Collection[str] | None = None) -> Instanc
     whole = rng.random() < 0.5
     ids = [f"a{i + 1}" for i in range(n)], [f"t{j + 1}" for j in range(m)]
     unit = 30.0 if metric == "geographic" else 1.0
+    homes = _homes(rng, n, corner, size) if "bases" in has else {}
+    bases = list(homes.get("bases", ()))
+    returns = rng.random(n) < 0.5 if "returns" in has else np.zeros(n, dtype=bool)
     return Instance(
         name=f"varied-{seed}",
         ability=rng.integers(1, 5, n) if whole else rng.uniform(0.5, 4, n),
@@ -97,23 +104,34 @@ def varied_instance(seed: int, fields: Collection[str] | None = None) -> Instanc
         speed=np.where(rng.random(n) < 0.7, rng.uniform(0.2, 3, n) * unit, np.inf) if "speeds" in has else None,
         energy_per_distance=float(rng.choice([0.0, 1.0, 6.0] if "rates" in has else [1.0, 6.0])),
         agent_energy_per_distance=rng.choice([0.0, 0.5, 2.0, np.nan], n) if "rates" in has else None,
-        returns=rng.random(n) < 0.5 if "returns" in has else None,
+        **homes,
+        returns=returns | (np.array(homes.get("return_base", [-1] * n)) >= 0),
         skills=[rng.permutation(["camera", "pump"])[: rng.integers(0, 3)].tolist() for _ in range(n)]
         if "skills" in has
         else None,
         needs=[["camera", "pump"][: rng.integers(0, 3)] for _ in range(m)] if "skills" in has else None,
         metric=metric,
-        distances=_table(rng, *ids, unit) if "distances" in has else None,
+        distances=_table(rng, *ids, bases, unit) if "distances" in has else None,
         allowed_tasks=[rng.permutation(m)[:2].tolist() if rng.random() < 0.3 else None for _ in range(n)],
     )
 
 
-def _table(rng: np.random.Generator, agents: list[str], tasks: list[str], unit: float) -> DistanceTable:
+def _homes(rng: np.random.Generator, n: int, corner: FloatArray, size: FloatArray) -> dict[str, Any]:
+    """Return two bases, one of them sometimes nowhere, and which agents return to which."""
+    places = (corner + size * rng.random((2, 2))).tolist()
+    bases = {"north": places[0], "south": places[1] if rng.random() < 0.8 else None}
+    return {"bases": bases, "return_base": rng.integers(-1, 2, n).tolist()}
+
+
+def _table(
+    rng: np.random.Generator, agents: list[str], tasks: list[str], bases: list[str], unit: float
+) -> DistanceTable:
     """Return some distances from agents, from tasks and back, either all that there are or some among others."""
-    pairs = [(one, other) for one in agents + tasks for other in agents + tasks if one != other]
-    pairs = [pair for pair in pairs if not set(pair) <= set(agents) and rng.random() < 0.4]
+    places = agents + tasks + bases
+    pairs = [(one, other) for one in places for other in places if one != other]
+    pairs = [pair for pair in pairs if set(pair) & set(tasks) and rng.random() < 0.4]
     rows = [(*pair, float(rng.uniform(0, 1.5)) * unit) for pair in pairs]
-    return DistanceTable.of(rows, agents, tasks, missing=str(rng.choice(["metric", "unreachable"])))
+    return DistanceTable.of(rows, agents, tasks, missing=str(rng.choice(["metric", "unreachable"])), base_ids=bases)
 
 
 def seeds_where(holds: Callable[[Instance], bool], number: int) -> list[int]:

@@ -67,6 +67,13 @@ CASES: dict[str, Instance] = {
         ),
         _case("one energy each", agent_energy_per_distance=(0.5, 2, 1, 0, 3), battery=(3,) * 5),
         _case("returns", returns=(True, False, True, True, False), battery=(6,) * 5),
+        _case(
+            "bases",
+            bases={"north": (0, 4), "nowhere": None},
+            return_base=(0, IDLE, 1, 0, IDLE),
+            returns=(True, True, True, True, False),
+            battery=(6.5,) * 5,
+        ),
         _case("skills", skills=(["lift"], ["lift", "see"], ["see"], [], ["lift"]), needs=(["lift"], [], ["see"])),
         _case(
             "own distances", distances=(("a1", "t1", 9), ("a2", "t3", 0.5), ("t2", "a3", 2)), speed=(INF, 1, 2, 4, 8)

@@ -1,14 +1,14 @@
 """The contract of an allocator: it receives a `Search` and returns a `Proposal`."""
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from alloc.allocators.contract.budget import Budget
 from alloc.allocators.contract.method import Method
-from alloc.allocators.contract.parameters import with_settings
+from alloc.allocators.contract.parameters import Parameterised
 from alloc.allocators.contract.search import Search
-from alloc.problems import Allocation, InputError, Instance, Objective
+from alloc.problems import Allocation, Instance, Objective
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Proposal:
     notes: tuple[str, ...] = ()
 
 
-class Allocator(ABC):
+class Allocator(Parameterised):
     """A method, loaded and ready; one object serves many instances and threads at once.
 
     Subclasses set `method`, and `parameters_type` if they have parameters; `allocate` changes no attribute.
@@ -61,18 +61,10 @@ class Allocator(ABC):
     """
 
     method: ClassVar[Method]
-    parameters_type: ClassVar[type[Any] | None] = None
-
-    def __init__(self, parameters: object = None, **settings: object) -> None:
-        if self.parameters_type is not None:
-            self.parameters = with_settings(self.parameters_type, parameters, settings)
-        elif parameters is not None or settings:
-            raise InputError(f"method {self.method.name!r} has no parameters", next(iter(settings), "parameters"))
 
     @classmethod
-    def default_parameters(cls) -> dict[str, object]:
-        """Return the default of each parameter, by name; nothing for a method without parameters."""
-        return {} if cls.parameters_type is None else dict(vars(cls.parameters_type()))
+    def _title(cls) -> str:
+        return f"method {cls.method.name!r}"
 
     def refusal(self, instance: Instance, objective: Objective, budget: Budget) -> str | None:
         """Return why the method cannot keep to `budget` on `instance`, or None if it can.

@@ -3,8 +3,9 @@
 import dataclasses
 import math
 import types
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, get_args, get_origin, get_type_hints
 
 from alloc.problems import InputError
 from alloc.problems.arguments import flag, listed, of_type, real, shown, text, whole
@@ -15,9 +16,6 @@ if TYPE_CHECKING:
 
 P = TypeVar("P", bound="DataclassInstance")
 Value = TypeVar("Value")
-
-LARGEST_INTEGER = 2**53
-"""Beyond it, floats skip integers."""
 
 
 def with_settings(parameters_type: type[P], parameters: P | None, settings: Mapping[str, object]) -> P:
@@ -44,8 +42,9 @@ def with_settings(parameters_type: type[P], parameters: P | None, settings: Mapp
     for name in settings:
         if name not in names:
             raise InputError(f"is not a parameter of this method{nearest(name, names)}", name)
-    checked = {name: _converted(value, hints[name], name, infinite=True) for name, value in settings.items()}
-    return dataclasses.replace(start, **checked)
+    if not issubclass(parameters_type, CheckedParameters):  # which check themselves, and know their ranges
+        settings = {name: _converted(value, hints[name], name, infinite=True) for name, value in settings.items()}
+    return dataclasses.replace(start, **settings)
 
 
 def bounded(
@@ -79,6 +78,28 @@ class CheckedParameters:
             object.__setattr__(self, field.name, value)
 
 
+class Parameterised(ABC):
+    """A class whose parameters are a frozen dataclass, or none; see `Allocator` and `Policy`."""
+
+    parameters_type: ClassVar[type[Any] | None] = None
+
+    def __init__(self, parameters: object = None, **settings: object) -> None:
+        if self.parameters_type is not None:
+            self.parameters = with_settings(self.parameters_type, parameters, settings)
+        elif parameters is not None or settings:
+            raise InputError(f"{self._title()} has no parameters", next(iter(settings), "parameters"))
+
+    @classmethod
+    def default_parameters(cls) -> dict[str, object]:
+        """Return the default of each parameter, by name; nothing where there are none."""
+        return {} if cls.parameters_type is None else dict(vars(cls.parameters_type()))
+
+    @classmethod
+    @abstractmethod
+    def _title(cls) -> str:
+        """Return what messages call it, such as ``method 'greedy'``."""
+
+
 def _converted(
     value: object,
     hint: Any,
@@ -101,7 +122,7 @@ def _converted(
     if kind is bool:
         return flag(value, name)
     if kind is int:
-        least = -LARGEST_INTEGER if low == -math.inf else int(low) + above
+        least = None if low == -math.inf else int(low) + above
         return whole(value, name, least, None if high == math.inf else int(high))
     if kind is float:
         if infinite and value == math.inf:

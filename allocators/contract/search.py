@@ -88,6 +88,7 @@ class Search:
         self.tolerance = tolerance
         self.seed, self.start, self.threads = seed, start, threads
         self._on_improvement, self._stop = on_improvement, stop or threading.Event()
+        self._is_ended = False
         self.iteration = 0
         self.best: Improvement | None = None
         self.fastest: Improvement | None = None
@@ -116,12 +117,44 @@ class Search:
     @property
     def interrupted(self) -> bool:
         """Whether a stop was requested, by a signal or the `stop` event."""
-        return self._stop.is_set()
+        return self._is_ended or self._stop.is_set()
 
     @property
     def makespan_limit(self) -> float:
         """Hours up to which allocations count as equally fast, so that energy decides; ``inf`` before the first one."""
         return math.inf if self.fastest is None else self.tolerance.hours(self.fastest.evaluation.served_makespan)
+
+    def part(
+        self, objective: Objective, tolerance: MakespanTolerance, on_improvement: Callable[[Improvement], None]
+    ) -> "Search":
+        """Return a run of its own on the same instance, with the same clock, time limit, stop event and best plans.
+
+        For another method within this run, possibly in another thread. It has no limit on iterations.
+
+        Parameters
+        ----------
+        objective, tolerance, on_improvement
+            As those of a search; improvements are not submitted to this one.
+        """
+        part = Search(
+            self.instance,
+            objective,
+            Budget(self.budget.time_limit_s),
+            seed=self.seed,
+            tolerance=tolerance,
+            stop=self._stop,
+            spent_s=self.elapsed_s,
+        )
+        part.raise_bound(self.lower_bound)
+        for known in (self.fastest, self.best):
+            if known is not None:
+                part.submit(known.allocation)
+        part._on_improvement = on_improvement
+        return part
+
+    def end(self) -> None:
+        """End this run, from any thread, but not the one that it is a part of."""
+        self._is_ended = True
 
     def submit(self, allocation: Allocation) -> Evaluation:
         """Score `allocation`, and keep and report it if it is the best so far.

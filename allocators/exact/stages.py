@@ -11,11 +11,13 @@ from alloc.allocators.contract.budget import Budget
 from alloc.allocators.contract.search import Search
 from alloc.allocators.exact.energy import primal_dual
 from alloc.allocators.exact.energy.least_energy import least_energy
-from alloc.allocators.exact.makespan import enumeration, repartition_search
+from alloc.allocators.exact.makespan import ascent, enumeration
 from alloc.allocators.exact.makespan.bisection import least_makespan
+from alloc.allocators.exact.makespan.repartition import search as repartition_search
 from alloc.allocators.exact.monitor import is_over
 from alloc.allocators.exact.solver_model import Solver
 from alloc.allocators.heuristic.greedy.list_schedule import greedy
+from alloc.allocators.heuristic.local_search import annealing_state
 from alloc.problems import Instance, Objective, count_classes, fewest_unserved, serve_all
 
 MAKESPAN_SHARE = 0.6
@@ -35,9 +37,11 @@ class ExactAllocator(Allocator):
 
     def __init__(self, *, descent: bool = True) -> None:
         self._descent = descent
+        ascent.compile_loops()
         enumeration.compile_loops()
         repartition_search.compile_loops()
         primal_dual.compile_loops()
+        annealing_state.compile_loops()
 
     def refusal(self, instance: Instance, objective: Objective, budget: Budget) -> str | None:
         """Refuse models that would take most of the time only to be built."""

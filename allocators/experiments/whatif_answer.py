@@ -58,7 +58,7 @@ def _listed(names: Sequence[str]) -> str:
 
 def _is_worse(result: Result, now: Result) -> bool:
     """Whether a plan serves fewer tasks than that of the fleet as it is, or is slower by more than what is proven."""
-    unserved, before = _unserved(result), _unserved(now)
+    unserved, before = result.unserved_count, now.unserved_count
     if unserved != before or result.makespan is None or now.makespan is None:
         return unserved > before
     return result.makespan > now.makespan * (1 + PROVEN)
@@ -66,7 +66,7 @@ def _is_worse(result: Result, now: Result) -> bool:
 
 def _change(result: Result, now: Result, *, short: bool = False) -> str:
     """Return the makespan of a fleet against that of the fleet as it is, or how many tasks are unserved."""
-    unserved, before = _unserved(result), _unserved(now)
+    unserved, before = result.unserved_count, now.unserved_count
     if result.evaluation is None:
         return "no plan was found"
     if result.makespan is None:
@@ -108,7 +108,3 @@ def _percent(share: float) -> str:
 
 def _time(result: Result, digits: int = FEWEST_DIGITS) -> str:
     return f"{number(result.makespan, digits)} {result.instance.units.time}".rstrip()
-
-
-def _unserved(result: Result) -> int:
-    return 0 if result.evaluation is None else len(result.evaluation.unserved_tasks)

@@ -4,12 +4,11 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.util import find_spec
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
-from alloc.allocators.contract.parameters import with_settings
-from alloc.problems import InputError
+from alloc.allocators.contract.parameters import Parameterised
 from alloc.problems.errors import AllocError
 from alloc.problems.missions.mission import Mission
 from alloc.problems.missions.radio import Pace, Radio
@@ -175,7 +174,7 @@ class FleetDecider(ABC):
         """
 
 
-class Policy(ABC):
+class Policy(Parameterised):
     """A policy, loaded and ready; one object serves many missions.
 
     Subclasses set `info`, and `parameters_type` if they have parameters, as allocators do; `begin` changes no
@@ -202,18 +201,10 @@ class Policy(ABC):
     """
 
     info: ClassVar[PolicyInfo]
-    parameters_type: ClassVar[type[Any] | None] = None
-
-    def __init__(self, parameters: object = None, **settings: object) -> None:
-        if self.parameters_type is not None:
-            self.parameters = with_settings(self.parameters_type, parameters, settings)
-        elif parameters is not None or settings:
-            raise InputError(f"policy {self.info.name!r} has no parameters", next(iter(settings), "parameters"))
 
     @classmethod
-    def default_parameters(cls) -> dict[str, object]:
-        """Return the default of each parameter, by name; nothing for a policy without parameters."""
-        return {} if cls.parameters_type is None else dict(vars(cls.parameters_type()))
+    def _title(cls) -> str:
+        return f"policy {cls.info.name!r}"
 
     @abstractmethod
     def begin(self, briefing: Briefing) -> AgentDecider | FleetDecider:

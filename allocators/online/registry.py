@@ -1,10 +1,11 @@
 """Policies by name, imported on first use; third parties add theirs by entry point."""
 
-import importlib
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
+from typing import cast
 
+from alloc.allocators.contract.plugins import imported, plugin_class, plugins, require_installed
 from alloc.allocators.online.contract import Policy, PolicyInfo
-from alloc.problems import InputError, MissingPackageError
+from alloc.problems import InputError
 from alloc.problems.arguments import text
 from alloc.problems.errors import nearest
 
@@ -17,6 +18,7 @@ POLICIES = {
     "greedy": "alloc.allocators.online.policies.greedy:GreedyUtility",
     "hedonic": "alloc.allocators.online.policies.hedonic:HedonicCoalitions",
     "auction": "alloc.allocators.online.policies.auction:ConsensusAuction",
+    "gappo": "alloc.allocators.online.policies.gappo:NetworkPolicy",
     "replan": "alloc.allocators.online.policies.replan:Replan",
     "routes": "alloc.allocators.online.policies.routes:Routes",
     "clairvoyant": "alloc.allocators.online.policies.clairvoyant:Clairvoyant",
@@ -78,9 +80,7 @@ def load_policy(name: str, parameters: object = None, **settings: object) -> Pol
         If what it requires is not installed.
     """
     kind = _class(name)
-    if kind.info.missing:
-        modules = " ".join(kind.info.missing)
-        raise MissingPackageError(f"policy {name!r} needs {modules}; install with: pip install {modules}", "policy")
+    require_installed(kind.info.missing, f"policy {name!r}", "policy")
     given = {key: value for key, value in settings.items() if value is not None}
     known = [*kind.info.options, *kind.default_parameters()]
     for key in given:
@@ -94,21 +94,12 @@ def load_policy(name: str, parameters: object = None, **settings: object) -> Pol
 def _class(name: str) -> type[Policy]:
     text(name, "policy")
     if name in POLICIES:
-        module, _, attribute = POLICIES[name].partition(":")
-        kind: type[Policy] = getattr(importlib.import_module(module), attribute)
-        return kind
-    plugins = _plugins()
-    if name not in plugins:
-        raise InputError(f"there is no policy {name!r}{nearest(name, [*POLICIES, *plugins])}", "policy")
-    try:
-        plugin = plugins[name].load()
-    except Exception as error:
-        raise InputError(f"plugin {name!r} ({plugins[name].value}) cannot be imported: {error}", "policy") from error
-    if not (isinstance(plugin, type) and issubclass(plugin, Policy) and hasattr(plugin, "info")):
-        raise InputError(f"plugin {name!r} ({plugins[name].value}) is not a Policy with an `info`", "policy")
-    return plugin
+        return cast("type[Policy]", imported(POLICIES[name]))
+    found = _plugins()
+    if name not in found:
+        raise InputError(f"there is no policy {name!r}{nearest(name, [*POLICIES, *found])}", "policy")
+    return plugin_class(found, name, Policy, "info", "a Policy with an `info`", "policy")  # type: ignore[type-abstract]
 
 
 def _plugins() -> dict[str, EntryPoint]:
-    """Return the entry points of other packages; the name of a built-in policy cannot be taken."""
-    return {entry.name: entry for entry in entry_points(group=ENTRY_POINT_GROUP) if entry.name not in POLICIES}
+    return plugins(ENTRY_POINT_GROUP, POLICIES)

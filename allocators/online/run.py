@@ -1,7 +1,7 @@
 """Missions under a policy: it is asked for orders, and what it does not answer in time is the last order."""
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from alloc.allocators.online.contract import AgentDecider, Briefing, FleetDecider, Policy, PolicyError
@@ -41,6 +41,7 @@ def simulate(
     seed: int = 0,
     deadline_ms: float | None = None,
     parameters: object = None,
+    observe: Callable[[Simulation], None] | None = None,
     **settings: object,
 ) -> MissionRun:
     """Let a policy lead the agents of a mission to its end.
@@ -58,6 +59,8 @@ def simulate(
         Milliseconds for each decision; a later answer is not followed, the last order stands.
     parameters : object, optional
         Parameters of a policy that is given by name.
+    observe : callable, optional
+        Called with the simulation before it begins, such as a `Recorder`.
     **settings
         Single parameters of a policy that is given by name.
 
@@ -86,6 +89,8 @@ def simulate(
     if leader.info.central and known is Knowledge.LOCAL:
         raise RefusedError(f"policy {leader.info.name!r} leads all agents, and needs full knowledge (--knowledge full)")
     simulation = Simulation(mission, known, number)
+    if observe is not None:
+        observe(simulation)
     control = _Control(leader, simulation, number, deadline_s)
     while (request := simulation.advance()) is not None:
         control.answer(request)

@@ -83,16 +83,24 @@ class RayEngine(Engine):
             while pending:
                 if should_stop():
                     return None
-                # fetched at once, so that results are not lost with the machine that holds them
-                done, pending = self._ray.wait(pending, timeout=POLL_S)
-                for task in done:
-                    results[tasks[task]] = call.result(self._ray.get(task))
-        except self._ray.exceptions.RayError as error:
-            raise EngineError(f"Ray gave an item up: {_reason(error)}") from error
+                with self._failures_told():
+                    # fetched at once, so that results are not lost with the machine that holds them
+                    done, pending = self._ray.wait(pending, timeout=POLL_S)
+                    replies = [self._ray.get(task) for task in done]
+                for task, reply in zip(done, replies, strict=True):
+                    results[tasks[task]] = call.result(reply)
         finally:
             for task in pending:
                 self._ray.cancel(task, force=True)
         return [results[index] for index in range(len(items))]
+
+    @contextlib.contextmanager
+    def _failures_told(self) -> Iterator[None]:
+        """Raise an `EngineError` for an error of Ray, or of the connection to it, which some versions raise as such."""
+        try:
+            yield
+        except (self._ray.exceptions.RayError, OSError) as error:
+            raise EngineError(f"Ray gave an item up: {_reason(error)}") from error
 
     def close(self) -> None:
         """See `Engine.close`."""

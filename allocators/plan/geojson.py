@@ -1,4 +1,4 @@
-"""A plan as GeoJSON (RFC 7946): points of tasks and agents, and a line for each move."""
+"""A plan as GeoJSON (RFC 7946): points of tasks, agents and bases, and a line for each move and each way to a base."""
 
 from dataclasses import asdict
 from typing import TYPE_CHECKING
@@ -13,10 +13,11 @@ if TYPE_CHECKING:
 
 Position = list[float]
 Feature = dict[str, object]
+Properties = AgentRow | TaskRow | dict[str, str]
 
 
 def to_geojson(result: "Result") -> str:
-    """Return a collection of features; the property `kind` is task, agent or move."""
+    """Return a collection of features; the property `kind` is task, agent, base, move or return."""
     instance = result.instance
     tasks = dict(zip(instance.task_ids, instance.task_position.tolist(), strict=True))
     starts = dict(zip(instance.agent_ids, instance.start_position.tolist(), strict=True))
@@ -28,32 +29,39 @@ def to_geojson(result: "Result") -> str:
         features += _point("agent", agent, starts[agent.agent])
     for agent in agents:
         if agent.task is not None and not agent.violation:
-            features += _move(agent, starts[agent.agent], tasks[agent.task])
+            features += _line("move", agent, starts[agent.agent], tasks[agent.task])
+    bases = dict(zip(instance.bases.ids, instance.bases.position.tolist(), strict=True))
+    for name, place in bases.items():
+        features += _point("base", {"base": name}, place)
+    for agent in agents:
+        base = int(instance.return_base[instance.agent_index[agent.agent]])
+        if agent.task is not None and not agent.violation and base >= 0:
+            features += _line("return", agent, tasks[agent.task], bases[instance.bases.ids[base]])
     units = {name: label for name, label in asdict(instance.units).items() if label}
     document: dict[str, object] = {"type": "FeatureCollection", "name": instance.name, "units": units}
     return json_text.lines({**document, "features": features})
 
 
-def _point(kind: str, row: AgentRow | TaskRow, place: Position) -> list[Feature]:
+def _point(kind: str, row: Properties, place: Position) -> list[Feature]:
     """Return a point; none where the place is unknown."""
     if np.isnan(place[0]):
         return []
     return [_feature(kind, row, {"type": "Point", "coordinates": _position(place)})]
 
 
-def _move(row: AgentRow, start: Position, goal: Position) -> list[Feature]:
+def _line(kind: str, row: AgentRow, start: Position, goal: Position) -> list[Feature]:
     """Return a line, in two parts where it crosses the date line; none where nothing is known, or nobody moves."""
     if np.isnan(start[0]) or np.isnan(goal[0]) or start == goal:
         return []
     first, second = _position(start), _position(goal)
     if abs(goal[0] - start[0]) <= 180:
-        return [_feature("move", row, {"type": "LineString", "coordinates": [first, second]})]
+        return [_feature(kind, row, {"type": "LineString", "coordinates": [first, second]})]
     edge = 180.0 if start[0] > 0 else -180.0
     before, after = abs(edge - start[0]), abs(edge + goal[0])
     share = before / (before + after) if before + after else 0.5
     latitude = start[1] + share * (goal[1] - start[1])
     parts = [[first, [edge, latitude]], [[-edge, latitude], second]]
-    return [_feature("move", row, {"type": "MultiLineString", "coordinates": parts})]
+    return [_feature(kind, row, {"type": "MultiLineString", "coordinates": parts})]
 
 
 def _position(place: Position) -> Position:
@@ -61,5 +69,6 @@ def _position(place: Position) -> Position:
     return place if place[2] else place[:2]
 
 
-def _feature(kind: str, row: AgentRow | TaskRow, geometry: dict[str, object]) -> Feature:
-    return {"type": "Feature", "geometry": geometry, "properties": {"kind": kind, **asdict(row)}}
+def _feature(kind: str, row: Properties, geometry: dict[str, object]) -> Feature:
+    properties = row if isinstance(row, dict) else asdict(row)
+    return {"type": "Feature", "geometry": geometry, "properties": {"kind": kind, **properties}}

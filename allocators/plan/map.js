@@ -23,9 +23,11 @@ const lines = (headings, cells) => headings.map((name, i) => `${name}: ${cells[i
 const listed = (names) => names.slice(0, 12).join(", ") + (names.length > 12 ? ` and ${names.length - 12} more` : "");
 const agentsOf = plan.tasks.map(() => []);
 const startsAt = plan.bases.map(() => []);
+const returnsTo = plan.bases.map(() => []);
 plan.agents.forEach((agent) => {
   if (agent.task >= 0 && !agent.violation) agentsOf[agent.task].push(agent);
   if (agent.base >= 0) startsAt[agent.base].push(agent);
+  if (agent.home >= 0) returnsTo[agent.home].push(agent);
 });
 
 // what is drawn once; zooming moves the group, and strokes keep their width
@@ -49,19 +51,28 @@ for (const move of moves.values()) {
   };
   move.path.onpointerleave = hide;
 }
+const returns = new Map();
+for (const agent of plan.agents) {
+  const [home, task] = [plan.bases[agent.home], plan.tasks[agent.task]];
+  if (agent.violation || !home || !task || !task.place || agent.home === agent.base || home.task === agent.task) continue;
+  const key = `${agent.task} ${agent.home}`;
+  if (!returns.has(key)) returns.set(key, { path: element(byId("returns"), "path", { d: `M${task.place}L${home.place}` }), agents: [] });
+  returns.get(key).agents.push(agent);
+}
 plan.bases.forEach((base, b) => {
   if (base.task !== null) return;
   const group = element(byId("starts"), "g");
   const size = Math.min(9 + 2 * Math.sqrt(startsAt[b].length), 20);
-  const square = { d: dot(base.place), style: "stroke-linecap: square" };
+  const square = { d: dot(base.place), style: startsAt[b].length ? "stroke-linecap: square" : "" };
   element(group, "path", { ...square, "stroke-width": size + 3, stroke: "#fff" });
   element(group, "path", { ...square, "stroke-width": size, stroke: "#56606b" });
   base.inner = element(group, "path", { ...square, "stroke-width": size - 5, stroke: "#fff" });
   base.group = group;
   group.onpointerenter = (event) => {
     const only = startsAt[b].length === 1;
-    show(event, only ? lines(plan.agentHeadings, startsAt[b][0].cells)
-      : `${base.name}: ${startsAt[b].length} agents begin here\n${listed(startsAt[b].map((agent) => agent.id))}`);
+    const back = returnsTo[b].length ? `\n${returnsTo[b].length} return here\n${listed(returnsTo[b].map((agent) => agent.id))}` : "";
+    show(event, only && !back ? lines(plan.agentHeadings, startsAt[b][0].cells)
+      : `${base.name}: ${startsAt[b].length} begin here\n${listed(startsAt[b].map((agent) => agent.id))}${back}`);
   };
   group.onpointerleave = hide;
 });
@@ -129,12 +140,13 @@ function filter() {
   for (const move of moves.values()) {
     move.path.classList.toggle("hidden", !move.agents.some((agent) => shown.has(agent)));
   }
+  for (const way of returns.values()) way.path.classList.toggle("hidden", !way.agents.some((agent) => shown.has(agent)));
   plan.bases.forEach((base, b) => {
     const here = startsAt[b].filter((agent) => shown.has(agent));
-    base.isShown = here.length > 0;
+    base.isShown = here.length > 0 || returnsTo[b].some((agent) => shown.has(agent));
     if (!base.group) return;
     base.group.classList.toggle("hidden", !base.isShown);
-    base.inner.classList.toggle("hidden", here.some((agent) => agent.task >= 0));
+    base.inner.classList.toggle("hidden", !startsAt[b].length || here.some((agent) => agent.task >= 0));
   });
   const body = byId("agents").tBodies[0];
   body.replaceChildren();
@@ -173,6 +185,15 @@ function drawGrid(width, height) {
   element(grid, "text", { x: width - 6, y: height - 20, "text-anchor": "end" }, plan.axes[0]);
   element(grid, "text", { x: 4, y: 14 }, plan.axes[1]);
 }
+function crosses([[ax, ay], [bx, by]], left, top, right, bottom) {
+  let [from, to] = [0, 1]; // the part of the line that lies within the box
+  for (const [at, step, low, high] of [[ax, bx - ax, left, right], [ay, by - ay, top, bottom]]) {
+    if (!step && (at < low || at > high)) return false;
+    const ends = step ? [(low - at) / step, (high - at) / step] : [0, 1];
+    [from, to] = [Math.max(from, Math.min(...ends)), Math.min(to, Math.max(...ends))];
+  }
+  return from < to;
+}
 function drawLabels() {
   const [labels, taken] = [byId("labels"), []];
   labels.replaceChildren();
@@ -184,6 +205,9 @@ function drawLabels() {
     if (base.task === null && base.isShown)
       named.push({ text: here > 1 ? `${base.name} (${here})` : base.name, place: base.place, away: 10, class: "base" });
   });
+  const lines = [...moves.values()].slice(0, 500).map((move) => [move.base.place, plan.tasks[move.task].place]
+    .map(([x, y]) => [x * view.k + view.x, y * view.k + view.y]));
+  const crossed = (a, b, half) => lines.filter((line) => crosses(line, a - half, b - 11, a + half, b + 3)).length;
   const marks = named.map(({ place, away }) => [place[0] * view.k + view.x, place[1] * view.k + view.y, away - 3]);
   const isOn = (a, b, half, [x, y, r]) => Math.hypot(Math.max(Math.abs(a - x) - half, 0), Math.max(Math.abs(b - 4 - y) - 6, 0)) < r;
   for (const { text, place, away, ...more } of named) {
@@ -192,9 +216,11 @@ function drawLabels() {
     const cut = text.length > 28 ? `${text.slice(0, 27)}…` : text;
     const half = 3.4 * cut.length;
     const spots = [[x, y - away], [x, y + away + 11], [x + away + half, y + 4], [x - away - half, y + 4]];
-    const free = spots.find(([a, b]) => !marks.some((mark) => isOn(a, b, half, mark))
+    const open = spots.filter(([a, b]) => !marks.some((mark) => isOn(a, b, half, mark))
       && !taken.some(([c, d, e]) => Math.abs(a - c) < half + e && Math.abs(b - d) < 14));
-    if (!free) continue;
+    if (!open.length) continue;
+    const counts = open.map(([a, b]) => crossed(a, b, half));
+    const free = open[counts.indexOf(Math.min(...counts))];
     taken.push([...free, half]);
     element(labels, "text", { x: free[0], y: free[1], "text-anchor": "middle", ...more }, cut);
   }
@@ -254,5 +280,6 @@ byId("search").oninput = (event) => { wanted = event.target.value.trim().toLower
 byId("summary").textContent = plan.summary.join("\n");
 byId("legend").children[1].hidden = !plan.tasks.some((task) => task.unserved);
 byId("legend").children[3].hidden = !plan.agents.some((agent) => agent.task < 0);
+byId("legend").children[4].hidden = !returns.size;
 filter();
 fit();

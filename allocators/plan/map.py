@@ -65,14 +65,13 @@ def document(result: "Result") -> Entry:
         "agentHeadings": [column.heading for column in columns],
         "tasks": _tasks(instance, tasks, (where.tasks - low) / scale),
         "bases": [_base(base, (base.place - low) / scale) for base in begin],
-        "agents": _agents(instance, agents, begin),
+        "agents": _agents(instance, agents, begin, where),
     }
 
 
 def _frame(where: Places) -> "tuple[FloatArray, FloatArray]":
     """Return the lower left corner of all places, and how much of each axis one unit of the drawing is."""
-    known = np.vstack([where.tasks, where.starts])
-    known = known[~np.isnan(known[:, 0])]
+    known = where.known
     low, high = known.min(axis=0), known.max(axis=0)
     unit = max(float(high[0] - low[0]), float(high[1] - low[1]) * where.aspect) / SIZE or 1.0
     return low, np.array([unit, unit / where.aspect])
@@ -101,14 +100,17 @@ def _base(base: Base, place: "FloatArray") -> Entry:
     return {"name": base.name, "place": _place(place), "task": base.task}
 
 
-def _agents(instance: Instance, rows: list[AgentRow], begin: list[Base]) -> list[Entry]:
+def _agents(instance: Instance, rows: list[AgentRow], begin: list[Base], where: Places) -> list[Entry]:
     columns = agent_columns(instance)
     base_of = {i: number for number, base in enumerate(begin) for i in base.agents.tolist()}
+    at = {tuple(base.place.tolist()): number for number, base in enumerate(begin)}
+    home = [at.get(tuple(place), -1) for place in where.home_of(instance, np.arange(instance.n)).tolist()]
     return [
         {
             "id": row.agent,
             "task": -1 if row.task is None else instance.task_index[row.task],
             "base": base_of.get(i, -1),
+            "home": home[i],
             "violation": row.violation,
             "cells": [_text(column.value(row)) for column in columns],
         }

@@ -16,6 +16,9 @@ from alloc.problems.units import labels
 if TYPE_CHECKING:
     from alloc.allocators.result import Result
 
+START = "start"
+"""What is said of an agent that returns to where it starts."""
+
 Value = str | float | tuple[str, ...] | None
 
 
@@ -33,6 +36,8 @@ class AgentRow:
         When it is at its task; None for an idle agent, and for one that cannot take its task.
     completion_time : float or None
         When its task is done; None likewise.
+    returns_to : str or None
+        The id of its base, or ``start`` where it returns there; None where it does not return.
     distance, energy : float
         Flown, back again where the agent returns, and the energy for it; 0 where `arrival` is None.
     battery, battery_left : float or None
@@ -46,6 +51,7 @@ class AgentRow:
     ability: float
     arrival: float | None
     completion_time: float | None
+    returns_to: str | None
     distance: float
     energy: float
     battery: float | None
@@ -112,10 +118,17 @@ def agent_rows(result: "Result", agents: IntArray | None = None) -> list[AgentRo
     with np.errstate(invalid="ignore"):
         left = np.maximum(battery - energy, 0.0)
     ids: list[str | None] = [*instance.task_ids, None]
-    figures = (arrival, done, distance, energy, battery, left)
-    columns = (instance.ability[chosen].tolist(), *map(_known, figures), [reasons.get(i, "") for i in chosen.tolist()])
+    before, after = map(_known, (arrival, done)), map(_known, (distance, energy, battery, left))
+    homes = [_returns_to(instance, i) for i in chosen.tolist()]
+    violations = [reasons.get(i, "") for i in chosen.tolist()]
+    columns = (instance.ability[chosen].tolist(), *before, homes, *after, violations)
     names = [instance.agent_ids[i] for i in chosen.tolist()], [ids[j] for j in task.tolist()]
     return list(starmap(AgentRow, zip(*names, *columns, strict=True)))
+
+
+def _returns_to(instance: Instance, agent: int) -> str | None:
+    base = instance.return_base[agent]
+    return instance.bases.ids[base] if base >= 0 else START if instance.returns[agent] else None
 
 
 def _flights(instance: Instance, agents: IntArray, tasks: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -169,6 +182,8 @@ def agent_columns(instance: Instance) -> list[Column[AgentRow]]:
     if instance.has_travel_time:
         columns.append(Column(heading("arrival", units.time), lambda row: row.arrival))
     columns.append(Column(heading("finish", units.time), lambda row: row.completion_time))
+    if (instance.return_base >= 0).any():
+        columns.append(Column("returns to", lambda row: row.returns_to))
     if instance.distances is not None or not np.isnan(instance.task_position).all():
         columns.append(Column(heading("distance", units.distance), lambda row: row.distance))
         columns.append(Column(heading("energy", units.energy), lambda row: row.energy))

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
-from alloc.allocators.plotting.colours import LIMIT, MAKESPAN
+from alloc.allocators.plotting.colours import LIMIT, MAKESPAN, MOVE
 from alloc.allocators.plotting.sites import plain_text
 from alloc.allocators.plotting.style import drawn, new_figure
 from alloc.problems.text import counted, heading, shortened
@@ -20,7 +20,7 @@ MOST_LABELS = 12
 
 
 def plot_whatif(found: "WhatIf", path: str | None = None) -> "Figure":
-    """Draw the makespan of each fleet, with what is proven of it, and the energy below.
+    """Draw the makespan of each fleet, with what is proven of it, and the energy below; above, unserved tasks, if any.
 
     Parameters
     ----------
@@ -42,31 +42,37 @@ def plot_whatif(found: "WhatIf", path: str | None = None) -> "Figure":
 
 
 def _draw(found: "WhatIf") -> "Figure":
-    has_energy = any(fleet.result.energy for fleet in found.fleets)
-    figure = new_figure(8, 6.2 if has_energy else 4.2)
-    axes = figure.subplots(1 + has_energy, 1, sharex=True, squeeze=False)[:, 0]
     units, results = found.instance.units, [fleet.result for fleet in found.fleets]
-    _bars(axes[0], [result.makespan for result in results], [result.lower_bound for result in results])
-    axes[0].set_ylabel(plain_text(heading("makespan", units.time)))
-    axes[0].legend(frameon=False, loc="upper right", ncols=3, fontsize=9)
-    if has_energy:
+    left = [float(result.unserved_count) for result in results]
+    complete = [result for result in results if result.makespan is not None]
+    parts = {"unserved": any(left), "makespan": bool(complete), "energy": any(result.energy for result in complete)}
+    drawn_parts = [name for name, is_there in parts.items() if is_there] or ["makespan"]
+    figure = new_figure(8, 2.2 + 2 * len(drawn_parts))
+    axes = figure.subplots(len(drawn_parts), 1, sharex=True, squeeze=False)[:, 0]
+    part = dict(zip(drawn_parts, axes, strict=True))
+    if "unserved" in part:
+        _bars(part["unserved"], left, [None] * len(left), MOVE)
+        part["unserved"].yaxis.get_major_locator().set_params(integer=True)
+        part["unserved"].set_ylabel("unserved tasks")
+    if "makespan" in part:
+        _bars(part["makespan"], [result.makespan for result in results], [result.lower_bound for result in results])
+        part["makespan"].set_ylabel(plain_text(heading("makespan", units.time)))
+        part["makespan"].legend(frameon=False, loc="upper right", ncols=3, fontsize=9)
+    if "energy" in part:
         energy = [result.energy if result.makespan is not None else None for result in results]
-        _bars(axes[1], energy, [result.energy_lower_bound for result in results])
-        axes[1].set_ylabel(plain_text(heading("energy", units.energy)))
+        _bars(part["energy"], energy, [result.energy_lower_bound for result in results])
+        part["energy"].set_ylabel(plain_text(heading("energy", units.energy)))
     _name(axes[-1], found.fleets)
     axes[0].set_title(_title(found), fontsize=10)
     return figure
 
 
-def _bars(axes: "Axes", values: Sequence[float | None], bounds: Sequence[float | None]) -> None:
-    """Draw a bar for each fleet, and over it what is proven to be needed; a cross where tasks are unserved."""
+def _bars(axes: "Axes", values: Sequence[float | None], bounds: Sequence[float | None], colour: str = MAKESPAN) -> None:
+    """Draw a bar for each fleet, and over it what is proven to be needed; nothing where tasks are unserved."""
     at = range(len(values))
-    axes.bar(at, [value or 0.0 for value in values], color=MAKESPAN, label="best found", width=0.7)
+    axes.bar(at, [value or 0.0 for value in values], color=colour, label="best found", width=0.7)
     if any(bound is not None for bound in bounds):
         axes.bar(at, [bound or 0.0 for bound in bounds], color=LIMIT, label="proven to be needed", width=0.7)
-    unserved = [place for place, value in enumerate(values) if value is None]
-    if unserved:
-        axes.plot(unserved, [0.0] * len(unserved), "x", color="black", clip_on=False, label="a task is unserved")
     axes.set_ylim(0, max((value or 0.0 for value in values), default=0.0) * 1.25 or 1.0)
     for place, value in enumerate(values):
         if value is not None and len(values) <= MOST_LABELS:

@@ -1,5 +1,6 @@
 """The drawing of a front of makespan against energy."""
 
+import math
 from typing import TYPE_CHECKING
 
 from alloc.allocators.plotting.colours import LIMIT, MAKESPAN
@@ -17,9 +18,17 @@ if TYPE_CHECKING:
 WIDE = 3.0
 """Ratio of the largest to the smallest makespan above which the axis is logarithmic."""
 
+MOST_TICKS = 9
+"""Numbers that a logarithmic axis has room for."""
+
+TENTHS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
+"""Factors of a power of ten at which a short axis has numbers."""
+
 
 def plot_front(front: "Front", path: str | None = None) -> "Figure":
     """Draw a front: the least energy found and the proven bound on it, as steps over the makespan.
+
+    Where tasks are unserved, the makespan is that of the others, nothing is proven, and the title says how many.
 
     Parameters
     ----------
@@ -43,19 +52,22 @@ def plot_front(front: "Front", path: str | None = None) -> "Figure":
 def _draw(front: "Front") -> "Figure":
     figure = new_figure(8, 5.2)
     axes = figure.subplots()
-    hours = [result.makespan or 0.0 for result in front.points]
+    hours = [result.served_makespan or 0.0 for result in front.points]
     energy = [result.energy or 0.0 for result in front.points]
     wide = hours[0] > 0 and hours[-1] > WIDE * hours[0]
     span = hours[-1] - hours[0] or hours[0] or 1.0  # also for a front of a single point
     end = hours[-1] * (1.25 if wide else 1.0) + 0.05 * span
     axes.step([*hours, end], [*energy, energy[-1]], where="post", color=MAKESPAN, linewidth=1.6, zorder=3)
     axes.plot(hours, energy, "o", color=MAKESPAN, markersize=6, clip_on=False, zorder=4, label="best found")
-    _draw_bounds(axes, front)
+    unserved = front.points[0].unserved_count
+    if not unserved:
+        _draw_bounds(axes, front)
+    axes.set_xlim(hours[0] / 1.1 if wide else hours[0] - 0.08 * span, end)
     if wide:
         _logarithmic(axes)
-    axes.set_xlim(hours[0] / 1.1 if wide else hours[0] - 0.08 * span, end)
     axes.set_ylim(0, max(energy) * 1.08 or 1.0)
-    axes.set_xlabel(heading("makespan", front.instance.units.time))
+    what = "makespan of the served tasks" if unserved else "makespan"
+    axes.set_xlabel(heading(what, front.instance.units.time))
     axes.set_ylabel(heading("energy", front.instance.units.energy))
     axes.spines[["top", "right"]].set_visible(False)
     axes.legend(frameon=False)
@@ -78,12 +90,24 @@ def _draw_bounds(axes: "Axes", front: "Front") -> None:
 
 
 def _logarithmic(axes: "Axes") -> None:
-    from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
+    from matplotlib.ticker import FixedLocator, FormatStrFormatter, NullFormatter
 
     axes.set_xscale("log")
-    axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axes.xaxis.set_major_locator(FixedLocator(log_ticks(*axes.get_xlim())))
     axes.xaxis.set_major_formatter(FormatStrFormatter("%g"))
     axes.xaxis.set_minor_formatter(NullFormatter())
+
+
+def log_ticks(low: float, high: float) -> list[float]:
+    """Return as many round numbers in a range as have room for their labels: close ones, or only powers of ten."""
+    decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    choices = [(TENTHS, 1), ((1.0, 2.0, 5.0), 1), *(((1.0,), step) for step in range(1, len(decades) + 1))]
+    for factors, step in choices:
+        ticks = [factor * 10.0**decade for decade in decades[::step] for factor in factors]
+        found = [tick for tick in ticks if low <= tick <= high]
+        if len(found) <= MOST_TICKS:
+            return found
+    return []
 
 
 def _title(front: "Front") -> str:
@@ -96,5 +120,7 @@ def _title(front: "Front") -> str:
 
 def _figures(result: "Result") -> str:
     units = result.instance.units
-    makespan = labelled(number(result.makespan, 4), units.time)
-    return f"T = {makespan}, energy {labelled(number(result.energy, 6), units.energy)}"
+    energy = f"energy {labelled(number(result.energy, 6), units.energy)}"
+    if result.unserved_count:
+        return f"{counted(result.unserved_count, 'task')} unserved, {energy}"
+    return f"T = {labelled(number(result.makespan, 4), units.time)}, {energy}"

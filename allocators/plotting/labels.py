@@ -16,8 +16,12 @@ GAPS = (0.0, 9.0)
 """Points between a circle and its label."""
 
 
-def place_labels(centre: FloatArray, radius: FloatArray, width: FloatArray, height: float) -> FloatArray:
+def place_labels(
+    centre: FloatArray, radius: FloatArray, width: FloatArray, height: float, lines: FloatArray
+) -> FloatArray:
     """Return the centre of each label, NaN where there is no room for it; the largest circles are labelled first.
+
+    Of the places without overlap, the first that the fewest lines cross is taken.
 
     Parameters
     ----------
@@ -27,19 +31,26 @@ def place_labels(centre: FloatArray, radius: FloatArray, width: FloatArray, heig
         Of the circles, and of their labels, in points.
     height : float
         Of every label, in points.
+    lines : ndarray, shape (l, 2, 2)
+        Both ends of each line, in points.
     """
     middle = np.full((len(centre), 2), np.nan)
     taken: list[Box] = []
     for j in np.argsort(-radius, kind="stable"):
         if np.isnan(centre[j]).any():
             continue
+        best: tuple[int, Box] | None = None
         for gap, (across, up) in product(GAPS, SIDES):
             offset = np.array([across * (radius[j] + width[j] / 2 + 2 + gap), up * (radius[j] + height / 2 + 1 + gap)])
             box = _box(centre[j] + offset, width[j], height)
             if not any(_overlap(box, other) for other in taken) and not _touches(box, centre, radius).any():
-                middle[j] = centre[j] + offset
-                taken.append(box)
-                break
+                crossed = int(_crosses(box, lines).sum())
+                if best is None or crossed < best[0]:
+                    best, middle[j] = (crossed, box), centre[j] + offset
+                if not crossed:
+                    break
+        if best is not None:
+            taken.append(best[1])
     return middle
 
 
@@ -60,6 +71,18 @@ def _box(middle: FloatArray, width: float, height: float) -> Box:
 
 def _overlap(one: Box, other: Box) -> bool:
     return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]
+
+
+def _crosses(box: Box, lines: FloatArray) -> NDArray[np.bool_]:
+    """Return which lines cross the box: where they are within its width, they are within its height, too."""
+    low, high = np.array(box[:2]), np.array(box[2:])
+    begin, step = lines[:, 0], lines[:, 1] - lines[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ends = np.stack([(low - begin) / step, (high - begin) / step])
+    ends[np.isnan(ends)] = 0.0  # a line along the very edge
+    first, last = ends.min(axis=0).max(axis=1), ends.max(axis=0).min(axis=1)
+    crossed: NDArray[np.bool_] = np.maximum(first, 0.0) < np.minimum(last, 1.0)
+    return crossed
 
 
 def _touches(box: Box, centre: FloatArray, radius: FloatArray) -> NDArray[np.bool_]:

@@ -14,16 +14,17 @@ if TYPE_CHECKING:
     from alloc.allocators import Result
 
 
-def draw_legend(axes: "Axes", result: "Result", begin: list[Base], *, counts: bool, moves: bool) -> None:
+def draw_legend(axes: "Axes", result: "Result", begin: list[Base], *, counts: bool, moves: bool, returns: bool) -> None:
     """Explain below the axes what is drawn, and nothing else.
 
     Parameters
     ----------
     begin : list of Base
         Those that are drawn.
-    counts, moves : bool
-        Whether circles hold numbers of agents, and whether somebody moves.
+    counts, moves, returns : bool
+        Whether circles hold numbers of agents, whether somebody moves, and whether to a base then.
     """
+    from matplotlib.lines import Line2D
     from matplotlib.patches import Polygon
 
     area = "task; area: workload, number: agents" if counts else "task; area: workload"
@@ -34,10 +35,14 @@ def draw_legend(axes: "Axes", result: "Result", begin: list[Base], *, counts: bo
         entries.append(_mark("s", "base (number of agents)", MOVE, 6))
     if any(len(base.agents) == 1 for base in begin):
         entries.append(_mark("o", "start of one agent", MOVE, 5))
+    if any(not len(base.agents) for base in begin):
+        entries.append(_mark("D", "base to return to", MOVE, 5))
     if any(is_idle(result, base) for base in begin):
         entries.append(_mark("o", "all idle there", "white", 5, edge=MOVE))
     if moves:
         entries.append(Polygon([(0, 0)], facecolor=MOVE, alpha=0.5, label="move, thin end at the task"))
+    if returns:
+        entries.append(Line2D([], [], color=MOVE, linewidth=0.9, linestyle=(0, (4, 3)), label="flight back to a base"))
     axes.legend(
         handles=entries,
         handler_map={Polygon: _wedge_handler()},

@@ -19,7 +19,7 @@ from alloc.allocators.plotting.colours import (
 from alloc.allocators.plotting.labels import place_labels, visible
 from alloc.allocators.plotting.legend import draw_legend
 from alloc.allocators.plotting.moves import flows, wedges
-from alloc.allocators.plotting.starts import draw_starts, start_names
+from alloc.allocators.plotting.starts import draw_returns, draw_starts, start_names
 from alloc.problems.text import heading, short_names
 
 if TYPE_CHECKING:
@@ -33,6 +33,9 @@ MAX_LABELS = 60
 
 MAX_AGENTS = 20_000
 """Number of agents above which the moves of a sample are drawn: more wedges would only overlap."""
+
+MAX_LINES = 300
+"""Number of moves, and of returns, that names keep clear of where they can."""
 
 WIDTH = 1.25
 """Width of the map over its height."""
@@ -49,11 +52,14 @@ class Sites:
         Where agents begin, but for those at tasks.
     radius : ndarray, shape (m + bases,)
         Of the marks of tasks and bases, in points.
+    lines : ndarray, shape (l, 2, 2)
+        Both ends of moves and returns.
     """
 
     where: Places
     bases: list[Base]
     radius: "FloatArray"
+    lines: "FloatArray"
 
 
 def drawn_agents(result: "Result") -> "IntArray":
@@ -70,10 +76,14 @@ def draw_sites(axes: "Axes", result: "Result") -> Sites:
     low, high = _window(where)
     size = draw_starts(axes, result, begin)
     moves = _draw_moves(axes, result, where, float(high[0] - low[0]))
+    returns = draw_returns(axes, result, where, drawn_agents(result))
+    lines = np.concatenate([moves[:MAX_LINES], returns[:MAX_LINES]])
     _draw_tasks(axes, result, where.tasks, area)
     _finish(axes, result, where)
-    draw_legend(axes, result, begin, counts=result.instance.m <= MAX_LABELS, moves=moves)
-    return Sites(where, begin, np.concatenate([np.sqrt(area / np.pi), size / 2]))
+    draw_legend(
+        axes, result, begin, counts=result.instance.m <= MAX_LABELS, moves=bool(len(moves)), returns=bool(len(returns))
+    )
+    return Sites(where, begin, np.concatenate([np.sqrt(area / np.pi), size / 2]), lines)
 
 
 def _areas(result: "Result", where: Places) -> "FloatArray":
@@ -89,21 +99,23 @@ def _areas(result: "Result", where: Places) -> "FloatArray":
     return np.maximum(12.0, largest * work / max(float(work.max()), 1e-300))
 
 
-def _draw_moves(axes: "Axes", result: "Result", where: Places, extent: float) -> bool:
-    """Draw a wedge for each group that moves; return whether there is one."""
+def _draw_moves(axes: "Axes", result: "Result", where: Places, extent: float) -> "FloatArray":
+    """Draw a wedge for each group that moves; return both ends of each, those of the largest groups first."""
     from matplotlib.collections import PolyCollection
 
     if result.allocation is None:
-        return False
-    shapes = wedges(flows(where, result.allocation, drawn_agents(result)), 0.8 * extent, where.aspect)
+        return np.zeros((0, 2, 2))
+    moves = flows(where, result.allocation, drawn_agents(result))
+    lines = np.stack([moves.begin, moves.end], axis=1)[np.argsort(-moves.count, kind="stable")]
+    shapes = wedges(moves, 0.8 * extent, where.aspect)
     if not shapes:
-        return False
+        return lines
     corner = np.array(shapes) / extent
     across, along = corner[:, 2] - corner[:, 0], corner[:, 1] - corner[:, 0]
     covered = float(np.abs(across[:, 0] * along[:, 1] - across[:, 1] * along[:, 0]).sum()) / 2 * where.aspect
     alpha = float(np.clip(min(max(40 / len(shapes), 0.2), 0.3 / max(covered, 0.01)), 0.015, 0.55))
     axes.add_collection(PolyCollection(shapes, facecolors=MOVE, alpha=alpha, linewidths=0, zorder=1))
-    return True
+    return lines
 
 
 def _draw_tasks(axes: "Axes", result: "Result", sites: "FloatArray", area: "FloatArray") -> None:
@@ -128,8 +140,7 @@ def _draw_tasks(axes: "Axes", result: "Result", sites: "FloatArray", area: "Floa
 
 def _window(where: Places) -> "tuple[FloatArray, FloatArray]":
     """Return the limits of both axes: a quarter wider than high, with a margin for circles and labels."""
-    known = np.vstack([where.tasks, where.starts])
-    known = known[~np.isnan(known[:, 0])]
+    known = where.known
     low, high = known.min(axis=0), known.max(axis=0)
     size = max(float((high - low)[0]) / WIDTH, float((high - low)[1]) * where.aspect) or 1.0
     half = 0.62 * size * np.array([WIDTH, 1 / where.aspect])
@@ -176,7 +187,8 @@ def name_sites(axes: "Axes", result: "Result", sites: Sites) -> None:
     radius[: 0 if is_named else m] = 0.0  # many small circles may be written over
     centre = axes.transData.transform(place) * 72 / axes.figure.dpi
     width = np.array([0.62 * size * len(name) for name in names])
-    middle = place_labels(centre, radius, width, 1.1 * size)
+    lines = axes.transData.transform(sites.lines.reshape(-1, 2)).reshape(-1, 2, 2) * 72 / axes.figure.dpi
+    middle = place_labels(centre, radius, width, 1.1 * size, lines)
     for j in np.flatnonzero(~np.isnan(middle[:, 0])):
         if names[j]:
             colour = "black" if j < m else "#3a4450"

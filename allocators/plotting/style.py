@@ -48,7 +48,7 @@ def drawn(draw: Callable[[], "Figure"], path: str | None) -> "Figure":
     """Return the figure that `draw` makes, and write it to `path` if there is one."""
     if path is not None:
         check_plot(path)
-    with _style():
+    with in_style():
         figure = draw()
         if path is not None:
             _save(figure, path)
@@ -56,7 +56,7 @@ def drawn(draw: Callable[[], "Figure"], path: str | None) -> "Figure":
 
 
 @contextmanager
-def _style() -> Iterator[None]:
+def in_style() -> Iterator[None]:
     """Draw inside with fonts for all scripts, and without output of matplotlib on standard error."""
     logger = logging.getLogger("matplotlib")
     level = logger.level

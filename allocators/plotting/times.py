@@ -24,6 +24,9 @@ MAX_ROWS = 40
 MOST_LETTERS = 70
 """Letters of 7 points that a bar over the whole axis has room for."""
 
+MARGIN = 1.06
+"""End of the axis over the latest time."""
+
 MAX_BARS = 1_000
 """Number of tasks above which bars are single lines."""
 
@@ -35,7 +38,7 @@ def draw_times(axes: "Axes", result: "Result") -> None:
     time, unserved = finite_times(result), unserved_tasks(result)
     order = np.lexsort((-time, ~unserved))
     top = max(float(time.max()), result.makespan or 0.0, result.lower_bound or 0.0) or 1.0
-    height, hatched = np.where(unserved, top, time)[order], unserved[order]
+    height, hatched = np.where(unserved, MARGIN * top, time)[order], unserved[order]  # never done: to the end
     fill = colours(result)[order]
     fill[hatched] = 1.0
     rows = result.instance.m <= MAX_ROWS
@@ -81,7 +84,7 @@ def _name_rows(axes: "Axes", result: "Result", order: "IntArray", top: float) ->
     names = [plain_text(short[j]) for j in order]
     axes.set_yticks(range(m), names, fontsize=8 if m <= 25 else 6.5)
     axes.set_ylim(m - 0.4, -0.6)
-    axes.set_xlim(0, top * 1.06)
+    axes.set_xlim(0, MARGIN * top)
     axes.set_xlabel(heading("completion time", result.instance.units.time))
     for row, j in enumerate(order):
         if result.instance.workload[j] == 0:
@@ -114,7 +117,7 @@ def listed(names: Sequence[str], longest: int) -> str:
 
 def _name_columns(axes: "Axes", result: "Result", top: float) -> None:
     axes.set_xlim(-0.6, result.instance.m - 0.4)
-    axes.set_ylim(0, top * 1.06)
+    axes.set_ylim(0, MARGIN * top)
     axes.set_xlabel("tasks, the last one first")
     axes.set_ylabel(heading("completion time", result.instance.units.time))
 

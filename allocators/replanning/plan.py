@@ -15,11 +15,10 @@ from numpy.typing import NDArray
 
 from alloc.allocators.contract.improvement import Improvement
 from alloc.allocators.replanning.moves import Moves
+from alloc.allocators.replanning.pins import pinned
 from alloc.problems import IDLE, Allocation, InputError, Instance, Objective, evaluate
 from alloc.problems.allocation import CarriedOver
 from alloc.problems.distances.build import replanned
-from alloc.problems.errors import nearest
-from alloc.problems.evaluation import reason_of
 from alloc.problems.instance import FloatArray, IntArray
 
 if TYPE_CHECKING:
@@ -211,29 +210,8 @@ def replanning(
     if carried is not None:
         unknown = [instance.agent_index[name] for name in (*carried.new_agents, *carried.agents_without_task)]
         has_place[unknown] = False
-    target, pinned = task.copy(), np.zeros(instance.n, dtype=np.bool_)
+    target, is_pinned = task.copy(), np.zeros(instance.n, dtype=np.bool_)
     for name, goal in pins.items():
-        agent = _agent(instance, name)
-        pinned[agent], target[agent] = True, _task(instance, agent, goal)
-    return Replanning(instance, objective, task, target, plan is not None, has_place, pinned, price)
-
-
-def _agent(instance: Instance, name: str) -> int:
-    if name not in instance.agent_index:
-        message = f"no agent {name!r} in instance {instance.name!r}{nearest(name, instance.agent_ids)}"
-        raise InputError(message, "pins")
-    return instance.agent_index[name]
-
-
-def _task(instance: Instance, agent: int, goal: str | None) -> int:
-    if goal is None:
-        return IDLE
-    if goal not in instance.task_index:
-        message = f"no task {goal!r} in instance {instance.name!r}{nearest(goal, instance.task_ids)}"
-        raise InputError(message, "pins")
-    task = instance.task_index[goal]
-    if not instance.reach.allows(np.array([agent]), np.array([task]))[0]:
-        raise InputError(
-            f"{instance.agent_ids[agent]!r} cannot do {goal!r}: {reason_of(instance, agent, task)}", "pins"
-        )
-    return task
+        agent, target_task = pinned(instance, name, goal)
+        is_pinned[agent], target[agent] = True, target_task
+    return Replanning(instance, objective, task, target, plan is not None, has_place, is_pinned, price)

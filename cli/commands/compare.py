@@ -3,6 +3,7 @@
 import re
 import sys
 import threading
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -12,11 +13,11 @@ from alloc.cli.options import examples
 from alloc.cli.output.console import is_terminal, note, say, table, to_json
 from alloc.cli.output.files import check_outputs, save
 from alloc.problems.text import heading, labelled, number, percent
-from alloc.problems.vocabulary import Objective
 
 if TYPE_CHECKING:
     from alloc.allocators import Allocator
     from alloc.allocators.experiments.compare import Row
+    from alloc.problems import Units
 
 EXAMPLES = examples(
     "alloc compare demo.json --methods greedy,ga,cpsat",
@@ -52,7 +53,7 @@ def compare_command(
     seeds: Annotated[
         str, typer.Option(metavar="SEEDS", help="Seeds such as 0,1,2, or one number N for the seeds 0 to N - 1.")
     ] = "1",
-    objective: options.ObjectiveOption = Objective.MAKESPAN,
+    objective: options.ObjectiveOption = options.PlainObjective.MAKESPAN,
     time_limit: options.TimeLimitOption = None,
     iterations: options.IterationsOption = None,
     target_gap: options.TargetGapOption = None,
@@ -75,8 +76,7 @@ def compare_command(
     limit = options.time_limit(time_limit, iterations)
     Budget(limit, iterations, target_gap)
     problems = [read_instance(instance) for instance in instances]
-    units = {problem.units.time for problem in problems}
-    unit = units.pop() if len(units) == 1 else ""
+    units = _common_units([problem.units for problem in problems])
     stop, rows, total = threading.Event(), [], len(problems) * len(wanted)
     with signals_set(stop):
         for row in compare(
@@ -91,8 +91,8 @@ def compare_command(
             stop=stop,
         ):
             rows.append(row)
-            _show_done(row, len(rows), total, unit)
-    _print(share_bounds(rows), csv, unit, json=json)
+            _show_done(row, len(rows), total, units.time)
+    _print(share_bounds(rows), csv, units, json=json)
     if stop.is_set():
         note(f"interrupted after {len(rows)} of {total} rows")
     complete = len(rows) == total and all(row.reason or row.runs == len(numbers) for row in rows)
@@ -130,6 +130,16 @@ def _seeds(text: str) -> list[int]:
     return list(range(int(text)))
 
 
+def _common_units(units: "Sequence[Units]") -> "Units":
+    """Return the labels on which all instances agree."""
+    from dataclasses import fields
+
+    from alloc.problems import Units
+
+    labels = {field.name: {getattr(one, field.name) for one in units} for field in fields(Units)}
+    return Units(**{name: found.pop() for name, found in labels.items() if len(found) == 1})
+
+
 def _show_done(row: "Row", count: int, total: int, unit: str) -> None:
     """On a terminal, print each row as soon as it is known; the table follows at the end."""
     if is_terminal(sys.stderr):
@@ -137,19 +147,19 @@ def _show_done(row: "Row", count: int, total: int, unit: str) -> None:
         say(f"[{count}/{total}] {row.instance}, {row.method}: {outcome}")
 
 
-def _print(rows: "list[Row]", csv: str | None, unit: str, *, json: bool) -> None:
+def _print(rows: "list[Row]", csv: str | None, units: "Units", *, json: bool) -> None:
     from alloc.problems.formats import is_standard_output
 
     def document() -> str:
         return to_json({"format": "alloc-comparison/1", "rows": [row.to_dict() for row in rows]})
 
     is_table_wanted = not json and not (csv is not None and is_standard_output(csv))
-    save(lambda: _csv(rows), csv, document if json else None, [lambda: _tell(rows, unit)] if is_table_wanted else [])
+    save(lambda: _csv(rows), csv, document if json else None, [lambda: _tell(rows, units)] if is_table_wanted else [])
 
 
-def _tell(rows: "list[Row]", unit: str) -> None:
-    header = ["instance", "method", heading("T", unit), "worst", "gap", "worst", "energy"]
-    header += ["time (s)", "worst", "runs", "status"]
+def _tell(rows: "list[Row]", units: "Units") -> None:
+    header = ["instance", "method", heading("T", units.time), "worst", "gap", "worst"]
+    header += [heading("energy", units.energy), "time (s)", "worst", "runs", "status"]
     say(table(header, [_cells(row) for row in rows], left=2))
     for row in rows:
         if row.reason:

@@ -6,7 +6,6 @@ import typer
 
 from alloc.cli import options
 from alloc.cli.options import examples
-from alloc.cli.output.claims import with_claims
 from alloc.cli.output.console import note, say, write_json
 from alloc.cli.output.files import read_pair
 
@@ -65,17 +64,15 @@ def evaluate_command(
         str,
         typer.Argument(
             metavar="ALLOCATION",
-            help="An allocation, a result of `alloc solve`, or a solver's solution of what `alloc export` wrote; "
-            "- is standard input.",
+            help=f"{options.PLAN}; - is standard input.",
         ),
     ],
     json: options.JsonOption = False,
 ) -> None:
     """Score an allocation, wherever it comes from."""
-    from alloc.allocators.conclusion import scored_result
+    from alloc.allocators.conclusion import scored_result, with_claims
 
     problem, answer, claims = read_pair(instance, allocation)
-    assert answer is not None
     result = scored_result(problem, answer, "evaluate")
     if claims:
         result, lines = with_claims(result, claims)

@@ -7,7 +7,7 @@ import typer
 from alloc.cli import options
 from alloc.cli.options import examples
 from alloc.cli.output.files import check_outputs
-from alloc.problems.vocabulary import ModelFormat, ModelKind, Objective
+from alloc.problems.vocabulary import ModelFormat, ModelKind
 
 EXAMPLES = examples(
     "alloc export demo.json --output demo.lp",
@@ -33,8 +33,8 @@ def export_command(
         ModelKind, typer.Option(help="Variables count agents that are alike, or there is one per agent and task.")
     ] = ModelKind.CLASS,
     objective: Annotated[
-        Objective, typer.Option(help="What is minimised: the makespan, or the energy at --makespan.")
-    ] = Objective.MAKESPAN,
+        options.PlainObjective, typer.Option(help="What is minimised: the makespan, or the energy at --makespan.")
+    ] = options.PlainObjective.MAKESPAN,
     makespan: Annotated[
         float | None,
         typer.Option(
@@ -53,6 +53,6 @@ def export_command(
         output,
         format=file_format,
         model=model,
-        objective=objective,
+        objective=objective.value,
         makespan=makespan,
     )

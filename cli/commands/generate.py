@@ -170,6 +170,7 @@ def _covering(
 
 def _write(made: "Instance | Mission", output: str, *, into_folder: bool) -> None:
     from alloc.problems import InputError
+    from alloc.problems.formats.messages import unwritable
 
     if not into_folder:
         _write_file(made, output)
@@ -179,6 +180,8 @@ def _write(made: "Instance | Mission", output: str, *, into_folder: bool) -> Non
         folder.mkdir(parents=True, exist_ok=True)
     except FileExistsError as error:
         raise InputError("is a file; several instances need a folder", source=output) from error
+    except OSError as error:
+        raise unwritable(error, folder, output) from error
     _write_file(made, str(folder / f"{made.name}.json"))
 
 

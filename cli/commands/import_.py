@@ -66,6 +66,9 @@ def import_command(
     distances: Annotated[
         str | None, typer.Option(metavar="FILE", help="Table with from, to and distance, or a matrix.")
     ] = None,
+    bases: Annotated[
+        str | None, typer.Option(metavar="FILE", help="Table of bases to which agents return: ids and places.")
+    ] = None,
     columns: MapOption = None,
     units: UnitsOption = None,
     decimal: Annotated[Decimal | None, typer.Option(help="The decimal mark, where numbers do not show it.")] = None,
@@ -84,7 +87,8 @@ def import_command(
     from alloc.problems.formats.spreadsheet import read_grid
 
     read = [("--agents", _file(agents)), ("--tasks", _file(tasks))]
-    read += [] if distances is None else [("--distances", _file(distances))]
+    others = {"--distances": distances, "--bases": bases}
+    read += [(option, _file(name)) for option, name in others.items() if name is not None]
     check_outputs(("--output", output), read=read)
     instance = Instance.from_tables(
         read_grid(agents),
@@ -96,6 +100,7 @@ def import_command(
         missing=missing,
         name=Path(agents if output == STANDARD else output).stem or "instance",
         report=_silent if quiet else _say,
+        bases=None if bases is None else read_grid(bases),
     )
     write_instance(instance, output)
     if not quiet and output != STANDARD:

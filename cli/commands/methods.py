@@ -7,12 +7,18 @@ import typer
 from alloc.cli import options
 from alloc.cli.options import examples
 from alloc.cli.output.console import note, say, table, write_json
+from alloc.problems.vocabulary import Objective
 
 EXAMPLES = examples(
     "alloc methods",
     "alloc methods --json",
     "alloc methods --prepare",
     closing="Some methods compile loops when first used; --prepare does this for all of them.",
+)
+
+MOVES = (
+    f"Every method with {Objective.MAKESPAN_ENERGY} takes {Objective.MAKESPAN_MOVES} as well: "
+    "`alloc solve` with the plan in force as --start."
 )
 
 
@@ -57,29 +63,50 @@ def methods_command(
         write_json(facts)
         return
     header = ["name", "kind", "objectives", "speeds", "slack", "proves", "state", "what it is"]
-    say(table(header, [_row(fact) for fact in facts], left=len(header)))
-    say("")
-    for fact in facts:
-        if fact["citation"]:
-            say(f"{fact['name']}: {fact['citation']}")
+    citations = [f"{fact['name']}: {fact['citation']}" for fact in facts if fact["citation"]]
+    lines = [table(header, [_row(fact) for fact in facts], left=len(header)), "", MOVES, "", *citations]
+    say("\n".join(lines))
 
 
 def _prepare() -> None:
     """Load each installed method, which compiles its loops; a plugin that fails gives a note.
 
-    `greedy` compiles its loops apart, as it needs none but on large instances.
+    Methods of one kind share loops, so each kind has a process of its own. The learned ones take longest, and begin.
     """
-    from alloc.allocators import describe, load, names
+    from alloc.allocators import describe, names
+    from alloc.allocators.parallel.processes import ProcessEngine
+    from alloc.problems import InputError
+
+    kinds: dict[str, list[str]] = {"learned": []}
+    for name in names():
+        try:
+            method = describe(name)
+        except InputError as error:
+            note(str(error))
+            continue
+        if not method.missing:
+            kinds.setdefault(str(method.kind), []).append(name)
+    with ProcessEngine() as engine:
+        for messages in engine.map(_load, list(kinds.values())) or ():
+            for message in messages:
+                note(message)
+
+
+def _load(methods: list[str]) -> list[str]:
+    """Load methods and return the messages of those that fail."""
+    from alloc.allocators import load
     from alloc.allocators.heuristic.greedy import tree_search
     from alloc.problems import InputError
 
-    for name in names():
+    failures = []
+    for name in methods:
         try:
-            if not describe(name).missing:
-                load(name)
+            load(name)
         except InputError as error:
-            note(str(error))
-    tree_search.compile_loops()
+            failures.append(str(error))
+    if "greedy" in methods:
+        tree_search.compile_loops()  # which `greedy` needs on large instances only, and loads then
+    return failures
 
 
 def _facts(name: str) -> Fact:

@@ -11,7 +11,7 @@ from alloc.cli import options
 from alloc.cli.options import examples
 from alloc.cli.output.console import is_terminal, note, say, table, to_json
 from alloc.cli.output.files import check_outputs, check_picture, read_known, save
-from alloc.problems.text import heading, labelled, number, percent
+from alloc.problems.text import counted, heading, labelled, number, percent
 
 if TYPE_CHECKING:
     from alloc.allocators import Result
@@ -93,19 +93,32 @@ def _show_point(result: "Result") -> None:
     """On a terminal, print each point as soon as it is known; the table follows at the end."""
     if is_terminal(sys.stderr):
         makespan = labelled(number(result.makespan), result.instance.units.time)
+        makespan = f"{counted(left, 'task')} unserved" if (left := result.unserved_count) else f"T {makespan}"
         energy = labelled(number(result.energy), result.instance.units.energy)
-        say(f"T {makespan}, energy {energy}, gap {percent(result.energy_gap)}")
+        say(f"{makespan}, energy {energy}, gap {percent(result.energy_gap)}")
 
 
 def _table(front: "Front") -> str:
     units = front.instance.units
-    header = [heading("T", units.time), "slower", heading("energy", units.energy), "saved", "at least", "gap"]
+    left = [result.unserved_count for result in front.points]
+    served = [result.served_makespan for result in front.points]
+    header = [
+        heading("T of the served" if any(left) else "T", units.time),
+        "slower",
+        heading("energy", units.energy),
+        "saved",
+        "at least",
+        "gap",
+    ]
     header += ["time (s)", "method", "status"]
+    if any(left):
+        header.insert(0, "unserved")
     fastest = front.points[0]
     rows = [
         [
-            number(result.makespan, 5),
-            _change(result.makespan, fastest.makespan),
+            *([str(unserved)] if any(left) else []),
+            number(makespan, 5),
+            _change(makespan, served[0]),
             number(result.energy, 5),
             _change(fastest.energy, result.energy, of=fastest.energy),
             number(result.energy_lower_bound, 5),
@@ -114,7 +127,7 @@ def _table(front: "Front") -> str:
             result.method,
             str(result.status),
         ]
-        for result in front.points
+        for result, makespan, unserved in zip(front.points, served, left, strict=True)
     ]
     return table(header, rows, left=0)
 

@@ -7,7 +7,7 @@ import typer
 from alloc.cli import options
 from alloc.cli.options import examples
 from alloc.cli.output.console import STANDARD, note
-from alloc.cli.output.files import check_outputs, check_picture
+from alloc.cli.output.files import check_film, check_outputs, check_picture
 from alloc.problems.text import counted
 
 if TYPE_CHECKING:
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 EXAMPLES = examples(
     "alloc plot demo.json best.json --output best.png",
     "alloc plot demo.json best.json --output best.pdf",
+    "alloc plot run.jsonl --output run.png",
+    "alloc plot run.jsonl --output run.html",
     "alloc solve demo.json --json | alloc plot demo.json - --output demo.svg",
 )
 
@@ -27,19 +29,26 @@ def register(app: typer.Typer) -> None:
 
 
 def plot_command(
-    instance: options.InstanceArgument,
-    result: Annotated[
-        str,
-        typer.Argument(metavar="RESULT", help="A result of `alloc solve`, or an allocation; - is standard input."),
+    instance: Annotated[
+        str, typer.Argument(metavar="INSTANCE|LOG", help="An instance, or alone a log of `alloc simulate --log`.")
     ],
-    output: Annotated[str, typer.Option(metavar="FILE", help="Drawing to write: .png, .svg or .pdf.")],
+    output: Annotated[
+        str, typer.Option(metavar="FILE", help="Drawing to write: .png, .svg or .pdf; of a log also .html, .gif, .mp4.")
+    ],
+    result: Annotated[
+        str | None,
+        typer.Argument(metavar="[RESULT]", help=f"{options.PLAN}; - is standard input."),
+    ] = None,
 ) -> None:
-    """Draw a stored result or allocation: sites and moves, and when each task is done."""
+    """Draw a stored result or allocation: sites and moves, when each task is done; or the log of a mission."""
     from alloc.allocators import plot
     from alloc.problems import InputError
     from alloc.problems.formats import read_instance
 
     check_outputs(("--output", output), read=[("INSTANCE", instance), ("RESULT", result)])
+    if result is None:
+        _draw_log(instance, output)
+        return
     check_picture(output)
     if instance == result == STANDARD:
         raise InputError("cannot be the instance and the result at once", source="standard input")
@@ -50,22 +59,38 @@ def plot_command(
         note(f"{count} cannot take the task given, and drawn there all the same; `alloc evaluate` says why")
 
 
-def _read(path: str, instance: "Instance") -> "Result":
-    """Read a result, or score an allocation."""
-    from alloc.allocators import Result
-    from alloc.allocators.conclusion import scored_result
-    from alloc.allocators.result_document import read_document
-    from alloc.problems import InputError
-    from alloc.problems.formats import allocation_from_document
-    from alloc.problems.formats.allocation_file import ALLOCATION_FORMAT
+def _draw_log(log: str, output: str) -> None:
+    """Draw or animate the mission of a log."""
+    from alloc.allocators.plotting import animate_mission, plot_mission
+    from alloc.problems import InputError, course_of, read_log
     from alloc.problems.formats.files import named
     from alloc.problems.formats.messages import told
 
-    document = read_document(path)
+    is_film = output.lower().endswith((".html", ".gif", ".mp4"))
+    (check_film if is_film else check_picture)(output)
+    recorded = read_log(log)
     try:
-        if document.get("format") != ALLOCATION_FORMAT:
-            return Result.from_dict(document, instance)
-        allocation, _ = allocation_from_document(document, instance)
-        return scored_result(instance, allocation)
+        course = course_of(recorded)
     except InputError as error:
-        raise told(error, named(path)) from error.__cause__
+        raise told(error, named(log)) from error
+    (animate_mission if is_film else plot_mission)(course, output)
+
+
+def _read(path: str, instance: "Instance") -> "Result":
+    """Read a result, or score a plan."""
+    from alloc.allocators import Result
+    from alloc.allocators.conclusion import scored_result
+    from alloc.problems import InputError
+    from alloc.problems.formats import read_plan
+    from alloc.problems.formats.messages import told
+
+    plan = read_plan(path, instance)
+    if not plan.result:
+        allocation, warning = plan.allocation(instance)
+        if warning is not None:
+            note(warning)
+        return scored_result(instance, allocation)
+    try:
+        return Result.from_dict(plan.result, instance)
+    except InputError as error:
+        raise told(error, plan.source) from error.__cause__

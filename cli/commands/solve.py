@@ -15,6 +15,7 @@ from alloc.problems.vocabulary import Objective
 
 if TYPE_CHECKING:
     from alloc.allocators import Result
+    from alloc.problems import Instance
 
 EXAMPLES = examples(
     "alloc solve demo.json",
@@ -33,28 +34,38 @@ MethodOption = Annotated[
     str,
     typer.Option(autocompletion=options.complete_methods, help="One of `alloc methods`, or auto, which picks one."),
 ]
+ObjectiveOption = Annotated[
+    Objective,
+    typer.Option(
+        help="What is minimised, after the number of unserved tasks: the makespan, then the energy or the moves."
+    ),
+]
 SlackOption = Annotated[
     float,
-    typer.Option(min=0, help="With energy: accept makespans this much above the shortest one found; 0.02 is 2 %."),
+    typer.Option(help="With energy or moves: accept makespans this much above the shortest one found; 0.02 is 2 %."),
 ]
 LimitOption = Annotated[
     float | None,
-    typer.Option(metavar="TIME", help="With energy: accept makespans up to this one.", show_default=False),
+    typer.Option(metavar="TIME", help="With energy or moves: accept makespans up to this one.", show_default=False),
 ]
 StartOption = Annotated[
     str | None,
-    typer.Option(metavar="FILE", help="A plan to start from, or the one in force; what has gone since is left out."),
+    typer.Option(
+        metavar="FILE",
+        help="A plan to start from, or the one in force, in any form; what has gone since is left out.",
+    ),
 ]
 MovePriceOption = Annotated[
     float,
-    typer.Option(min=0, help="With energy: what each agent counts for that gets another task than in --start."),
+    typer.Option(help="With energy: what each agent counts for that gets another task than in --start."),
 ]
 PinOption = Annotated[
     list[str] | None,
     typer.Option(metavar="AGENT=TASK", help="An agent that must do this task, or none after the =; may be repeated."),
 ]
 PinFileOption = Annotated[
-    str | None, typer.Option(metavar="FILE", help="Agents that must do the tasks that this allocation gives them.")
+    str | None,
+    typer.Option(metavar="FILE", help="Agents that must do the tasks that this plan gives them; --pin counts more."),
 ]
 PolicyOption = Annotated[str | None, typer.Option(metavar="FILE", help="A trained policy, for learned methods.")]
 DeviceOption = Annotated[
@@ -77,7 +88,7 @@ def register(app: typer.Typer) -> None:
 def solve_command(
     instance: options.InstanceArgument,
     method: MethodOption = "auto",
-    objective: options.ObjectiveOption = Objective.MAKESPAN,
+    objective: ObjectiveOption = Objective.MAKESPAN,
     time_limit: options.TimeLimitOption = None,
     iterations: options.IterationsOption = None,
     target_gap: options.TargetGapOption = None,
@@ -101,7 +112,7 @@ def solve_command(
     from alloc.allocators import solve
     from alloc.cli.output.progress import Progress
     from alloc.problems import InputError
-    from alloc.problems.formats import read_assignment, read_instance
+    from alloc.problems.formats import read_instance, read_plan
 
     read = [("INSTANCE", instance), ("--policy", policy), ("--pin-file", pin_file)]
     check_outputs(("--output", output), ("--plot", plot), read=read)
@@ -120,9 +131,9 @@ def solve_command(
             iterations=iterations,
             target_gap=target_gap,
             seed=seed,
-            start=None if start is None else read_assignment(start),
+            start=None if start is None else read_plan(start, problem).assignment(),
             move_price=move_price,
-            pins=_pins(pin, pin_file),
+            pins=_pins(problem, pin, pin_file, quiet=quiet),
             threads=threads,
             makespan_slack=makespan_slack,
             makespan_limit=makespan_limit,
@@ -133,19 +144,14 @@ def solve_command(
     raise typer.Exit(0 if result.evaluation is not None and not result.evaluation.unserved_tasks else 1)
 
 
-def _pins(pin: list[str] | None, file: str | None) -> dict[str, str | None]:
-    """Return the task of each agent that is pinned, by options and by a file."""
-    from alloc.problems.formats import read_assignment
+def _pins(problem: "Instance", pairs: list[str] | None, file: str | None, *, quiet: bool) -> dict[str, str | None]:
+    """Return the task of each agent that is pinned; an option counts more than the file."""
+    from alloc.allocators.replanning.pins import parse_pins, read_pins
 
-    found: dict[str, str | None] = {} if file is None else read_assignment(file)
-    for pair in pin or []:
-        agent, sign, task = pair.partition("=")
-        if not sign or not agent:
-            raise typer.BadParameter(f"must be AGENT=TASK, got {pair!r}", param_hint="'--pin'")
-        if found.get(agent, task or None) != (task or None) and file is None:
-            raise typer.BadParameter(f"{agent!r} is pinned to two tasks", param_hint="'--pin'")
-        found[agent] = task or None
-    return found
+    pins, left_out = ({}, None) if file is None else read_pins(problem, file)
+    if left_out is not None and not quiet:
+        note(left_out)
+    return pins | parse_pins(problem, pairs or ())
 
 
 def _settings(settings: list[str] | None) -> dict[str, Any]:

@@ -11,8 +11,7 @@ from alloc.cli import options
 from alloc.cli.options import examples
 from alloc.cli.output.console import is_terminal, note, say, table, to_json
 from alloc.cli.output.files import check_outputs, check_picture, save
-from alloc.problems.text import number, percent
-from alloc.problems.vocabulary import Objective
+from alloc.problems.text import counted, number, percent
 
 if TYPE_CHECKING:
     from alloc.allocators import Fleet, WhatIf
@@ -51,10 +50,10 @@ def whatif_command(
         str,
         typer.Option(autocompletion=options.complete_methods, help="One of `alloc methods`, or auto, which picks one."),
     ] = "auto",
-    objective: options.ObjectiveOption = Objective.MAKESPAN,
+    objective: options.ObjectiveOption = options.PlainObjective.MAKESPAN,
     time_limit: Annotated[
         float | None,
-        typer.Option(min=0, help="Seconds for each fleet.", show_default="10; none where --iterations is given"),
+        typer.Option(help="Seconds for each fleet.", show_default="10; none where --iterations is given"),
     ] = None,
     iterations: Annotated[int | None, typer.Option(min=0, help="Iterations for each fleet.")] = None,
     seed: options.SeedOption = 0,
@@ -78,7 +77,7 @@ def whatif_command(
         up_to=up_to,
         remove=remove or (),
         method=method,
-        objective=objective,
+        objective=objective.value,
         time_limit_s=options.time_limit(time_limit, iterations),
         iterations=iterations,
         seed=seed,
@@ -106,7 +105,9 @@ def _show_fleet(fleet: "Fleet") -> None:
     """On a terminal, print each fleet as soon as it is solved; the table follows at the end."""
     if is_terminal(sys.stderr):
         result = fleet.result
-        say(f"{result.instance.n} agents: makespan {number(result.makespan)}, gap {percent(result.gap)}")
+        left = result.unserved_count
+        makespan = f"{counted(left, 'task')} unserved" if left else f"makespan {number(result.makespan)}"
+        say(f"{result.instance.n} agents: {makespan}, gap {percent(result.gap)}")
 
 
 def _tell(found: "WhatIf", *, with_table: bool) -> None:
@@ -123,10 +124,14 @@ def _table(found: "WhatIf") -> str:
     header = ["agents", "change", _named("makespan", units.time), "change", "at least", "gap"]
     header += [_named("energy", units.energy), "at least", "time (s)", "status"]
     now = found.fleets[0].result.makespan
+    unserved = [fleet.result.unserved_count for fleet in found.fleets]
+    if any(unserved):
+        header.insert(2, "unserved")
     rows = [
         [
             str(fleet.result.instance.n),
             _changes(fleet),
+            *([str(left)] if any(unserved) else []),
             number(fleet.result.makespan, 5),
             _against(fleet.result.makespan, now),
             number(fleet.result.lower_bound, 5),
@@ -136,7 +141,7 @@ def _table(found: "WhatIf") -> str:
             number(fleet.result.runtime_s, 3),
             str(fleet.result.status),
         ]
-        for fleet in found.fleets
+        for fleet, left in zip(found.fleets, unserved, strict=True)
     ]
     return table(header, rows, left=0)
 

@@ -12,6 +12,9 @@ from alloc.problems.text import one_line
 STANDARD = "-"
 """The file name that stands for standard input and standard output."""
 
+INTERRUPTED = 130
+"""Exit code after Ctrl-C, unless it ended a run that has an answer."""
+
 
 def write_out(text: str) -> None:
     """Write to standard output; a reader that has closed it, as in ``| head``, is no error.
@@ -39,6 +42,12 @@ def note(text: str) -> None:
 def complain(text: str) -> None:
     """Write the one line of an error to standard error."""
     say(f"alloc: {one_line(text)}")
+
+
+def interrupted() -> int:
+    """Say that Ctrl-C came before there was anything to answer with, and return the exit code."""
+    complain("interrupted before there was a result")
+    return INTERRUPTED
 
 
 def write_json(value: object) -> None:

@@ -11,25 +11,22 @@ if TYPE_CHECKING:
     from alloc.problems import Allocation, Instance
 
 
-def read_pair(
-    instance: str, allocation: str | None, *, quiet: bool = False
-) -> "tuple[Instance, Allocation | None, dict[str, object]]":
-    """Read an instance, and an allocation of it if there is one, with a note if that names another instance.
+def read_pair(instance: str, allocation: str) -> "tuple[Instance, Allocation, dict[str, object]]":
+    """Read an instance, and a plan of it, with a note if that names another instance.
 
-    The third is what a result file states about its allocation, as `read_claims` returns it.
+    The third is what a result file states about its plan, which nobody has checked; empty for a plan alone.
     """
     from alloc.problems import InputError
-    from alloc.problems.formats import read_claims, read_instance
+    from alloc.problems.formats import read_instance, read_plan
 
     if instance == allocation == STANDARD:
         raise InputError("cannot be the instance and the allocation at once", source="standard input")
     problem = read_instance(instance)
-    if allocation is None:
-        return problem, None, {}
-    answer, warning, claims = read_claims(allocation, problem)
-    if warning is not None and not quiet:
+    plan = read_plan(allocation, problem)
+    answer, warning = plan.allocation(problem)
+    if warning is not None:
         note(warning)
-    return problem, answer, claims
+    return problem, answer, plan.result
 
 
 def read_instances(name: str) -> "list[Instance]":
@@ -170,6 +167,14 @@ def check_picture(path: str | None) -> None:
         from alloc.allocators.plotting import check_plot
 
         check_plot(path)
+
+
+def check_film(path: str | None) -> None:
+    """Raise an `InputError` if there is an animation to write, and its suffix is wrong, or a program for it missing."""
+    if path is not None:
+        from alloc.allocators.plotting import check_animation
+
+        check_animation(path)
 
 
 def check_output(name: str | None) -> None:

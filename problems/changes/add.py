@@ -8,9 +8,9 @@ import numpy as np
 from alloc.problems.arguments import flag, listed, real, shown
 from alloc.problems.changes.move import index_of, position, set_place, without_own
 from alloc.problems.changes.remove import AGENT_ARRAYS, replaced, with_rows
-from alloc.problems.distances.given import DistanceTable
 from alloc.problems.errors import InputError, nearest
 from alloc.problems.fields import IntArray
+from alloc.problems.vocabulary import IDLE
 
 if TYPE_CHECKING:
     from alloc.problems.instance import Instance
@@ -58,6 +58,8 @@ def with_agents(instance: "Instance", added: Iterable[Mapping[str, object]]) -> 
     for index, row in enumerate(rows, start=instance.n):
         blank = row.get("like") is None
         _set_numbers(fields, row, index, blank=blank)
+        if blank or "returns" in row:
+            _set_return(fields, instance, row, index)
         if blank or "tasks" in row:
             lists[index] = _task_indices(instance, row.get("tasks"), index)
         if blank or "skills" in row:
@@ -103,9 +105,7 @@ def with_tasks(instance: "Instance", added: Iterable[Mapping[str, object]]) -> "
         ],
         task_position=np.vstack([instance.task_position, np.array(place).reshape(-1, 3)]),
         needs=[*needs, *(row.get("needs") for row in rows)],
-        distances=None
-        if table is None
-        else DistanceTable(table.n, table.m + len(rows), table.source, table.target, table.distance, table.missing),
+        distances=None if table is None else table.with_more_tasks(len(rows)),
     )
 
 
@@ -129,10 +129,19 @@ def _set_numbers(fields: dict[str, object], row: Mapping[str, object], index: in
         if blank or field in row:
             value = row.get(field)
             array[index] = np.nan if value is None else real(value, f"agents[{index}].{field}")
-    returns = fields["returns"]
+
+
+def _set_return(fields: dict[str, object], instance: "Instance", row: Mapping[str, object], index: int) -> None:
+    """Set whether an agent returns, and to which base: false, true for its start, or the id of a base."""
+    given, place = row.get("returns"), f"agents[{index}].returns"
+    returns, base = fields["returns"], fields["return_base"]
     assert isinstance(returns, np.ndarray)
-    if blank or "returns" in row:
-        returns[index] = row.get("returns") is not None and flag(row["returns"], f"agents[{index}].returns")
+    assert isinstance(base, np.ndarray)
+    if isinstance(given, str) and given not in instance.bases.ids:
+        known = nearest(given, instance.bases.ids) if instance.bases.ids else ""
+        raise InputError(f"there is no base {given!r}{known}; give True, False or the id of a base", place)
+    base[index] = instance.bases.ids.index(given) if isinstance(given, str) else IDLE
+    returns[index] = isinstance(given, str) or (given is not None and flag(given, place))
 
 
 def _task_indices(instance: "Instance", names: object, index: int) -> IntArray | None:

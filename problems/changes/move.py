@@ -10,7 +10,7 @@ from alloc.problems.arguments import listed, of_type, shown
 from alloc.problems.changes.remove import replaced
 from alloc.problems.distances.given import DistanceTable
 from alloc.problems.errors import InputError, nearest
-from alloc.problems.fields import BoolArray
+from alloc.problems.fields import BoolArray, IntArray
 from alloc.problems.vocabulary import IDLE
 
 if TYPE_CHECKING:
@@ -25,7 +25,8 @@ def moved_to(instance: "Instance", places: Mapping[str, str | Sequence[float]]) 
     instance : Instance
     places : mapping
         For each id of an agent that has moved, the id of the task where it is now, or its coordinates. Distances given
-        for the agent itself are dropped, as they are from where it was.
+        for the agent itself are dropped, as they are from where it was. An agent that returns goes on to return to
+        where it started, which becomes a base, or to the base that it has.
 
     Raises
     ------
@@ -39,14 +40,50 @@ def moved_to(instance: "Instance", places: Mapping[str, str | Sequence[float]]) 
         moved[index] = True
         key = "start_task" if isinstance(place, str) else "position"
         set_place(fields, instance, {key: place}, index)
-    return replaced(instance, **fields, distances=without_own(instance.distances, moved))
+    kept = with_starts_as_bases(instance, np.flatnonzero(moved & instance.returns & (instance.return_base == IDLE)))
+    return replaced(kept, **fields, distances=without_own(kept.distances, moved))
+
+
+def with_starts_as_bases(instance: "Instance", agents: IntArray) -> "Instance":
+    """Return the same problem in which the starts of some agents are bases, to which they return.
+
+    Agents that start at one place and have no distances of their own share a base, named after the first of them.
+
+    Parameters
+    ----------
+    instance : Instance
+    agents : ndarray of int
+        Indices.
+    """
+    if not len(agents):
+        return instance
+    table, groups = instance.distances, dict[tuple[object, ...], list[int]]()
+    owners = set() if table is None else {*table.source.tolist(), *table.target.tolist()}
+    at_task = np.where(np.isnan(instance.agent_position[:, 0]), instance.start_task, IDLE)
+    for agent in agents.tolist():
+        place = (
+            tuple(instance.start_position[agent].tolist()) if not np.isnan(instance.start_position[agent, 0]) else ()
+        )
+        groups.setdefault((place, at_task[agent], agent if agent in owners else IDLE), []).append(agent)
+    bases, base = instance.bases, instance.return_base.copy()
+    for group in groups.values():
+        base[group] = len(bases.ids)
+        name = bases.new_id(f"start of {instance.agent_ids[group[0]]}")
+        bases = bases.with_more([name], instance.start_position[group[:1]])
+    starts = [(group[0], int(at_task[group[0]])) for group in groups.values()]
+    return replaced(
+        instance,
+        bases=bases,
+        return_base=base,
+        distances=None if table is None else table.with_bases_at(starts),
+    )
 
 
 def without_own(table: DistanceTable | None, agents: BoolArray) -> DistanceTable | None:
     """Return a table without the distances that are given for the agents marked in `agents`, shape (n,)."""
     if table is None:
         return None
-    dropped = np.append(agents, np.zeros(table.m, dtype=np.bool_))
+    dropped = np.append(agents, np.zeros(table.size - table.n, dtype=np.bool_))
     kept = ~(dropped[table.source] | dropped[table.target])
     return replace(table, source=table.source[kept], target=table.target[kept], distance=table.distance[kept])
 

@@ -24,6 +24,7 @@ AGENT_ARRAYS = (
     "speed",
     "agent_energy_per_distance",
     "returns",
+    "return_base",
 )
 """Fields of an instance with one row per agent; ids, allowed tasks and skills are tuples."""
 

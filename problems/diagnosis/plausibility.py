@@ -53,7 +53,7 @@ def findings(instance: Instance) -> tuple[Finding, ...]:
     -------
     tuple of Finding
     """
-    checks = (_degrees, _unplaced, _unreaching, _without_effect, _other_units, _alike, _too_few_agents)
+    checks = (_degrees, _unplaced, _bases, _unreaching, _without_effect, _other_units, _alike, _too_few_agents)
     return tuple(finding for check in checks for finding in check(instance))
 
 
@@ -68,7 +68,7 @@ def _degrees(instance: Instance) -> Iterator[Finding]:
     """Longitudes and latitudes that are taken for coordinates in a plane."""
     if instance.metric == GEOGRAPHIC:
         return
-    places = np.concatenate([instance.agent_position, instance.task_position])
+    places = np.concatenate([instance.agent_position, instance.task_position, instance.bases.position])
     flat = places[~np.isnan(places[:, 0]), :2]
     if len(flat) < 2 or (flat == flat.round()).all():
         return
@@ -101,10 +101,26 @@ def _unplaced(instance: Instance) -> Iterator[Finding]:
             yield Finding("position", f"{_named(lost, ids, noun)} {verb} no place: the way there counts as 0")
 
 
+def _bases(instance: Instance) -> Iterator[Finding]:
+    """Bases to which nobody returns, and those to which the way is nowhere given."""
+    table, ids = instance.distances, instance.bases.ids
+    used = np.isin(np.arange(len(ids)), instance.return_base)
+    if not used.all():
+        yield Finding("bases", f"nobody returns to {_named(~used, ids, 'base')}")
+    lost = used & np.isnan(instance.bases.position[:, 0])
+    if table is not None:
+        node = instance.n + instance.m + np.arange(len(ids))
+        lost &= ~np.isin(node, np.concatenate([table.source, table.target]))
+    if lost.any() and not np.isnan(instance.task_position[:, 0]).all():
+        verb = "has" if lost.sum() == 1 else "have"
+        yield Finding("bases", f"{_named(lost, ids, 'base')} {verb} no place: the way back there counts as 0")
+
+
 def _unreaching(instance: Instance) -> Iterator[Finding]:
-    """Agents whose battery or range ends before the first task."""
-    reach = instance.reach
+    """Agents whose battery, range or ways end before the first task."""
+    reach, table = instance.reach, instance.distances
     limited = np.isfinite(instance.battery) | np.isfinite(instance.communication_range)
+    limited |= table is not None and table.missing == "unreachable"
     if not limited.any() or not reach.has_table:
         return
     reaches_some: BoolArray = np.asarray(reach.mask.any(axis=1))
@@ -119,7 +135,7 @@ def _unreaching(instance: Instance) -> Iterator[Finding]:
             continue
         nearest = int(tasks[np.argmin(reach.cost[reach.origin[agent], tasks])])
         reason = reason_of(instance, agent, nearest)
-        field = "battery" if "battery" in reason else "range"
+        field = next(name for name in ("distances", "battery", "range") if name in reason)
         others = int(reaches_none.sum()) - 1
         who = f"and {counted(others, 'other')} reach" if others else "reaches"
         text = f"{instance.agent_ids[agent]} {who} no task; to {instance.task_ids[nearest]}, its nearest, {reason}"

@@ -1,5 +1,6 @@
 """Why a task stays unserved: who could take it and does something else, or how much the nearest agent falls short."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,7 +45,9 @@ class Unserved:
     reason: str
 
 
-def why_unserved(instance: Instance, allocation: Allocation, most: int = MOST_TASKS) -> tuple[Unserved, ...]:
+def why_unserved(
+    instance: Instance, allocation: Allocation, most: int = MOST_TASKS, pinned: Collection[int] = ()
+) -> tuple[Unserved, ...]:
     """Return why tasks stay unserved, the most urgent first.
 
     Takes O(n) time for each task.
@@ -55,6 +58,8 @@ def why_unserved(instance: Instance, allocation: Allocation, most: int = MOST_TA
     allocation : Allocation
     most : int
         How many tasks are looked at.
+    pinned : collection of int
+        Agents that had to do what they do.
 
     Returns
     -------
@@ -67,18 +72,18 @@ def why_unserved(instance: Instance, allocation: Allocation, most: int = MOST_TA
     """
     tasks = np.array(evaluate(instance, allocation).unserved_tasks, dtype=np.intp)
     tasks = tasks[np.argsort(-instance.priority[tasks], kind="stable")][:most]
-    return tuple(_why(instance, allocation, task) for task in tasks.tolist())
+    return tuple(_why(instance, allocation, task, pinned) for task in tasks.tolist())
 
 
-def _why(instance: Instance, allocation: Allocation, task: int) -> Unserved:
+def _why(instance: Instance, allocation: Allocation, task: int, pinned: Collection[int]) -> Unserved:
     able = instance.reach.agents_of(task)
     nearest = None if len(able) else _nearest(instance, task)
-    reason = _busy(instance, allocation, able) if nearest is None else _short(instance, nearest, task)
+    reason = _busy(instance, allocation, able, pinned) if nearest is None else _short(instance, nearest, task)
     first = tuple(able[:MOST_AGENTS].tolist())
     return Unserved(task, float(instance.priority[task]), first, len(able), nearest, reason)
 
 
-def _busy(instance: Instance, allocation: Allocation, able: IntArray) -> str:
+def _busy(instance: Instance, allocation: Allocation, able: IntArray, pinned: Collection[int]) -> str:
     """Return what those do who could take the task."""
     named = able[:MOST_AGENTS].tolist()
     doing = []
@@ -88,9 +93,11 @@ def _busy(instance: Instance, allocation: Allocation, able: IntArray) -> str:
         priority = (
             f" (priority {number(float(instance.priority[held]))})" if works and _has_priorities(instance) else ""
         )
-        doing.append(
-            f"{instance.agent_ids[agent]} " + (f"does {instance.task_ids[held]}{priority}" if works else "is idle")
-        )
+        if agent in pinned:
+            does = f"is pinned to {instance.task_ids[held]}{priority}" if works else "is pinned to no task"
+        else:
+            does = f"does {instance.task_ids[held]}{priority}" if works else "is idle"
+        doing.append(f"{instance.agent_ids[agent]} {does}")
     others = f", and {counted(len(able) - len(named), 'other')}" if len(able) > len(named) else ""
     return f"{counted(len(able), 'agent')} could take it: {', '.join(doing)}{others}"
 

@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from alloc.problems.distances.geometry import Geometry, GivenRows, given_rows
+from alloc.problems.distances.geometry import Geometry, given_rows
 from alloc.problems.distances.given import DistanceTable
 from alloc.problems.distances.metric import Floats
 from alloc.problems.distances.move import Move
@@ -25,8 +25,8 @@ Flags = NDArray[np.bool_]
 def build_reach(instance: "Instance") -> Reach:
     """Group agents by origin; takes O(n log n) time and O(n) memory.
 
-    Agents of one origin share place, given distances, range, battery, energy per distance, whether they return, and
-    their list of tasks.
+    Agents of one origin share place, given distances, range, battery, energy per distance, whether and to where they
+    return, and their list of tasks.
 
     Parameters
     ----------
@@ -39,17 +39,22 @@ def build_reach(instance: "Instance") -> Reach:
     columns = [*place.T, instance.communication_range, instance.battery, number.astype(np.float64)]
     columns += [column.astype(np.float64) for column in (factor, returns) if column is not None]
     start = np.where(np.isnan(instance.agent_position[:, 0]), instance.start_task, -1)
-    table = instance.distances
+    table, home = instance.distances, _home_of(instance)
     if table is not None:
-        columns.append(_rows_of(table, start).astype(np.float64))
+        columns.append(_rows_of(table, np.arange(instance.n), start).astype(np.float64))
+    if home is not None:
+        columns += [*home.place.T, home.rows.astype(np.float64)]
     first, origin = group_rows(columns)
-    given = None if table is None else given_rows(table, first, start[first])
+    geometry = _geometry(instance, place[first], first, start[first])
     list_of = number[first]
-    if table is not None and given is not None and table.missing == "unreachable":
-        list_of, lists = _bound_to(given, list_of, lists)
+    if home is not None:
+        back = _geometry(instance, home.place[first], home.node[first], home.start[first])
+        geometry = replace(geometry, home=back)
+    if table is not None and table.missing == "unreachable":
+        list_of, lists = _bound_to(geometry, list_of, lists)
     reach = Reach(
         origin=origin,
-        geometry=Geometry(place[first], instance.task_position, instance.metric, instance.distance_unit, given),
+        geometry=geometry,
         communication_range=instance.communication_range[first],
         battery=instance.battery[first],
         energy_per_distance=base,
@@ -61,6 +66,43 @@ def build_reach(instance: "Instance") -> Reach:
     for array in (origin, reach.geometry.start, list_of):
         array.setflags(write=False)
     return reach
+
+
+class Home(NamedTuple):
+    """Where each agent returns to: a place, and its node and start task in a table of distances.
+
+    Attributes
+    ----------
+    place : ndarray, shape (n, 3)
+        Where it starts for those that return there, or not at all.
+    node, start : ndarray of int, shape (n,)
+        Of the table; -1 for no start task.
+    rows : ndarray of int, shape (n,)
+        The node that gives distances, -1 for none.
+    """
+
+    place: Floats
+    node: Indices
+    start: Indices
+    rows: Indices
+
+
+def _home_of(instance: "Instance") -> Home | None:
+    """Return where agents return to; None where each returns to where it starts, if at all."""
+    base, table, agents = instance.return_base, instance.distances, np.arange(instance.n)
+    if not (base >= 0).any():
+        return None
+    away = base >= 0
+    place = np.where(away[:, None], instance.bases.position[np.maximum(base, 0)], instance.start_position)
+    start = np.where(~away & np.isnan(instance.agent_position[:, 0]), instance.start_task, -1)
+    node = np.where(away, instance.n + instance.m + base, agents)
+    return Home(place, node, start, np.full(instance.n, -1) if table is None else _rows_of(table, node, start))
+
+
+def _geometry(instance: "Instance", place: Floats, node: Indices, start: Indices) -> Geometry:
+    """Return the geometry of some places, by what a table gives for their nodes and start tasks."""
+    given = None if instance.distances is None else given_rows(instance.distances, node, start)
+    return Geometry(place, instance.task_position, instance.metric, instance.distance_unit, given)
 
 
 def replanned(
@@ -113,11 +155,9 @@ def restricted_reach(reach: Reach, agents: Indices, tasks: Indices) -> Reach:
     number = np.full(len(reach.goal) + 1, -1, dtype=np.intp)
     number[tasks] = np.arange(len(tasks))
     part, move = _chosen(reach, old, origin.astype(np.intp)), reach.move
-    geometry = part.geometry
-    given = None if geometry.given is None else geometry.given.renumbered(number, len(tasks))
     return replace(
         part,
-        geometry=replace(geometry, task_position=geometry.task_position[tasks], given=given),
+        geometry=part.geometry.restricted(tasks, number),
         lists=tuple(np.sort(number[named][number[named] >= 0]) for named in reach.lists),
         move=None if move is None else Move(number[move.task[old]], move.price[old], move.energy_weight),
     )
@@ -146,20 +186,29 @@ def _factors(rate: Floats, base: float) -> tuple[float, Floats | None]:
     return unit, rate / unit
 
 
-def _rows_of(table: DistanceTable, start: Indices) -> Indices:
-    """Return the node of a table that gives each agent's distances, its own before its start task's; -1 for none."""
-    nodes = np.zeros(table.n + table.m + 1, dtype=np.bool_)
+def _rows_of(table: DistanceTable, node: Indices, start: Indices) -> Indices:
+    """Return the node of a table that gives distances, one's own before that of the start task; -1 for none."""
+    nodes = np.zeros(table.size, dtype=np.bool_)
     nodes[table.source] = nodes[table.target] = True
-    agents = np.arange(len(start))
-    by_task = np.where(start >= 0, table.n + start, table.n + table.m)
-    return np.where(nodes[agents], agents, np.where(start >= 0, by_task, -1))
+    return np.where(nodes[node], node, np.where(start >= 0, table.n + start, -1))
 
 
-def _bound_to(given: GivenRows, list_of: Indices, lists: Sequence[Indices]) -> tuple[Indices, tuple[Indices, ...]]:
-    """Return lists that allow each origin the tasks whose distance is given, and no others."""
-    own: list[Indices | None] = [given.task[begin:end] for begin, end in pairwise(given.first.tolist())]
+def _bound_to(geometry: Geometry, list_of: Indices, lists: Sequence[Indices]) -> tuple[Indices, tuple[Indices, ...]]:
+    """Return lists that allow each origin the tasks whose distance is given, there and back home, and no others."""
+    ways = _given_tasks(geometry)
+    if geometry.home is not None:  # where nobody returns to a base, home is where one starts
+        home = _given_tasks(geometry.home)
+        ways = [np.intersect1d(*pair, assume_unique=True) for pair in zip(ways, home, strict=True)]
+    own: list[Indices | None] = [*ways]
     for origin in np.flatnonzero(list_of >= 0).tolist():
         tasks = own[origin]
         assert tasks is not None
         own[origin] = tasks[np.isin(tasks, lists[list_of[origin]], assume_unique=True)]
     return number_lists(own, len(own))
+
+
+def _given_tasks(geometry: Geometry) -> list[Indices]:
+    """Return the tasks whose distance is given, for each origin."""
+    given = geometry.given
+    assert given is not None
+    return [given.task[begin:end] for begin, end in pairwise(given.first.tolist())]

@@ -35,7 +35,10 @@ def geodesic_distances(place: Floats, goal: Floats, unit: str) -> Floats:
     lon, lat, other_lon, other_lat = (
         np.where(unknown, 0.0, part) for part in (a[..., 0], a[..., 1], b[..., 0], b[..., 1])
     )
-    _, _, surface = _ellipsoid().inv(lon, lat, other_lon, other_lat)
+    if unknown.size == 1:  # of arrays of one element pyproj makes numbers, of which some versions of numpy warn
+        _, _, surface = _ellipsoid().inv(lon.item(), lat.item(), other_lon.item(), other_lat.item())
+    else:
+        _, _, surface = _ellipsoid().inv(lon, lat, other_lon, other_lat)
     climb = np.where(unknown, 0.0, a[..., 2] - b[..., 2])
     distance: Floats = np.hypot(np.asarray(surface), climb) / METRES[unit]
     return distance

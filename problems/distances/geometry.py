@@ -89,6 +89,8 @@ class Geometry(ReadOnly):
     unit : str
         Of geographic distances.
     given : GivenRows or None
+    home : Geometry or None
+        That of the places to which the origins return; None where each returns to where it starts, if at all.
     """
 
     start: Floats
@@ -96,6 +98,7 @@ class Geometry(ReadOnly):
     metric: str = EUCLIDEAN
     unit: str = "km"
     given: GivenRows | None = None
+    home: "Geometry | None" = None
 
     @property
     def is_euclidean(self) -> bool:
@@ -115,7 +118,14 @@ class Geometry(ReadOnly):
     def chosen(self, origins: IntArray) -> "Geometry":
         """Return the geometry of some origins, in this order."""
         given = None if self.given is None else self.given.chosen(origins)
-        return replace(self, start=self.start[origins], given=given)
+        home = None if self.home is None else self.home.chosen(origins)
+        return replace(self, start=self.start[origins], given=given, home=home)
+
+    def restricted(self, tasks: IntArray, number: IntArray) -> "Geometry":
+        """Return the geometry of some tasks, of which task j is number ``number[j]``, -1 for none."""
+        given = None if self.given is None else self.given.renumbered(number, len(tasks))
+        home = None if self.home is None else self.home.restricted(tasks, number)
+        return replace(self, task_position=self.task_position[tasks], given=given, home=home)
 
     def between(self, origin: IntArray, task: IntArray) -> Floats:
         """Distance from each of these origins to the task beside it; both broadcast."""
@@ -130,12 +140,23 @@ class Geometry(ReadOnly):
         return self.given.replace(table, self.given.there, origins[:, None], np.arange(self.given.m)[tasks])
 
     def there_and_back(self, origin: IntArray, task: IntArray, distance: Floats) -> Floats:
-        """Length of the flight from each of these origins to the task, which is `distance` away, and back."""
+        """Length of the flight from each of these origins to the task, which is `distance` away, and back home."""
+        if self.home is not None:
+            return distance + self.home.back(origin, task)
         back = distance if self.given is None else self.given.replace(distance, self.given.back, origin, task)
         return distance + back
 
-    def farthest(self, corner: Floats) -> Floats:
+    def back(self, origin: IntArray, task: IntArray) -> Floats:
+        """Distance from each task to the origin beside it, or, where `origin` is a column, from all to all."""
+        if origin.ndim == 2:
+            way = distance_table(self.start[origin[:, 0]], self.task_position[task], self._by_metric)
+        else:
+            way = self._by_metric(self.start[origin], self.task_position[task])
+        return way if self.given is None else self.given.replace(way, self.given.back, origin, task)
+
+    def farthest(self, low: Floats, high: Floats) -> Floats:
         """Return at least how far each origin is from all places in a box, by its farthest corner; shape (origins,)."""
+        corner = np.where(self.place > low / 2 + high / 2, low, high)
         if self.metric == MANHATTAN:
             return manhattan_distances(self.place, corner)
         if self.metric == GEOGRAPHIC:
@@ -151,22 +172,22 @@ class Geometry(ReadOnly):
         return manhattan_distances(place, goal) if self.metric == MANHATTAN else distances(place, goal)
 
 
-def given_rows(table: DistanceTable, agents: IntArray, start_task: IntArray) -> GivenRows:
-    """Return what a table says of some agents: a row for each, or, where it has none, that of the task where it starts.
+def given_rows(table: DistanceTable, nodes: IntArray, start_task: IntArray) -> GivenRows:
+    """Return what a table says of agents or bases: a row for each, or, where it has none, that of its start task.
 
     Parameters
     ----------
     table : DistanceTable
-    agents : ndarray of int, shape (origins,)
-        One agent of each origin.
+    nodes : ndarray of int, shape (origins,)
+        One agent of each origin, or a base, as the table numbers them.
     start_task : ndarray of int, shape (origins,)
         Task at which the agent starts, -1 for none.
     """
     node, task, there, back = table.to_tasks()
-    begin = np.searchsorted(node, np.arange(table.n + table.m + 1))
-    origins = np.arange(len(agents))
+    begin = np.searchsorted(node, np.arange(table.size + 1))
+    origins = np.arange(len(nodes))
     placed = start_task >= 0
-    own = entries(begin, origins, agents)
+    own = entries(begin, origins, nodes)
     by_task = entries(begin, origins[placed], table.n + start_task[placed])
     origin = np.concatenate([own[0], by_task[0], origins[placed]])
     goal = np.concatenate([task[own[1]], task[by_task[1]], start_task[placed]])
@@ -174,7 +195,7 @@ def given_rows(table: DistanceTable, agents: IntArray, start_task: IntArray) -> 
     out, home = (np.concatenate([way[own[1]], way[by_task[1]], none]) for way in (there, back))
     key, first = np.unique(origin * table.m + goal, return_index=True)
     origin, goal = np.divmod(key, table.m)
-    rows = GivenRows(np.searchsorted(origin, np.arange(len(agents) + 1)), goal, out[first], home[first], table.m)
+    rows = GivenRows(np.searchsorted(origin, np.arange(len(nodes) + 1)), goal, out[first], home[first], table.m)
     for array in (rows.first, rows.task, rows.there, rows.back):
         array.setflags(write=False)
     return rows

@@ -11,7 +11,7 @@ from alloc.problems.arguments import listed, shown
 from alloc.problems.distances.metric import Floats
 from alloc.problems.distances.origins import entries
 from alloc.problems.errors import InputError, nearest
-from alloc.problems.fields import IntArray, ReadOnly, numbers
+from alloc.problems.fields import BoolArray, IntArray, ReadOnly, numbers
 
 Missing = Literal["metric", "unreachable"]
 
@@ -21,18 +21,20 @@ MISSING = ("metric", "unreachable")
 
 @dataclass(frozen=True, eq=False)
 class DistanceTable(ReadOnly):
-    """Distances between agents' starts and tasks, as far as they are given; both directions alike unless both are.
+    """Distances of tasks from agents' starts, bases and each other, as far as given; both ways alike unless both are.
 
     Attributes
     ----------
     n, m : int
         Agents and tasks of the instance.
     source, target : ndarray of int, shape (k,)
-        Where each flight begins and ends: agent i as i, task j as n + j. What is given for the task where an agent
-        starts holds for the agent, too.
+        Where each flight begins and ends: agent i as i, task j as n + j, base k as n + m + k. What is given for the
+        task where an agent starts holds for the agent, too.
     distance : ndarray, shape (k,)
     missing : {"metric", "unreachable"}
         What holds for pairs that are left out.
+    bases : int
+        Bases of the instance.
     """
 
     n: int
@@ -41,6 +43,12 @@ class DistanceTable(ReadOnly):
     target: IntArray
     distance: Floats
     missing: Missing
+    bases: int = 0
+
+    @property
+    def size(self) -> int:
+        """Number of agents, tasks and bases."""
+        return self.n + self.m + self.bases
 
     @classmethod
     def of(
@@ -49,25 +57,26 @@ class DistanceTable(ReadOnly):
         agent_ids: Sequence[str],
         task_ids: Sequence[str],
         missing: str = "metric",
+        base_ids: Sequence[str] = (),
     ) -> "DistanceTable":
         """Return the table of some rows.
 
         Parameters
         ----------
         rows : iterable of (str, str, float)
-            Id of an agent or a task, id of another, and the distance from the one to the other, >= 0.
-        agent_ids, task_ids : sequence of str
+            Id of an agent, a task or a base, id of another, and the distance from the one to the other, >= 0.
+        agent_ids, task_ids, base_ids : sequence of str
         missing : {"metric", "unreachable"}
 
         Raises
         ------
         InputError
-            If an id is unknown or stands for an agent and a task, a pair is given twice, or two agents are paired.
+            If an id is unknown or stands for two of them, a pair is given twice, or neither of a pair is a task.
         """
         entries = [_row(entry, number) for number, entry in enumerate(listed(rows, "distances", "rows"))]
         source, target = [entry[0] for entry in entries], [entry[1] for entry in entries]
         distance = numbers([entry[2] for entry in entries], "distances") if entries else np.zeros(0)
-        return cls.from_columns(source, target, distance, agent_ids, task_ids, missing)
+        return cls.from_columns(source, target, distance, agent_ids, task_ids, missing, base_ids)
 
     @classmethod
     def from_columns(
@@ -78,15 +87,16 @@ class DistanceTable(ReadOnly):
         agent_ids: Sequence[str],
         task_ids: Sequence[str],
         missing: str = "metric",
+        base_ids: Sequence[str] = (),
     ) -> "DistanceTable":
         """Return the table of some rows that are given by columns; takes millions of them in seconds.
 
         Parameters
         ----------
         source, target : sequence of str
-            Ids of agents and tasks.
+            Ids of agents, tasks and bases.
         distance : ndarray, shape (k,)
-        agent_ids, task_ids : sequence of str
+        agent_ids, task_ids, base_ids : sequence of str
         missing : {"metric", "unreachable"}
 
         Raises
@@ -96,14 +106,15 @@ class DistanceTable(ReadOnly):
         """
         if missing not in MISSING:
             raise InputError(f"must be {' or '.join(map(repr, MISSING))}, got {shown(missing)}", "distances.missing")
-        nodes = _nodes(agent_ids, task_ids)
+        nodes = _nodes(agent_ids, task_ids, base_ids)
         table = cls(
             len(agent_ids),
             len(task_ids),
-            _numbered(source, nodes, 0),
-            _numbered(target, nodes, 1),
+            _numbered(source, nodes, 0, "agent, task or base" if base_ids else "agent or task"),
+            _numbered(target, nodes, 1, "agent, task or base" if base_ids else "agent or task"),
             np.array(distance, dtype=np.float64),
             cast("Missing", missing),
+            len(base_ids),
         )
         table.check()
         for array in (table.source, table.target, table.distance):
@@ -116,31 +127,38 @@ class DistanceTable(ReadOnly):
         given: "DistanceTable | Iterable[tuple[str, str, float]]",
         agent_ids: Sequence[str],
         task_ids: Sequence[str],
+        base_ids: Sequence[str] = (),
     ) -> "DistanceTable":
         """Return a table that is given, or that of the rows that are given, for an instance with these ids."""
         if not isinstance(given, DistanceTable):
-            return cls.of(given, agent_ids, task_ids)
+            return cls.of(given, agent_ids, task_ids, base_ids=base_ids)
         if (given.n, given.m) != (len(agent_ids), len(task_ids)):
             raise InputError(f"is for {given.n} agents and {given.m} tasks", "distances")
-        return given
+        if given.bases > len(base_ids):
+            raise InputError(f"is for {given.bases} bases", "distances")
+        return replace(given, bases=len(base_ids))  # tables without rows of bases need not know of them
 
     def check(self) -> None:
         """Raise `InputError` for the first row that breaks a rule."""
         for wrong, rule in (
             (~(np.isfinite(self.distance) & (self.distance >= 0)), "must have a distance that is a finite number >= 0"),
             (
-                (self.source < self.n) & (self.target < self.n),
-                "joins two agents; give an agent and a task, or two tasks",
+                ~(self._is_task(self.source) | self._is_task(self.target)),
+                f"joins two agents{' or bases' if self.bases else ''}; give an agent and a task, or two tasks"
+                f"{', or a base and a task' if self.bases else ''}",
             ),
         ):
             if wrong.any():
                 raise InputError(rule, f"distances.rows[{int(np.argmax(wrong))}]")
-        key = self.source * (self.n + self.m) + self.target
+        key = self.source * self.size + self.target
         order = np.argsort(key, kind="stable")
         twice = key[order][1:] == key[order][:-1]
         if twice.any():
             row = order[int(np.argmax(twice)) + 1]
             raise InputError("gives a pair that an earlier row gives; keep one of them", f"distances.rows[{row}]")
+
+    def _is_task(self, node: IntArray) -> BoolArray:
+        return (node >= self.n) & (node < self.n + self.m)
 
     def with_rows_of_starts(self, agents: IntArray, start_task: IntArray) -> "DistanceTable":
         """Return the table in which some agents have for their own what is given for the task where they start.
@@ -151,11 +169,11 @@ class DistanceTable(ReadOnly):
         """
         if not len(agents):
             return self
-        size, begins = self.n + self.m, self.n + start_task
+        size, begins = self.size, self.n + start_task
         known = np.concatenate([self.source * size + self.target, self.target * size + self.source])
         parts = [(self.source, self.target, self.distance)]
         for ends, others in ((self.source, self.target), (self.target, self.source)):
-            row = np.flatnonzero((ends >= self.n) & (others >= self.n))
+            row = np.flatnonzero(self._is_task(ends) & self._is_task(others))
             row = row[np.argsort(ends[row], kind="stable")]
             begin = np.searchsorted(ends[row], np.arange(size + 1))
             agent, entry = entries(begin, agents, begins)
@@ -168,8 +186,9 @@ class DistanceTable(ReadOnly):
 
     def restricted(self, agents: IntArray, tasks: IntArray) -> "DistanceTable":
         """Return what the table says of some agents and tasks, numbered anew in this order; agents may be repeated."""
-        number = np.full(self.n + self.m, -1, dtype=np.intp)
+        number = np.full(self.size, -1, dtype=np.intp)
         number[self.n + tasks] = len(agents) + np.arange(len(tasks))
+        number[self.n + self.m :] = len(agents) + len(tasks) + np.arange(self.bases)
         fixed = (number[self.source] >= 0) & (number[self.target] >= 0)
         parts = [(number[self.source[fixed]], number[self.target[fixed]], self.distance[fixed])]
         for ends, others in ((self.source, self.target), (self.target, self.source)):
@@ -181,11 +200,47 @@ class DistanceTable(ReadOnly):
             pair = (new, number[others[entry]])
             parts.append((*(pair if ends is self.source else pair[::-1]), self.distance[entry]))
         source, target, distance = (np.concatenate([part[column] for part in parts]) for column in range(3))
-        return DistanceTable(len(agents), len(tasks), source, target, distance, self.missing)
+        return DistanceTable(len(agents), len(tasks), source, target, distance, self.missing, self.bases)
+
+    def with_more_tasks(self, count: int) -> "DistanceTable":
+        """Return the table with `count` tasks more, of which nothing is given."""
+        ends = (np.where(one < self.n + self.m, one, one + count) for one in (self.source, self.target))
+        source, target = ends
+        return replace(self, m=self.m + count, source=source, target=target)
+
+    def with_bases_at(self, starts: Sequence[tuple[int, int]]) -> "DistanceTable":
+        """Return the table with further bases, each of which is where an agent starts.
+
+        Parameters
+        ----------
+        starts : sequence of (int, int)
+            Index of the agent, and that of the task where it starts, -1 for none. The base has what is given for the
+            agent, and for other tasks what is given for that task.
+        """
+        rows: dict[tuple[int, int], float] = {}
+        for base, (agent, task) in enumerate(starts, start=self.size):
+            for node in (agent, self.n + task) if task >= 0 else (agent,):
+                new: dict[tuple[int, int], float] = {}
+                for ends, others in ((self.source, self.target), (self.target, self.source)):
+                    for row in np.flatnonzero((ends == node) & self._is_task(others)).tolist():
+                        pair = base, int(others[row])
+                        new[pair if ends is self.source else pair[::-1]] = float(self.distance[row])
+                known = {sum(pair) - base for pair in rows if base in pair}  # the tasks
+                rows |= {pair: length for pair, length in new.items() if sum(pair) - base not in known}
+            if task >= 0:  # which is where one is then
+                rows.setdefault((base, self.n + task), 0.0)
+        ends = np.array(list(rows), dtype=np.intp).reshape(-1, 2)
+        return replace(
+            self,
+            source=np.append(self.source, ends[:, 0]),
+            target=np.append(self.target, ends[:, 1]),
+            distance=np.append(self.distance, np.array(list(rows.values()))),
+            bases=self.bases + len(starts),
+        )
 
     def to_tasks(self) -> tuple[IntArray, IntArray, Floats, Floats]:
         """Return node, task, distance there and distance back for all known pairs, in order of node and task."""
-        size = self.n + self.m
+        size = self.size
         key, back = self.source * size + self.target, self.target * size + self.source
         keys = np.concatenate([key, back])
         values = np.concatenate([self.distance, self.distance])
@@ -193,7 +248,7 @@ class DistanceTable(ReadOnly):
         values = values[first]
         node, goal = np.divmod(keys, size)
         reverse = values[np.searchsorted(keys, goal * size + node)] if len(keys) else values
-        chosen = goal >= self.n
+        chosen = self._is_task(goal)
         return node[chosen], goal[chosen] - self.n, values[chosen], reverse[chosen]
 
 
@@ -209,18 +264,18 @@ def _row(entry: object, number: int) -> Row:
 
 
 AMBIGUOUS, UNKNOWN = -1, -2
-"""What stands in for the node of an id that an agent and a task have, and of one that there is not."""
+"""What stands in for the node of an id that two have, such as an agent and a task, and of one that there is not."""
 
 
-def _nodes(agent_ids: Sequence[str], task_ids: Sequence[str]) -> dict[str, int]:
+def _nodes(agent_ids: Sequence[str], task_ids: Sequence[str], base_ids: Sequence[str]) -> dict[str, int]:
     """Return the node of each id."""
     nodes = {name: index for index, name in enumerate(agent_ids)}
-    for index, name in enumerate(task_ids):
-        nodes[name] = AMBIGUOUS if name in nodes else len(agent_ids) + index
+    for index, name in enumerate((*task_ids, *base_ids), start=len(agent_ids)):
+        nodes[name] = AMBIGUOUS if name in nodes else index
     return nodes
 
 
-def _numbered(names: Sequence[str], nodes: Mapping[str, int], column: int) -> IntArray:
+def _numbered(names: Sequence[str], nodes: Mapping[str, int], column: int, kinds: str) -> IntArray:
     """Return the nodes of some ids, which stand in this column of the rows."""
     found = np.array(list(map(nodes.get, names, repeat(UNKNOWN))), dtype=np.intp)
     wrong = found < 0
@@ -228,6 +283,7 @@ def _numbered(names: Sequence[str], nodes: Mapping[str, int], column: int) -> In
         row = int(np.argmax(wrong))
         name, place = names[row], f"distances.rows[{row}][{column}]"
         if found[row] == AMBIGUOUS:
-            raise InputError(f"{name!r} is the id of an agent and of a task; give them different ids", place)
-        raise InputError(f"there is no agent or task {name!r}{nearest(name, tuple(nodes))}", place)
+            two = "an agent and of a task" if "base" not in kinds else "two of the agents, tasks and bases"
+            raise InputError(f"{name!r} is the id of {two}; give them different ids", place)
+        raise InputError(f"there is no {kinds} {name!r}{nearest(name, tuple(nodes))}", place)
     return found

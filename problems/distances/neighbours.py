@@ -146,7 +146,7 @@ def nearest_distance(reach: ReachRule, wanted: NDArray[np.bool_]) -> NDArray[np.
     if len(placed) and len(known):
         axes = 1 if reach.geometry.metric == MANHATTAN else 2
         straight, found = cKDTree(reach.goal[known]).query(reach.place[placed], p=axes)
-        if reach.geometry.is_euclidean:
+        if reach.geometry.is_euclidean and reach.geometry.home is None:  # then the nearest is the first within reach
             distance = reach.distances_between(placed, known[found])
             within = reach.is_within(placed, known[found], distance)
         else:

@@ -48,6 +48,11 @@ def number_lists(
     return number, tuple(distinct)
 
 
+def list_keys(lists: Sequence[NDArray[np.intp]], m: int) -> Indices:
+    """Return list times m plus task for every entry of every list, ascending, and an end that no key equals."""
+    return np.concatenate([*(number * m + tasks for number, tasks in enumerate(lists)), [len(lists) * m]])
+
+
 def entries(begin: Indices, origins: Indices, nodes: Indices) -> tuple[Indices, Indices]:
     """Return row and entry for all entries of compressed rows that begin at `begin`: those of `nodes`, as `origins`."""
     length = begin[nodes + 1] - begin[nodes]

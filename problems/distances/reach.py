@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from alloc.problems.distances.geometry import Geometry
 from alloc.problems.distances.move import Move
 from alloc.problems.distances.neighbours import Neighbours, estimated_pairs, find_neighbours
+from alloc.problems.distances.origins import list_keys
 from alloc.problems.fields import ReadOnly
 
 TOLERANCE = 1e-9
@@ -46,7 +47,7 @@ class Reach(ReadOnly):
     factor : ndarray, shape (origins,), or None
         Energy per unit of distance of each origin over `energy_per_distance`; None where all are 1.
     returns : ndarray of bool, shape (origins,), or None
-        Whether the flight back counts; None where no agent returns.
+        Whether the flight back counts, see `Geometry.home`; None where no agent returns.
     list_of : ndarray of int, shape (origins,)
         Which of `lists` the origin is bound to; -1 where it may do all tasks.
     lists : tuple of ndarray of int
@@ -111,8 +112,7 @@ class Reach(ReadOnly):
         """What the flight from each origin to each task costs, see `costs`; shape (origins, m), like `distance`."""
         if self.cost_is_distance:
             return self.distance
-        origins, tasks = np.arange(len(self.place))[:, None], np.arange(len(self.goal))
-        cost = self.costs(origins, tasks, self.distance)
+        cost = self.costs(np.arange(len(self.place))[:, None], np.arange(len(self.goal)), self.distance)
         cost.setflags(write=False)
         return cost
 
@@ -210,11 +210,9 @@ class Reach(ReadOnly):
     def cost_of(self, agent: Indices, task: Indices) -> Floats:
         """Cost of each agent's flight to the task beside it; both of shape (k,), and so is the answer."""
         origin = self.origin[agent]
-        return (
-            self.cost[origin, task]
-            if self.has_table
-            else self.costs(origin, task, self.distances_between(origin, task))
-        )
+        if self.has_table:
+            return self.cost[origin, task]
+        return self.costs(origin, task, self.distances_between(origin, task))
 
     def costs(self, origin: Indices, task: Indices, distance: Floats) -> Floats:
         """Cost of the flight from each of these origins to the task, which is `distance` away, in units of distance.
@@ -246,11 +244,15 @@ class Reach(ReadOnly):
         return within
 
     def _is_near(self, origin: Indices, task: Indices, distance: Floats) -> Flags:
+        limited = bool(np.isfinite(self.battery).any())
+        with np.errstate(over="ignore"):
+            return self._is_enough(origin, distance, self.flown(origin, task, distance) if limited else None)
+
+    def _is_enough(self, origin: Indices, distance: Floats, flown: Floats | None) -> Flags:
+        """Whether range and battery are enough for flights of these lengths, `flown` as in `flown`, None for none."""
         near: Flags = distance <= self.communication_range[origin] + TOLERANCE
-        if np.isfinite(self.battery).any():
-            with np.errstate(over="ignore"):
-                flown = self.flown(origin, task, distance)
-                near &= self.energy_per_distance * flown <= self.battery[origin] + TOLERANCE
+        if flown is not None:
+            near &= self.energy_per_distance * flown <= self.battery[origin] + TOLERANCE
         return near
 
     def _is_allowed(self, number: Indices, task: Indices) -> Flags:
@@ -262,10 +264,7 @@ class Reach(ReadOnly):
 
     @cached_property
     def _list_keys(self) -> Indices:
-        """List times m plus task for every entry of every list, ascending, and an end that no key equals."""
-        m = len(self.goal)
-        keys = [number * m + tasks for number, tasks in enumerate(self.lists)]
-        return np.concatenate([*keys, [len(self.lists) * m]])
+        return list_keys(self.lists, len(self.goal))
 
     def _mask_of(self, origins: Indices, distance: Floats) -> Flags:
         mask = self._is_near(origins[:, None], np.arange(len(self.goal)), distance)
@@ -286,10 +285,12 @@ class Reach(ReadOnly):
         origins = np.arange(len(self.place))
         if self.geometry.given is None:
             low, high = known.min(axis=0), known.max(axis=0)
-            corner = np.where(self.place > low / 2 + high / 2, low, high)
             with np.errstate(over="ignore", invalid="ignore"):
-                farthest = self.geometry.farthest(corner) * (1 + 1e-12)
-                doubtful = np.flatnonzero(~self._is_near(origins, np.zeros_like(origins), farthest))
+                ways = (self.geometry, self.geometry.home or self.geometry)
+                farthest, back = (way.farthest(low, high) * (1 + 1e-12) for way in ways)
+                longest = farthest if self.returns is None else farthest + np.where(self.returns, back, 0.0)
+                flown = longest if self.factor is None else longest * self.factor
+                doubtful = np.flatnonzero(~self._is_enough(origins, farthest, flown))
                 worst = doubtful[np.argsort((self.radius - farthest)[doubtful])]
         else:
             worst = origins

@@ -5,8 +5,7 @@ from alloc.problems.formats.allocation_file import (
     allocation_to_document,
     read_allocation,
     read_allocations,
-    read_assignment,
-    read_claims,
+    read_plan,
     write_allocation,
 )
 from alloc.problems.formats.document import from_document, to_document
@@ -29,10 +28,9 @@ __all__ = [
     "is_standard_output",
     "read_allocation",
     "read_allocations",
-    "read_assignment",
     "read_bytes",
-    "read_claims",
     "read_instance",
+    "read_plan",
     "read_text",
     "to_document",
     "write_allocation",

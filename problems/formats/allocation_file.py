@@ -1,5 +1,7 @@
-"""Allocations as files (alloc-allocation/1), and those inside results (alloc-result/1)."""
+"""Plans in files: allocations (alloc-allocation/1), results (alloc-result/1), tables and solutions of solvers."""
 
+import json
+from dataclasses import dataclass
 from typing import cast
 
 from alloc.problems.allocation import Allocation
@@ -7,6 +9,7 @@ from alloc.problems.arguments import of_type
 from alloc.problems.errors import InputError
 from alloc.problems.formats import json_text
 from alloc.problems.formats.columns import check_names, require_format
+from alloc.problems.formats.csv_table import parse_table
 from alloc.problems.formats.files import PathLike, named, read_text, write_text_atomically
 from alloc.problems.formats.json_columns import require_known
 from alloc.problems.formats.messages import described, quoted, told
@@ -20,14 +23,136 @@ FRONT_FORMAT = "alloc-pareto/1"
 
 ALLOCATION_FIELDS = ("format", "instance", "assignment")
 
+LARGEST_EXACT = 2**53
+"""Beyond it, floats skip whole numbers."""
 
-def read_allocation(path: PathLike, instance: Instance) -> tuple[Allocation, str | None]:
-    """Read an allocation, or the allocation in a result, or in a solver's solution of a model by `write_model`.
+TABLE_COLUMNS = ("agent", "task")
+"""Columns of a table that make a plan, as `write_result` writes it."""
+
+
+@dataclass(frozen=True)
+class PlanFile:
+    """A plan as a file has it, whatever its format, before it is held against an instance.
+
+    Attributes
+    ----------
+    source : str
+        What messages call the file.
+    document : dict
+        An allocation or a result; what a table or a solver's solution says, as an allocation.
+    """
+
+    source: str
+    document: dict[str, object]
+
+    @property
+    def result(self) -> dict[str, object]:
+        """All fields of a result, which nobody has checked; empty for a plan alone."""
+        return self.document if self.document.get("format") == RESULT_FORMAT else {}
+
+    def assignment(self) -> dict[str, str | None]:
+        """Return the task id of each agent id, None for idle, whatever instance they belong to.
+
+        Raises
+        ------
+        InputError
+            If the document breaks the rules of its format; the message names the file.
+        """
+        try:
+            return _assignment(self.document)
+        except InputError as error:
+            raise told(error, self.source) from error.__cause__
+
+    def allocation(self, instance: Instance) -> tuple[Allocation, str | None]:
+        """Return the plan as an allocation of `instance`, and one line where the file names another instance.
+
+        Raises
+        ------
+        InputError
+            As `assignment` does, and if an agent or task is unknown.
+        """
+        try:
+            allocation, name = allocation_from_document(self.document, instance)
+        except InputError as error:
+            raise told(error, self.source) from error.__cause__
+        return allocation, _other_instance(self.source, name, instance)
+
+
+def read_plan(path: PathLike, instance: Instance) -> PlanFile:
+    """Read a file of any of the formats that hold a plan.
 
     Parameters
     ----------
     path : str or path
-        A JSON file whatever its suffix, or a solution file of HiGHS, CBC, Gurobi or SCIP; ``-`` for standard input.
+        JSON with an allocation or a result, whatever the suffix; a ``.csv`` table with the columns agent and task; or a
+        solution file of HiGHS, CBC, Gurobi or SCIP, of a model by `write_model`. ``-`` is standard input, where the
+        first line tells them apart.
+    instance : Instance
+        What the names in a solution file belong to; ids in other files may be any.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or is none of these.
+    """
+    source = named(path)
+    of_type(instance, Instance, "instance")
+    try:
+        return PlanFile(source, _document(read_text(path), source, instance))
+    except InputError as error:
+        raise told(error, source) from error.__cause__
+
+
+def _document(text: str, source: str, instance: Instance) -> dict[str, object]:
+    suffix, is_json = source.lower()[-4:], text.lstrip().startswith("{")
+    if is_solution(text) or (suffix == ".sol" and not is_json):
+        return {"format": ALLOCATION_FORMAT, "assignment": solution_allocation(text, instance).to_ids(instance)}
+    if not is_json and (suffix == ".csv" or _has_table_header(text)):
+        return {"format": ALLOCATION_FORMAT, "assignment": _table_assignment(text)}
+    return parse_result(text)
+
+
+def _has_table_header(text: str) -> bool:
+    """Return whether the first line names the columns of a plan."""
+    header = text.lstrip().partition("\n")[0].split(",")
+    return set(TABLE_COLUMNS) <= {name.strip().strip('"') for name in header}
+
+
+def _table_assignment(text: str) -> dict[str, str | None]:
+    """Return the task id of each agent id in a table, None where the cell is empty; other columns may be any."""
+    table = parse_table(text, TABLE_COLUMNS)
+    found: dict[str, str | None] = {}
+    for row, (agent, task) in enumerate(zip(*map(table.cells.__getitem__, TABLE_COLUMNS), strict=True)):
+        if not agent or agent in found:
+            problem = f"{quoted(agent)} occurs twice; remove one" if agent else "is missing"
+            raise InputError(problem, table.place(row, TABLE_COLUMNS[0]))
+        found[agent] = task or None
+    return found
+
+
+def parse_result(text: str) -> dict[str, object]:
+    """Return the object in a JSON text; a seed stays exact, where other whole numbers become floats.
+
+    Raises
+    ------
+    InputError
+        If it is no JSON object.
+    """
+    document = json_text.require_object(json_text.parse(text))
+    seed = document.get("seed")
+    if isinstance(seed, float) and seed >= LARGEST_EXACT:
+        document["seed"] = json.loads(text, parse_int=lambda digits: int(digits[:20]))["seed"]
+    return document
+
+
+def read_allocation(path: PathLike, instance: Instance) -> tuple[Allocation, str | None]:
+    """Read an allocation: from JSON, a result, a ``.csv`` table, or a solver's solution of a model by `write_model`.
+
+    Parameters
+    ----------
+    path : str or path
+        A JSON file whatever its suffix; a table with the columns agent and task; or a solution file of HiGHS, CBC,
+        Gurobi or SCIP; ``-`` for standard input.
     instance : Instance
         What the ids belong to.
 
@@ -43,51 +168,7 @@ def read_allocation(path: PathLike, instance: Instance) -> tuple[Allocation, str
     InputError
         If it cannot be read, breaks the rules of its format, or names an unknown agent or task.
     """
-    allocation, warning, _ = read_claims(path, instance)
-    return allocation, warning
-
-
-def read_claims(path: PathLike, instance: Instance) -> tuple[Allocation, str | None, dict[str, object]]:
-    """Read an allocation as `read_allocation` does, and the other fields of the file where it is a result.
-
-    Returns
-    -------
-    allocation, warning
-        As `read_allocation` returns them.
-    claims : dict
-        What the result says of itself, which nobody has checked; empty for an allocation alone.
-    """
-    source = named(path)
-    of_type(instance, Instance, "instance")
-    try:
-        content = read_text(path)
-        if is_solution(content) or (source.lower().endswith(".sol") and not content.lstrip().startswith("{")):
-            return solution_allocation(content, instance), None, {}
-        document = json_text.require_object(json_text.parse(content))
-        allocation, name = allocation_from_document(document, instance)
-    except InputError as error:
-        raise told(error, source) from error.__cause__
-    claims = document if document["format"] == RESULT_FORMAT else {}
-    return allocation, _other_instance(source, name, instance), claims
-
-
-def read_assignment(path: PathLike) -> dict[str, str | None]:
-    """Read the task id of each agent id, whatever instance they belong to.
-
-    Parameters
-    ----------
-    path : str or path
-        As for `read_allocation`.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read, or breaks the rules of its format.
-    """
-    try:
-        return _assignment(json_text.require_object(json_text.parse(read_text(path))))
-    except InputError as error:
-        raise told(error, named(path)) from error.__cause__
+    return read_plan(path, instance).allocation(instance)
 
 
 def read_allocations(path: PathLike, instance: Instance) -> tuple[list[Allocation], str | None]:
@@ -104,17 +185,15 @@ def read_allocations(path: PathLike, instance: Instance) -> tuple[list[Allocatio
     InputError
         As `read_allocation` does.
     """
-    source = named(path)
+    plan = read_plan(path, instance)
+    if plan.document.get("format") != FRONT_FORMAT:
+        allocation, warning = plan.allocation(instance)
+        return [allocation], warning
     try:
-        document = json_text.parse(read_text(path))
-        if not isinstance(document, dict) or document.get("format") != FRONT_FORMAT:
-            allocation, name = allocation_from_document(document, instance)
-            allocations = [allocation]
-        else:
-            allocations, name = _front_from_document(document, instance)
+        allocations, name = _front_from_document(plan.document, instance)
     except InputError as error:
-        raise told(error, source) from error.__cause__
-    return allocations, _other_instance(source, name, instance)
+        raise told(error, plan.source) from error.__cause__
+    return allocations, _other_instance(plan.source, name, instance)
 
 
 def _front_from_document(document: dict[str, object], instance: Instance) -> tuple[list[Allocation], str | None]:

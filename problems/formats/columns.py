@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from alloc.problems.distances.bases import Bases
 from alloc.problems.distances.given import DistanceTable
 from alloc.problems.errors import InputError, nearest
 from alloc.problems.formats.messages import described, quoted
@@ -27,6 +28,7 @@ AGENT_FIELDS = (
     "returns",
     "skills",
 )
+BASE_FIELDS = ("id", "position")
 TASK_FIELDS = ("id", "workload", "position", "priority", "needs")
 UNIT_FIELDS = ("time", "distance", "energy", "work", "speed")
 DISTANCE_FIELDS = ("missing", "rows")
@@ -44,7 +46,7 @@ class DistanceColumns:
     Attributes
     ----------
     source, target : sequence of str, length k
-        Ids of agents and tasks.
+        Ids of agents, tasks and bases.
     distance : ndarray, shape (k,)
     missing : str
         What holds for pairs that are left out.
@@ -77,9 +79,12 @@ class Columns:
     speed_unit : str
         Of `speed`, where it is not that of `units`.
     agent_energy_per_distance : ndarray, shape (n,), or None
-    returns : sequence of bool, or None
+    returns : sequence of (bool or str), or None
+        The id of a base, or whether the agent returns to its start.
     skills, needs : sequence of (sequence of str, or None), or None
     distances : DistanceColumns or None
+    base_ids : sequence of str
+    base_position : ndarray, shape (bases, 3), or None
     """
 
     agent_ids: Sequence[str]
@@ -101,10 +106,12 @@ class Columns:
     units: Units = field(default_factory=Units)
     speed_unit: str = ""
     agent_energy_per_distance: FloatArray | None = None
-    returns: Sequence[bool] | None = None
+    returns: Sequence[bool | str] | None = None
     skills: Sequence[Sequence[str] | None] | None = None
     needs: Sequence[Sequence[str] | None] | None = None
     distances: DistanceColumns | None = None
+    base_ids: Sequence[str] = ()
+    base_position: FloatArray | None = None
 
     def build(self) -> Instance:
         """Return the instance.
@@ -135,11 +142,13 @@ class Columns:
             tau=self.tau,
             energy_per_distance=self.energy_per_distance,
             agent_energy_per_distance=self.agent_energy_per_distance,
-            returns=self.returns,
+            returns=None if self.returns is None else [given is not False for given in self.returns],
+            return_base=_return_bases(self.returns, self.base_ids),
             skills=self.skills,
             needs=self.needs,
             metric=self.metric,
             distances=self._distance_table(),
+            bases=Bases.of(self.base_ids, self.base_position),
             units=self.units,
         )
 
@@ -154,7 +163,7 @@ class Columns:
         if given is None:
             return None
         return DistanceTable.from_columns(
-            given.source, given.target, given.distance, self.agent_ids, self.task_ids, given.missing
+            given.source, given.target, given.distance, self.agent_ids, self.task_ids, given.missing, self.base_ids
         )
 
 
@@ -163,6 +172,7 @@ def check_names(named: "Columns | Instance", name_field: str = "name") -> None:
     _check_texts([named.name], name_field)
     _check_texts(named.agent_ids, "agents[{}].id")
     _check_texts(named.task_ids, "tasks[{}].id")
+    _check_texts(named.base_ids if isinstance(named, Columns) else named.bases.ids, "bases[{}].id")
     for lists, place in ((named.skills, "agents[{}].skills"), (named.needs, "tasks[{}].needs")):
         if lists is not None:
             _check_texts(["".join(names or ()) for names in lists], place)
@@ -231,6 +241,19 @@ def _starts(names: Sequence[str | None] | None, index: dict[str, int]) -> IntArr
         row = starts.index(IDLE - 1)
         raise _unknown_task(str(names[row]), index, f"agents[{row}].start_task")
     return np.array(starts, dtype=np.intp)
+
+
+def _return_bases(returns: Sequence[bool | str] | None, ids: Sequence[str]) -> list[int] | None:
+    """Return the index of the base to which each agent returns, -1 for none."""
+    if returns is None or not any(isinstance(given, str) for given in returns):
+        return None
+    index = {name: number for number, name in enumerate(ids)}
+    for row, given in enumerate(returns):
+        if isinstance(given, str) and given not in index:
+            known = nearest(given, ids) if ids else ""
+            mend = f"{known}; say true, false or the id of one of the 'bases'"
+            raise InputError(f"there is no base {quoted(given)}{mend}", f"agents[{row}].returns")
+    return [index[given] if isinstance(given, str) else IDLE for given in returns]
 
 
 def _allowed(lists: Sequence[Sequence[str] | None] | None, index: dict[str, int]) -> list[list[int] | None] | None:

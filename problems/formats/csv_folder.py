@@ -1,10 +1,10 @@
-"""An instance as a folder of tables: agents.csv, tasks.csv and, optionally, distances.csv and instance.json."""
+"""An instance as a folder of tables: agents.csv, tasks.csv; optionally bases.csv, distances.csv, instance.json."""
 
 import os
 import re
 import secrets
 import shutil
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -17,14 +17,16 @@ from alloc.problems.formats.document import (
     HEADER_FIELDS,
     HeaderValues,
     agent_rows,
+    base_rows,
     distance_rows,
     header_document,
     header_values,
     missing_rule,
     task_rows,
 )
-from alloc.problems.formats.files import read_text, reason, write_text_atomically
+from alloc.problems.formats.files import read_text, write_text_atomically
 from alloc.problems.formats.json_columns import Row, require_known
+from alloc.problems.formats.messages import reason, unwritable
 from alloc.problems.instance import Instance
 from alloc.problems.vocabulary import GEOGRAPHIC
 
@@ -36,8 +38,10 @@ MORE_TASK_COLUMNS = ("needs",)
 """Columns that are written where the instance makes use of them."""
 
 DISTANCE_COLUMNS = ("from", "to", "distance")
-AGENTS, TASKS, DISTANCES, HEADER = "agents.csv", "tasks.csv", "distances.csv", "instance.json"
-FILES = (AGENTS, TASKS, DISTANCES, HEADER)
+AGENTS, TASKS, BASES = "agents.csv", "tasks.csv", "bases.csv"
+DISTANCES, HEADER = "distances.csv", "instance.json"
+FILES = (AGENTS, TASKS, BASES, DISTANCES, HEADER)
+BASE_COLUMNS = ("id", *AXES)
 
 
 class Header(NamedTuple):
@@ -59,6 +63,7 @@ def read_folder(folder: Path, default_name: str) -> Instance:
     axes = GEOGRAPHIC_AXES if header.values["metric"] == GEOGRAPHIC else AXES
     agents = _read_placed(folder / AGENTS, (*AGENT_COLUMNS, *MORE_AGENT_COLUMNS), ("id", "ability"), axes)
     tasks = _read_placed(folder / TASKS, (*TASK_COLUMNS, *MORE_TASK_COLUMNS), ("id", "workload"), axes)
+    bases = _read_placed(folder / BASES, BASE_COLUMNS, ("id",), axes) if os.path.lexists(folder / BASES) else None
     table = _read_distances(folder / DISTANCES, header.missing)
     ability, workload = agents.numbers("ability"), tasks.numbers("workload")
     assert ability is not None, "a required column"
@@ -78,21 +83,25 @@ def read_folder(folder: Path, default_name: str) -> Instance:
         tasks=agents.lists("tasks"),
         priority=tasks.numbers("priority"),
         agent_energy_per_distance=agents.numbers("energy_per_distance"),
-        returns=agents.flags("returns"),
+        returns=agents.returns("returns"),
         skills=agents.lists("skills"),
         needs=tasks.lists("needs"),
         distances=None if table is None else _distances(table, header.missing),
+        base_ids=() if bases is None else bases.cells["id"],
+        base_position=None if bases is None else bases.positions(axes),
     )
     try:
         return columns.build()
     except InputError as error:
-        raise InputError(error.message, _translated(error.place, agents, tasks, table, axes)) from error
+        tables = {"agents": agents, "tasks": tasks, "bases": bases}
+        message = error.message.replace("of the 'bases'", f"in {BASES}")
+        raise InputError(message, _translated(error.place, tables, table, axes)) from error
 
 
 def write_folder(instance: Instance, folder: Path) -> None:
     """Write `instance` into `folder`, which is made where it does not exist; files of other names stay.
 
-    A table of distances of the instance that was there does not stay.
+    Tables of distances and of bases of the instance that was there do not stay.
 
     Raises
     ------
@@ -104,8 +113,9 @@ def write_folder(instance: Instance, folder: Path) -> None:
     if os.path.lexists(folder):
         for name, text in texts.items():
             write_text_atomically(folder / name, text)
-        if DISTANCES not in texts:
-            _remove(folder / DISTANCES)  # of the instance that was there; it would be read as part of this one
+        for name in (BASES, DISTANCES):
+            if name not in texts:
+                _remove(folder / name)  # of the instance that was there; it would be read as part of this one
         return
     beside = folder.parent / f".alloc-{secrets.token_hex(8)}.tmp"
     try:
@@ -116,7 +126,7 @@ def write_folder(instance: Instance, folder: Path) -> None:
     except InputError as error:
         raise InputError(error.message) from error  # without the name of the temporary file
     except (OSError, ValueError) as error:
-        raise InputError(f"cannot be written: {reason(error)}") from error
+        raise unwritable(error, folder) from error
     finally:
         shutil.rmtree(beside, ignore_errors=True)
 
@@ -128,6 +138,8 @@ def _texts(instance: Instance) -> dict[str, str]:
         AGENTS: table_text(_columns(agent_rows(instance), AGENT_COLUMNS, MORE_AGENT_COLUMNS, axes)),
         TASKS: table_text(_columns(task_rows(instance), TASK_COLUMNS, MORE_TASK_COLUMNS, axes)),
     }
+    if instance.bases.ids:
+        texts[BASES] = table_text(_columns(base_rows(instance), BASE_COLUMNS, (), axes))
     header = header_document(instance)
     if instance.distances is not None:
         header["distances"] = {"missing": instance.distances.missing}
@@ -215,16 +227,16 @@ def _distances(table: Table, missing: str | None) -> DistanceColumns:
     return columns if missing is None else replace(columns, missing=missing)
 
 
-def _translated(place: str, agents: Table, tasks: Table, distances: Table | None, axes: Sequence[str]) -> str:
+def _translated(place: str, tables: Mapping[str, Table | None], distances: Table | None, axes: Sequence[str]) -> str:
     """Turn ``agents[3].ability`` into ``agents.csv line 5, column ability``."""
     match = re.fullmatch(r"distances\.rows\[(\d+)\](?:\[(\d)\])?", place)
     if match is not None and distances is not None:
         row, column = int(match[1]), match[2]
         return distances.place(row, DISTANCE_COLUMNS[int(column)] if column else "distance")
-    match = re.fullmatch(r"(agents|tasks)(?:\[(\d+)\]\.(\w+))?", place)
-    if match is None:
+    match = re.fullmatch(r"(agents|tasks|bases)(?:\[(\d+)\]\.(\w+))?", place)
+    table = None if match is None else tables[match[1]]
+    if match is None or table is None:
         return place and f"{HEADER}, {place}"
-    table = agents if match[1] == "agents" else tasks
     if match[2] is None:
         return table.file
     return table.place(int(match[2]), " and ".join(axes[:2]) if match[3] == "position" else match[3])

@@ -30,7 +30,7 @@ class Table:
 
     def place(self, row: int, column: str) -> str:
         """Return the place of a cell, in words."""
-        return f"{self.file} line {self.lines[row]}, column {column}"
+        return f"{_line(self.file, self.lines[row])}, column {column}"
 
     def numbers(self, column: str) -> FloatArray | None:
         """Return a column of numbers, NaN where empty; None if the table does not have it."""
@@ -73,16 +73,12 @@ class Table:
         """Return a column of lists of strings, None where empty; None if the table does not have it."""
         return list(map(split_ids, self.cells[column])) if column in self.cells else None
 
-    def flags(self, column: str) -> list[bool] | None:
-        """Return a column of true and false, false where empty; None if the table does not have it."""
+    def returns(self, column: str) -> list[bool | str] | None:
+        """Return a column of true, false and ids of bases, false where empty; None if the table does not have it."""
         if column not in self.cells:
             return None
-        words = [cell.strip().lower() for cell in self.cells[column]]
-        wrong = next((row for row, word in enumerate(words) if word not in ("true", "false", "")), None)
-        if wrong is not None:
-            message = f"must be true or false, got {quoted(self.cells[column][wrong])}"
-            raise InputError(message, self.place(wrong, column))
-        return [word == "true" for word in words]
+        words = {"true": True, "false": False, "": False}
+        return [words.get(cell.strip().lower(), cell) for cell in self.cells[column]]
 
 
 def read_table(path: Path, known: Sequence[str], required: Sequence[str]) -> Table:
@@ -97,6 +93,27 @@ def read_table(path: Path, known: Sequence[str], required: Sequence[str]) -> Tab
         text = read_text(path)
     except InputError as error:
         raise InputError(error.message, f"{path.name} {error.place}".rstrip()) from error
+    return parse_table(text, required, known, path.name)
+
+
+def parse_table(text: str, required: Sequence[str], known: Sequence[str] | None = None, file: str = "") -> Table:
+    """Return the table in the text of a CSV file.
+
+    Parameters
+    ----------
+    text : str
+    required : sequence of str
+        Columns that must be there.
+    known : sequence of str, optional
+        Columns that may be there; any by default.
+    file : str
+        The file within a folder, for errors.
+
+    Raises
+    ------
+    InputError
+        If it is no CSV, has a column that is not `known`, or does not have one that is `required`.
+    """
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
     rows: list[list[str]] = []
     lines: list[int] = []
@@ -106,23 +123,27 @@ def read_table(path: Path, known: Sequence[str], required: Sequence[str]) -> Tab
                 rows.append(row)
                 lines.append(reader.line_num)
     except csv.Error as error:
-        raise InputError(f"is not CSV: {error}", f"{path.name} line {reader.line_num}") from error
+        raise InputError(f"is not CSV: {error}", _line(file, reader.line_num)) from error
     if not rows:
-        raise InputError(f"is empty; its first line must name the columns: {','.join(known)}", path.name)
+        raise InputError(f"is empty; its first line must name the columns: {','.join(known or required)}", file)
     names = [name.strip() for name in rows[0]]
-    _check_names(names, known, required, f"{path.name} line {lines[0]}")
+    _check_names(names, known, required, _line(file, lines[0]))
     if set(map(len, rows)) != {len(names)}:
         row, line = next((r, n) for r, n in zip(rows, lines, strict=True) if len(r) != len(names))
-        raise InputError(f"has {len(row)} cells, but there are {len(names)} columns", f"{path.name} line {line}")
+        raise InputError(f"has {len(row)} cells, but there are {len(names)} columns", _line(file, line))
     cells = [list(column) for column in zip(*rows[1:], strict=True)] or [[] for _ in names]
-    return Table(path.name, dict(zip(names, cells, strict=True)), lines[1:])
+    return Table(file, dict(zip(names, cells, strict=True)), lines[1:])
 
 
-def _check_names(names: list[str], known: Sequence[str], required: Sequence[str], place: str) -> None:
+def _line(file: str, number: int) -> str:
+    return f"{file} line {number}".lstrip()
+
+
+def _check_names(names: list[str], known: Sequence[str] | None, required: Sequence[str], place: str) -> None:
     if len(names) == 1 and (";" in names[0] or "\t" in names[0]):
         raise InputError("has one column only; separate columns by commas", place)
     for name in names:
-        if name not in known:
+        if known is not None and name not in known:
             raise InputError(unknown_field(name, known, "column"), place)
         if names.count(name) > 1:
             raise InputError(f"the column {name!r} occurs twice; remove one", place)

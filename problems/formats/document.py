@@ -9,6 +9,7 @@ from alloc.problems.errors import InputError
 from alloc.problems.formats import json_columns as columns_of
 from alloc.problems.formats.columns import (
     AGENT_FIELDS,
+    BASE_FIELDS,
     DEFAULT_ENERGY_PER_DISTANCE,
     DEFAULT_MISSING,
     DEFAULT_NAME,
@@ -31,7 +32,7 @@ from alloc.problems.units import Units
 from alloc.problems.vocabulary import EUCLIDEAN
 
 HEADER_FIELDS = ("format", "name", "tau", "energy_per_distance", "metric", "units", "distances")
-INSTANCE_FIELDS = (*HEADER_FIELDS, "agents", "tasks")
+INSTANCE_FIELDS = (*HEADER_FIELDS, "bases", "agents", "tasks")
 
 
 class HeaderValues(TypedDict):
@@ -65,6 +66,7 @@ def from_document(document: object, *, default_name: str = DEFAULT_NAME) -> Inst
     require_known(header, INSTANCE_FIELDS, "")
     agents = columns_of.rows(header, "agents", AGENT_FIELDS)
     tasks = columns_of.rows(header, "tasks", TASK_FIELDS)
+    bases = [] if header.get("bases") is None else columns_of.rows(header, "bases", BASE_FIELDS)
     return Columns(
         **header_values(header, default_name),
         agent_ids=columns_of.texts(agents, "agents", "id"),
@@ -80,10 +82,12 @@ def from_document(document: object, *, default_name: str = DEFAULT_NAME) -> Inst
         tasks=columns_of.text_lists(agents, "agents", "tasks"),
         priority=columns_of.nullable_numbers(tasks, "tasks", "priority"),
         agent_energy_per_distance=columns_of.nullable_numbers(agents, "agents", "energy_per_distance"),
-        returns=columns_of.flags(agents, "agents", "returns"),
+        returns=columns_of.returns(agents, "agents", "returns"),
         skills=columns_of.name_lists(agents, "agents", "skills"),
         needs=columns_of.name_lists(tasks, "tasks", "needs"),
         distances=_distances(header.get("distances")),
+        base_ids=columns_of.texts(bases, "bases", "id"),
+        base_position=columns_of.positions(bases, "bases"),
     ).build()
 
 
@@ -97,6 +101,8 @@ def to_document(instance: Instance) -> Row:
     """
     check_names(instance)
     document = {**header_document(instance), "agents": agent_rows(instance), "tasks": task_rows(instance)}
+    if instance.bases.ids:
+        document["bases"] = base_rows(instance)
     if instance.distances is not None:
         document["distances"] = {
             "missing": instance.distances.missing,
@@ -121,7 +127,7 @@ def agent_rows(instance: Instance) -> list[Row]:
     if rates is not None:
         columns["energy_per_distance"] = plain_numbers(rates)
     if instance.returns.any():
-        columns["returns"] = instance.returns.tolist()
+        columns["returns"] = returns_of(instance)
     if instance.skills is not None:
         columns["skills"] = list(map(list, instance.skills))
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
@@ -140,6 +146,18 @@ def task_rows(instance: Instance) -> list[Row]:
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
+def base_rows(instance: Instance) -> list[Row]:
+    """Return the bases of an instance as plain objects."""
+    places = plain_positions(instance.bases.position)
+    return [{"id": name, "position": place} for name, place in zip(instance.bases.ids, places, strict=True)]
+
+
+def returns_of(instance: Instance) -> list[bool | str]:
+    """Return the base to which each agent returns, or whether it returns to where it starts."""
+    base, names = instance.return_base.tolist(), instance.bases.ids
+    return [names[b] if b >= 0 else flag for flag, b in zip(instance.returns.tolist(), base, strict=True)]
+
+
 def own_rates(instance: Instance) -> FloatArray | None:
     """Return the energy per distance of each agent, NaN where it is that of the instance; None if it is for all."""
     rates, usual = instance.agent_energy_per_distance, instance.energy_per_distance
@@ -151,7 +169,7 @@ def distance_rows(instance: Instance) -> list[tuple[str, str, float | int | None
     table = instance.distances
     if table is None:
         return []
-    names = (*instance.agent_ids, *instance.task_ids)
+    names = (*instance.agent_ids, *instance.task_ids, *instance.bases.ids)
     source, target = ([names[node] for node in nodes.tolist()] for nodes in (table.source, table.target))
     return list(zip(source, target, plain_numbers(table.distance), strict=True))
 

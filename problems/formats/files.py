@@ -9,7 +9,7 @@ from pathlib import Path
 
 from alloc.problems.arguments import of_type
 from alloc.problems.errors import InputError
-from alloc.problems.formats.messages import one_line
+from alloc.problems.formats.messages import one_line, reason, unwritable
 
 STANDARD_STREAM = "-"
 
@@ -144,7 +144,7 @@ def write_bytes_atomically(path: PathLike, data: bytes) -> None:
     except (OSError, ValueError) as error:
         if isinstance(error, BrokenPipeError) and is_standard_output(path):
             raise  # whoever read has left: no fault of the input
-        raise _unwritable(error, path, source) from error
+        raise unwritable(error, path, source) from error
 
 
 def check_writable(path: PathLike) -> None:
@@ -165,16 +165,7 @@ def check_writable(path: PathLike) -> None:
                 os.close(os.open(target, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
                 target.unlink()
     except (OSError, ValueError) as error:
-        raise _unwritable(error, path, source) from error
-
-
-def _unwritable(error: OSError | ValueError, path: PathLike, source: str) -> InputError:
-    if isinstance(error, InputError):
-        return error
-    if isinstance(error, FileNotFoundError):
-        folder = one_line(os.path.dirname(os.fspath(path)) or ".")
-        return InputError(f"cannot be written: there is no folder {folder!r}; create it first", source=source)
-    return InputError(f"cannot be written: {reason(error)}", source=source)
+        raise unwritable(error, path, source) from error
 
 
 def _refuse_unless_regular(mode: int, source: str) -> None:
@@ -285,9 +276,3 @@ def _overwrite(target: Path, data: bytes) -> None:
                     raise
         file.write(data)
         file.truncate(len(data))
-
-
-def reason(error: Exception) -> str:
-    """Return the words of a system error, to stand after a colon."""
-    words = getattr(error, "strerror", None) or str(error) or type(error).__name__
-    return one_line(words[0].lower() + words[1:])

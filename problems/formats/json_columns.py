@@ -124,10 +124,11 @@ def name_lists(rows: list[Row], kind: str, field: str) -> list[Sequence[str] | N
     return text_lists(rows, kind, field, "a string", "a list of strings")
 
 
-def flags(rows: list[Row], kind: str, field: str) -> list[bool] | None:
-    """Return the true and false of a field, false for null; None if all are null."""
-    column = _column(rows, kind, field, {bool, type(None)}, _is_flag_or_null, "true or false")
-    return None if column.count(None) == len(column) else [bool(value) for value in column]
+def returns(rows: list[Row], kind: str, field: str) -> list[bool | str] | None:
+    """Return the true, the false and the ids of bases of a field, false for null; None if all are null."""
+    rule = "true, false or the id of a base"
+    column = _column(rows, kind, field, {bool, str, type(None)}, _is_return_or_null, rule)
+    return None if column.count(None) == len(column) else [False if value is None else value for value in column]
 
 
 def positions(rows: list[Row], kind: str) -> FloatArray | None:
@@ -167,8 +168,8 @@ def _is_number_or_null(value: object) -> TypeGuard[float | int | None]:
     return value is None or (isinstance(value, float | int) and not isinstance(value, bool))
 
 
-def _is_flag_or_null(value: object) -> TypeGuard[bool | None]:
-    return isinstance(value, bool | None)
+def _is_return_or_null(value: object) -> TypeGuard[bool | str | None]:
+    return isinstance(value, bool | str | None)
 
 
 def _is_text(value: object) -> TypeGuard[str]:

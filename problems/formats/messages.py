@@ -1,5 +1,8 @@
 """Values, names and errors in words that fit on one line."""
 
+import os
+from pathlib import Path
+
 from alloc.problems.errors import InputError
 
 LONGEST_NAME = 40
@@ -38,3 +41,34 @@ def told(error: InputError, source: str) -> InputError:
     """Return the same error with its source, fit for one line."""
     place = one_line(error.place, 100 + LONGEST_NAME)
     return InputError(one_line(error.message), place, one_line(error.source or source, 4096))
+
+
+def reason(error: Exception) -> str:
+    """Return the words of a system error, to stand after a colon."""
+    words = getattr(error, "strerror", None) or str(error) or type(error).__name__
+    return one_line(words[0].lower() + words[1:])
+
+
+def unwritable(error: OSError | ValueError, path: str | os.PathLike[str], source: str = "") -> InputError:
+    """Return the error that says why a file or folder cannot be written, and what to do.
+
+    Parameters
+    ----------
+    error : OSError or ValueError
+    path : str or path
+        What was to be written.
+    source : str
+        What messages call it.
+    """
+    if isinstance(error, InputError):
+        return error
+    folder = Path(path).parent
+    problem = reason(error)
+    if isinstance(error, NotADirectoryError):
+        file = next((parent for parent in (folder, *folder.parents) if parent.is_file()), folder)
+        problem = f"{quoted(str(file))} is a file, not a folder; name another place"
+    elif isinstance(error, FileNotFoundError) and folder.is_dir():
+        problem = f"no files can be made in {quoted(str(folder))}; name another folder"
+    elif isinstance(error, FileNotFoundError):
+        problem = f"there is no folder {one_line(str(folder))!r}; create it first"
+    return InputError(f"cannot be written: {problem}", source=source)

@@ -41,6 +41,8 @@ def from_npz(data: bytes, default_name: str) -> Instance:
         if name not in arrays:
             raise InputError("is missing", f"array {name}")
     _check_lengths(arrays)
+    if "base_position" in arrays and "base_id" not in arrays:
+        raise InputError("is missing; base_position needs it", "array base_id")
     columns = Columns(
         name=_text(arrays, "name", default_name),
         tau=_scalar(arrays, "tau", DEFAULT_TAU),
@@ -61,15 +63,18 @@ def from_npz(data: bytes, default_name: str) -> Instance:
         units=_units(arrays),
         speed_unit=_text(arrays, "units_speed", ""),
         agent_energy_per_distance=_optional(arrays, "agent_energy_per_distance"),
-        returns=arrays["agent_returns"].tolist() if "agent_returns" in arrays else None,
+        returns=_returns(arrays),
         skills=_lists(arrays, "agent_skills"),
         needs=_lists(arrays, "task_needs"),
         distances=_distances(arrays),
+        base_ids=arrays["base_id"].tolist() if "base_id" in arrays else (),
+        base_position=_optional(arrays, "base_position"),
     )
     try:
         return columns.build()
     except InputError as error:
-        raise InputError(error.message, _translated(error.place)) from error
+        message = error.message.replace("say true, false or the id of one of the 'bases'", "list it in base_id")
+        raise InputError(message, _translated(error.place)) from error
 
 
 def to_npz(instance: Instance) -> bytes:
@@ -122,12 +127,16 @@ def _optional_arrays(instance: Instance) -> dict[str, NDArray[np.generic]]:
         arrays["agent_energy_per_distance"] = rates
     if instance.returns.any():
         arrays["agent_returns"] = instance.returns
+    if instance.bases.ids:
+        arrays |= {"base_id": _texts(instance.bases.ids), "base_position": instance.bases.position}
+        names = (*instance.bases.ids, "")
+        arrays["agent_return_base"] = _texts([names[base] for base in instance.return_base.tolist()])
     for name, lists in (("agent_skills", instance.skills), ("task_needs", instance.needs)):
         if lists is not None:
             arrays |= _list_arrays(name, lists)
     table = instance.distances
     if table is not None:
-        ids = _texts((*instance.agent_ids, *instance.task_ids))
+        ids = _texts((*instance.agent_ids, *instance.task_ids, *instance.bases.ids))
         arrays |= {"distance_from": ids[table.source], "distance_to": ids[table.target], "distance": table.distance}
         arrays["distance_missing"] = np.array(table.missing)
     return arrays
@@ -149,7 +158,7 @@ def _texts(texts: tuple[str, ...] | list[str]) -> NDArray[np.generic]:
 
 
 def _check_lengths(arrays: Arrays) -> None:
-    for axis, ids in (("n", "agent_id"), ("m", "task_id"), ("d", "distance_from")):
+    for axis, ids in (("n", "agent_id"), ("m", "task_id"), ("d", "distance_from"), ("b", "base_id")):
         if ids not in arrays:
             continue
         count = len(arrays[ids])
@@ -187,6 +196,20 @@ def _start_tasks(arrays: Arrays) -> list[str | None] | None:
     if "agent_start_task" not in arrays:
         return None
     return [name or None for name in arrays["agent_start_task"].tolist()]
+
+
+def _returns(arrays: Arrays) -> list[bool | str] | None:
+    """Return the base to which each agent returns, or whether it returns to where it starts."""
+    if "agent_return_base" not in arrays:
+        return arrays["agent_returns"].tolist() if "agent_returns" in arrays else None
+    names = arrays["agent_return_base"].tolist()
+    flags = arrays["agent_returns"].tolist() if "agent_returns" in arrays else [bool(name) for name in names]
+    for row, (name, flag) in enumerate(zip(names, flags, strict=True)):
+        if name and not flag:
+            raise InputError(
+                "names a base, but agent_returns says that it does not return", f"agent_return_base[{row}]"
+            )
+    return [name or flag for name, flag in zip(names, flags, strict=True)]
 
 
 def _distances(arrays: Arrays) -> DistanceColumns | None:

@@ -37,6 +37,7 @@ FIELDS: dict[str, tuple[str, str]] = {
     "agent_tasks": (TEXTS, "k"),
     "agent_energy_per_distance": (NUMBERS, "n"),
     "agent_returns": (FLAGS, "n"),
+    "agent_return_base": (TEXTS, "n"),
     "agent_skills_count": (COUNTS, "n"),
     "agent_skills": (TEXTS, "k"),
     "task_id": (TEXTS, "m"),
@@ -45,12 +46,14 @@ FIELDS: dict[str, tuple[str, str]] = {
     "task_priority": (NUMBERS, "m"),
     "task_needs_count": (COUNTS, "m"),
     "task_needs": (TEXTS, "k"),
+    "base_id": (TEXTS, "b"),
+    "base_position": (NUMBERS, "b,3"),
     "distance_from": (TEXTS, "d"),
     "distance_to": (TEXTS, "d"),
     "distance": (NUMBERS, "d"),
     "distance_missing": (TEXTS, ""),
 }
-"""Kind and shape of each array; those of distances have length ``d``, and ``k`` is free."""
+"""Kind and shape of each array; those of distances have length ``d``, of bases ``b``; ``k`` is free."""
 
 REQUIRED = ("format", "agent_id", "agent_ability", "task_id", "task_workload")
 

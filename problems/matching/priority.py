@@ -89,7 +89,7 @@ def _all_within_reach(
     length = near.first[origin + 1] - near.first[origin]
     if length.sum() > most:
         return None
-    row, task = np.repeat(np.arange(len(agents)), length), entries(near.first, near.task.astype(np.intp), origin)
+    row, task = np.repeat(np.arange(len(agents)), length), values_of_rows(near.first, near.task.astype(np.intp), origin)
     return row[wanted[task]], task[wanted[task]]
 
 
@@ -172,7 +172,7 @@ class _Groups:
 
     def _pairs_of(self, tasks: IntArray, agents: IntArray) -> tuple[IntArray, IntArray]:
         """Return the pairs of these tasks with these agents, which ascend, as compressed rows of places in `agents`."""
-        row = entries(self.first, self.row, tasks)
+        row = values_of_rows(self.first, self.row, tasks)
         length = self.first[tasks + 1] - self.first[tasks]
         place = np.minimum(np.searchsorted(agents, row), len(agents) - 1)
         kept = agents[place] == row
@@ -199,7 +199,7 @@ def _rivals(first: IntArray, column: IntArray, matched: IntArray, columns: int) 
     front = np.flatnonzero(matched == IDLE)
     while len(front):
         rival[front] = True
-        able = np.unique(entries(first, column, front))
+        able = np.unique(values_of_rows(first, column, front))
         able = able[~met[able]]
         met[able] = True
         front = row_of[able]
@@ -207,7 +207,7 @@ def _rivals(first: IntArray, column: IntArray, matched: IntArray, columns: int) 
     return rival, met
 
 
-def entries(first: IntArray, values: IntArray, rows: IntArray) -> IntArray:
+def values_of_rows(first: IntArray, values: IntArray, rows: IntArray) -> IntArray:
     """Return the values of these rows of compressed rows, one row after the other."""
     length = first[rows + 1] - first[rows]
     offset = np.arange(length.sum()) - np.repeat(np.cumsum(length) - length, length)

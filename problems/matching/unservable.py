@@ -10,7 +10,7 @@ from alloc.problems.matching.agent_matching import AgentMatching
 from alloc.problems.matching.clock import GATHERED_PER_SECOND, Clock, at_least, share_of, unlimited
 from alloc.problems.matching.hopcroft_karp import match
 from alloc.problems.matching.precedence import Precedence, differs, of_first, urgent_first
-from alloc.problems.matching.priority import entries, most_priority, sampled_matching
+from alloc.problems.matching.priority import most_priority, sampled_matching, values_of_rows
 from alloc.problems.matching.serving import needs_agent, serve_in_turn
 from alloc.problems.vocabulary import IDLE
 
@@ -225,10 +225,10 @@ def _rivals(near: Neighbours, origin: IntArray, tasks: IntArray, m: int) -> tupl
     is_rival, met = np.zeros(m, dtype=np.bool_), np.zeros(len(near.first) - 1, dtype=np.bool_)
     while len(tasks):
         is_rival[tasks] = True
-        able = np.unique(entries(first, by_task, tasks))
+        able = np.unique(values_of_rows(first, by_task, tasks))
         able = able[~met[able]]
         met[able] = True
-        tasks = entries(bounds, held, able)
+        tasks = values_of_rows(bounds, held, able)
         tasks = tasks[~is_rival[tasks]]
     return np.flatnonzero(is_rival), np.flatnonzero(met)
 

@@ -1,6 +1,7 @@
 """The log of a simulation, and the same simulation again from its log."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 
@@ -66,12 +67,14 @@ class Laws:
     battery_energy: float
 
 
-def replay(log: MissionLog) -> tuple[MissionResult, Laws]:
+def replay(log: MissionLog, observe: Callable[[Simulation], None] | None = None) -> tuple[MissionResult, Laws]:
     """Simulate a mission again by the orders and messages of its log; all laws are checked on the way.
 
     Parameters
     ----------
     log : MissionLog
+    observe : callable, optional
+        Called with the simulation before it begins, such as a `Recorder`.
 
     Returns
     -------
@@ -90,6 +93,8 @@ def replay(log: MissionLog) -> tuple[MissionResult, Laws]:
     mission = mission_from_document(header["mission"])
     seed = _whole(header["seed"], "line 1: seed")
     simulation = Simulation(mission, str(header["knowledge"]), seed, aware=False)
+    if observe is not None:
+        observe(simulation)
     while (request := simulation.advance()) is not None:
         _follow(simulation, request.wanted, log.records)
     times = _times(result, len(log.records) + 2)

@@ -1,7 +1,7 @@
 """The allocation in a solver's solution of a model: files of HiGHS, CBC, Gurobi and SCIP."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from itertools import pairwise
 
 import numpy as np
@@ -15,12 +15,17 @@ from alloc.problems.models.programme import RATIO
 
 HEAD = re.compile(
     r"(model status|solution status|objective value:|# (solution|objective)|optimal|(integer )?infeasible|unbounded"
-    r"|stopped)",
+    r"|stopped|columns\s+index\s+status)",
     re.IGNORECASE,
 )
-"""How the first line of such a file begins, in HiGHS, SCIP, Gurobi and CBC."""
+"""How such a file begins, in HiGHS (last of all its pretty style), SCIP, Gurobi and CBC."""
 
 NO_SOLUTION = re.compile(r"(solution status:|model status)?\s*(integer )?(infeasible|unbounded)", re.IGNORECASE)
+NO_SOLUTION_AT_END = re.compile(r"^model status:\s*(primal )?(infeasible|unbounded)", re.IGNORECASE | re.MULTILINE)
+"""The verdict in HiGHS's pretty style, in which empty values stand before it."""
+
+PRETTY_HEADER = re.compile(r"\s+Index Status\s+Lower\s+Upper(?P<value>\s+Primal)\s+Dual\b.*\bName")
+"""Above the variables in HiGHS's pretty style: cells may be empty, so that only the place in the line tells them."""
 
 VARIABLE = re.compile(rf"([{''.join(Grouping)}])_(\w+?){SEPARATOR}(\w+)", re.ASCII)
 
@@ -49,7 +54,7 @@ def solution_allocation(text: str, instance: Instance) -> Allocation:
     InputError
         If there is no solution, a variable is not of this instance, or values are no whole numbers or too many.
     """
-    if NO_SOLUTION.match(text.lstrip()):
+    if NO_SOLUTION.match(text.lstrip()) or NO_SOLUTION_AT_END.search(text):
         raise InputError("the solver found no solution", "line 1")
     found = list(_values(text))
     if not found:
@@ -66,17 +71,36 @@ Entry = tuple[int, str, str, str, float]
 
 
 def _values(text: str) -> Iterator[Entry]:
-    """Yield the variables of a model with their values; CBC puts a number, or two asterisks too, before the name."""
+    """Yield the variables of a model with their values."""
+    cell = None
     for number, line in enumerate(text.splitlines(), 1):
-        if line.startswith(("# Rows", "# Dual")):  # of HiGHS, after the values
+        if line.startswith(("# Rows", "# Dual", "Rows")):  # of HiGHS, after the values
             return
-        words = line.split()
-        for name, value in pairwise(words[:4]):
+        header = PRETTY_HEADER.match(line)
+        if header is not None:
+            cell = slice(*header.span("value"))
+            continue
+        for name, value in _pairs(line, cell):
             match = VARIABLE.fullmatch(name)
             if match is not None or name == RATIO:
                 letter, agent, task = (RATIO, "", "") if match is None else match.groups()
                 yield number, letter, agent, task, _number(value, name, number)
                 break
+
+
+def _pairs(line: str, cell: slice | None) -> Iterable[tuple[str, str]]:
+    """Return what may be a name and its value; CBC puts a number, or two asterisks too, before the name.
+
+    Parameters
+    ----------
+    line : str
+    cell : slice or None
+        Where the value stands, in a file whose lines end with the name.
+    """
+    words = line.split()
+    if cell is None:
+        return pairwise(words[:4])
+    return [(words[-1], line[cell].strip())] if words else []
 
 
 def _number(value: str, name: str, line: int) -> float:

@@ -6,6 +6,7 @@ from typing import TypedDict
 import numpy as np
 from numpy.typing import NDArray
 
+from alloc.problems.distances.bases import Bases
 from alloc.problems.distances.given import DistanceTable
 from alloc.problems.errors import InputError, nearest
 from alloc.problems.fields import FloatArray, IntArray
@@ -35,6 +36,8 @@ class Arguments(TypedDict, total=False):
     priority: FloatArray | None
     agent_energy_per_distance: FloatArray | None
     returns: NDArray[np.bool_] | None
+    return_base: IntArray | None
+    bases: Bases
     skills: list[list[str]] | None
     needs: list[list[str]] | None
     metric: str
@@ -48,7 +51,7 @@ def ids_of(records: Records, letter: str) -> list[str]:
     return records.ids if records.ids is not None else [f"{letter}{number}" for number in range(1, count + 1)]
 
 
-def arguments_of(first: Records, second: Records, common: Conversion) -> Arguments:
+def arguments_of(first: Records, second: Records, bases: Records | None, common: Conversion) -> Arguments:
     """Return the arguments of an instance, but for what concerns agents and tasks together.
 
     Raises
@@ -60,7 +63,8 @@ def arguments_of(first: Records, second: Records, common: Conversion) -> Argumen
     skills_at = separators([*_cells(first, "skills"), *_cells(second, "needs")])
     skills, needs = first.lists("skills", skills_at), second.lists("needs", skills_at)
     spellings: dict[str, str] = {}
-    returns = first.flags("returns")
+    base_ids = [] if bases is None else ids_of(bases, "b")
+    homes = first.homes(base_ids)
     priority = second.numbers.get("priority")
     return {
         "ability": _scaled(first, "ability", common),
@@ -78,7 +82,9 @@ def arguments_of(first: Records, second: Records, common: Conversion) -> Argumen
         "agent_energy_per_distance": (
             _scaled(first, "energy_per_distance", common) if "energy_per_distance" in first.numbers else None
         ),
-        "returns": None if returns is None else np.array(returns),
+        "returns": None if homes is None else np.array([home is not False for home in homes]),
+        "return_base": _return_bases(homes, base_ids),
+        "bases": Bases.of(base_ids, None if bases is None else _positions(bases, common)),
         "skills": None if skills is None else [_alike(names, spellings) for names in skills],
         "needs": None if needs is None else [_alike(names, spellings) for names in needs],
         "units": common.units,
@@ -113,6 +119,12 @@ def _positions(records: Records, common: Conversion) -> FloatArray | None:
 def _alike(names: list[str], spellings: dict[str, str]) -> list[str]:
     """Return skills in the letters in which they were first written."""
     return [spellings.setdefault(name.casefold(), name) for name in names]
+
+
+def _return_bases(homes: list[bool | str] | None, ids: list[str]) -> IntArray | None:
+    if homes is None:
+        return None
+    return np.array([ids.index(home) if isinstance(home, str) else IDLE for home in homes], dtype=np.intp)
 
 
 def _starts(records: Records, task_ids: list[str]) -> IntArray | None:

@@ -1,5 +1,6 @@
 """Where a table begins and ends: its header, a row of units, totals, footnotes and empty rows."""
 
+import re
 from dataclasses import dataclass, field
 from itertools import zip_longest
 
@@ -132,8 +133,13 @@ def _names(grid: Grid, row: int) -> list[str]:
 def _joined(upper: str, lower: str) -> str:
     """Return the name of a column out of two rows: the lower cell, or the upper one with its unit."""
     if upper and lower and upper != lower and measure_of(lower.strip("[]()")) is not None:
-        return f"{upper} [{lower.strip('[]()')}]"
+        return upper if _ends_in(upper, lower) else f"{upper} [{lower.strip('[]()')}]"
     return lower or upper
+
+
+def _ends_in(name: str, unit: str) -> bool:
+    """Whether the name of a column has the unit already that stands in the cell below it."""
+    return measure_of(re.split(r"[\s\[(]", name.rstrip(")] "))[-1]) == measure_of(unit.strip("[]() "))
 
 
 def _is_number(cell: Cell) -> bool:
@@ -149,7 +155,7 @@ def _are_units(cells: list[Cell]) -> bool:
 
 
 def _with_unit(header: Header, unit: Cell) -> Header:
-    if not isinstance(unit, str) or is_absent(unit):
+    if not isinstance(unit, str) or is_absent(unit) or _ends_in(header.text, unit):
         return header
     return Header(
         f"{header.text} [{as_text(unit).strip('[]()')}]", header.ranks, measure_of(as_text(unit).strip("[]()"))

@@ -2,7 +2,7 @@
 
 import logging
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypedDict, TypeVar
 
@@ -23,7 +23,7 @@ from alloc.problems.vocabulary import EUCLIDEAN, GEOGRAPHIC
 
 DECIMALS: Mapping[str, Mark] = {"point": ".", "comma": ","}
 Built = TypeVar("Built")
-ROW = re.compile(r"^(agents|tasks|distances\.rows)\[(\d+)\]")
+ROW = re.compile(r"^(agents|tasks|bases|distances\.rows)\[(\d+)\]")
 
 
 class TableOptions(TypedDict, total=False):
@@ -35,6 +35,7 @@ class TableOptions(TypedDict, total=False):
     missing: str | None
     name: str
     report: Callable[[str], object] | None
+    bases: object | None
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,7 @@ class Reading:
         rows = [(source, target, distance * factor) for source, target, distance in pairs.rows]
         ids = self.arguments["agent_ids"], self.arguments["task_ids"]
         try:
-            return DistanceTable.of(rows, *ids, missing)
+            return DistanceTable.of(rows, *ids, missing, self.arguments["bases"].ids)
         except InputError as error:
             raise self.located(error) from error
 
@@ -90,6 +91,7 @@ def read_tables(
     missing: str | None = None,
     name: str = "instance",
     report: Callable[[str], object] | None = None,
+    bases: object | None = None,
 ) -> Reading:
     """Return what tables as people keep them say, by the names of their columns.
 
@@ -112,6 +114,8 @@ def read_tables(
     report : function, optional
         Called with a line for each column, on what it was taken for, and for each row that was left out; they are
         logged where it is None.
+    bases : the same as `agents`, optional
+        Ids and places to which agents return.
 
     Raises
     ------
@@ -127,20 +131,25 @@ def read_tables(
         raise InputError(
             "holds agents and tasks at once; name a sheet for each, or two files", source=first_grid.source
         )
-    first = _records(first_grid, "agents", wanted, mark)
+    is_percent = units is not None and units.energy == "%"
+    first = _records(first_grid, "agents", wanted, mark, is_percent=is_percent)
     second = _records(second_grid, "tasks", wanted, mark)
+    third = None if bases is None else _records(grid_of(bases, "bases"), "bases", wanted, mark)
     pairs = None
     if distances is not None:
         grid = grid_of(distances, "distances")
-        pairs = pairs_of(grid, ids_of(first, "a"), ids_of(second, "t"), wanted.of("distances", grid), mark)
+        others = [*ids_of(first, "a"), *([] if third is None else ids_of(third, "b"))]
+        pairs = pairs_of(grid, others, ids_of(second, "t"), wanted.of("distances", grid), mark)
     wanted.require_all_used()
-    geographic = _geographic(first, second)
-    found = [*first.found, *second.found, *(pairs.found if pairs else [])]
+    placed = [first, second, *([] if third is None else [third])]
+    geographic = _geographic(placed)
+    found = [one for records in placed for one in records.found] + (pairs.found if pairs else [])
     common = conversion(found, units or Units(), geographic=geographic)
-    arguments = arguments_of(first, second, common)
+    arguments = arguments_of(first, second, third, common)
     arguments |= {"name": name, "metric": GEOGRAPHIC if geographic else EUCLIDEAN}
-    lines = [*_lines(first, common), *_lines(second, common)]
-    places = {"agents": (first.table.source, first.table.places), "tasks": (second.table.source, second.table.places)}
+    lines = [line for records in placed for line in _lines(records, common)]
+    places: dict[str, tuple[str, list[str]]] = {}
+    places |= {str(records.match.kind): (records.table.source, records.table.places) for records in placed}
     reading = Reading(arguments, places)
     if pairs is None:
         lines += _unplaced(first, second)
@@ -155,24 +164,25 @@ def read_tables(
     return reading
 
 
-def _records(grid: Grid, kind: Kind, wanted: Wanted, mark: Mark | None) -> Records:
+def _records(grid: Grid, kind: Kind, wanted: Wanted, mark: Mark | None, *, is_percent: bool = False) -> Records:
     named = wanted.of(kind, grid)
     table = table_of(grid, kind, frozenset(named.values()))
     for field in [field for field, text in named.items() if column_named(table, text) is None and not is_number(text)]:
         match_columns(table, kind, {field: named[field]})  # raises the error that names the columns
-    return records_of(match_columns(table, kind, named), mark)
+    return records_of(match_columns(table, kind, named), mark, is_percent=is_percent)
 
 
-def _geographic(first: Records, second: Records) -> bool:
+def _geographic(placed: Sequence[Records]) -> bool:
     """Return whether places are latitude and longitude; refuse tables that differ."""
-    kinds = {records.geographic for records in (first, second)} - {None}
-    if len(kinds) > 1:
-        told = ["latitude and longitude" if records.geographic else "x and y" for records in (first, second)]
-        raise InputError(
-            f"gives places by {told[1]}, but {first.table.source} by {told[0]}; give both alike",
-            source=second.table.source,
-        )
-    return bool(kinds and kinds.pop())
+    known = [records for records in placed if records.geographic is not None]
+    for records in known[1:]:
+        if records.geographic != known[0].geographic:
+            told = ["latitude and longitude" if one.geographic else "x and y" for one in (known[0], records)]
+            raise InputError(
+                f"gives places by {told[1]}, but {known[0].table.source} by {told[0]}; give both alike",
+                source=records.table.source,
+            )
+    return bool(known and known[0].geographic)
 
 
 def _missing(pairs: Pairs, first: Records, second: Records) -> str:

@@ -1,5 +1,6 @@
 """One table of agents or tasks, field by field."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -7,6 +8,7 @@ import numpy as np
 from alloc.problems.arguments import shown
 from alloc.problems.errors import InputError
 from alloc.problems.fields import FloatArray
+from alloc.problems.tables.charge import charged
 from alloc.problems.tables.conversion import DIMENSIONS, Found
 from alloc.problems.tables.grid import as_name
 from alloc.problems.tables.language.digits import Mark
@@ -19,7 +21,10 @@ from alloc.problems.tables.values import coordinates, flag, names_in
 NUMERIC = frozenset(
     ("ability", "workload", "battery", "range", "speed", "energy_per_distance", "priority", "x", "y", "z", "lat", "lon")
 )
-REQUIRED = {"agents": "ability", "tasks": "workload"}
+REQUIRED: dict[str, str | None] = {"agents": "ability", "tasks": "workload", "bases": None}
+HALF_TURN = 180.0
+"""Degrees."""
+
 EXAMPLES = {
     "agents": "ability=Capacity, or ability=1 for all alike",
     "tasks": "workload=Demand, or workload=1 for all alike",
@@ -60,11 +65,13 @@ class Records:
         """The table that the rows are of."""
         return self.match.table
 
-    def flags(self, name: str) -> list[bool] | None:
-        """Return the yes and no of a field, None where there is no such column."""
-        if name not in self.match.columns:
+    def homes(self, bases: Sequence[str]) -> list[bool | str] | None:
+        """Return the ids of bases to which rows return, or whether they return at all; None without such a column."""
+        if "returns" not in self.match.columns:
             return None
-        return [flag(self.table, row, self.match.columns[name]) for row in range(len(self.table.rows))]
+        column = self.match.columns["returns"]
+        names = [as_name(cell) for cell in self.match.cells("returns")]
+        return [name if name in bases else flag(self.table, row, column) for row, name in enumerate(names)]
 
     def lists(self, name: str, marks: str) -> list[list[str]] | None:
         """Return the lists of names of a field, None where there is no such column."""
@@ -80,6 +87,8 @@ class Records:
         height = self.numbers.get("z", np.zeros(len(self.table.rows)))
         place = np.column_stack([self.numbers[first], self.numbers[second], np.nan_to_num(height)])
         self._check_places(place)
+        if self.geographic:
+            place[place[:, 0] > HALF_TURN, 0] -= 2 * HALF_TURN
         place[np.isnan(place[:, 0])] = np.nan
         return place
 
@@ -87,7 +96,9 @@ class Records:
         half = np.isnan(place[:, 0]) != np.isnan(place[:, 1])
         if half.any():
             raise self.table.error("has one coordinate without the other; fill in both or none", int(np.argmax(half)))
-        wrong = (np.abs(place[:, 1]) > 90) | (np.abs(place[:, 0]) > 180) if self.geographic else np.zeros(1, dtype=bool)
+        wrong = np.zeros(1, dtype=bool)
+        if self.geographic:
+            wrong = (np.abs(place[:, 1]) > 90) | (place[:, 0] < -HALF_TURN) | (place[:, 0] > 2 * HALF_TURN)
         if wrong.any():
             row = int(np.argmax(wrong))
             raise self.table.error(
@@ -97,8 +108,8 @@ class Records:
             )
 
 
-def records_of(match: Match, decimal: Mark | None) -> Records:
-    """Return the rows of a table of agents or tasks.
+def records_of(match: Match, decimal: Mark | None, *, is_percent: bool = False) -> Records:
+    """Return the rows of a table of agents, tasks or bases; `is_percent` says whether energies are in percent.
 
     Raises
     ------
@@ -106,7 +117,7 @@ def records_of(match: Match, decimal: Mark | None) -> Records:
         If a cell cannot be read, an id is there twice, or what every row must have is absent.
     """
     table, required = match.table, REQUIRED[match.kind]
-    if required not in match.columns and required not in match.constants:
+    if required is not None and required not in match.columns and required not in match.constants:
         names = ", ".join(repr(header.text) for header in table.headers if header.text)
         names += f"; say which by --map {EXAMPLES[match.kind]}"
         raise table.error(f"no column is known as the {required}; the columns are {names}")
@@ -118,13 +129,25 @@ def records_of(match: Match, decimal: Mark | None) -> Records:
             found.append(Found(table.source, table.headers[column].text, name, measure))
     for name, value in match.constants.items():
         numbers[name] = np.full(len(table.rows), value)
-    require_numbers(table, match.columns.get(required), required, numbers[required])
+    if required is not None:
+        require_numbers(table, match.columns.get(required), required, numbers[required])
     numbers |= _combined(match)
     found += _unit_of_position(match)
     records = Records(match, None, numbers, found, _is_geographic(numbers))
-    records.ids = _ids(match, numbers[required], records.notes)
+    records.ids = _ids(match, None if required is None else numbers[required], records.notes)
     _metres(records)
+    _west(records)
+    share = charged(match, numbers, found, decimal, is_percent=is_percent)
+    records.notes += [share] if share else []
     return records
+
+
+def _west(records: Records) -> None:
+    """Say that longitudes beyond 180 are taken as west."""
+    if not records.geographic or not (records.numbers["lon"] > HALF_TURN).any():
+        return
+    east = float(records.numbers["lon"][np.argmax(records.numbers["lon"] > HALF_TURN)])
+    records.notes.append(f"longitudes beyond 180 are west: {east:g} is {east - 2 * HALF_TURN:g}")
 
 
 def _is_geographic(numbers: dict[str, FloatArray]) -> bool | None:
@@ -170,7 +193,7 @@ def _unit_of_position(match: Match) -> list[Found]:
     return [Found(match.table.source, header.text, axis, header.measure) for axis in "xyz"]
 
 
-def _ids(match: Match, required: FloatArray, notes: list[str]) -> list[str] | None:
+def _ids(match: Match, required: FloatArray | None, notes: list[str]) -> list[str] | None:
     """Return the ids of the rows; those without get a number, and `notes` says so."""
     table = match.table
     letter = match.kind[0]
@@ -179,7 +202,8 @@ def _ids(match: Match, required: FloatArray, notes: list[str]) -> list[str] | No
         return None
     column = match.columns["id"]
     ids = [as_name(cell) for cell in match.cells("id")]
-    _refuse_unnamed_sum(table, ids, required)
+    if required is not None:
+        _refuse_unnamed_sum(table, ids, required)
     first: dict[str, int] = {}
     for row, name in enumerate(ids):
         if name and name in first:

@@ -27,6 +27,9 @@ def flag(table: Table, row: int, column: int) -> bool:
         return False
     if text in YES:
         return True
+    if re.search(r"\w", text):
+        message = f"must be yes, no or the id of a base, got {shown(cell)}; give the bases with --bases"
+        raise table.error(message, row, column)
     raise table.error(f"must be yes or no, got {shown(cell)}", row, column)
 
 

@@ -77,16 +77,19 @@ class TestPpo(AllocatorConformance):
     iterations = 2  # as its kin below, it plays by the planner of `gappo`
 
 
+@pytest.mark.slow
 class TestA2c(AllocatorConformance):
     name = "a2c"
     iterations = 2
 
 
+@pytest.mark.slow
 class TestDqn(AllocatorConformance):
     name = "dqn"
     iterations = 2
 
 
+@pytest.mark.slow
 class TestDdpg(AllocatorConformance):
     name = "ddpg"
     iterations = 2

@@ -33,13 +33,24 @@ time.sleep(after_s)
 """
 
 
+GAPPO = pytest.param("gappo", marks=pytest.mark.slow)
+
+ENDS = [
+    pytest.param("gappo", 0.0, marks=pytest.mark.slow),
+    pytest.param("gappo", 0.8, marks=pytest.mark.slow),
+    ("milp", 0.0),
+    ("milp", 0.8),
+]
+"""Methods, and seconds after which the main thread ends."""
+
+
 def run(method: str, after_s: float, how: str, times: int = 1) -> subprocess.CompletedProcess[str]:
     """Solve in a thread, in 1.5 s a run, and end the main thread after so many seconds; `gappo` learns from 0.3 s."""
     command = [sys.executable, "-c", PROGRAM, method, str(after_s), how, str(times)]
     return subprocess.run(command, capture_output=True, text=True, timeout=60)
 
 
-@pytest.mark.parametrize("method", ["milp", "cpsat", "gappo", "local-search"])
+@pytest.mark.parametrize("method", ["milp", "cpsat", GAPPO, "local-search"])
 def test_a_daemon_thread_is_stopped_and_awaited(method: str) -> None:
     """However often it solves, its run is ended as by a stop event, the next is none, and nothing crashes."""
     ran = run(method, 0.8, "daemon", 1000)
@@ -47,6 +58,7 @@ def test_a_daemon_thread_is_stopped_and_awaited(method: str) -> None:
     assert set(ran.stdout.split("\n")) <= {"interrupted True", "proven True", "finished True", ""}
 
 
+@pytest.mark.slow
 def test_an_interrupt_of_the_main_thread_crashes_nothing() -> None:
     """Ctrl-C in `join`, after which some versions of Python take the other thread for ended: no abort."""
     ran = run("milp", 0.8, "interrupted")
@@ -54,7 +66,7 @@ def test_an_interrupt_of_the_main_thread_crashes_nothing() -> None:
     assert ran.stderr.rstrip().endswith("KeyboardInterrupt")
 
 
-@pytest.mark.parametrize(("method", "after_s"), [("gappo", 0.0), ("gappo", 0.8), ("milp", 0.0), ("milp", 0.8)])
+@pytest.mark.parametrize(("method", "after_s"), ENDS)
 def test_a_thread_that_is_joined_has_its_whole_time(method: str, after_s: float) -> None:
     """The end of the program waits for it; that pools take no work by then costs no answer."""
     ran = run(method, after_s, "joined")
@@ -62,6 +74,7 @@ def test_a_thread_that_is_joined_has_its_whole_time(method: str, after_s: float)
     assert ran.stdout == "time_limit True\n"
 
 
+@pytest.mark.slow
 def test_a_run_may_begin_at_exit() -> None:
     """A handler of `atexit`, registered before or after, may still solve."""
     program = """

@@ -185,7 +185,7 @@ def test_the_table_has_a_row_per_agent() -> None:
     assert frame["distance"].tolist() == [0.0, 1.0, 0.0]
     assert frame["completion_time"].tolist()[:2] == pytest.approx([4 / 3, 1.0])
     unknown = frame.columns[frame.isna().to_numpy()[2]].tolist()
-    assert unknown == ["task", "arrival", "completion_time", "battery", "battery_left"]
+    assert unknown == ["task", "arrival", "completion_time", "returns_to", "battery", "battery_left"]
     assert replace(found, allocation=None, evaluation=None).to_frame().empty
 
 

@@ -75,3 +75,23 @@ def test_what_slack_leaves_open_is_not_called_settled():
     assert "optimal, no allocation within" in lines
     assert "cannot be done sooner" not in lines
     assert "the same agents, allocated otherwise, gain" in lines
+
+
+@pytest.mark.parametrize(
+    ("sites", "text"),
+    [
+        ([1, 50], "1 of 2 tasks can be served by nobody"),
+        ([1, 2, 3], "1 of 3 tasks cannot be served along with the others"),
+        ([1, 2, 3, 50], "2 of 4 tasks cannot be served along with the others, 1 of them by nobody at all"),
+    ],
+)
+def test_the_headline_says_what_nobody_can_do(sites, text):
+    """Tasks that compete for two agents are told apart from those that no agent can take."""
+    instance = Instance(
+        ability=[1, 1],
+        workload=[1] * len(sites),
+        agent_position=[[0, 0]] * 2,
+        task_position=[[x, 0] for x in sites],
+        communication_range=[9, 9],
+    )
+    assert summary(solve(instance, "greedy", handle_signals=False)).splitlines()[0].endswith(f": {text}")

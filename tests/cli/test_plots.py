@@ -13,6 +13,7 @@ from alloc.problems import Instance
 from alloc.problems.formats import write_instance
 
 
+@pytest.mark.slow
 def test_names_of_every_script_are_drawn_without_output(tmp_path):
     """Missing glyphs and folders that cannot be written to cause no output, for results and fronts alike."""
     ids = ["日本語のタスク", "한국어", "हिन्दी عربي"]

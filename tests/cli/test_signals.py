@@ -11,6 +11,8 @@ import pytest
 from alloc.problems import Family, random_instance
 from alloc.problems.formats import write_instance
 
+INTERRUPTED = "alloc: interrupted before there was a result\n"
+
 PATIENCE_S = 2.5
 """A second for the run to end, and as much again, and some, for a busy machine to end the process."""
 
@@ -91,8 +93,8 @@ def test_a_signal_ends_the_run_with_the_best_so_far(hard, tmp_path, method, numb
     assert took < PATIENCE_S
 
 
-def test_ctrl_c_outside_a_run_is_quiet(tmp_path):
-    """While waiting for its input, Ctrl-C ends the command with 130 and without a word."""
+def test_ctrl_c_outside_a_run_is_one_line(tmp_path):
+    """While waiting for its input, Ctrl-C ends the command with 130 and a line that there is no result."""
     process = subprocess.Popen(
         [sys.executable, "-m", "alloc.cli", "validate", "-"],
         stdin=subprocess.PIPE,
@@ -106,4 +108,17 @@ def test_ctrl_c_outside_a_run_is_quiet(tmp_path):
     process.stdin.flush()
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=20)
-    assert (process.returncode, out, err) == (130, "", "")
+    assert (process.returncode, out, err) == (130, "", INTERRUPTED)
+
+
+@pytest.mark.parametrize("module", ["typer", "numpy"])
+def test_ctrl_c_while_modules_are_loaded_is_one_line(tmp_path, module):
+    """Whether the command line itself is still being loaded, or what a run needs, Ctrl-C gives 130 and one line."""
+    (tmp_path / f"{module}.py").write_text("import signal; signal.raise_signal(signal.SIGINT)")
+    ran = subprocess.run(
+        [sys.executable, "-m", "alloc", "solve", "demo.json"],
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])},
+    )
+    assert (ran.returncode, ran.stdout, ran.stderr) == (130, "", INTERRUPTED)

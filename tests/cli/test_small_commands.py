@@ -63,6 +63,7 @@ def test_methods_lists_all(alloc):
     assert (ran.code, ran.out) == (0, "")
     assert all(name in ran.err for name in facts)
     assert "doi:10.1137/0603019" in ran.err
+    assert "makespan-moves" in ran.err
 
 
 def test_methods_names_what_is_missing(alloc, monkeypatch):
@@ -80,7 +81,7 @@ def test_methods_survives_a_broken_plugin(alloc, monkeypatch):
     from importlib.metadata import EntryPoint
 
     broken = EntryPoint("broken", "no_such_module:Thing", "alloc.allocators")
-    monkeypatch.setattr("alloc.allocators.registry.entry_points", lambda group: [broken])
+    monkeypatch.setattr("alloc.allocators.contract.plugins.entry_points", lambda group: [broken])
     facts = {fact["name"]: fact for fact in alloc("methods", "--json").json}
     assert "cannot be imported" in facts["broken"]["error"]
     assert alloc("methods").code == 0
@@ -89,12 +90,15 @@ def test_methods_survives_a_broken_plugin(alloc, monkeypatch):
 def test_methods_are_prepared_once_for_all(alloc, monkeypatch):
     """Every method that is installed is loaded, what loading leaves out is compiled, and nothing is printed.
 
-    A broken plugin is a note.
+    A broken plugin is a note. Here everything runs in one process, where what is loaded can be seen.
     """
     from importlib.metadata import EntryPoint
 
+    from alloc.allocators.parallel.serial import SerialEngine
+
+    monkeypatch.setattr("alloc.allocators.parallel.processes.ProcessEngine", SerialEngine)
     broken = EntryPoint("broken", "no_such_module:Thing", "alloc.allocators")
-    monkeypatch.setattr("alloc.allocators.registry.entry_points", lambda group: [broken])
+    monkeypatch.setattr("alloc.allocators.contract.plugins.entry_points", lambda group: [broken])
     loaded = []
     monkeypatch.setattr("alloc.allocators.load", loaded.append)
     monkeypatch.setattr(
@@ -102,5 +106,5 @@ def test_methods_are_prepared_once_for_all(alloc, monkeypatch):
     )
     ran = alloc("methods", "--prepare")
     assert (ran.code, ran.out) == (0, "")
-    assert {"greedy", "cpsat", "local-search", "the tree of greedy"} <= set(loaded)
+    assert {"greedy", "cpsat", "local-search", "gappo", "the tree of greedy"} <= set(loaded)
     assert "plugin 'broken'" in ran.err

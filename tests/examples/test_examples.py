@@ -35,6 +35,14 @@ def test_replan(checkout):
     assert " without it, at " in printed
 
 
+def test_ground_station(checkout):
+    """Each order that changes has its cause: the drone that fails, the task that comes in, those that are done."""
+    lines = run(checkout / "examples" / "ground_station.py").splitlines()
+    assert any("d3: None  (agent d3 failed at 1)" in line for line in lines)
+    assert any(": south  (task south appeared at 1.5)" in line for line in lines)
+    assert lines[-1].endswith("all is done")
+
+
 @pytest.mark.slow
 def test_train_stable_baselines3(checkout):
     """A short training of somebody else's PPO on the environment ends with a plan better than chance."""

@@ -62,6 +62,21 @@ def test_errors_name_the_place(fields: dict, place: str) -> None:
     assert caught.value.place == place
 
 
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"return_base": [1]}, r"agents\[0\].return_base: is 1, but bases run from 0 to 0"),
+        ({"return_base": [0], "returns": [False]}, r"agents\[0\].returns: is False, but 'north' is the base"),
+        ({"bases": {"True": None}}, r"bases\[0\].id: 'True' cannot be the name of a base"),
+        ({"bases": {"north": (1,)}}, r"bases\[0\].position: must be 2 or 3 numbers"),
+    ],
+)
+def test_bases_that_are_none_are_refused(fields: dict, message: str) -> None:
+    """A base that there is not, one beside `returns` that says no, and names and places that files cannot keep."""
+    with pytest.raises(InputError, match=message):
+        Instance(**{"ability": [1], "workload": [1], "bases": {"north": (0, 1)}, **fields})
+
+
 @pytest.mark.parametrize("kind", ["agent_ids", "task_ids"])
 def test_ids_are_unique(kind: str) -> None:
     """Two of the same name are an error, and so is another number of names."""

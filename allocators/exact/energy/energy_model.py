@@ -12,7 +12,7 @@ from alloc.problems.instance import FloatArray
 
 Mask = NDArray[np.bool_]
 
-GRID = 1000
+GRID = 2048
 """Steps into which a need is divided where it is no small whole number."""
 
 MAX_NEED = 5000

@@ -47,6 +47,12 @@ class StepRule:
 ALONE, CLUSTERED = StepRule(0.75, 20, 0.7), StepRule(0.95, 60, 0.8)
 """Before and after the clusters are added: more prices need longer memory and more patience."""
 
+FIRST_STEP_PRICED = 0.1
+"""First step from prices of the linear programme, which are nearly the best already."""
+
+COMPARE_EVERY = 10
+"""Rounds between two that look for pairs to drop, where that takes long."""
+
 CONVERGED_STEP = 0.02
 """Steps shorter than this, where 1 is the step that would reach the plan's cost, hardly raise the bound."""
 
@@ -67,7 +73,7 @@ class Relaxed:
         The bound; ``inf`` if a task has no group.
     group : ndarray of int, shape (p,)
         Agents of each pair in the cheapest groups of tasks.
-    excess : ndarray, shape (p,)
+    excess : ndarray, shape (p,) or (0,)
         How much more the best group with an agent of the pair costs, or less than that.
     cluster_group : ndarray of int, shape (e,)
         Agents of each entry in the cheapest groups of clusters.
@@ -87,6 +93,8 @@ class LagrangianBound:
     model : EnergyModel
     task_distance : ndarray, shape (t, t)
         How far tasks are from each other.
+    price : ndarray, shape (k,)
+        Of one agent of each class, to begin with.
 
     Attributes
     ----------
@@ -96,7 +104,7 @@ class LagrangianBound:
         Pairs that have not been dropped.
     """
 
-    def __init__(self, model: EnergyModel, task_distance: FloatArray) -> None:
+    def __init__(self, model: EnergyModel, task_distance: FloatArray, price: FloatArray) -> None:
         self.kept = np.ones(len(model.class_of_pair), dtype=bool)
         self.bound, self._model = 0.0, model
         self._member = None
@@ -104,16 +112,22 @@ class LagrangianBound:
         if model.ability is not None and len(model.need) > 3 and links <= MAX_LINKS:
             self._member = cluster_tasks(task_distance)
         self._clusters: Clusters | None = None
-        self._price, self._cluster_price = np.zeros(len(model.count)), np.zeros(0)
+        self._price, self._cluster_price = price, np.zeros(0)
         self._direction = (np.zeros(len(model.count)), np.zeros(0))
         self._known_price = np.zeros((0 if self._member is None else len(self._member), len(model.count)))
         self._dropped = np.zeros(len(model.class_of_pair), dtype=bool)
-        self._step, self._rounds_without_rise, self._decays = 1.0, 0, 0
+        self._step, self._rounds_without_rise, self._decays = FIRST_STEP_PRICED if price.any() else 1.0, 0, 0
+        self._rounds = 0
 
     @property
     def converged(self) -> bool:
         """Whether steps have become so short that the bound hardly rises any more."""
         return self._step < CONVERGED_STEP and (self._clusters is not None or self._member is None)
+
+    @property
+    def is_rising_slowly(self) -> bool:
+        """Whether a solver may soon do better; hardly where sums of weights are limited, which clusters make use of."""
+        return self._clusters is not None and bool(self._model.max_weight[0] < 0)
 
     def ascend(self, rounds: int, cost: float) -> None:
         """Change prices `rounds` times, given the cost of a plan at hand."""
@@ -124,10 +138,12 @@ class LagrangianBound:
 
     def _round(self, cost: float) -> None:
         relaxed = self._solve()
+        self._rounds += 1
         if not np.isfinite(relaxed.value):  # the pairs kept allow no plan, so none is better than the one at hand
             self.bound, self._step = (self.bound if self.kept.all() else np.inf), 0.0
             return
-        self._dropped |= relaxed.value + relaxed.excess > cost * (1 + 1e-9)
+        if len(relaxed.excess):
+            self._dropped |= relaxed.value + relaxed.excess > cost * (1 + 1e-9)
         self._note(relaxed.value)
         self._change_prices(relaxed, cost)
         add = self._clusters is None and self._decays >= DECAYS_ALONE and self._member is not None
@@ -145,7 +161,9 @@ class LagrangianBound:
             price += clusters.link @ self._cluster_price
             cluster_group, _, cluster_cost = solve_subproblems(clusters.model, -self._cluster_price, compare=False)
             value += cluster_cost
-        group, excess, task_cost = solve_subproblems(model, price)
+        # where sums of weights are not limited, the excess takes much longer than the groups
+        compare = self._rounds % COMPARE_EVERY == 0 or bool(model.max_weight[0] >= 0)
+        group, excess, task_cost = solve_subproblems(model, price, compare=compare)
         return Relaxed(value + task_cost, group, excess, cluster_group)
 
     def _change_prices(self, relaxed: Relaxed, cost: float) -> None:

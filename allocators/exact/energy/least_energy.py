@@ -1,14 +1,15 @@
 """The least energy at a makespan: agents alike to the nearest tasks, both sides of the gap, then the solver."""
 
 import sys
+from contextlib import nullcontext
 
 from alloc.allocators.contract.search import Search
 from alloc.allocators.exact.energy.places import nearest_places, without_idlers
 from alloc.allocators.exact.energy.primal_dual import REPEATABLE_SLICES, PrimalDual
 from alloc.allocators.exact.energy.state import EnergyState
-from alloc.allocators.exact.model import FEW_PAIRS, Model
+from alloc.allocators.exact.model import Model
 from alloc.allocators.exact.monitor import SolverMonitor, is_over
-from alloc.allocators.exact.solver_model import Answer, Solver, SolverLimits, SolverModel, is_repeatable
+from alloc.allocators.exact.solver_model import Answer, Solver, SolverLimits, SolverModel
 from alloc.allocators.parallel.pool import Pool
 from alloc.problems import agent_classes
 from alloc.problems.evaluation import last_equal
@@ -16,8 +17,11 @@ from alloc.problems.evaluation import last_equal
 SHARE_WITHOUT_SOLVER = 0.3
 """Share of the time before which the solver does not run."""
 
-TRAVEL_SHARE, MAX_TRAVEL_S = 0.4, 20.0
-"""Share of the time, and seconds at the most, of the local search where travel takes time."""
+SMALL_PAIRS = 3000
+"""Pairs of class and task that a better plan may have, up to which the solver comes next even if bounds still rise."""
+
+LOCAL_SHARE, MAX_LOCAL_S = 0.4, 20.0
+"""Share of the time, and seconds at the most, of local search where nothing else finds plans."""
 
 
 def least_energy(search: Search, solver: Solver, min_served: int) -> float | None:
@@ -44,20 +48,22 @@ def least_energy(search: Search, solver: Solver, min_served: int) -> float | Non
     model = Model.build(search.instance, agent_classes(search.instance, by_place=True), min_served)
     search.submit(nearest_places(search.instance, search.best.allocation, lambda: is_over(search)))
     search.submit(without_idlers(model, search.best.allocation, time))
-    demand = model.at(time)
-    if model.travel_time is not None and len(demand.class_of_pair) > FEW_PAIRS and not is_repeatable(search):
-        _search_travelling(search)
-    cost = _least_cost(EnergyState.begin(search, model, demand), solver)
+    state = EnergyState.begin(search, model, model.at(time))
+    with nullcontext() if state.local_search is None else state.local_search:
+        cost = _least_cost(state, solver)
     return min(max(0.0, cost * search.instance.reach.energy_per_distance), sys.float_info.max)
 
 
 def _least_cost(state: EnergyState, solver: Solver) -> float:
     """Close the gap from both sides, then by the solver; return what is proven to be needed, in units of distance."""
-    both = state.primal_dual
+    both, search = state.primal_dual, state.search
+    if state.local_search is not None:
+        state.local_search.turn(min(LOCAL_SHARE * search.remaining_s, MAX_LOCAL_S))
+        state.submit(None)
     if both is None:
         return _solve_rest(state, solver).bound
     _close_gap(state, both)
-    if both.closed or is_over(state.search):
+    if both.closed or is_over(search):
         return both.bound
     answer = _solve_rest(state, solver)
     return max(both.bound, min(answer.bound, state.cost))
@@ -75,9 +81,10 @@ def _close_gap(state: EnergyState, both: PrimalDual) -> None:
     with Pool(1) as pool:
         while not (is_over(search) or both.closed):
             progress = state.progress
-            if progress >= 1 or (both.converged and progress >= SHARE_WITHOUT_SOLVER):
+            is_ready = both.converged or (both.is_rising_slowly and len(both.keep) <= SMALL_PAIRS)
+            if progress >= 1 or (is_ready and progress >= SHARE_WITHOUT_SOLVER):
                 return
-            state.submit(both.run(min(1.0, progress), pool if search.threads > 1 else None))
+            state.submit(both.run(min(1.0, progress), pool if state.spare_threads else None))
 
 
 def _solve_rest(state: EnergyState, solver: Solver) -> Answer:
@@ -90,35 +97,18 @@ def _solve_rest(state: EnergyState, solver: Solver) -> Answer:
         demand=demand,
         cost=state.model.cost[state.model.pairs_at(demand)],
         hint=state.model.counts(demand, search.best.allocation),
-        limits=SolverLimits.of(
-            search, search.remaining_s, search.threads if both is None else max(1, search.threads - 1)
-        ),
+        limits=SolverLimits.of(search, search.remaining_s, max(1, state.spare_threads + (both is None))),
     )
 
     def meanwhile() -> bool:
-        if both is None or state.repeatable or search.threads == 1:
+        if state.repeatable:
             return False
-        state.submit(both.run(min(1.0, state.progress), None))
-        return both.closed
+        plan = None if both is None or not state.spare_threads else both.run(min(1.0, state.progress), None)
+        state.submit(plan)
+        return both is not None and both.closed
 
     answer = solver.solve_model(model, SolverMonitor(search, state.model, demand, state.until_s, meanwhile))
     search.iteration += 1
     if answer.counts is not None:
         search.submit(state.model.allocation(demand, answer.counts))
     return answer
-
-
-def _search_travelling(search: Search) -> None:
-    """Save energy by local search first, as `PrimalDual` finds no plans where travel takes time.
-
-    Loaded when it is needed, as most runs do without.
-    """
-    from alloc.allocators.heuristic.local_search.annealing_state import AnnealingState
-    from alloc.allocators.heuristic.local_search.clock import Clock
-    from alloc.allocators.heuristic.local_search.improve import reduce_energy
-    from alloc.allocators.heuristic.local_search.parameters import LocalSearchParameters
-
-    parameters = LocalSearchParameters()
-    seconds = min(TRAVEL_SHARE * search.remaining_s, MAX_TRAVEL_S)
-    state = AnnealingState(search.instance, search.seed, parameters.neighbours)
-    reduce_energy(search, state, parameters, Clock(search, search.elapsed_s + seconds))

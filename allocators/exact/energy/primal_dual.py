@@ -8,6 +8,7 @@ import numpy as np
 from alloc.allocators.exact.demand import Demand
 from alloc.allocators.exact.energy.energy_model import MAX_NEED, EnergyModel, round_demand
 from alloc.allocators.exact.energy.lagrangian import LagrangianBound
+from alloc.allocators.exact.energy.linear import class_prices
 from alloc.allocators.exact.energy.pairwise_search import PairwiseSearch, Perturbation
 from alloc.allocators.exact.model import ROUNDING, Model
 from alloc.allocators.parallel.pool import Pool
@@ -23,6 +24,9 @@ MAX_TASKS = 2000
 SLICE_S = 0.02
 """Time of each side in one call of `PrimalDual.run`."""
 
+MAX_LEAD_S = 0.1
+"""How much more time one side may have had before it waits for the other."""
+
 REPEATABLE_SLICES, REPEATABLE_ROUNDS = 60, 10
 """Slices, and rounds in each, where effort is counted."""
 
@@ -34,22 +38,29 @@ def compile_loops() -> None:
     plans.descend()
     plans.anneal(1, 0.0)
     one, two = np.ones(2, dtype=np.int64), np.array([0, 1])
-    LagrangianBound(EnergyModel(two, two, one, one, np.ones(2), one, one, one, one, None), np.zeros((2, 2))).ascend(
-        1, 3.0
-    )
+    LagrangianBound(
+        EnergyModel(two, two, one, one, np.ones(2), one, one, one, one, None), np.zeros((2, 2)), np.zeros(2)
+    ).ascend(1, 3.0)
 
 
 class Timer:
-    """Adapts the number of rounds to a slice of time, by how long the last ones took."""
+    """Adapts the number of rounds to a slice of time, by how long the last ones took.
+
+    Attributes
+    ----------
+    spent_s : float
+        Time of all rounds so far.
+    """
 
     def __init__(self) -> None:
-        self._rounds = 1
+        self._rounds, self.spent_s = 1, 0.0
 
     def run(self, work: Callable[[int], None]) -> None:
         """Do as many rounds as fit."""
         begin = time.monotonic()
         work(self._rounds)
         took = max(time.monotonic() - begin, 1e-5)
+        self.spent_s += took
         self._rounds = int(np.clip(self._rounds * np.clip(SLICE_S / took, 0.25, 2.0), 1, 100_000))
 
 
@@ -64,13 +75,17 @@ class PrimalDual:
     plan : Allocation
         A plan that meets the demand.
     seed : int
+    seconds : float
+        Time limit of the linear programme to begin with.
     """
 
-    def __init__(self, instance: Instance, model: Model, demand: Demand, plan: Allocation, seed: int) -> None:
+    def __init__(
+        self, instance: Instance, model: Model, demand: Demand, plan: Allocation, seed: int, seconds: float
+    ) -> None:
         self._model, self._demand = model, demand
         task_distance = pairwise_distance(instance.reach.goal[model.tasks])
         self._pairs: IntArray = np.arange(len(demand.class_of_pair))
-        self._dual = None if demand.partial else self._begin_dual(task_distance)
+        self._dual = None if demand.partial else self._begin_dual(task_distance, seconds)
         self._primal = _begin_primal(instance, model, demand, plan, task_distance, seed)
         self._reported = self._cost = _cost_of_plan(instance, plan)
         self._primal_timer, self._dual_timer = Timer(), Timer()
@@ -80,6 +95,11 @@ class PrimalDual:
     def bound(self) -> float:
         """Cost that every plan needs, as far as proven."""
         return 0.0 if self._dual is None else min(self._dual.bound * (1 - ROUNDING), self._cost)
+
+    @property
+    def finds_plans(self) -> bool:
+        """Whether there is a primal side."""
+        return self._primal is not None
 
     @property
     def is_empty(self) -> bool:
@@ -95,6 +115,11 @@ class PrimalDual:
     def converged(self) -> bool:
         """Whether bounds hardly rise any more."""
         return self._dual is None or self._dual.converged
+
+    @property
+    def is_rising_slowly(self) -> bool:
+        """Whether bounds have risen for long enough that the solver may raise them faster."""
+        return self._dual is None or self._dual.is_rising_slowly
 
     @property
     def keep(self) -> IntArray:
@@ -114,13 +139,14 @@ class PrimalDual:
         if not self._descended:
             return self._descend()
         rising = None if pool is None else pool.submit(self._ascend)
-        if self._primal is not None:
+        lead_s = self._primal_timer.spent_s - self._dual_timer.spent_s  # rounds of either side may take long
+        if self._primal is not None and (lead_s <= MAX_LEAD_S or rising is not None):
             primal = self._primal
             self._primal_timer.run(lambda rounds: primal.anneal(rounds, progress))
-        if rising is None:
-            self._ascend()
-        else:
+        if rising is not None:
             rising.result()
+        elif lead_s >= -MAX_LEAD_S or self._primal is None:
+            self._ascend()
         return self._better()
 
     def repeat(self, slice_: int) -> Allocation | None:
@@ -156,7 +182,7 @@ class PrimalDual:
         tasks = np.append(self._model.tasks, IDLE)
         return Allocation(tasks[self._primal.best])
 
-    def _begin_dual(self, task_distance: FloatArray) -> LagrangianBound | None:
+    def _begin_dual(self, task_distance: FloatArray, seconds: float) -> LagrangianBound | None:
         """Start the dual side; None where its tables are too large."""
         cost = self._model.cost[self._model.pairs_at(self._demand)]
         rounded, pairs = round_demand(self._demand, cost)
@@ -164,7 +190,7 @@ class PrimalDual:
         if cells > MAX_WORK:
             return None
         self._pairs = pairs
-        return LagrangianBound(rounded, task_distance)
+        return LagrangianBound(rounded, task_distance, class_prices(self._demand, cost, seconds))
 
 
 def pairwise_distance(place: FloatArray) -> FloatArray:

@@ -7,12 +7,16 @@ import numpy as np
 from alloc.allocators.contract.search import Search
 from alloc.allocators.exact.demand import Demand
 from alloc.allocators.exact.energy.primal_dual import MAX_TASKS, PrimalDual
+from alloc.allocators.exact.local_search import LocalSearchPhase
 from alloc.allocators.exact.model import FEW_PAIRS, Model
 from alloc.allocators.exact.solver_model import is_repeatable
-from alloc.problems import Allocation
+from alloc.problems import Allocation, Objective
 
 STAGE_S = 60.0
 """Seconds of which phases get their shares where there is no time limit, or a longer one."""
+
+LINEAR_SHARE = 0.1
+"""Share of the stage's time for a linear programme to begin with, at the most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +36,8 @@ class EnergyState:
         Whether effort is counted and not timed.
     primal_dual : PrimalDual or None
         None where the solver is quick enough by itself, or neither side can be had.
+    local_search : LocalSearchPhase or None
+        None where `primal_dual` finds plans, or the solver is quick enough by itself.
     """
 
     search: Search
@@ -41,25 +47,37 @@ class EnergyState:
     until_s: float
     repeatable: bool
     primal_dual: PrimalDual | None
+    local_search: LocalSearchPhase | None
 
     @classmethod
     def begin(cls, search: Search, model: Model, demand: Demand) -> "EnergyState":
         """Start from the best plan of `search`."""
         assert search.best is not None
         begin_s, limit_s = search.elapsed_s, search.budget.time_limit_s
-        primal_dual = None
+        primal_dual, local_search = None, None
+        until_s = np.inf if limit_s is None else limit_s
         if len(demand.class_of_pair) > FEW_PAIRS and len(demand.need) <= MAX_TASKS:
-            both = PrimalDual(search.instance, model, demand, search.best.allocation, search.seed)
+            seconds = np.inf if is_repeatable(search) else LINEAR_SHARE * min(STAGE_S, search.remaining_s)
+            both = PrimalDual(search.instance, model, demand, search.best.allocation, search.seed, seconds)
             primal_dual = None if both.is_empty else both
+        if len(demand.class_of_pair) > FEW_PAIRS and (primal_dual is None or not primal_dual.finds_plans):
+            local_search = LocalSearchPhase(search, Objective.MAKESPAN_ENERGY, until_s, search.makespan_limit)
         return cls(
             search=search,
             model=model,
             demand=demand,
             begin_s=begin_s,
-            until_s=np.inf if limit_s is None else limit_s,
+            until_s=until_s,
             repeatable=is_repeatable(search),
             primal_dual=primal_dual,
+            local_search=local_search,
         )
+
+    @property
+    def spare_threads(self) -> int:
+        """Threads that neither the calling one nor the local search beside it takes."""
+        beside = self.local_search is not None and self.local_search.is_beside
+        return max(0, self.search.threads - 1 - beside)
 
     @property
     def cost(self) -> float:
@@ -77,5 +95,7 @@ class EnergyState:
         """Submit a plan of `primal_dual`, if there is a new one, and pass it the cost of the best plan."""
         if plan is not None:
             self.search.submit(plan)
+        if self.local_search is not None:
+            self.local_search.exchange()
         if self.primal_dual is not None:
             self.primal_dual.note_cost(self.cost)

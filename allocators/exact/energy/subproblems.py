@@ -70,8 +70,9 @@ def solve_one(
 ) -> float:
     """Write the cheapest group of one task and return its cost, ``inf`` if there is none."""
     exact, pairs = max_weight >= 0, len(weight)
-    if exact and not compare:
-        paid, cheapest = cheapest_by_core(weight, price, copies, need, max_weight)
+    if not compare and need > 0 and (exact or (pairs > 0 and price.min() >= 0)):
+        most = max_weight if exact else need + weight.max() - 1  # without an agent that can be spared
+        paid, cheapest = cheapest_by_core(weight, price, copies, need, most)
         for p in range(pairs):
             group[p] = cheapest[p]
         return paid

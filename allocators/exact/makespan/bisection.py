@@ -11,8 +11,11 @@ from alloc.allocators.exact.makespan.state import TIGHT, MakespanState
 from alloc.allocators.exact.model import FEW_PAIRS
 from alloc.allocators.exact.solver_model import Solver, Verdict
 
-FIRST_SHARES = (0.005, 0.2)
-"""Shares of the time in which repartitions and configurations take turns, as either alone often closes the gap."""
+SHARES = ((0.03, 0.01, 0.02), (0.1, 0.05, 0.05), (0.25, 0.15, 0.1))
+"""Shares of the time in which repartitions, configurations and local search take turns before the solver."""
+
+PROBE_SHARE = 0.1
+"""Share of the time of a probe; as much goes to plans after one that stayed open."""
 
 
 def least_makespan(search: Search, solver: Solver, min_served: int, until_s: float, *, descent: bool) -> None:
@@ -31,19 +34,22 @@ def least_makespan(search: Search, solver: Solver, min_served: int, until_s: flo
         Whether plans are looked for without the solver first.
     """
     state = MakespanState.begin(search, min_served, until_s, descent=descent)
-    narrow_without_solver(state)
-    bisect(state, solver)
-
-
-def narrow_without_solver(state: MakespanState) -> None:
-    """Find plans and bounds that often meet, so that no solver is needed."""
-    if state.descent:
+    is_plain = search.instance.reach.is_complete and state.model.unit is not None
+    if descent and (is_plain or not state.repartition.is_tractable):
         descend_in_steps(state)
-        for share in FIRST_SHARES if len(state.model.class_of_pair) > FEW_PAIRS else ():
-            search_repartitions(state, share)
-            raise_bound_by_configurations(state, share)
-    elif state.search.instance.has_travel_time or not state.search.instance.reach.is_complete:
-        raise_bound_by_relaxation(state)
+    raise_bound_by_relaxation(state)
+    if not state.ended:
+        with state.with_local_search():
+            take_turns(state)
+            bisect(state, solver)
+
+
+def take_turns(state: MakespanState) -> None:
+    """Find plans and bounds that often meet, so that no solver is needed."""
+    for plans, bounds, local in SHARES if state.descent and len(state.model.class_of_pair) > FEW_PAIRS else ():
+        search_repartitions(state, plans)
+        raise_bound_by_configurations(state, bounds)
+        state.search_locally(local)
 
 
 def bisect(state: MakespanState, solver: Solver) -> None:
@@ -52,7 +58,7 @@ def bisect(state: MakespanState, solver: Solver) -> None:
     The lower bound is probed first, as it is often the optimum. A probe without a verdict raises the lower end of the
     bisection but proves nothing; it is repeated with more time once nothing else is left.
     """
-    probe = Probe(state.lower, state.share_s(0.25))
+    probe = Probe(state.lower, state.share_s(PROBE_SHARE))
     while not state.ended:
         verdict = probe_makespan(state, solver, probe)
         if verdict is Verdict.UNKNOWN:
@@ -61,7 +67,11 @@ def bisect(state: MakespanState, solver: Solver) -> None:
             if probe.purpose is Purpose.BISECT:
                 state.unresolved = max(state.unresolved, probe.time)
             if not state.bounds_tried:
-                raise_bound_by_configurations(state, 0.2)
+                raise_bound_by_configurations(state, 2 * PROBE_SHARE)
+            if state.descent:
+                search_repartitions(state, PROBE_SHARE)
+                state.search_locally(PROBE_SHARE / 2)
+                raise_bound_by_configurations(state, PROBE_SHARE / 2)
         probe = _next_probe(state, verdict)
 
 
@@ -72,6 +82,6 @@ def _next_probe(state: MakespanState, last: Verdict) -> Probe:
         state.unresolved = 0.0
         return Probe(upper * (1 - 0.9 * PROVEN), np.inf, Purpose.LAST)
     if state.would_prove(floor) or (last is Verdict.INFEASIBLE and not state.bounds_tried):
-        return Probe(upper * (1 - TIGHT / 2), state.share_s(0.1), Purpose.BELOW_PLAN)
+        return Probe(upper * (1 - TIGHT / 2), state.share_s(PROBE_SHARE), Purpose.BELOW_PLAN)
     middle = float(np.sqrt(floor * upper)) if upper > 2 * floor else (floor + upper) / 2
-    return Probe(middle, state.share_s(0.1))
+    return Probe(middle, state.share_s(PROBE_SHARE))

@@ -23,7 +23,7 @@ import numpy as np
 from alloc.allocators.exact.knapsack import Table, WholeArray, fill_table
 from alloc.allocators.exact.makespan.restricted_master import CLOSE, RestrictedMaster, TaskNeeds
 from alloc.allocators.exact.model import Model
-from alloc.problems.instance import FloatArray
+from alloc.problems.instance import FloatArray, IntArray
 
 MAX_NEED = 20_000
 """Largest need in units up to which needs are kept as they are."""
@@ -85,7 +85,6 @@ class ConfigurationProgramme:
     def __init__(self, model: Model, low: float) -> None:
         self._model = model
         _, need = model.uncapped(low)
-        self._step = 1.0 if model.unit is not None and need.max() <= MAX_NEED else float(need.max()) / GRID
         mask = model.classes.mask[:, model.tasks]
         if model.travel_time is None:
             _, group = np.unique(mask, axis=1, return_inverse=True)
@@ -94,21 +93,19 @@ class ConfigurationProgramme:
             group = np.arange(len(model.tasks))
         self._tasks_alike = [np.flatnonzero(group == g) for g in range(group.max() + 1)]
         self.count = model.classes.count.astype(np.int64)
-        agents = int(np.minimum(self.count, GRID).sum())
-        self.is_tractable = bool(agents * need.max() / self._step * len(self._tasks_alike) <= MAX_CELLS)
+        largest = np.array([need[tasks].max() for tasks in self._tasks_alike])
+        is_whole = model.unit is not None and need.max() <= MAX_NEED
+        self._steps = np.ones(len(largest)) if is_whole else largest / GRID
+        agents = np.minimum(self.count, GRID) @ (mask[:, [tasks[0] for tasks in self._tasks_alike]])
+        self.is_tractable = bool(agents @ (largest / self._steps) <= MAX_CELLS)
         self._known: list[WholeArray] = []
 
     def needs(self, time: float) -> list[TaskNeeds]:
         """Return the needs at T = `time`, rounded such that what is impossible so is impossible indeed."""
         weight, need = self._model.uncapped(time)
-        if self._step == 1.0:
-            whole_weight, whole_need = weight.astype(np.int64), need.astype(np.int64)
-        else:
-            whole_weight = np.ceil(weight / self._step).astype(np.int64)
-            whole_need = np.maximum(1, np.floor(need / self._step * (1 - 1e-12))).astype(np.int64)
         return [
-            TaskNeeds(tasks, np.ascontiguousarray(whole_weight[:, tasks[0]]), whole_need[tasks])  # as loops take it
-            for tasks in self._tasks_alike
+            _in_steps(tasks, weight[:, tasks[0]], need[tasks], step)
+            for tasks, step in zip(self._tasks_alike, self._steps.tolist(), strict=True)
         ]
 
     def largest_infeasible(self, prices: DualPrices, low: float, high: float) -> float:
@@ -151,12 +148,12 @@ class ConfigurationProgramme:
         price, smoothing = self._first_price(tasks), 0.0
         best: DualPrices | None = None
         while not should_stop():
-            priced, tables = self._solve_pricing(tasks, price)
+            priced, tables = self.solve_pricing(tasks, price)
             if best is None or priced.theta > best.theta:
                 best = priced
             if best.theta > 1 or (master.solved and best.theta >= master.theta - CLOSE):
                 return replace(best, converged=True)
-            new = master.add_groups(tables, self._known)
+            new = master.add_groups(tables, priced.price, self._known)
             if not new and smoothing == 0.0 and master.solved:
                 return replace(best, converged=True)
             if not master.solve():
@@ -178,7 +175,7 @@ class ConfigurationProgramme:
         typical = np.maximum.reduce([np.minimum(needs.weight, needs.need.max()) for needs in tasks]).astype(float)
         return np.where(usable, typical, 0.0) / max(1e-300, float(typical @ self.count))
 
-    def _solve_pricing(self, tasks: list[TaskNeeds], price: FloatArray) -> tuple[DualPrices, list[Table]]:
+    def solve_pricing(self, tasks: list[TaskNeeds], price: FloatArray) -> tuple[DualPrices, list[Table]]:
         """Find the cheapest groups at `price` made whole: what these prove, and the tables of the groups."""
         whole: FloatArray = np.round(np.maximum(0.0, price) * PRICE_SUM)
         total, cost = float(whole @ self.count), 0.0
@@ -192,3 +189,11 @@ class ConfigurationProgramme:
 
     def _table(self, needs: TaskNeeds, price: FloatArray) -> Table:
         return fill_table(needs.weight, price, self.count, int(needs.need.max()), False)
+
+
+def _in_steps(tasks: IntArray, weight: FloatArray, need: FloatArray, step: float) -> TaskNeeds:
+    """Round weights and needs, unless they are whole already; as arrays that loops take."""
+    if step == 1.0:
+        return TaskNeeds(tasks, np.ascontiguousarray(weight.astype(np.int64)), need.astype(np.int64))
+    whole_need = np.maximum(1, np.floor(need / step * (1 - 1e-12))).astype(np.int64)
+    return TaskNeeds(tasks, np.ascontiguousarray(np.ceil(weight / step).astype(np.int64)), whole_need)

@@ -1,5 +1,6 @@
 """Lower bounds without the solver: by configurations, by groups, and by fractions of agents."""
 
+from alloc.allocators.exact.makespan.ascent import ConfigurationAscent
 from alloc.allocators.exact.makespan.configuration import ConfigurationProgramme
 from alloc.allocators.exact.makespan.enumeration import enumerate_groups
 from alloc.allocators.exact.makespan.relaxation import relaxed_lower_bound
@@ -7,29 +8,35 @@ from alloc.allocators.exact.makespan.set_partitioning import solve_set_partition
 from alloc.allocators.exact.makespan.state import TIGHT, MakespanState
 from alloc.allocators.exact.solver_model import Verdict
 
+REPEATABLE_ROUNDS = 60
+"""Rounds of one ascent where effort is counted."""
+
 
 def raise_bound_by_configurations(state: MakespanState, share: float) -> None:
-    """Raise the lower bound by the configuration linear programme, or by a simpler one where it is too large."""
+    """Raise the lower bound by the configuration linear programme, unless it is too large."""
     first, state.bounds_tried = not state.bounds_tried, True
     if state.ended or state.partial:
+        return
+    if state.model.travel_time is not None:
+        _ascend(state, state.search.elapsed_s + state.share_s(share))
         return
     if first:
         configurations = ConfigurationProgramme(state.model, state.lower)
         state.configurations = configurations if configurations.is_tractable else None
-        if state.configurations is None:
-            raise_bound_by_relaxation(state)
     if state.configurations is not None:
         _bisect_by_prices(state, state.configurations, state.search.elapsed_s + state.share_s(share))
 
 
 def raise_bound_by_relaxation(state: MakespanState) -> None:
-    """Raise the lower bound by linear programmes of single agents: more than the simple bounds, less than a probe."""
-    if state.ended or state.partial:
+    """Raise the lower bound by linear programmes of single agents, where not all agents can be everywhere at once."""
+    instance = state.search.instance
+    if state.ended or state.partial or not (instance.has_travel_time or not instance.reach.is_complete):
         return
-    seconds = 1.0 if state.repeatable else state.share_s(0.1)
-    bound = relaxed_lower_bound(state.model, state.lower, state.upper, seconds, lambda: state.over)
+    bound, state.price = relaxed_lower_bound(
+        state.model, state.lower, state.upper, state.share_s(0.2), lambda: state.over
+    )
     if bound > state.lower:
-        state.rule_out(bound)
+        state.rule_out_below(bound)
 
 
 def probe_by_groups(state: MakespanState, time: float, seconds: float) -> Verdict:
@@ -57,6 +64,21 @@ def probe_by_groups(state: MakespanState, time: float, seconds: float) -> Verdic
     if verdict is Verdict.INFEASIBLE:
         state.rule_out(time)
     return verdict
+
+
+def _ascend(state: MakespanState, until_s: float) -> None:
+    """Raise the lower bound by a subgradient method, where each task has a knapsack of its own."""
+    if state.ascent is None and state.price is not None:
+        state.ascent = ConfigurationAscent(state.model, state.lower, state.price)
+    if state.ascent is None or not state.ascent.is_tractable:
+        return
+    rounds = 0
+    while not (state.ended or state.ascent.converged or state.search.elapsed_s >= until_s):
+        if state.ascent.round(state.lower):
+            state.rule_out(state.ascent.proven)
+        rounds += 1
+        if state.repeatable and rounds >= REPEATABLE_ROUNDS:
+            return
 
 
 def _bisect_by_prices(state: MakespanState, configurations: ConfigurationProgramme, until_s: float) -> None:

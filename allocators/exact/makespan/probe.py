@@ -57,7 +57,14 @@ def _probe_by_solver(state: MakespanState, solver: Solver, demand: Demand, probe
         hint=state.model.counts(demand, state.plan),
         limits=SolverLimits.of(search, until_s - search.elapsed_s, search.threads),
     )
-    answer = solver.solve_model(model, SolverMonitor(search, state.model, demand, until_s))
+
+    def meanwhile() -> bool:
+        """Whether the local search beside the solver has found a plan for this T."""
+        if state.local_search is not None:
+            state.local_search.exchange()
+        return state.upper <= probe.time or state.closed
+
+    answer = solver.solve_model(model, SolverMonitor(search, state.model, demand, until_s, meanwhile))
     search.iteration += 1
     if answer.counts is not None:
         return state.verdict_on(state.model.allocation(demand, answer.counts), probe.time)

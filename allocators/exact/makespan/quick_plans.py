@@ -14,6 +14,9 @@ REPEATABLE_TARGETS = 20
 PATIENCE_S = 0.05
 """Seconds without a better plan after which the repartition search may end."""
 
+FAR = 0.01
+"""Relative gap above which the first target is halfway to the lower bound, and not the bound itself."""
+
 STEPS_PER_TARGET = 1000
 """Repartitions for one target makespan."""
 
@@ -41,17 +44,22 @@ def search_repartitions(state: MakespanState, share: float) -> None:
     search, repartition = state.search, state.repartition
     if not repartition.is_tractable or state.partial or state.ended:  # it cannot choose which tasks to serve
         return
+
+    def over() -> bool:
+        return state.over or search.elapsed_s > until_s
+
     repartition.start(state.plan)
     begin_s = last_s = search.elapsed_s
-    targets, weight = 0, 1.0
+    targets, weight = 0, 1.0 if state.upper <= (1 + FAR) * state.lower else 0.5
+    until_s = begin_s + state.share_s(share)
     while not state.ended:
         upper, now_s, targets = state.upper, search.elapsed_s, targets + 1
-        patience_s = max(state.share_s(share / 10, PATIENCE_S), last_s - begin_s)
-        late = now_s - begin_s > state.share_s(share) or now_s - last_s > patience_s
+        patience_s = max(state.share_s(share / 2, PATIENCE_S), last_s - begin_s)
+        late = now_s > until_s or now_s - last_s > patience_s
         if targets > REPEATABLE_TARGETS if state.repeatable else late:
             return
         target = max(state.lower, upper + weight * (state.lower - upper) - TIGHT / 2 * upper)
-        _, plan = repartition.run(target, lambda: state.over, max_steps=STEPS_PER_TARGET)
+        _, plan = repartition.run(target, over, max_steps=STEPS_PER_TARGET, price=state.price)
         search.submit(plan)
         if state.upper < upper:
             last_s = search.elapsed_s
@@ -66,7 +74,10 @@ def find_plan(state: MakespanState, time: float) -> bool:
     state.repartition.start(state.plan)
     until_s = np.inf if state.repeatable else state.search.elapsed_s + state.share_s(0.01)
     found, plan = state.repartition.run(
-        time, lambda: state.over or state.search.elapsed_s >= until_s, max_steps=STEPS_PER_PROBE
+        time,
+        lambda: state.over or state.search.elapsed_s >= until_s,
+        max_steps=STEPS_PER_PROBE,
+        price=state.price,
     )
     return state.submit(plan, time) and found
 

@@ -1,7 +1,15 @@
-"""A lower bound on the makespan from linear programmes alone, for where probes with integers take too long."""
+"""A lower bound on the makespan from linear programmes alone: what fractions of agents could do.
+
+At a fixed T the programme maximises the least part of its need that a task gets. Its dual prices of the tasks prove
+more than that one T: with any prices >= 0, T is impossible if the value of all agents together, each on the task where
+it has the most, is less than that of all needs. So from one solution to the next T is raised to the largest one that
+the last prices exclude, which takes a few solutions in all (Newton's method; Dinkelbach (1967),
+doi:10.1287/mnsc.13.7.492).
+"""
 
 import time
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from scipy.optimize import OptimizeResult, linprog
@@ -9,24 +17,28 @@ from scipy.sparse import csr_array, hstack, vstack
 
 from alloc.allocators.exact.demand import Demand
 from alloc.allocators.exact.model import Model
-from alloc.allocators.exact.solver_model import Verdict
 from alloc.allocators.runtime.interrupts import run_native
 from alloc.problems.instance import FloatArray
 
-MAX_PAIRS = 100_000
+MAX_PAIRS = 400_000
 """Pairs of class and task above which a linear programme takes too long."""
 
-SAFETY = 1e-6
+SAFETY = 1e-10
 """Part of the workload by which fractions of agents must fall short before that counts as a proof."""
 
 CLOSE = 1e-5
-"""Relative distance at which the bisection ends."""
+"""Relative rise of the bound at which the method ends."""
+
+PRECISION = 1e-9
+"""Relative precision of the largest T that given prices exclude."""
 
 
 def relaxed_lower_bound(
     model: Model, low: float, high: float, seconds: float, should_stop: Callable[[], bool]
-) -> float:
-    """Return the largest T between `low` and `high` that bisection finds infeasible even for fractions of agents.
+) -> tuple[float, FloatArray | None]:
+    """Return a T from `low` to `high` such that no plan is faster, even with fractions of agents; nearly the largest.
+
+    Returns also the value of a unit of each workload near there, shape (t,), if that was found.
 
     Parameters
     ----------
@@ -39,28 +51,29 @@ def relaxed_lower_bound(
     should_stop : callable
         Asked every 20 ms.
     """
-    end = time.monotonic() + seconds
-    if len(model.class_of_pair) > MAX_PAIRS:
-        return low
-    middle = low * (1 + CLOSE)
-    while high - low > CLOSE * high and not should_stop():
-        verdict = _solve_relaxation(model.at(middle), end - time.monotonic(), should_stop)
-        if verdict is Verdict.UNKNOWN:
-            return low
-        if verdict is Verdict.INFEASIBLE:
-            low = max(middle, model.next_makespan(middle))
-        else:
-            high = middle
-        middle = (low + high) / 2
-    return low
+    end, last = time.monotonic() + seconds, None
+    while len(model.class_of_pair) <= MAX_PAIRS and low < high and not should_stop():
+        demand = model.at(low)
+        if demand.trivially_infeasible:
+            low = _largest(model, low, high, lambda demand: demand.trivially_infeasible)
+            low = max(low * (1 + PRECISION), model.next_makespan(low))
+            continue
+        price = _dual_prices(demand, end - time.monotonic(), should_stop)
+        last = last if price is None else price / model.workload * demand.need
+        if price is None or not _excludes(price, demand):
+            break
+        proven = _largest(model, low, high, partial(_excludes, price))
+        raised = max(proven, model.next_makespan(proven))
+        if raised <= low * (1 + CLOSE):
+            return min(raised, high), last
+        low = raised
+    return min(low, high), last
 
 
-def _solve_relaxation(demand: Demand, seconds: float, should_stop: Callable[[], bool]) -> Verdict:
-    """Maximise the least part of its need that a task gets from fractions of agents; the proof are the dual prices."""
+def _dual_prices(demand: Demand, seconds: float, should_stop: Callable[[], bool]) -> FloatArray | None:
+    """Return the prices of one unit of each need, shape (t,), or None where time is up."""
     if seconds <= 0:
-        return Verdict.UNKNOWN
-    if demand.trivially_infeasible:
-        return Verdict.INFEASIBLE
+        return None
     pairs, tasks, classes = len(demand.class_of_pair), len(demand.need), len(demand.count)
     columns = np.arange(pairs)
     part = demand.weight / demand.need[demand.task_of_pair]
@@ -69,7 +82,7 @@ def _solve_relaxation(demand: Demand, seconds: float, should_stop: Callable[[], 
     least = csr_array(np.ones((tasks, 1)))
     matrix = vstack([hstack([-share, least]), hstack([used, csr_array((classes, 1))])])
     limits = np.concatenate([np.zeros(tasks), demand.count])
-    bounds = np.column_stack([np.zeros(pairs + 1), np.append(demand.max_count, 1.0)])
+    bounds = np.column_stack([np.zeros(pairs + 1), np.append(demand.max_count, np.inf)])
     cost = np.append(np.zeros(pairs), -1.0)
 
     def work() -> OptimizeResult:
@@ -77,10 +90,24 @@ def _solve_relaxation(demand: Demand, seconds: float, should_stop: Callable[[], 
 
     answer = run_native(work, should_stop, lambda: None)
     if answer is None or answer.status != 0:
-        return Verdict.UNKNOWN
-    price = np.maximum(0.0, -answer.ineqlin.marginals[:tasks])  # any will do for the proof: weak duality
-    largest = _largest_value(demand, price[demand.task_of_pair] * part)
-    return Verdict.INFEASIBLE if largest < price.sum() * (1 - SAFETY) else Verdict.FEASIBLE
+        return None
+    return np.asarray(np.maximum(0.0, -answer.ineqlin.marginals[:tasks])) / demand.need
+
+
+def _largest(model: Model, low: float, high: float, is_excluded: Callable[[Demand], bool]) -> float:
+    """Return the largest T from `low`, which is excluded, to `high` that is, or close to it."""
+    if is_excluded(model.at(high)):
+        return high
+    while high - low > PRECISION * high:
+        middle = (low + high) / 2
+        low, high = (middle, high) if is_excluded(model.at(middle)) else (low, middle)
+    return low
+
+
+def _excludes(price: FloatArray, demand: Demand) -> bool:
+    """Whether the value of all agents is less than that of all needs: weak duality, so that any prices prove it."""
+    needed = float(price @ demand.need)
+    return _largest_value(demand, price[demand.task_of_pair] * demand.weight) < needed * (1 - SAFETY)
 
 
 def _largest_value(demand: Demand, value: FloatArray) -> float:

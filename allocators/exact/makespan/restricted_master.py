@@ -1,15 +1,19 @@
 """The configuration linear programme restricted to the groups found so far, solved by HiGHS."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import highspy
 import numpy as np
 
 from alloc.allocators.exact.knapsack import Table, WholeArray, read_group
-from alloc.problems.instance import IntArray
+from alloc.problems.instance import FloatArray, IntArray
 
 CLOSE = 1e-9
 """Gap at which the programme counts as solved, and by which theta may exceed 1 although no prices prove that."""
+
+GROUPS_AT_ONCE = 100
+"""Groups added to the programme at once, about, where there are few rows."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,17 +78,43 @@ class RestrictedMaster:
         if met:
             self._add(max(met)[1], group)
 
-    def add_groups(self, tables: list[Table], known: list[WholeArray]) -> bool:
-        """Add the cheapest groups of negative reduced cost, to `known` as well; return whether there were any."""
-        new = False
+    def add_groups(self, tables: list[Table], price: FloatArray, known: list[WholeArray]) -> bool:
+        """Add cheap groups of negative reduced cost, to `known` as well; return whether there were any.
+
+        Of each row the cheapest one, and where there are few rows, the cheapest ones with an agent of each class.
+
+        Parameters
+        ----------
+        price : ndarray, shape (k,)
+            Of the tables.
+        """
+        new, most = False, max(1, GROUPS_AT_ONCE // len(self._rows))
         for row, (index, need, _) in enumerate(self._rows):
-            group = read_group(tables[index], len(self._count), need)
-            if self.solved and group @ self.price >= self._group_price[row] - CLOSE / 10:
-                continue
-            if self._add(row, group):
-                known.append(group)
-                new = True
+            for group in self._cheap_groups(self._tasks[index], tables[index], price, need, most):
+                if self.solved and group @ self.price >= self._group_price[row] - CLOSE / 10:
+                    continue
+                if self._add(row, group):
+                    known.append(group)
+                    new = True
         return new
+
+    def _cheap_groups(
+        self, needs: TaskNeeds, table: Table, price: FloatArray, need: int, most: int
+    ) -> Iterator[WholeArray]:
+        """Yield the cheapest group, and then the cheapest with an agent of a class, for the classes that add least."""
+        classes = len(self._count)
+        yield read_group(table, classes, need)
+        if most == 1:
+            return
+        rest = np.maximum(0, need - needs.weight)
+        with_one = np.where(needs.weight > 0, table[0][rest] + price, np.inf)
+        for k in np.argsort(with_one, kind="stable")[: most - 1].tolist():
+            if not np.isfinite(with_one[k]):
+                return
+            group = read_group(table, classes, rest[k])
+            if group[k] < self._count[k]:
+                group[k] += 1
+                yield group
 
     def solve(self) -> bool:
         """Solve; return whether that succeeded."""

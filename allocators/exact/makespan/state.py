@@ -1,17 +1,22 @@
 """The state that the phases of the makespan stage pass along."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
 
 from alloc.allocators.contract.search import Search
 from alloc.allocators.contract.tolerance import PROVEN
+from alloc.allocators.exact.local_search import LocalSearchPhase
+from alloc.allocators.exact.makespan.ascent import ConfigurationAscent
 from alloc.allocators.exact.makespan.configuration import ConfigurationProgramme
-from alloc.allocators.exact.makespan.repartition_search import RepartitionSearch
-from alloc.allocators.exact.model import Model
+from alloc.allocators.exact.makespan.repartition.search import RepartitionSearch
+from alloc.allocators.exact.model import FEW_PAIRS, Model
 from alloc.allocators.exact.monitor import is_over
 from alloc.allocators.exact.solver_model import Verdict, is_repeatable
-from alloc.problems import Allocation, Evaluation, agent_classes
+from alloc.problems import Allocation, Evaluation, Objective, agent_classes
+from alloc.problems.instance import FloatArray
 
 TIGHT = 1e-8
 """Relative gap at which the stage ends; well above the tolerance of 1e-9 that solvers and scores have."""
@@ -45,6 +50,12 @@ class MakespanState:
         Whether linear programmes have been used for a bound; after that, a probe tries more before the solver.
     configurations : ConfigurationProgramme or None
         None before that, and where the programme is too large.
+    price : ndarray, shape (t,), or None
+        Value of a unit of each workload by the linear programme of single agents, where that was solved.
+    ascent : ConfigurationAscent or None
+        None before it is needed.
+    local_search : LocalSearchPhase or None
+        None where the solver is quick enough by itself, or must find plans alone, or some tasks stay unserved.
     """
 
     search: Search
@@ -58,6 +69,9 @@ class MakespanState:
     unresolved: float = 0.0
     bounds_tried: bool = False
     configurations: ConfigurationProgramme | None = None
+    price: FloatArray | None = None
+    ascent: ConfigurationAscent | None = None
+    local_search: LocalSearchPhase | None = None
 
     @classmethod
     def begin(cls, search: Search, min_served: int, until_s: float, *, descent: bool) -> "MakespanState":
@@ -113,7 +127,11 @@ class MakespanState:
 
     def rule_out(self, time: float) -> None:
         """Take note that no plan has a makespan of `time` or less."""
-        self.lower = max(self.lower, self.model.next_makespan(time))
+        self.rule_out_below(self.model.next_makespan(time))
+
+    def rule_out_below(self, time: float) -> None:
+        """Take note that no plan has a makespan less than `time`."""
+        self.lower = max(self.lower, time)
         if not self.partial:
             self.search.raise_bound(min(self.lower, self.upper))
 
@@ -131,7 +149,22 @@ class MakespanState:
         served = len(self.model.tasks) - len(score.unserved_tasks)
         return served >= self.model.min_served and score.served_makespan <= time * (1 + TIGHT / 4)
 
-    def share_s(self, share: float, least_s: float = 0.3) -> float:
+    @contextmanager
+    def with_local_search(self) -> Iterator[None]:
+        """Have local search at hand in the block."""
+        if not self.descent or self.partial or len(self.model.class_of_pair) <= FEW_PAIRS:
+            yield
+            return
+        with LocalSearchPhase(self.search, Objective.MAKESPAN, self.until_s) as self.local_search:
+            yield
+        self.local_search = None
+
+    def search_locally(self, share: float) -> None:
+        """Improve the fastest plan by local search for this share of the time, where it is at hand."""
+        if self.local_search is not None and not self.ended:
+            self.local_search.turn(self.share_s(share, 0.05))
+
+    def share_s(self, share: float, least_s: float = 0.1) -> float:
         """Return this share of the stage's time in seconds, at least `least_s`; ``inf`` where effort is counted."""
         if self.repeatable:
             return float("inf")

@@ -41,7 +41,6 @@ class Agents(NamedTuple):
     task : ndarray of int, shape (n,)
         Task of each agent, -1 for none; changed in place.
     position : ndarray, shape (origins, 3)
-        In `unit`.
     longest_distance, battery, radius : ndarray, shape (origins,)
         Limits with tolerance, and the distance beyond which no task is within reach.
     list_of : ndarray of int, shape (origins,)
@@ -50,7 +49,7 @@ class Agents(NamedTuple):
         Lists of tasks as a compressed sparse row.
     listed_distance : ndarray
         How far each listed task is, all being within reach; empty where coordinates give that.
-    unit, energy_per_distance : float
+    energy_per_distance : float
     """
 
     origin: Indices
@@ -65,7 +64,6 @@ class Agents(NamedTuple):
     list_begin: Indices
     listed_task: Indices
     listed_distance: Floats
-    unit: float
     energy_per_distance: float
 
 
@@ -99,7 +97,6 @@ class TreeGreedy:
             battery=reach.battery + TOLERANCE,
             radius=reach.radius,
             **_lists(reach),
-            unit=1.0,
             energy_per_distance=float(reach.energy_per_distance),
         )
 
@@ -178,7 +175,7 @@ def _worst_of_list(agent: int, tasks: Tasks, agents: Agents) -> tuple[int, float
             if agents.listed_distance[entry] < horizon:
                 best, best_distance = j, agents.listed_distance[entry]
             continue
-        distance = _distance(agents.position[origin], tasks.position[j], agents.unit)
+        distance = _distance(agents.position[origin], tasks.position[j])
         if _is_reachable(distance, longest, battery, rate, horizon):
             best, best_distance = j, distance
     return best, best_distance
@@ -188,13 +185,13 @@ def _worst_of_list(agent: int, tasks: Tasks, agents: Agents) -> tuple[int, float
 def _worst_in_tree(agent: int, tree: Tree, tasks: Tasks, agents: Agents, stack: Indices) -> tuple[int, float]:
     """Return the worst-served task within reach, and its distance; -1 if there is none."""
     begin, end, low, high, order, worst = tree.begin, tree.end, tree.low, tree.high, tree.order, tree.worst
-    positions, coverage, rank, unit = tasks.position, tasks.coverage, tasks.rank, agents.unit
+    positions, coverage, rank = tasks.position, tasks.coverage, tasks.rank
     origin = agents.origin[agent]
     longest, battery, horizon = agents.longest_distance[origin], agents.battery[origin], agents.horizon[agent]
     rate = agents.energy_per_distance
     position = agents.position[origin]
     is_unknown = np.isnan(position[0])
-    limit = min(agents.radius[origin], horizon) / unit
+    limit = min(agents.radius[origin], horizon)
     best, best_distance = -1, 0.0
     size, stack[0] = 1, 0
     while size > 0:
@@ -205,7 +202,7 @@ def _worst_in_tree(agent: int, tree: Tree, tasks: Tasks, agents: Agents, stack: 
             continue
         if not is_unknown and _is_beyond(position, low[node], high[node], limit):
             continue
-        distance = _distance(position, positions[j], unit)
+        distance = _distance(position, positions[j])
         if _is_reachable(distance, longest, battery, rate, horizon):
             best, best_distance = j, distance
         elif 2 * node + 2 < len(begin):
@@ -219,7 +216,7 @@ def _worst_in_tree(agent: int, tree: Tree, tasks: Tasks, agents: Agents, stack: 
                 j = order[entry]
                 if best >= 0 and not is_worse(j, best, coverage, rank):
                     continue
-                distance = _distance(position, positions[j], unit)
+                distance = _distance(position, positions[j])
                 if _is_reachable(distance, longest, battery, rate, horizon):
                     best, best_distance = j, distance
     return best, best_distance
@@ -232,13 +229,11 @@ def _is_reachable(distance: float, longest: float, battery: float, energy_per_di
 
 
 @compiled
-def _distance(one: Floats, other: Floats, unit: float) -> float:
+def _distance(one: Floats, other: Floats) -> float:
     """Return the distance as in `alloc.problems.distances.metric`, to the last bit."""
     x, y, z = one[0] - other[0], one[1] - other[1], one[2] - other[2]
     distance = float(np.sqrt(x * x + y * y + z * z))
-    if np.isnan(distance):
-        return 0.0
-    return distance if unit == 1.0 else min(distance * unit, 1.7976931348623157e308)
+    return 0.0 if np.isnan(distance) else distance
 
 
 @compiled

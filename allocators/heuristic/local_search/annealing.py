@@ -17,6 +17,12 @@ TRIES = 30
 ANY_TASK_PERIOD = 8
 """One in so many exchanges is with any task, not with a candidate."""
 
+PRICE_GROWTH = 0.3
+"""Relative rise of the price of a task with each exchange that leaves it short, per relative shortfall."""
+
+HIGHEST_PRICE = 1e6
+"""Highest price, where the mean is 1 when the search for a target makespan begins."""
+
 SMALLEST_GAIN = 1e-10
 """Relative improvement of the cost from which on a plan is saved as the best."""
 
@@ -43,6 +49,13 @@ def draw_helper(arrays: InstanceArrays, plan: Plan, task: int) -> int:
 
 
 @compiled
+def raise_price(plan: Plan, task: int) -> None:
+    """Raise the price of a short task, so that its shortfall goes on to tasks that can make up for it."""
+    shortfall = 1.0 - plan.group_ability[task] / plan.demand[task]
+    plan.price[task] = min(plan.price[task] * (1.0 + PRICE_GROWTH * shortfall), HIGHEST_PRICE)
+
+
+@compiled
 def anneal(
     arrays: InstanceArrays,
     plan: Plan,
@@ -55,8 +68,14 @@ def anneal(
 ) -> float:
     """Make `steps` exchanges, the noise multiplied by `cooling` before each; return the last noise.
 
-    Where cost has no weight, only exchanges with short tasks are made, until there is none; otherwise the plan of
-    least cost without a shortfall is saved.
+    A task that stays short rises in price: shortfalls go on, over any number of tasks, to where agents are cheap, as in
+    auctions. Where cost has no weight, only exchanges with short tasks are made, until there is none; otherwise the
+    plan of least cost without a shortfall is saved.
+
+    References
+    ----------
+    Penalties that rise where a constraint stays violated: Morris (1993), AAAI-93, 40-45; Yagiura, Ibaraki and Glover
+    (2004), doi:10.1287/ijoc.1030.0036.
     """
     tasks, agents = plan.demand.shape[0] - 1, plan.group_of_agent.shape[0]
     noise = weights.noise
@@ -90,6 +109,8 @@ def anneal(
         exchange(arrays, plan, work, now, makespan, agent, task, other)
         if plan.counter[FULL_GROUP] > 0:
             break
+        if plan.group_ability[task] < plan.demand[task]:
+            raise_price(plan, task)
         if plan.counter[N_SHORT] == 0:
             if weights.cost == 0.0:
                 break

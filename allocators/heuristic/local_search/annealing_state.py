@@ -19,6 +19,9 @@ from alloc.allocators.heuristic.local_search.plan import (
 )
 from alloc.problems import IDLE, Allocation, Instance
 
+PRICE_DECAY = 0.99
+"""Power by which the prices of tasks fall towards 1 in each run in which the cost counts."""
+
 ROUNDING = 1e-12
 """Relative part by which demands are lowered, against rounding errors of sums."""
 
@@ -66,12 +69,14 @@ class AnnealingState:
         group = np.where(allocation.task_of_agent == IDLE, idle, allocation.task_of_agent).astype(np.int32)
         group[np.append(self.instance.workload == 0, False)[group]] = idle
         self._is_served = np.isin(np.arange(idle), group)
+        self.plan.price[:] = 1.0
         self._set_groups(group)
         self.set_target(makespan)
 
     def set_target(self, makespan: float) -> None:
-        """Keep the plan, and set another target makespan; no plan is the best then."""
-        arrays, demand = self.arrays, self.plan.demand
+        """Keep the plan and the prices, and set another target makespan; no plan is the best then."""
+        arrays, demand, price = self.arrays, self.plan.demand, self.plan.price
+        price /= np.exp(np.log(price).mean())
         self.makespan = makespan
         with np.errstate(over="ignore"):
             exact = self.instance.workload / (makespan * arrays.ability_unit) * (1 - ROUNDING)
@@ -87,6 +92,8 @@ class AnnealingState:
 
     def run(self, steps: int, weights: Weights, cooling: float = 1.0) -> float:
         """Make exchanges; return the last noise."""
+        if weights.cost > 0:
+            np.maximum(1.0, self.plan.price**PRICE_DECAY, out=self.plan.price)
         noise: float = anneal(
             self.arrays, self.plan, self.workspace, self.candidates, self.makespan, steps, weights, cooling
         )

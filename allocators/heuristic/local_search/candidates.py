@@ -72,7 +72,7 @@ def mean_candidate_cost(arrays: InstanceArrays, candidates: Candidates) -> float
     tasks = candidates.of_origin[candidates.row[rows]]
     with np.errstate(over="ignore", invalid="ignore"):
         step = arrays.origin_position[rows][:, None, :] - arrays.task_position[tasks]
-        cost = np.sqrt((step * step).sum(axis=2))[tasks >= 0] * arrays.distance_unit
+        cost = np.sqrt((step * step).sum(axis=2))[tasks >= 0]
     if len(arrays.cost) and arrays.cost is not arrays.distance:
         cost = arrays.cost[rows[:, None], tasks][tasks >= 0]
     cost = cost[np.isfinite(cost) & (cost > 0)]

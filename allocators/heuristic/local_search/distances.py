@@ -9,45 +9,6 @@ from alloc.problems.instance import FloatArray
 
 
 @compiled
-def compute_distance(
-    origin_position: FloatArray,
-    task_position: FloatArray,
-    longest_distance: FloatArray,
-    battery: FloatArray,
-    list_begin: NDArray[np.int64],
-    listed_task: Int32Array,
-    distance_unit: float,
-    energy_per_distance: float,
-    origin: int,
-    task: int,
-) -> float:
-    """Return the distance from an origin to a task, ``inf`` where it is out of reach, bit for bit as `Reach` does.
-
-    Takes arrays rather than `InstanceArrays`, as passing that costs more than the distance.
-    """
-    total = 0.0
-    for axis in range(3):
-        step = origin_position[origin, axis] - task_position[task, axis]
-        total += step * step
-    distance: float = np.sqrt(total) * distance_unit
-    if np.isnan(distance):
-        distance = 0.0
-    distance = min(distance, 1.7976931348623157e308)
-    if not distance <= longest_distance[origin] or not energy_per_distance * distance <= battery[origin]:
-        return np.inf
-    low, high = list_begin[origin], list_begin[origin + 1]
-    if low == high:
-        return distance
-    while low < high:
-        middle = (low + high) // 2
-        if listed_task[middle] < task:
-            low = middle + 1
-        else:
-            high = middle
-    return distance if low < list_begin[origin + 1] and listed_task[low] == task else np.inf
-
-
-@compiled
 def listed_entry(list_begin: NDArray[np.int64], listed_task: Int32Array, origin: int, task: int) -> int:
     """Return where a task stands in the list of an origin, -1 if it does not."""
     low, high = list_begin[origin], list_begin[origin + 1]
@@ -61,6 +22,36 @@ def listed_entry(list_begin: NDArray[np.int64], listed_task: Int32Array, origin:
     return low if low < end and listed_task[low] == task else -1
 
 
+@compiled
+def compute_distance(
+    origin_position: FloatArray,
+    task_position: FloatArray,
+    longest_distance: FloatArray,
+    battery: FloatArray,
+    list_begin: NDArray[np.int64],
+    listed_task: Int32Array,
+    energy_per_distance: float,
+    origin: int,
+    task: int,
+) -> float:
+    """Return the distance from an origin to a task, ``inf`` where it is out of reach, bit for bit as `Reach` does.
+
+    Takes arrays rather than `InstanceArrays`, as passing that costs more than the distance.
+    """
+    total = 0.0
+    for axis in range(3):
+        step = origin_position[origin, axis] - task_position[task, axis]
+        total += step * step
+    distance: float = np.sqrt(total)
+    if np.isnan(distance):
+        distance = 0.0
+    distance = min(distance, 1.7976931348623157e308)
+    if not distance <= longest_distance[origin] or not energy_per_distance * distance <= battery[origin]:
+        return np.inf
+    is_listed = list_begin[origin] == list_begin[origin + 1] or listed_entry(list_begin, listed_task, origin, task) >= 0
+    return distance if is_listed else np.inf
+
+
 @inlined
 def untabulated_distance(arrays: InstanceArrays, origin: int, task: int) -> float:
     """Return the distance from an origin to a task without the table."""
@@ -71,7 +62,6 @@ def untabulated_distance(arrays: InstanceArrays, origin: int, task: int) -> floa
         arrays.battery,
         arrays.list_begin,
         arrays.listed_task,
-        arrays.distance_unit,
         arrays.energy_per_distance,
         origin,
         task,

@@ -11,6 +11,8 @@ from alloc.allocators.heuristic.local_search.plan import (
     POOL_BY_HALVES,
     POOL_BY_SUMS,
     POOL_ENUMERATED,
+    POOL_TRAVELLING,
+    Needs,
     Plan,
     Weights,
     Workspace,
@@ -43,7 +45,7 @@ def add_to_pool(
     origins, ability, hours_per_distance = arrays.origin, arrays.ability, arrays.hours_per_distance
     table, costs_of, starts, goals = arrays.distance, arrays.cost, arrays.origin_position, arrays.task_position
     longest, battery, rate = arrays.longest_distance, arrays.battery, arrays.energy_per_distance
-    list_begin, listed, unit = arrays.list_begin, arrays.listed_task, arrays.distance_unit
+    list_begin, listed = arrays.list_begin, arrays.listed_task
     agents, contribution, other_contribution = work.agent, work.ability, work.other_ability
     listed_distance, listed_cost = arrays.listed_distance, arrays.listed_cost
     extra, costs, logistic = work.extra_cost, work.cost, work.logistic
@@ -71,9 +73,9 @@ def add_to_pool(
                     continue
                 there, cost_there = listed_distance[entry], listed_cost[entry]
         else:
-            here = compute_distance(starts, goals, longest, battery, list_begin, listed, unit, rate, row, task)
+            here = compute_distance(starts, goals, longest, battery, list_begin, listed, rate, row, task)
             if other != idle:
-                there = compute_distance(starts, goals, longest, battery, list_begin, listed, unit, rate, row, other)
+                there = compute_distance(starts, goals, longest, battery, list_begin, listed, rate, row, other)
             cost_here, cost_there = here, there
         if here == np.inf or there == np.inf:
             continue
@@ -107,10 +109,11 @@ def exchange(
         task, other = other, task
     by_sums = weights.integer_ability * POOL_BY_SUMS < MOST_SUMS
     most = POOL_BY_SUMS // 2 if by_sums else POOL_BY_HALVES // 2
-    if plan.size[task] + plan.size[other] <= POOL_ENUMERATED:
-        most = POOL_ENUMERATED
+    enumerated = POOL_ENUMERATED if arrays.instant_travel else POOL_TRAVELLING
+    if plan.size[task] + plan.size[other] <= enumerated:
+        most = enumerated
     elif not arrays.instant_travel:  # contributions depend on the task, so that meeting in the middle does not apply
-        most = POOL_ENUMERATED // 2
+        most = enumerated // 2
     pool: int = np.int64(0)  # type: ignore[assignment]
     for group in (task, other):
         if plan.size[group] > 0:
@@ -128,16 +131,20 @@ def exchange(
             members += 1
         else:
             other_missing += work.other_ability[index]
-    all_in_pool = members == plan.size[task] and plan.demand[task] > 0.0
-    other_all_in_pool = pool - members == plan.size[other] and plan.demand[other] > 0.0
+    needs = Needs(
+        missing=missing,
+        other_missing=other_missing,
+        price=plan.price[task],
+        other_price=plan.price[other],
+        all_in_pool=members == plan.size[task] and plan.demand[task] > 0.0,
+        other_all_in_pool=pool - members == plan.size[other] and plan.demand[other] > 0.0,
+    )
     most_needed = missing if other == plan.demand.shape[0] - 1 else max(missing, total - other_missing)
     largest_sum = int(max(0.0, min(total, most_needed + weights.surplus)))
     if by_sums and (pool > POOL_ENUMERATED or pool * largest_sum < 2 << pool):
-        subset = best_by_sums(
-            work, weights, pool, largest_sum, total, missing, other_missing, all_in_pool, other_all_in_pool
-        )
+        subset = best_by_sums(work, weights, pool, largest_sum, total, needs)
     elif pool > POOL_ENUMERATED:
-        subset = best_by_halves(work, weights, pool, missing, other_missing)
+        subset = best_by_halves(work, weights, pool, needs)
     else:
-        subset = best_by_enumeration(work, weights, pool, missing, other_missing, all_in_pool, other_all_in_pool)
+        subset = best_by_enumeration(work, weights, pool, needs)
     apply_subset(plan, work, pool, subset, task, other)

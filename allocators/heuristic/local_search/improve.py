@@ -22,6 +22,10 @@ HARD_FROM = 0.95
 FIRST_CYCLE_SHARE = 0.1
 """Part of a long budget for a first annealing cycle, so that a run that is stopped early has a good plan."""
 
+PATIENCE, LEAST_SHARE = 3.0, 0.2
+"""Time without a smaller makespan, as a multiple of the time until then, and share of the time for it, after which the
+energy has its turn."""
+
 REPORT_INTERVAL = 20.0
 """Time between two reports, as a multiple of the time that scoring one plan takes."""
 
@@ -66,7 +70,10 @@ def improve(
         _improve_endlessly(search, parameters, clock)
         return
     state = AnnealingState(search.instance, search.seed, parameters.neighbours)
-    reduce_makespan(search, state, parameters, clock.part(parameters.makespan_share) if energy_counts else clock)
+    if energy_counts:
+        reduce_makespan(search, state, parameters, clock.part(parameters.makespan_share), patience=PATIENCE)
+    else:
+        reduce_makespan(search, state, parameters, clock)
     if energy_counts and clock.is_long:
         reduce_energy(search, state, parameters, clock.part(FIRST_CYCLE_SHARE))
     if energy_counts:
@@ -83,16 +90,29 @@ def _improve_endlessly(search: Search, parameters: LocalSearchParameters, clock:
         cycle *= 2
 
 
-def reduce_makespan(search: Search, state: AnnealingState, parameters: LocalSearchParameters, clock: Clock) -> None:
-    """Attempt target makespans between the lower bound and the best, closer to the best after each failure."""
+def reduce_makespan(
+    search: Search,
+    state: AnnealingState,
+    parameters: LocalSearchParameters,
+    clock: Clock,
+    *,
+    patience: float | None = None,
+) -> None:
+    """Attempt target makespans between the lower bound and the best, closer to the best after each failure.
+
+    With `patience`, ends early when the last improvement was that many times as long ago as it took, but not in the
+    first `LEAST_SHARE` of the clock.
+    """
     assert search.fastest is not None
     state.begin(search.fastest.allocation, search.fastest.evaluation.served_makespan)
-    iterations, fraction, attempts = float(parameters.attempt_iterations), 0.0, 0
+    iterations, fraction, attempts, improved = float(parameters.attempt_iterations), 0.0, 0, 0.0
     while not clock.is_over and not search.fast_enough:
         fastest = search.fastest.evaluation
         best = fastest.served_makespan
         bound = min(search.lower_bound, best) if fastest.makespan is not None else 0.5 * best
         if bound >= best * (1 - RELATIVE_TOLERANCE):
+            return
+        if patience is not None and clock.progress > max(LEAST_SHARE, (1 + patience) * improved):
             return
         initial = parameters.attempt_noise[attempts % len(parameters.attempt_noise)]
         noise = state.mean_ability * np.geomspace(initial, parameters.attempt_final_noise, int(iterations) + 1)[1:]
@@ -100,6 +120,8 @@ def reduce_makespan(search: Search, state: AnnealingState, parameters: LocalSear
         fraction = 0.5 * fraction if reached else min(0.5 * (1 + fraction), 0.999)
         iterations *= 1.0 if reached else parameters.attempt_growth
         attempts += 1
+        if search.fastest.evaluation.served_makespan < best:
+            improved = clock.progress
 
 
 def _attempt(

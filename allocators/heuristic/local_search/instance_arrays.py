@@ -36,14 +36,14 @@ class InstanceArrays(NamedTuple):
     cost : ndarray, as `distance`
         Costs, see `Reach.costs`; the same array where they are distances.
     origin_position, task_position : ndarray, shape (origins, 3) and (m, 3)
-        Coordinates, in `distance_unit`; NaN where unknown.
+        Coordinates; NaN where unknown.
     longest_distance, battery : ndarray, shape (origins,)
         Limits on distance and on energy, tolerance included.
     list_begin, listed_task : ndarray of int, shape (origins + 1,) and (total,)
         Tasks that agents of each origin may do, sorted, as a compressed sparse row; an empty row allows all tasks.
     listed_distance, listed_cost : ndarray, shape (total,) or (0,)
         Distances and costs of these tasks, which are all within reach, where coordinates do not give them.
-    distance_unit, energy_per_distance, ability_unit : float
+    energy_per_distance, ability_unit : float
     integer_ability : bool
         Whether all abilities are integers in `ability_unit`, and travel takes no time.
     instant_travel : bool
@@ -63,7 +63,6 @@ class InstanceArrays(NamedTuple):
     listed_task: Int32Array
     listed_distance: FloatArray
     listed_cost: FloatArray
-    distance_unit: float
     energy_per_distance: float
     ability_unit: float
     integer_ability: bool
@@ -91,7 +90,6 @@ def instance_arrays(instance: Instance) -> InstanceArrays:
         listed_task=listed_task,
         listed_distance=listed_distance,
         listed_cost=listed_cost,
-        distance_unit=1.0,
         energy_per_distance=reach.energy_per_distance,
         ability_unit=scale,
         integer_ability=unit is not None,

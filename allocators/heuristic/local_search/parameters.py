@@ -7,6 +7,9 @@ from alloc.allocators.contract.parameters import CheckedParameters, bounded
 from alloc.allocators.heuristic.local_search.annealing_state import AnnealingState
 from alloc.allocators.heuristic.local_search.plan import Weights
 
+FLIGHTS = 2.6
+"""Mean flights of the current plan that count as much as one to a candidate task, where agents must fly far."""
+
 
 @dataclass(frozen=True)
 class LocalSearchParameters(CheckedParameters):
@@ -44,7 +47,7 @@ class LocalSearchParameters(CheckedParameters):
     final_noise: float = bounded(0.007, low=0, above=True)
     short_task_penalty: float = bounded(1.2, low=0)
     shortfall_penalty: float = bounded(5.0, low=0)
-    attempt_noise: tuple[float, ...] = bounded((0.1, 0.01, 0.001), low=0, above=True)
+    attempt_noise: tuple[float, ...] = bounded((0.1, 0.01, 0.03, 0.001), low=0, above=True)
     attempt_final_noise: float = bounded(1e-6, low=0, above=True)
     attempt_iterations: int = bounded(4, low=1)
     attempt_growth: float = bounded(1.2, low=1)
@@ -60,13 +63,14 @@ class LocalSearchParameters(CheckedParameters):
         ----------
         state : AnnealingState
         noise : float
-            Relative to the mean distance to a candidate task.
+            Relative to the mean distance to a candidate task, or to `FLIGHTS` mean flights where those are longer.
         penalty_factor : float
             Factor on both penalties.
         """
         unit = penalty_factor * max(state.candidate_cost, state.cost / state.instance.n)
         shortfall = self.shortfall_penalty * unit / state.mean_ability
-        return state.weights(1.0, noise * state.candidate_cost, self.short_task_penalty * unit, shortfall)
+        noise *= max(state.candidate_cost, FLIGHTS * state.cost / state.instance.n)
+        return state.weights(1.0, noise, self.short_task_penalty * unit, shortfall)
 
     def noise_reduction(self, exchanges: float) -> float:
         """Return the factor on `initial_noise` where the budget allows so many exchanges per agent."""

@@ -14,6 +14,9 @@ POOL_BY_SUMS = 32
 POOL_ENUMERATED = 12
 """Agents in one exchange where all subsets are enumerated."""
 
+POOL_TRAVELLING = 8
+"""The same where travel takes time, so that abilities depend on the task: cheap exchanges, and many of them."""
+
 POOL_BY_HALVES = 16
 """Agents in one exchange by meeting in the middle; the subsets of both halves must fit into the workspace."""
 
@@ -47,6 +50,8 @@ class Plan(NamedTuple):
         Index of each agent within its group.
     demand, group_ability : ndarray, shape (m + 1,)
         Ability that each task needs to be done within the target makespan, and that its group has.
+    price : ndarray, shape (m + 1,)
+        Factor on the penalty of each unit of ability that a task lacks; rises while a task is short.
     short_task, short_position : ndarray of int, shape (m,)
         List of the tasks whose group ability is below their demand, and the position of each task on it, -1 for none.
     best_group, journal : ndarray of int, shape (n,)
@@ -66,6 +71,7 @@ class Plan(NamedTuple):
     position: Int32Array
     demand: FloatArray
     group_ability: FloatArray
+    price: FloatArray
     short_task: Int32Array
     short_position: Int32Array
     best_group: Int32Array
@@ -130,6 +136,27 @@ class Weights(NamedTuple):
     integer_ability: float
 
 
+class Needs(NamedTuple):
+    """What two tasks lack without the agents of the pool, and what it costs; the second may be the idle agents.
+
+    Attributes
+    ----------
+    missing, other_missing : float
+        Ability that each lacks.
+    price, other_price : float
+        Factor on the penalty of each unit, see `Plan.price`.
+    all_in_pool, other_all_in_pool : bool
+        Whether all agents of a task are in the pool, so that it may become unserved.
+    """
+
+    missing: float
+    other_missing: float
+    price: float
+    other_price: float
+    all_in_pool: bool
+    other_all_in_pool: bool
+
+
 def group_slots(
     group_of_agent: Int32Array, groups: int, least: NDArray[np.int64]
 ) -> tuple[Int32Array, NDArray[np.int64], Int32Array, Int32Array]:
@@ -158,6 +185,7 @@ def idle_plan(n: int, m: int, random: NDArray[np.uint64]) -> Plan:
         position=np.zeros(n, dtype=int32),
         demand=np.zeros(m + 1),
         group_ability=np.zeros(m + 1),
+        price=np.ones(m + 1),
         short_task=np.zeros(m, dtype=int32),
         short_position=np.full(m, -1, dtype=int32),
         best_group=np.full(n, m, dtype=int32),

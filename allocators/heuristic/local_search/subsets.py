@@ -1,13 +1,12 @@
 """The cheapest subset of a pool of agents for one of two tasks, the rest being for the other; compiled.
 
 A subset is a bit mask over the pool. Its cost is that of its agents (`Workspace.cost`) and the penalties of both tasks'
-shortfalls. `missing` and `other_missing` are the abilities that each task would lack without any agent of the pool;
-`all_in_pool` and `other_all_in_pool` tell whether all agents of a task are in the pool, so that it may become unserved.
+shortfalls, which follow from their `Needs`.
 """
 
 import numpy as np
 
-from alloc.allocators.heuristic.local_search.plan import MOST_SUMS, POOL_BY_HALVES, Weights, Workspace
+from alloc.allocators.heuristic.local_search.plan import MOST_SUMS, POOL_BY_HALVES, Needs, Weights, Workspace
 from alloc.allocators.runtime.compiled import compiled
 
 UNSERVED_PENALTY = 1e12
@@ -21,11 +20,11 @@ UNREACHABLE = 1e300
 
 
 @compiled
-def penalty(weights: Weights, shortfall: float, is_unserved: bool) -> float:
+def penalty(weights: Weights, price: float, shortfall: float, is_unserved: bool) -> float:
     """Return the penalty of the shortfall of one task."""
     if shortfall <= 0.0:
         return 0.0
-    return weights.short_task + weights.shortfall * shortfall + (UNSERVED_PENALTY if is_unserved else 0.0)
+    return weights.short_task + price * weights.shortfall * shortfall + (UNSERVED_PENALTY if is_unserved else 0.0)
 
 
 @compiled
@@ -35,30 +34,28 @@ def best_by_sums(
     pool: int,
     largest_sum: int,
     total: float,
-    missing: float,
-    other_missing: float,
-    all_in_pool: bool,
-    other_all_in_pool: bool,
+    needs: Needs,
 ) -> np.uint64:
     """Return the cheapest subset by dynamic programming over integer sums of abilities.
 
     For each sum up to `largest_sum`, the cheapest subset of the first k agents is known, for growing k. Indices are
     unsigned, which spares the compiler checks for negative ones.
     """
+    missing, other_missing, price, other_price, all_in_pool, other_all_in_pool = needs
     cost, sets, sizes, costs = work.sum_cost, work.sum_set, work.ability, work.cost
     old, new = np.uint64(0), np.uint64(MOST_SUMS)
     one, top = np.uint64(1), np.uint64(0)
     last = np.uint64(largest_sum)
     cost[0], sets[0] = 0.0, np.uint64(0)
     for index in range(pool):
-        size, price, bit = np.uint64(sizes[index]), costs[index], one << np.uint64(index)
+        size, extra, bit = np.uint64(sizes[index]), costs[index], one << np.uint64(index)
         reach = min(last, top + size)
         for entry in range(top + one, reach + one):
             cost[old + entry], sets[old + entry] = UNREACHABLE, np.uint64(0)
         for entry in range(np.uint64(0), min(size, reach + one)):
             cost[new + entry], sets[new + entry] = cost[old + entry], sets[old + entry]
         for entry in range(size, reach + one):
-            without, with_it = cost[old + entry], cost[old + entry - size] + price
+            without, with_it = cost[old + entry], cost[old + entry - size] + extra
             cheaper = with_it < without
             cost[new + entry] = with_it if cheaper else without
             sets[new + entry] = (sets[old + entry - size] | bit) if cheaper else sets[old + entry]
@@ -66,44 +63,37 @@ def best_by_sums(
         old, new = new, old
     best, subset = np.inf, np.uint64(0)
     for entry in range(int(top) + 1):
-        value = cost[old + np.uint64(entry)] + penalty(weights, missing - entry, all_in_pool and entry == 0)
-        value += penalty(weights, other_missing - (total - entry), other_all_in_pool and entry == total)
+        value = cost[old + np.uint64(entry)] + penalty(weights, price, missing - entry, all_in_pool and entry == 0)
+        value += penalty(weights, other_price, other_missing - (total - entry), other_all_in_pool and entry == total)
         if value < best:
             best, subset = value, sets[old + np.uint64(entry)]
     return subset
 
 
 @compiled
-def best_by_enumeration(
-    work: Workspace,
-    weights: Weights,
-    pool: int,
-    missing: float,
-    other_missing: float,
-    all_in_pool: bool,
-    other_all_in_pool: bool,
-) -> np.uint64:
+def best_by_enumeration(work: Workspace, weights: Weights, pool: int, needs: Needs) -> np.uint64:
     """Return the cheapest of all 2^pool subsets."""
+    missing, other_missing, price, other_price, all_in_pool, other_all_in_pool = needs
     ability, other, cost = work.subset_ability, work.subset_other_ability, work.subset_cost
     ability[0], cost[0], other[0] = 0.0, 0.0, 0.0
     for index in range(pool):
         other[0] += work.other_ability[index]
     for index in range(pool):
         half = 1 << index
-        more, less, price = work.ability[index], work.other_ability[index], work.cost[index]
+        more, less, extra = work.ability[index], work.other_ability[index], work.cost[index]
         for entry in range(half):
             ability[half + entry] = ability[entry] + more
             other[half + entry] = other[entry] - less
-            cost[half + entry] = cost[entry] + price
+            cost[half + entry] = cost[entry] + extra
     count = 1 << pool
     best, subset = np.inf, 0
     for entry in range(count):
         shortfall, other_shortfall = missing - ability[entry], other_missing - other[entry]
         value = cost[entry]
         if shortfall > 0.0:
-            value += penalty(weights, shortfall, all_in_pool and entry == 0)
+            value += penalty(weights, price, shortfall, all_in_pool and entry == 0)
         if other_shortfall > 0.0:
-            value += penalty(weights, other_shortfall, other_all_in_pool and entry == count - 1)
+            value += penalty(weights, other_price, other_shortfall, other_all_in_pool and entry == count - 1)
         if value < best:
             best, subset = value, entry
     return np.uint64(subset)
@@ -137,7 +127,7 @@ def sorted_subsets(work: Workspace, begin: int, count: int, base: int) -> int:
 
 
 @compiled
-def best_by_halves(work: Workspace, weights: Weights, pool: int, missing: float, other_missing: float) -> np.uint64:
+def best_by_halves(work: Workspace, weights: Weights, pool: int, needs: Needs) -> np.uint64:
     """Return the cheapest of the subsets that barely suffice, by meeting in the middle.
 
     With the subsets of both halves of the pool sorted, the subsets of the second half that complete each of the first
@@ -147,6 +137,7 @@ def best_by_halves(work: Workspace, weights: Weights, pool: int, missing: float,
     ----------
     Horowitz and Sahni (1974), doi:10.1145/321812.321823.
     """
+    missing, other_missing, price, other_price, _, _ = needs
     ability, other = work.subset_ability, work.subset_other_ability
     cost, bits = work.subset_cost, work.subset_bits
     middle = 1 << (POOL_BY_HALVES // 2)
@@ -160,8 +151,8 @@ def best_by_halves(work: Workspace, weights: Weights, pool: int, missing: float,
         while enough > 0 and ability[entry] + ability[middle + enough - 1] >= missing:
             enough -= 1
         for fit in range(middle + max(0, enough - 1), middle + min(other_size, enough + LOOKAHEAD)):
-            value = cost[entry] + cost[fit] + penalty(weights, missing - ability[entry] - ability[fit], False)
-            value += penalty(weights, other_missing - (total - other[entry] - other[fit]), False)
+            value = cost[entry] + cost[fit] + penalty(weights, price, missing - ability[entry] - ability[fit], False)
+            value += penalty(weights, other_price, other_missing - (total - other[entry] - other[fit]), False)
             if value < best:
                 best, subset = value, bits[entry] | bits[fit]
     return np.uint64(subset)

@@ -11,7 +11,7 @@ import torch
 from alloc.allocators.learned.network.state_dict import StateDict
 from alloc.problems import InputError
 from alloc.problems.formats import write_bytes_atomically
-from alloc.problems.formats.files import reason
+from alloc.problems.formats.messages import reason
 
 CHECKPOINT_FORMAT = "alloc-checkpoint/3"
 

@@ -44,10 +44,10 @@ def save_policy(
         "version": version("alloc-mrta"),
         "training": json.dumps(dict(training or {})),
     }
-    write_bytes_atomically(path, _sorted(save(tensors, metadata=metadata)))
+    write_bytes_atomically(path, sorted_metadata(save(tensors, metadata=metadata)))
 
 
-def _sorted(data: bytes) -> bytes:
+def sorted_metadata(data: bytes) -> bytes:
     """Return a safetensors file with its metadata sorted; the library writes them in random order."""
     end = 8 + int.from_bytes(data[:8], "little")
     header = json.loads(data[8:end])

@@ -7,7 +7,7 @@ from safetensors import SafetensorError, safe_open
 
 from alloc.problems import InputError
 from alloc.problems.arguments import of_type
-from alloc.problems.formats.files import reason
+from alloc.problems.formats.messages import reason
 
 
 def read_header(path: Path | str) -> dict[str, str]:

@@ -1,6 +1,8 @@
 """The local part of the scores of `ActorCritic` in compiled loops: features of pairs, and a small network on them.
 
-The features are those of `problems.game.observation.pair_features` in single precision; tests compare the two.
+The features are those of `problems.game.observation.pair_features` in single precision. The formulas stand twice, as
+torch works on all pairs at once, and a loop on the pairs that have changed, with no array in between.
+`test_compiled_games_are_those_of_torch` holds both to the same games.
 numba before 0.68 takes the value of an IntEnum as an index, not its member.
 """
 

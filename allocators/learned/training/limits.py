@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from alloc.allocators.learned.training.report import Report, best_generation
+from alloc.problems.arguments import real, whole
 
 
 @dataclass(frozen=True)
@@ -13,11 +14,11 @@ class Limits:
     Attributes
     ----------
     steps : int or None
-        Decisions of agents, of all members together.
+        Decisions of agents, of all members together, >= 0.
     iterations : int or None
-        Generations.
+        Generations, >= 0.
     minutes : float or None
-        Training time.
+        Training time, finite and >= 0.
     patience : int or None
         Consecutive generations without better networks.
     """
@@ -26,6 +27,12 @@ class Limits:
     iterations: int | None = None
     minutes: float | None = None
     patience: int | None = None
+
+    def __post_init__(self) -> None:
+        for name, check in (("steps", whole), ("iterations", whole), ("minutes", real), ("patience", whole)):
+            value = getattr(self, name)
+            if value is not None:
+                object.__setattr__(self, name, check(value, name))
 
     def progress(self, history: Sequence[Report]) -> float:
         """Return the share of the training that is done, 0 to 1: of the steps, else the generations, else the time."""

@@ -5,13 +5,14 @@ from collections.abc import Callable
 from alloc.allocators.learned.files.run_files import RunFiles
 from alloc.allocators.learned.files.training_log import TrainingLog
 from alloc.allocators.learned.training.limits import Limits
+from alloc.allocators.learned.training.population import PopulationTraining
 from alloc.allocators.learned.training.report import Report
-from alloc.allocators.learned.training.trainer import Trainer
-from alloc.allocators.parallel.engine import Engine, never_stop
+from alloc.allocators.parallel.engine import Engine, EngineError, never_stop
+from alloc.problems import TrainingError
 
 
 def run_training(
-    trainer: Trainer,
+    trainer: PopulationTraining,
     files: RunFiles,
     limits: Limits,
     *,
@@ -26,7 +27,7 @@ def run_training(
 
     Parameters
     ----------
-    trainer : Trainer
+    trainer : PopulationTraining
     files : RunFiles
         The policy file gets the networks of all members of the best generation, the best first.
     limits : Limits
@@ -36,13 +37,18 @@ def run_training(
         As for `Engine.map`; an unfinished generation is dropped.
     on_report : callable
         Called with every `Report`.
+
+    Raises
+    ------
+    TrainingError
+        If the engine gives up; the run can be resumed.
     """
     trainer.save(files.checkpoint)
     if trainer.best:
         trainer.write_policy(files.policy)
     with TrainingLog(Report, files.log, files.tensorboard, trainer.history) as lines:
         while not trainer.is_over(limits) and not should_stop():
-            report = trainer.advance(limits, engine, should_stop)
+            report = _advanced(trainer, files, limits, engine, should_stop)
             if report is None:
                 return
             try:
@@ -52,3 +58,18 @@ def run_training(
                     trainer.write_policy(files.policy)
             lines.append(report)
             on_report(report)
+
+
+def _advanced(
+    trainer: PopulationTraining,
+    files: RunFiles,
+    limits: Limits,
+    engine: Engine | None,
+    should_stop: Callable[[], bool],
+) -> Report | None:
+    """Return the report of another generation; what the engine says gets how to go on."""
+    try:
+        return trainer.advance(limits, engine, should_stop)
+    except EngineError as error:
+        kept = f"{files.checkpoint} holds {trainer.generation} generations, and resuming goes on from them"
+        raise TrainingError(f"{error}; {kept}") from error

@@ -9,8 +9,9 @@ from alloc.allocators.learned.algorithms.registry import method_parameters
 from alloc.allocators.learned.files.policy_header import read_header
 from alloc.allocators.learned.files.run_files import RunFiles
 from alloc.allocators.learned.training.families import check_families
-from alloc.allocators.parallel.engine import Engine, EngineError, never_stop
-from alloc.problems import InputError, Instance, TrainingError
+from alloc.allocators.parallel.engine import Engine, never_stop
+from alloc.problems import InputError, Instance
+from alloc.problems.arguments import real
 
 if TYPE_CHECKING:
     from alloc.allocators.learned.training.limits import Limits
@@ -115,6 +116,7 @@ def train(
     """
     learner = _hyperparameters(method, parameters)
     check_families(families)
+    minutes = None if minutes is None else real(minutes, "minutes")
     if population is not None and method != "gappo":
         raise InputError(f"{method} trains one network; gappo breeds several", "population")
     if init is not None:
@@ -128,21 +130,17 @@ def train(
 
     if tensorboard is not None:
         summary_writer()  # raises where TensorBoard is not installed; a writer would already purge its folder
+    if steps is None and minutes is None and iterations is None:
+        steps = DEFAULT_STEPS
+    limits = Limits(steps, iterations, minutes, patience)
     size = (population or DEFAULT_POPULATION) if method == "gappo" else 1
     trainer = new_trainer(
         method, learner, size, decisions, families, turn=turn, reward=reward, seed=seed, instances=instances, init=init
     )
     if resume:
         trainer.resume(files.checkpoint)
-    if steps is None and minutes is None and iterations is None:
-        steps = DEFAULT_STEPS
-    limits = Limits(steps, iterations, minutes, patience)
     on_start(trainer, limits)
-    try:
-        run_training(trainer, files, limits, engine=engine, should_stop=should_stop, on_report=on_report)
-    except EngineError as error:
-        kept = f"{files.checkpoint} holds {trainer.generation} generations, and resuming goes on from them"
-        raise TrainingError(f"{error}; {kept}") from error
+    run_training(trainer, files, limits, engine=engine, should_stop=should_stop, on_report=on_report)
     return trainer
 
 

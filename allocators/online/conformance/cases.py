@@ -5,6 +5,7 @@ from functools import cache
 import numpy as np
 
 from alloc.problems import Event, Instance, Mission, MissionParameters, Radio, random_mission
+from alloc.problems.missions.events import EventKind
 from alloc.problems.vocabulary import Knowledge, MissionFamily
 
 FAMILIES = (MissionFamily.STEADY, MissionFamily.RECHARGING, MissionFamily.DEADLINES, MissionFamily.SILENCE)
@@ -30,11 +31,12 @@ def short_of_energy(knowledge: Knowledge, horizon: float = 8.0) -> Mission:
 
 
 def _instance(last: tuple[float, float], workload: float, battery: float = 30.0) -> Instance:
+    places: list[tuple[float, float]] = [(0, 0), (0.1, 0.2), (0.3, 0.1), (0.2, 0.4), (1, 1), last]
     return Instance(
         ability=[1, 2, 3],
         workload=[2, 3, 4, 2, 3, workload],
         agent_position=[[0.1, 0.1], [0.2, 0.1], [0.1, 0.3]],
-        task_position=[[0, 0], [0.1, 0.2], [0.3, 0.1], [0.2, 0.4], [1, 1], last],
+        task_position=places,
         speed=[0.4, 0.4, 0.4],
         battery=[battery] * 3,
         energy_per_distance=6.0,
@@ -50,7 +52,10 @@ def futures(knowledge: Knowledge) -> tuple[Mission, Mission]:
     """Return two missions that are the same up to `CHANGE`: later tasks, work and failures differ."""
     appears = np.array([0, 0, 0, 0, 0, CHANGE])
     calm = _mission(_instance((0.9, 0.2), 5), knowledge, appears=appears)
-    events = [Event(CHANGE, "agent-fails", agent="a1"), Event(CHANGE, "task-changes", task="t5", workload=30)]
+    events = [
+        Event(CHANGE, EventKind.AGENT_FAILS, agent="a1"),
+        Event(CHANGE, EventKind.TASK_CHANGES, task="t5", workload=30),
+    ]
     return calm, _mission(_instance((0.2, 0.9), 1), knowledge, appears=appears, events=events)
 
 

@@ -27,7 +27,7 @@ MOST_OUT, MOST_WAITING, BY_TIME = 7, 8, 0.6
 
 @compiled
 def value(s: Situation, r: Schedule) -> float:
-    """Return what a schedule is worth, less being better: undone weight, then time, then flights and switches."""
+    """Return the value of a schedule, less being better: undone weight, then time, then flights and switches."""
     n, undone = len(s.agents), max(0.0, r.totals[0])
     switches = 0
     for i in range(n):

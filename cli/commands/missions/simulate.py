@@ -7,16 +7,17 @@ import typer
 from alloc.cli import options
 from alloc.cli.options import examples
 from alloc.cli.output.console import STANDARD, note, say, write_json
-from alloc.cli.output.files import check_outputs
+from alloc.cli.output.files import check_film, check_outputs, check_picture
 from alloc.problems.vocabulary import Knowledge
 
 if TYPE_CHECKING:
-    from alloc.problems import Mission, MissionResult
+    from alloc.problems import Course, Mission, MissionResult
 
 EXAMPLES = examples(
     "alloc simulate mission.json --policy nearest",
     "alloc simulate mission.json --policy greedy --knowledge local --seed 3 --log run.jsonl",
     "alloc simulate mission.json --policy replan --set method=greedy --knowledge full --json",
+    "alloc simulate mission.json --policy greedy --plot run.png --animate run.html",
     "alloc simulate mission.json --policy auction --runs 10 --json",
     "alloc generate mission --seed 7 --output - | alloc simulate - --policy hedonic",
     closing="Exit code 0 if all tasks are done in all runs, 1 if not. An instance is a mission in which nothing comes.",
@@ -53,32 +54,62 @@ def simulate_command(
         typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the policy; may be repeated."),
     ] = None,
     log: Annotated[str | None, typer.Option(metavar="FILE", help="Write what happens as JSON lines.")] = None,
+    plot: Annotated[
+        str | None,
+        typer.Option(metavar="FILE", help="Draw tracks, tasks, work, messages and agents: .png, .svg, .pdf."),
+    ] = None,
+    animate: Annotated[
+        str | None,
+        typer.Option(metavar="FILE", help="Write a page that plays the mission, .html, or a film: .gif, .mp4."),
+    ] = None,
     json: options.JsonOption = False,
     quiet: options.QuietOption = False,
 ) -> None:
     """Let a policy lead the agents of a mission: allocation that goes on in time."""
     from alloc.allocators import load_policy, simulate
-    from alloc.problems import read_mission, write_log
+    from alloc.problems import Recorder, read_mission, write_log
 
-    check_outputs(("--log", log), read=[("MISSION", mission)])
-    if log is not None and runs > 1:
-        raise typer.BadParameter("is for a single run", param_hint="'--log'")
+    check_files(mission, runs, {"--log": log, "--plot": plot, "--animate": animate})
     if log == STANDARD and json:
         raise typer.BadParameter("cannot go to standard output together with --json", param_hint="'--log'")
     leader = load_policy(policy, **options.values(settings))
     problem = read_mission(mission)
     results: list[MissionResult] = []
+    recorder = Recorder(with_knowledge=animate is not None) if plot or animate else None
     for number in range(seed, seed + runs):
-        run = simulate(problem, leader, knowledge=knowledge, seed=number, deadline_ms=deadline_ms or None)
+        run = simulate(
+            problem, leader, knowledge=knowledge, seed=number, deadline_ms=deadline_ms or None, observe=recorder
+        )
         results.append(run.result)
         if log is not None:
             write_log(run.log, log)
     if json:
-        documents = [result.to_dict() for result in results]
-        write_json(documents[0] if runs == 1 else documents)
+        write_json(results[0].to_dict() if runs == 1 else [result.to_dict() for result in results])
     if not quiet:
         tell(results, problem, summary=not json)
+    if recorder is not None:
+        draw(recorder.course(results[0]), plot, animate)
     raise typer.Exit(0 if all(result.is_done for result in results) else 1)
+
+
+def check_files(mission: str, runs: int, written: dict[str, str | None]) -> None:
+    """Raise an error, before anything is simulated, for a file that cannot be written, or not of several runs."""
+    check_outputs(*written.items(), read=[("MISSION", mission)])
+    check_picture(written["--plot"])
+    check_film(written["--animate"])
+    for option, path in written.items():
+        if path is not None and runs > 1:
+            raise typer.BadParameter("is for a single run", param_hint=f"'{option}'")
+
+
+def draw(course: "Course", plot: str | None, animate: str | None) -> None:
+    """Write the picture and the animation of a run that are wanted."""
+    from alloc.allocators.plotting import animate_mission, plot_mission
+
+    if plot is not None:
+        plot_mission(course, plot)
+    if animate is not None:
+        animate_mission(course, animate)
 
 
 def tell(results: "list[MissionResult]", mission: "Mission", *, summary: bool) -> None:

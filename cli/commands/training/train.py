@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from alloc.cli.commands.training import train_options as options
+from alloc.cli.commands.training.train_missions import Shared, check_no_games, train_in_missions
 from alloc.cli.commands.training.train_options import Engine
 from alloc.cli.options import SeedOption, assignments, examples
 from alloc.cli.output.console import STANDARD, complain, note, say
@@ -19,6 +20,7 @@ from alloc.problems.text import counted, number
 from alloc.problems.vocabulary import Reward, TurnRule
 
 if TYPE_CHECKING:
+    from alloc.allocators.learned.missions.training.trainer import MissionTrainer
     from alloc.allocators.learned.training.limits import Limits
     from alloc.allocators.learned.training.report import Report
     from alloc.allocators.learned.training.trainer import Trainer
@@ -29,6 +31,7 @@ EXAMPLES = examples(
     "alloc train gappo --output policy.safetensors --steps 2000000 --resume",
     "alloc train ppo --output mine.safetensors --instances my-instances --init policy.safetensors --minutes 10",
     "alloc solve demo.json --method gappo --policy policy.safetensors",
+    "alloc train gappo --missions mixed --output missions.safetensors --minutes 150",
     closing="Ctrl-C ends the training; the last complete generation is stored, and --resume continues from it to the "
     "same curve, also after a crash. With --steps or --iterations the same seed trains the same policy, on any engine; "
     "with --minutes alone the schedules follow the clock.",
@@ -49,9 +52,10 @@ def train_command(
     patience: options.PatienceOption = None,
     family: options.FamilyOption = None,
     instances: options.TrainingInstancesOption = None,
+    missions: options.MissionsOption = None,
     init: options.InitOption = None,
     population: options.PopulationOption = None,
-    generation_steps: options.GenerationStepsOption = 20_000,
+    generation_steps: options.GenerationStepsOption = None,
     former_generation_steps: options.FormerGenerationStepsOption = None,
     settings: options.HyperparametersOption = None,
     turn: options.TurnOption = TurnRule.BIDDING,
@@ -68,38 +72,62 @@ def train_command(
 ) -> None:
     """Train a learned method, with a checkpoint after each generation."""
     state, lines = _files(output, checkpoint, log, init)
-    from alloc.allocators import train
     from alloc.allocators.parallel.engines import check_engine, make_engine
 
     check_engine(engine.value, workers, address)
+    if missions is not None:
+        check_no_games(family=family, instances=instances, turn=turn, reward=reward)
     problems = None if instances is None else read_instances(instances)
-    progress = Progress(problems or [])
+    progress, size = Progress(problems or []), former_generation_steps or generation_steps
     with _failures_told(state, progress), make_engine(engine.value, workers, address, threads) as where, _interrupts():
-        train(
-            method,
-            output,
+        shared = Shared(
             steps=steps,
             minutes=minutes,
             iterations=iterations,
             patience=patience,
-            families=family or ["mixed"],
-            instances=problems,
             init=init,
             population=population,
-            decisions=former_generation_steps or generation_steps,
             parameters=assignments(settings),
-            turn=turn.value,
-            reward=reward.value,
             seed=seed,
             resume=resume,
             checkpoint=state,
             log=lines,
             tensorboard=tensorboard,
             engine=where,
-            on_start=progress.start,
-            on_report=progress.tell,
         )
+        if missions is None:
+            _train_in_games(method, output, family, problems, size, turn, reward, shared, progress)
+        else:
+            train_in_missions(method, output, missions, size, shared, progress)
     progress.close(output)
+
+
+def _train_in_games(
+    method: str,
+    output: str,
+    families: list[str] | None,
+    problems: "list[Instance] | None",
+    decisions: int | None,
+    turn: TurnRule,
+    reward: Reward,
+    shared: Shared,
+    progress: "Progress",
+) -> None:
+    """Train on families of instances, or on given ones."""
+    from alloc.allocators import train
+
+    train(
+        method,
+        output,
+        families=families or ["mixed"],
+        instances=problems,
+        decisions=decisions or 20_000,
+        turn=turn.value,
+        reward=reward.value,
+        on_start=progress.start,
+        on_report=progress.tell,
+        **shared,
+    )
 
 
 @contextmanager
@@ -138,7 +166,7 @@ class Progress:
 
     def __init__(self, instances: "Sequence[Instance]") -> None:
         self._instances = instances
-        self._trainer: Trainer | None = None
+        self._trainer: Trainer | MissionTrainer | None = None
         self._limits: Limits | None = None
 
     @property
@@ -146,7 +174,7 @@ class Progress:
         """Number of complete generations."""
         return 0 if self._trainer is None else self._trainer.generation
 
-    def start(self, trainer: "Trainer", limits: "Limits") -> None:
+    def start(self, trainer: "Trainer | MissionTrainer", limits: "Limits") -> None:
         """Note which instances are held out; a callback for `on_start`."""
         self._trainer, self._limits = trainer, limits
         if self._instances:

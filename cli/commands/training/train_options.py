@@ -29,9 +29,7 @@ StepsOption = Annotated[
         show_default=f"{STEPS}; none where --minutes or --iterations is given",
     ),
 ]
-MinutesOption = Annotated[
-    float | None, typer.Option(min=0, help="Minutes of training, including those before --resume.")
-]
+MinutesOption = Annotated[float | None, typer.Option(help="Minutes of training, including those before --resume.")]
 GenerationsOption = Annotated[
     int | None, typer.Option("--iterations", min=0, help="Generations, including those before --resume.")
 ]
@@ -54,11 +52,26 @@ TrainingInstancesOption = Annotated[
         help="Train on these instances instead; of five or more, a random fifth is held out for validation.",
     ),
 ]
+MissionsOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="FAMILY|FILE",
+        help="Train in missions instead, for alloc simulate --policy gappo: families of missions, as of "
+        "alloc generate mission, mixed for all of them, or mission files; may be repeated.",
+    ),
+]
 InitOption = Annotated[str | None, typer.Option(metavar="POLICY", help="Start from the networks of this policy file.")]
 PopulationOption = Annotated[
     int | None, typer.Option(min=1, help="Networks that are trained and bred; for gappo only.", show_default="4")
 ]
-GenerationStepsOption = Annotated[int, typer.Option(min=1, help="Decisions of agents per network and generation.")]
+GenerationStepsOption = Annotated[
+    int | None,
+    typer.Option(
+        min=1,
+        help="Decisions of agents per network and generation.",
+        show_default="20000; 60000 in missions",
+    ),
+]
 FormerGenerationStepsOption = Annotated[
     int | None, typer.Option("--lesson", min=1, hidden=True, help="Former name of --generation-steps.")
 ]

@@ -14,9 +14,13 @@ SCHEMAS = {
     "alloc-evaluation/1": "the scores that `alloc evaluate --json` prints",
     "alloc-comparison/1": "the rows that `alloc compare --json` prints",
     "alloc-policy/1": "the metadata of a policy file",
+    "alloc-mission-policy/1": "the metadata of a policy file for missions",
     "alloc-mission/1": "an instance, and what happens in time",
     "alloc-mission-result/1": "the measures that `alloc simulate --json` prints",
     "alloc-mission-log/1": "the first line of what `alloc simulate --log` writes",
+    "alloc-planner-request/1": "the lines that `alloc plan --stdio` reads",
+    "alloc-planner-orders/1": "the lines that `alloc plan --stdio` writes",
+    "alloc-planner/1": "a planner, as `alloc plan --state` saves it",
 }
 """What each format with a schema is for."""
 

@@ -73,7 +73,7 @@ def _of_task(state: MissionState, task: TaskState) -> Iterator[str]:
     grown = left - task.left if task.status is TaskStatus.OPEN and not task.begun else 0.0
     worked = max(0.0, task.left - left)
     accounted = task.done + worked + left - grown + task.cancelled + task.missed
-    if not _is_close(total, accounted, total):
+    if not _is_close(total, accounted, max(total, left)):
         yield f"{total!r} of work on {name!r} appeared or grew, but {accounted!r} is accounted for"
     if min(left, task.done, task.cancelled, task.missed, task.appeared, task.grown) < 0:
         yield f"a ledger of {name!r} is below 0"

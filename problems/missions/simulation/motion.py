@@ -130,6 +130,13 @@ def close(state: MissionState, task: TaskState, status: TaskStatus) -> None:
     task.workers.clear()
 
 
+def status_at_deadline(state: MissionState, task: TaskState) -> TaskStatus:
+    """Return what becomes of an open task at its deadline: it is missed, unless only rounding errors are left."""
+    bring_up_to_date(state, task)
+    is_done = task.left <= CLOSE * (task.appeared + task.grown)
+    return TaskStatus.DONE if is_done else TaskStatus.MISSED
+
+
 def bring_up_to_date(state: MissionState, task: TaskState) -> None:
     """Count what was worked, or grew, on an open task since it was brought up to date."""
     if task.status is TaskStatus.OPEN:

@@ -22,10 +22,10 @@ from alloc.problems.missions.simulation.changes import happen, land, obey
 from alloc.problems.missions.simulation.channel import Channel
 from alloc.problems.missions.simulation.log import Log
 from alloc.problems.missions.simulation.motion import (
-    CLOSE,
     bring_up_to_date,
     close,
     end_flights,
+    status_at_deadline,
 )
 from alloc.problems.missions.simulation.reports import Message, View
 from alloc.problems.missions.simulation.state import (
@@ -210,9 +210,7 @@ class Simulation:
             if item.task.status is TaskStatus.OPEN and item.task.version == item.version:
                 self._close(item.task, TaskStatus.DONE)
         elif isinstance(item, TaskState) and item.status is TaskStatus.OPEN:
-            bring_up_to_date(self.state, item)
-            is_done = item.left <= CLOSE * (item.appeared + item.grown)
-            self._close(item, TaskStatus.DONE if is_done else TaskStatus.MISSED)
+            self._close(item, status_at_deadline(self.state, item))
 
     def _happen(self, event: Event) -> None:
         self.log.event(event)

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Literal
 
-from alloc.problems.tables.language.measures import Measure, measure_of
-from alloc.problems.tables.language.synonyms import AGENTS, DISTANCES, KINDS, TASKS, Synonyms
+from alloc.problems.tables.language.measures import Measure, kind_of, measure_of
+from alloc.problems.tables.language.synonyms import AGENTS, BASES, DISTANCES, KINDS, TASKS, Synonyms
 
-Kind = Literal["agents", "tasks", "distances"]
+Kind = Literal["agents", "tasks", "bases", "distances"]
 
-SYNONYMS: Mapping[Kind, Synonyms] = {"agents": AGENTS, "tasks": TASKS, "distances": DISTANCES}
+SYNONYMS: Mapping[Kind, Synonyms] = {"agents": AGENTS, "tasks": TASKS, "bases": BASES, "distances": DISTANCES}
 
 BRACKETS = re.compile(r"^(.*?)\s*[\[(<]\s*([^\])>]*?)\s*[\])>]\s*(.*)$", re.DOTALL)
 TAIL = re.compile(
@@ -24,6 +24,9 @@ FILLERS = re.compile(
     r"|\s+(?:max|maximum|nominal|net|rated|est|estimated)$"
 )
 """Words that change nothing of what a column is."""
+
+USED = ("energy", "charge", "volume")
+"""Kinds of units of what agents use up."""
 
 ENDINGS = frozenset(("id", "lat", "lon"))
 """Fields that a name is of where its last word alone is, such as `Standort Lat` and `Asset ID`."""
@@ -88,6 +91,16 @@ def ranks_of(text: str, kind: Kind) -> dict[str, int]:
     return dict.fromkeys(ENDINGS & known.get(last, {}).keys(), 2) if kind != "distances" else {}
 
 
+def _ranks_by_unit(measure: Measure | None, kind: Kind, ranks: Mapping[str, int]) -> Mapping[str, int]:
+    """Return what a column may be by its name, or by a unit that says more: of what is used per distance, or held."""
+    if measure is None or kind != "agents" or kind_of(measure.top) not in USED:
+        return ranks
+    if not ranks and kind_of(measure.bottom) == "distance":
+        return {"energy_per_distance": 2}
+    is_capacity = not measure.bottom and ranks == names(kind).get("capacity") and kind_of(measure.top) != "volume"
+    return {"battery": 1} if is_capacity else ranks
+
+
 def header_of(text: str, kind: Kind) -> Header:
     """Return what a header says, its unit in brackets or behind its name."""
     bracket = BRACKETS.match(text)
@@ -95,10 +108,12 @@ def header_of(text: str, kind: Kind) -> Header:
         measure = measure_of(bracket[2])
         inner = header_of(f"{bracket[1]} {bracket[3]}".strip(), kind)
         label = "" if measure else bracket[2]
-        return Header(text, inner.ranks, measure or inner.measure, label)
+        return Header(text, _ranks_by_unit(measure, kind, inner.ranks), measure or inner.measure, label)
     tail = TAIL.match(text)
     measure = measure_of(tail[2]) if tail else None
-    if tail and measure and ranks_of(tail[1], kind):
-        return Header(text, ranks_of(tail[1], kind), measure)
+    if tail and measure:
+        ranks = _ranks_by_unit(measure, kind, ranks_of(tail[1], kind))
+        if ranks:
+            return Header(text, ranks, measure)
     whole = measure_of(text) if kind == "distances" else None  # "km" is a distance in km
     return Header(text, ranks_of(text, kind), whole)

@@ -66,7 +66,8 @@ AGENTS: Synonyms = {
     ),
     "energy_per_distance": (
         "energy per distance",
-        "consumption, energy consumption, verbrauch, energieverbrauch, consommation, consumo",
+        "consumption, energy consumption, energy use, energy usage, fuel use, fuel consumption, verbrauch, "
+        "energieverbrauch, consommation, consumo",
     ),
     "start_task": ("start task", "starts at, current task, initial task, startaufgabe"),
     "tasks": ("tasks", "allowed tasks, eligible tasks, possible tasks, may do, can do, aufgaben, taches, tareas"),
@@ -78,8 +79,17 @@ AGENTS: Synonyms = {
     ),
     "returns": (
         "returns",
-        "return, round trip, return home, return to base, returns to base, rth, ruckkehr, rueckkehr, ruckflug, "
-        "retour, regreso",
+        "return, returns to, round trip, return home, return to base, returns to base, return base, home base, rth, "
+        "ruckkehr, rueckkehr, ruckflug, retour, regreso",
+    ),
+    **PLACES,
+}
+
+BASES: Synonyms = {
+    "id": (
+        "id",
+        "name, base, depot, airfield, station, home, hub, site, bezeichnung, basis, standort, nom, nombre",
+        "no, nr, number, nummer, numero, code, label",
     ),
     **PLACES,
 }
@@ -123,6 +133,7 @@ KINDS = {
     "agents": "agent, drone, uav, robot, vehicle, truck, van, crew, worker, machine, employee, team, unit, fahrzeug, "
     "drohne, drohnen",
     "tasks": "task, job, order, mission, target, site, customer, stop, auftrag, aufgabe",
+    "bases": "base, depot, airfield, station, hub",
 }
 """What agents and tasks are called; `drone_id` and `Drone No.` are ids of agents."""
 

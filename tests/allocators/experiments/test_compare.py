@@ -77,12 +77,15 @@ def test_rows_come_as_they_are_done_and_stop_when_asked():
 
 def test_gaps_share_the_best_bound():
     """What one method proves counts for all on that instance, and for no other instance of the same name."""
-    easy = Instance(name="small", ability=[2, 2], workload=[1, 1])
-    rows = list(compare([SMALL, easy], ["greedy", "cpsat"]))
+    lists = [[1, 2], [0], [0, 1, 2], [0, 1, 2], [1, 2]]
+    hard = Instance(name="one", ability=[6, 7, 6, 5, 5], workload=[12, 8, 5], allowed_tasks=lists)
+    easy = Instance(name="one", ability=[2, 2], workload=[1, 1])
+    rows = list(compare([hard, easy], ["greedy", "cpsat"]))
     greedy, cpsat, *others = share_bounds(rows)
-    assert rows[0].lower_bound < 1.18 < rows[1].lower_bound
-    assert greedy.lower_bound == cpsat.lower_bound == pytest.approx(13 / 11)
-    assert greedy.gap_mean == pytest.approx(1 - 13 / 11 / greedy.makespan_mean)
+    assert rows[0].lower_bound < 0.92 < rows[1].lower_bound
+    assert greedy.lower_bound == cpsat.lower_bound == pytest.approx(12 / 13)
+    assert greedy.gap_mean == pytest.approx(1 - 12 / 13 / greedy.makespan_mean)
+    assert greedy.gap_mean > 0.07
     assert cpsat.gap_worst == pytest.approx(0, abs=1e-6)
     assert [(row.lower_bound, row.number) for row in others] == [(0.5, 2), (0.5, 2)]
 

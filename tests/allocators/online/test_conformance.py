@@ -37,6 +37,10 @@ class TestAuction(PolicyConformance):
     name = "auction"
 
 
+class TestGappo(PolicyConformance):
+    name = "gappo"
+
+
 class TestReplan(PolicyConformance):
     name = "replan"
     settings = {"method": "greedy", "iterations": 1}  # noqa: RUF012

@@ -83,6 +83,7 @@ def test_workers_import_what_their_items_need() -> None:
         assert engine.map(eval, ["'torch' in __import__('sys').modules"]) == [False]
 
 
+@pytest.mark.slow
 def test_a_killed_worker_loses_nothing(tmp_path: Path, pair: ProcessEngine) -> None:
     """Items whose process is killed at the first try are done at the second, the others go on undisturbed."""
     items = [(number, str(tmp_path / str(number))) for number in range(4)]

@@ -25,8 +25,11 @@ from alloc.problems import InputError
 from alloc.problems.formats import write_instance
 from alloc.problems.generate import paper_like
 
-# Ray 2.40 leaves it to the garbage collector to close the logs of the processes that it starts
-pytestmark = pytest.mark.filterwarnings("ignore:unclosed file .*/ray/session_:ResourceWarning")
+# Ray 2.40 leaves the processes that it starts, and their logs, to the garbage collector
+pytestmark = [
+    pytest.mark.filterwarnings("ignore:unclosed file .*/ray/session_:ResourceWarning"),
+    pytest.mark.filterwarnings("ignore:subprocess .* is still running:ResourceWarning"),
+]
 
 
 def test_without_ray_the_mend_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -116,6 +119,21 @@ def test_an_item_that_always_kills_is_given_up(cluster: Any, engine: Engine, tmp
         with pytest.raises(EngineError, match="Ray gave an item up"):
             second.map(jobs.die, [str(tmp_path / "tries")])
     assert (tmp_path / "tries").read_text().count("tried") == 2
+
+
+@pytest.mark.needs("ray")
+@pytest.mark.slow
+def test_a_broken_connection_is_an_error_of_the_engine(engine: Engine, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is told as one of Ray, after which a training can be resumed, not as one of a file."""
+
+    def reset(_: object) -> None:
+        raise ConnectionResetError("Connection reset by peer")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("ray.get", reset)
+        with pytest.raises(EngineError, match="Connection reset by peer"):
+            engine.map(jobs.square, [3])
+    assert engine.map(jobs.square, [3]) == [9]
     assert engine.map(jobs.square, [3]) == [9]
 
 

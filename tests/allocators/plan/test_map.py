@@ -2,19 +2,16 @@
 
 import json
 import re
-import shutil
-import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
+from browser import needs_browser, run_in_browser
 
 from alloc.allocators import Result, write_result
 from alloc.allocators.conclusion import scored_result
 from alloc.allocators.plan.map import document
 from alloc.problems import Allocation, Instance
-
-BROWSER = shutil.which("chromium") or shutil.which("google-chrome")
 
 
 def harbour(**more: object) -> Instance:
@@ -100,15 +97,7 @@ document.body.replaceChildren(JSON.stringify(out));
 """
 
 
-@pytest.mark.skipif(BROWSER is None, reason="no browser is installed")
+@needs_browser
 def test_a_browser_zooms_filters_and_names(page: Path, tmp_path: Path) -> None:
     """Two moves, two bases, three tasks; zooming moves them, filters and the search hide them, hovering names them."""
-    assert BROWSER is not None
-    page.write_text(page.read_text(encoding="utf-8").replace("</body>", f"{SCRIPT}</body>"), encoding="utf-8")
-    command = [BROWSER, "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path / 'profile'}"]
-    command += ["--enable-logging=stderr", "--window-size=1200,800", "--dump-dom", page.as_uri()]
-    ran = subprocess.run(command, capture_output=True, text=True, timeout=60)
-    assert "CONSOLE" not in ran.stderr
-    found = re.search(r"<body>(.*?)</body>", ran.stdout, re.DOTALL)
-    assert found is not None, ran.stderr[-2000:]
-    assert json.loads(found[1]) == [2, 2, 3, 3, True, 0, 1, 1, 2, 0, 1, "task: t2", 5, 0]
+    assert run_in_browser(page, SCRIPT, tmp_path) == [2, 2, 3, 3, True, 0, 1, 1, 2, 0, 1, "task: t2", 5, 0]

@@ -76,6 +76,17 @@ def test_columns_have_units_and_say_something() -> None:
     assert "priority" in [column.heading for column in task_columns(fleet(priority=[1, 2]))]
 
 
+def test_rows_say_where_agents_return_to() -> None:
+    """The flight ends at the base that the row names; the column is there where somebody returns to a base."""
+    instance = fleet(bases={"harbour": (3, 4)}, return_base=[0, -1])
+    row, other = agent_rows(planned(instance, [0, 1]))
+    assert (row.returns_to, row.distance, row.arrival) == ("harbour", 3 + 4, 2.0)
+    assert other.returns_to is None
+    assert agent_rows(planned(fleet(), [0, 1]))[0].returns_to == "start"
+    assert "returns to" in [column.heading for column in agent_columns(instance)]
+    assert "returns to" not in [column.heading for column in agent_columns(fleet())]
+
+
 def test_some_rows_are_those_of_all() -> None:
     """Rows of chosen agents and tasks are those that they have among all."""
     result = planned(fleet(), [0, 1])

@@ -38,8 +38,10 @@ def test_without_positions_times_alone_are_drawn():
 
 
 def test_unserved_tasks_are_hatched(unservable):
-    """An unserved task has a hatched bar, and the legend says what that means."""
+    """An unserved task has a hatched bar to the end of the axis, as it is never done, and is in the legend."""
     (times,) = axes_of(unservable)
+    never, done = (bar.get_width() for bar in times.patches)
+    assert never == times.get_xlim()[1] > done
     assert [bar.get_hatch() for bar in times.patches] == ["////", None]
     assert "unserved" in [text.get_text() for text in times.get_legend().get_texts()]
 
@@ -96,12 +98,23 @@ def test_labels_keep_clear_of_each_other_and_of_circles():
     """A name goes to another side, or is left out, rather than cover anything; the largest circle chooses first."""
     centre = np.array([[0.0, 0.0], [0.0, 12.0], [np.nan, np.nan]])
     radius, width = np.array([10.0, 4.0, 3.0]), np.array([10.0, 10.0, 10.0])
-    middle = place_labels(centre, radius, width, 8.0)
+    middle = place_labels(centre, radius, width, 8.0, np.zeros((0, 2, 2)))
     assert middle[0].tolist() == [0, -15]
     assert middle[1].tolist() == [0, 21]
     assert np.isnan(middle[2]).all()
     assert visible(centre[:2], radius[:2], 3.0).tolist() == [True, True]
     assert visible(np.zeros((2, 2)), radius[:2], 3.0).tolist() == [False, True]
+
+
+def test_labels_keep_clear_of_moves():
+    """A name goes to the first side that no move crosses; where moves go all ways, to that which fewest cross."""
+    centre, radius, width = np.zeros((1, 2)), np.array([4.0]), np.array([10.0])
+    up = [[0.0, 0.0], [0.0, 60.0]]
+    (below,) = place_labels(centre, radius, width, 8.0, np.array([up]))
+    assert below[1] < 0
+    ways = [[[0.0, 0.0], [60 * np.cos(turn), 60 * np.sin(turn)]] for turn in np.linspace(0, 2 * np.pi, 73)]
+    (crowded,) = place_labels(centre, radius, width, 8.0, np.array(ways))
+    assert not np.isnan(crowded).any()
 
 
 def test_names_of_every_script_on_one_line():

@@ -8,15 +8,16 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import matplotlib
 import numpy as np
 import pytest
 from matplotlib.testing.compare import compare_images
 from PIL import Image
 
-from alloc.allocators import Fleet, Result, StopReason, TracePoint, WhatIf
+from alloc.allocators import Fleet, Result, StopReason, TracePoint, WhatIf, plot_mission, simulate
 from alloc.allocators.pareto import Front
 from alloc.allocators.plotting import plot, plot_convergence, plot_front, plot_whatif
-from alloc.problems import Allocation, Instance, Objective, Units, evaluate
+from alloc.problems import Allocation, Course, Event, Instance, Mission, Objective, Radio, Units, course_of, evaluate
 
 KEPT = Path(__file__).parent / "pictures"
 
@@ -101,6 +102,12 @@ def bases() -> Result:
     return planned(instance, [0, 0, 1, 1, 1], lower_bound=2.0)
 
 
+def returns() -> Result:
+    """Agents that return elsewhere than to where they begin: dashed lines to diamonds, and to a base of others."""
+    fields = {"bases": {"Alta": (0, 0), "Harbour": (5, 3)}, "return_base": [-1, 1, 1, 0, -1], "returns": [True] * 5}
+    return planned(replace(bases().instance, **fields), [0, 0, 1, 1, 1], lower_bound=2.0)
+
+
 def earth() -> Result:
     """Longitudes and latitudes on both sides of the date line, far north: degrees are not as long as wide."""
     instance = Instance(
@@ -172,12 +179,65 @@ def grown(*energies: float) -> WhatIf:
     return WhatIf(instance, ("a2",), tuple(fleets), True)
 
 
+def short(*plans: list[int]) -> WhatIf:
+    """Return fleets of which none serves all tasks: there is no makespan to be drawn."""
+    instance = two_sites()
+    fleets = [Fleet(("a4",) * k, (), planned(instance, plan)) for k, plan in enumerate(plans)]
+    return WhatIf(instance, ("a1",), tuple(fleets), True)
+
+
+def mission(*events: Event, loss: float = 0.3, positions: bool = True) -> Course:
+    """Return a mission by sight and radio: a task comes later, one is missed, and what `events` say."""
+    places = (
+        {"agent_position": [[0, 0], [4, 0], [0, 3]], "task_position": [[1, 3], [3, 0], [4, 3]]} if positions else {}
+    )
+    instance = Instance(
+        name="mission",
+        ability=[2, 3, 1],
+        speed=[2, 2, 1],
+        workload=[4, 6, 50],
+        units=Units(time="h", distance="km"),
+        **places,  # type: ignore[arg-type]
+    )
+    run = simulate(
+        Mission(
+            instance,
+            appears=[0, 0.6, 0],
+            deadline=[np.inf, np.inf, 3],
+            events=events,
+            horizon=6,
+            knowledge="local" if positions else "full",
+            sensing=2,
+            radio=Radio(radius=2.5, loss=loss),
+        ),
+        "greedy",
+    )
+    return course_of(run.log)
+
+
+def fleet() -> Course:
+    """Return a mission of more agents and tasks than have names."""
+    j = np.arange(60)
+    instance = Instance(
+        name="fleet",
+        ability=1 + j % 3,
+        speed=np.full(60, 2.0),
+        agent_position=np.column_stack([j % 10, j // 10]),
+        workload=5 + j % 7,
+        task_position=np.column_stack([(j * 7) % 10 + 0.5, (j * 3) % 6 + 0.5]),
+    )
+    return course_of(simulate(Mission(instance, appears=(j % 4) / 2), "nearest").log)
+
+
+FAILURE = Event(1.5, "agent-fails", agent="a3")
+
 DRAWN: dict[str, Callable[[str], object]] = {
     "moves": lambda path: plot(moves(), path),
     "times": lambda path: plot(times(), path),
     "many": lambda path: plot(many(), path),
     "lines": lambda path: plot(lines(), path),
     "bases": lambda path: plot(bases(), path),
+    "returns": lambda path: plot(returns(), path),
     "earth": lambda path: plot(earth(), path),
     "runs": lambda path: plot_convergence(runs(), path),
     "nothing": lambda path: plot(replace(moves(), allocation=None, evaluation=None), path),
@@ -185,6 +245,11 @@ DRAWN: dict[str, Callable[[str], object]] = {
     "wide-front": lambda path: plot_front(front(2.0, 5.0, 20.0), path),
     "one-point": lambda path: plot_front(front(), path),
     "fleets": lambda path: plot_whatif(grown(6.0, 9.0), path),
+    "short-fleets": lambda path: plot_whatif(short([-1, -1, -1], [-1, 1, 1]), path),
+    "short-point": lambda path: plot_front(Front(two_sites(), (planned(two_sites(), [-1, 1, 1]),), True), path),
+    "mission": lambda path: plot_mission(mission(FAILURE), path),
+    "mission-fleet": lambda path: plot_mission(fleet(), path),
+    "mission-nowhere": lambda path: plot_mission(mission(FAILURE, positions=False), path),
 }
 
 
@@ -201,6 +266,7 @@ def difference(name: str, path: Path) -> str | None:
     return compare_images(str(KEPT / f"{name}.png"), str(path), TOLERANCE)
 
 
+@pytest.mark.skipif(matplotlib.__version_info__ < (3, 11), reason="text of matplotlib before 3.11 has another size")
 @pytest.mark.parametrize("name", DRAWN)
 def test_picture_is_the_one_that_was_looked_at(tmp_path: Path, name: str) -> None:
     """The picture differs from the kept one by less than a wrong one does."""
@@ -254,6 +320,15 @@ WRONG: dict[str, tuple[str, Callable[[str], object]]] = {
     "a point elsewhere": ("front", lambda path: plot_front(front(1.5, 2.0), path)),
     "the scale": ("wide-front", lambda path: plot_front(front(1.3, 2.0), path)),
     "another energy": ("fleets", lambda path: plot_whatif(grown(9.0, 6.0), path)),
+    "home is another base": (
+        "returns",
+        lambda path: plot(planned(bases().instance, [0, 0, 1, 1, 1], lower_bound=2.0), path),
+    ),
+    "all are served": ("short-point", lambda path: plot_front(front(), path)),
+    "another number unserved": ("short-fleets", lambda path: plot_whatif(short([-1, 1, 1], [-1, 1, 1]), path)),
+    "nobody fails": ("mission", lambda path: plot_mission(mission(), path)),
+    "nobody is heard": ("mission", lambda path: plot_mission(mission(FAILURE, loss=1.0), path)),
+    "nobody fails there": ("mission-nowhere", lambda path: plot_mission(mission(positions=False), path)),
     "more than one point": ("one-point", lambda path: plot_front(front(1.3), path)),
 }
 

@@ -5,11 +5,13 @@ import os
 import re
 import signal
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from alloc.cli.commands.compare import _methods, _seeds
+from alloc.problems import Units
+from alloc.problems.formats import write_instance
 
 
 def test_table_has_a_row_per_instance_and_method(alloc, small, unservable):
@@ -27,6 +29,14 @@ def test_table_has_a_row_per_instance_and_method(alloc, small, unservable):
     assert rows[1]["makespan_mean"] == pytest.approx(13 / 11)
     assert rows[2]["makespan_mean"] is None
     assert rows[2]["unserved"] == 1
+
+
+def test_headings_have_the_units_that_all_instances_share(alloc, small):
+    """T and energy stand with their units; where two instances disagree, numbers are bare."""
+    write_instance(replace(small, name="timed", units=Units(time="h", energy="kWh")), "timed.json")
+    assert re.search(r" T \(h\) .* energy \(kWh\) ", alloc("compare", "timed.json", "--methods", "greedy").err)
+    ran = alloc("compare", "small.json", "timed.json", "--methods", "greedy")
+    assert re.search(r" T +worst .* energy +time", ran.err)
 
 
 def test_table_for_people_and_csv(alloc, small):
@@ -59,10 +69,22 @@ def test_a_refusal_is_a_row(alloc):
     assert "refuses" in alloc("compare", "fast.json", "--methods", "ga,greedy").err
 
 
+@pytest.fixture
+def compared(monkeypatch):
+    """What `compare` is asked for, in place of runs: methods and seeds."""
+    asked = []
+    monkeypatch.setattr(
+        "alloc.allocators.experiments.compare.compare",
+        lambda instances, methods, seeds, **options: asked.append((methods, seeds)) or [],
+    )
+    return asked
+
+
 @pytest.mark.parametrize(("text", "seeds"), [("3", [0, 1, 2]), ("7,", [7]), ("4,2,4", [4, 2]), ("0, 5", [0, 5])])
-def test_seeds(text, seeds):
+def test_seeds(alloc, small, compared, text, seeds):
     """A number is a count, a list is a list."""
-    assert _seeds(text) == seeds
+    alloc("compare", "small.json", "--methods", "greedy", "--seeds", text)
+    assert compared == [({"greedy": "greedy"}, seeds)]
 
 
 def test_interrupted_comparison_prints_what_is_finished(alloc, small):
@@ -78,12 +100,14 @@ def test_interrupted_comparison_prints_what_is_finished(alloc, small):
     assert ("hard", "ga") not in done
 
 
-def test_methods_with_parameters_in_brackets(monkeypatch):
+def test_methods_with_parameters_in_brackets(alloc, small, compared, monkeypatch):
     """Commas within brackets separate parameters and parts of values; the rows carry the text as it is written."""
     loaded = []
     monkeypatch.setattr("alloc.allocators.load", lambda name, **settings: loaded.append((name, settings)) or name)
-    found = _methods("greedy, ga[population=40,rates=0.1,0.2,elite=true],auto,ga[population=400]")
-    assert list(found) == ["greedy", "ga[population=40,rates=0.1,0.2,elite=true]", "auto", "ga[population=400]"]
+    text = "greedy, ga[population=40,rates=0.1,0.2,elite=true],auto,ga[population=400]"
+    alloc("compare", "small.json", "--methods", text)
+    ((methods, _),) = compared
+    assert list(methods) == ["greedy", "ga[population=40,rates=0.1,0.2,elite=true]", "auto", "ga[population=400]"]
     assert loaded == [("ga", {"population": 40, "rates": (0.1, 0.2), "elite": True}), ("ga", {"population": 400})]
 
 

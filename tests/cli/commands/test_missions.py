@@ -1,4 +1,5 @@
 import json
+from pathlib import Path
 
 import pytest
 from schema_checks import faults
@@ -87,3 +88,21 @@ def test_options_of_missions_are_for_missions(alloc):
         ran = alloc("generate", *arguments)
         assert (ran.code, ran.out) == (2, "")
         assert told in ran.err
+
+
+def test_a_mission_is_drawn_and_played_from_a_run_and_from_its_log(alloc, mission):
+    """Picture and page are written by the run, and by `alloc plot` from the log; only the run's page has knowledge."""
+    assert alloc(
+        "simulate", mission, "--policy", "greedy", "--log", "x.jsonl", "--plot", "x.svg", "--animate", "x.html"
+    ).code in (0, 1)
+    assert alloc("plot", "x.jsonl", "--output", "y.html").code == 0
+    assert '"knowledge": {' in Path("x.html").read_text(encoding="utf-8")
+    assert '"knowledge": null' in Path("y.html").read_text(encoding="utf-8")
+    assert "<svg" in Path("x.svg").read_text(encoding="utf-8")
+
+
+def test_wrong_names_of_films_are_told_before_the_run(alloc, mission):
+    """A suffix that no animation has, and a damaged log, are one line and exit code 2."""
+    found = alloc("simulate", mission, "--policy", "greedy", "--animate", "x.avi")
+    assert (found.code, found.err.strip()) == (2, "alloc: x.avi: must end in .gif, .mp4 or .html")
+    assert alloc("plot", mission, "--output", "x.png").code == 2

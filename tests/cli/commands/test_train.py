@@ -254,6 +254,7 @@ def test_resumed_by_another_command_it_goes_on_to_the_same_curve(alloc, mine):
     assert "population 2, not 3" in other.err
 
 
+@pytest.mark.slow
 def test_killed_at_any_moment_it_resumes_to_the_same_curve(alloc, mine):
     """kill -9 in mid-training, again and again, leaves whole files, and changes neither log nor policy."""
     options = [*QUICK, "--steps", "3000", "--population", "2"]

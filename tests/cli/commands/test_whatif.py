@@ -4,9 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from alloc.allocators import whatif
-from alloc.cli.commands.whatif import _table as table_of
 from alloc.problems import Instance, Units
+from alloc.problems.formats import write_instance
 
 
 def test_table_answer_and_files(alloc, small):
@@ -41,6 +40,9 @@ def test_unserved_tasks_give_exit_code_1(alloc, unservable):
     assert ran.code == 1
     assert "One more like a1: 1 task unserved as before." in ran.err
     assert "is new" not in ran.err
+    rows = [row.split() for row in ran.err.splitlines()]
+    column = rows[0].index("unserved")
+    assert [row[column + words] for row, words in zip(rows[2:4], (2, 0), strict=True)] == ["1", "1"]  # "as it is", "+1"
 
 
 @pytest.mark.parametrize(
@@ -70,9 +72,10 @@ def test_ctrl_c_saves_the_fleets_so_far(alloc, small, monkeypatch):
     assert found["answer"] == "interrupted before a fleet was changed"
 
 
-def test_units_stand_in_the_table():
+def test_units_stand_in_the_table(alloc):
     """The units of the instance stand in the heading."""
     instance = Instance(ability=[1, 2], workload=[3], units=Units(time="min", energy="Wh"))
-    head = table_of(whatif(instance, "a1", method="milp")).splitlines()[0]
+    write_instance(instance, "timed.json")
+    head = alloc("whatif", "timed.json", "--add", "like a1", "--method", "greedy").err.splitlines()[0]
     assert "makespan (min)" in head
     assert "energy (Wh)" in head

@@ -148,6 +148,7 @@ def test_descriptors_and_pipes_take_results(small, tmp_path, line, kept):
     assert json.loads(text.removeprefix(kept))["instance"] == "small"
 
 
+@pytest.mark.slow
 def test_file_names_that_are_no_utf_8(small, tmp_path):
     """Names from an old disk are names: of instances, results, pictures, tables and policies, in every command."""
     old = os.fsdecode(b"caf\xe9")

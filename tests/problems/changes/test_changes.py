@@ -36,6 +36,44 @@ def test_changes_against_the_definitions(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
+def test_who_moves_returns_to_where_it_started(seed: int) -> None:
+    """The way home from each task is what it was, whether from a place or a task, with distances of its own or not."""
+    instance = varied_instance(seed, {"metric", "distances", "returns", "bases"} if seed % 2 else None)
+    moved = instance.moved_to({"a1": "t2", "a2": instance.task_position[0].tolist()})
+    assert moved.returns.tolist() == instance.returns.tolist()
+    same_reach(moved)
+    same_reach(from_document(to_document(moved)))
+    back = [flight_energies(one, np.zeros((one.n, one.m))) for one in (instance, moved, moved.moved_to({"a1": "t1"}))]
+    np.testing.assert_allclose(back[1], back[0], rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(back[2], back[0], rtol=1e-9, atol=1e-9)
+
+
+def test_agents_that_started_together_share_a_base() -> None:
+    """It is called after the first of them, or otherwise where a base is called so; who does not return has none."""
+    instance = Instance(
+        ability=[1] * 4,
+        workload=[1],
+        agent_position=[[0, 0]] * 4,
+        task_position=[[3, 4]],
+        returns=[True, True, False, True],
+        bases={"start of a1": (9, 9)},
+    )
+    moved = instance.moved_to({"a1": [3, 0], "a2": [3, 1], "a3": [3, 2]})
+    assert moved.bases.ids == ("start of a1", "start of a1 (2)")
+    assert moved.return_base.tolist() == [1, 1, -1, -1]
+    assert moved.reach.cost[moved.reach.origin, 0].tolist() == [4 + 5, 3 + 5, 2, 5 + 5]
+
+
+def test_new_agents_return_where_they_are_told() -> None:
+    """To a base by its id, to where they start, or to the base of the agent that they are like."""
+    instance = Instance(ability=[1], workload=[1], bases={"north": (0, 1)}, return_base=[0])
+    rows = [{"id": "b", "like": "a1"}, {"id": "c", "like": "a1", "returns": True}, {"id": "d", "ability": 1}]
+    more = instance.with_agents([*rows, {"id": "e", "ability": 1, "returns": "north"}])
+    assert more.returns.tolist() == [True, True, True, False, True]
+    assert more.return_base.tolist() == [0, 0, -1, -1, 0]
+
+
+@pytest.mark.parametrize("seed", SEEDS)
 def test_without_tasks_nobody_moves(seed: int) -> None:
     """Agents that start at a task that goes keep their place, and the distances that are given for it."""
     instance = varied_instance(seed)
@@ -57,7 +95,7 @@ def test_without_tasks_nobody_moves(seed: int) -> None:
         (lambda one: one.with_agents([{"id": "x"}]), "ability"),
         (lambda one: one.with_agents([{"ability": 1}]), "agents.id: must be a string"),
         (lambda one: one.with_agents([{"id": "x", "ability": "3"}]), r"agents\[2\].ability: must be a finite number"),
-        (lambda one: one.with_agents([{"id": "x", "ability": 3, "returns": "no"}]), "must be True or False"),
+        (lambda one: one.with_agents([{"id": "x", "ability": 3, "returns": "no"}]), "no base 'no'; give True"),
         (lambda one: one.with_agents([{"id": "x", "ability": 3, "skills": 5}]), "skills"),
         (lambda one: one.with_agents([{"id": "x", "ability": 3, "start_task": ["t1"]}]), "no task"),
         (lambda one: one.moved_to([("a1", "t1")]), "places"),

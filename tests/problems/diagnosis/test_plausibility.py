@@ -40,6 +40,26 @@ DOUBTFUL = [
     ({"task_position": ((0, 0), (np.nan, np.nan))}, "position", "task t2 has no place"),
     ({"battery": (9, 9, 0.5)}, "battery", "a3 reaches no task; to t1, its nearest, energy 1.5 exceeds the battery 0.5"),
     ({"communication_range": (0.1, 0.1, 9)}, "range", "a1 and 1 other reach no task; to t1"),
+    (
+        {
+            "distances": DistanceTable.of(
+                [("a1", "t1", 1), ("a2", "t2", 3)], ["a1", "a2", "a3"], ["t1", "t2"], "unreachable"
+            )
+        },
+        "distances",
+        "a3 reaches no task; to t1, its nearest, there is no way to it in the table of distances",
+    ),
+    ({"bases": {"north": (0, 1)}}, "bases", "nobody returns to base north"),
+    (
+        {"bases": {"north": None}, "return_base": (0, -1, -1)},
+        "bases",
+        "base north has no place: the way back there counts as 0",
+    ),
+    (
+        {"bases": {"north": (0, 9)}, "return_base": (-1, 0, -1), "battery": (9, 3, 9)},
+        "battery",
+        "energy 8 exceeds the battery 3 (with the flight back to north)",
+    ),
     ({"speed": 3 * [5], **NOWHERE}, "speed", "has no effect"),
     ({"battery": 3 * [5], **NOWHERE}, "battery", "has no effect"),
     ({"ability": (2, 3, 5000)}, "ability", "that of a3 is 2e+03 times the median of the others, 2.5"),

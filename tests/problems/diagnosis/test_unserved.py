@@ -5,7 +5,7 @@ import pytest
 from tiny_instances import scarce_instance, varied_instance
 
 from alloc.allocators import solve
-from alloc.problems import Allocation, Instance, evaluate
+from alloc.problems import Allocation, DistanceTable, Instance, evaluate
 from alloc.problems.diagnosis.unserved import MOST_TASKS, why_unserved
 
 FLEET = Instance(
@@ -33,6 +33,25 @@ def test_reasons_by_hand() -> None:
         why_unserved(FLEET, Allocation([-1, -1, -1]), most=1)[0].reason
         == "2 agents could take it: a1 is idle, a3 is idle"
     )
+
+
+def test_agents_that_are_pinned_are_called_so() -> None:
+    """Neither idle nor busy by choice: a dispatcher who pinned them knows what to undo."""
+    pinned = why_unserved(FLEET, Allocation([1, -1, -1]), most=1, pinned={0, 2})
+    assert pinned[0].reason == "2 agents could take it: a1 is pinned to t2 (priority 2), a3 is pinned to no task"
+    result = solve(FLEET, time_limit_s=2, pins={"a3": None})
+    assert "a3 is pinned to no task" in str(result)
+    assert any(note.startswith("besides the pinned agents, ") for note in result.notes)
+
+
+def test_ways_home_that_are_not_given_are_told() -> None:
+    """A task from which the table has no way to the agent's base."""
+    rows = [("a1", "t1", 1.0), ("a1", "t2", 2.0), ("t1", "north", 1.0)]
+    table = DistanceTable.of(rows, ["a1"], ["t1", "t2"], "unreachable", ["north"])
+    fleet = Instance(ability=[1], workload=[1, 1], distances=table, bases={"north": None}, return_base=[0])
+    assert {one.task: one.reason for one in why_unserved(fleet, Allocation([0]))} == {
+        1: "no agent can take it; nearest is a1: there is no way from it back to north in the table of distances"
+    }
 
 
 def test_reasons_are_told_in_text_and_in_the_document() -> None:

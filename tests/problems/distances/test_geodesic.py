@@ -38,6 +38,13 @@ def test_altitude_and_unknown_places() -> None:
     assert geodesic_distances(one, other, "m").tolist() == [4000, 250, 0]
 
 
+@pytest.mark.parametrize("shape", [(0,), (1,), (1, 1), (2, 1)])
+def test_distances_have_the_shape_of_the_places(shape: tuple[int, ...]) -> None:
+    """Whatever their number, one pair too, which some versions of numpy and pyproj warn of."""
+    away = geodesic_distances(np.zeros((*shape, 3)), np.array([0.0, 0, 7]), "m")
+    assert away.tolist() == np.full(shape, 7.0).tolist()
+
+
 def test_an_instance_in_miles() -> None:
     """Distances of an instance are in its unit, and reach is by them."""
     instance = Instance(

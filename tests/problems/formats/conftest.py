@@ -19,6 +19,7 @@ ARRAYS = (
     "agent_position",
     "task_position",
     "start_task",
+    "return_base",
     "battery",
     "communication_range",
     "speed",
@@ -37,6 +38,8 @@ def assert_same(left: Instance, right: Instance) -> None:
     assert (left.tau, left.energy_per_distance) == (right.tau, right.energy_per_distance)
     assert (left.metric, left.units) == (right.metric, right.units)
     assert (left.skills, left.needs, left.returns.tolist()) == (right.skills, right.needs, right.returns.tolist())
+    assert left.bases.ids == right.bases.ids
+    np.testing.assert_array_equal(left.bases.position, right.bases.position)
     assert_same_distances(left.distances, right.distances)
     assert (left.allowed_tasks is None) == (right.allowed_tasks is None)
     for one, other in zip(left.allowed_tasks or (), right.allowed_tasks or (), strict=True):
@@ -49,7 +52,7 @@ def assert_same_distances(left: DistanceTable | None, right: DistanceTable | Non
     assert (left is None) == (right is None)
     if left is None or right is None:
         return
-    assert (left.n, left.m, left.missing) == (right.n, right.m, right.missing)
+    assert (left.n, left.m, left.bases, left.missing) == (right.n, right.m, right.bases, right.missing)
     for field in ("source", "target", "distance"):
         np.testing.assert_array_equal(getattr(left, field), getattr(right, field), err_msg=field)
 
@@ -135,16 +138,25 @@ def varied() -> Instance:
         speed=[60, 30, np.inf],
         energy_per_distance=2,
         agent_energy_per_distance=[None, 0.125, 2],
-        returns=[True, False, False],
+        returns=[True, False, True],
+        return_base=[-1, -1, 1],
         skills=[["lidar", "camera"], [], ["back\\slash", "semi;colon", 'com,ma "q"']],
         needs=[["camera"], None, ["semi;colon"]],
         metric="geographic",
         distances=DistanceTable.of(
-            [("d1", "t1", 7.25), ("t1", "d1", 9), ("t1", "t2", 0), ('the "big", one', "t3", 1 / 3)],
+            [
+                ("d1", "t1", 7.25),
+                ("t1", "d1", 9),
+                ("t1", "t2", 0),
+                ('the "big", one', "t3", 1 / 3),
+                ("t3", 'south, "old"', 2.5),
+            ],
             ["d1", 'the "big", one', "d;3"],
             ["t1", "t2", "t3"],
             missing="unreachable",
+            base_ids=["north", 'south, "old"'],
         ),
+        bases={"north": (14, 67.2, 12), 'south, "old"': None},
         units=Units(time="h", distance="nmi", energy="kWh", work="m²"),
     )
 
@@ -170,12 +182,17 @@ def optional_fields(draw: st.DrawFn, agents: list[str], tasks: list[str]) -> dic
     n, m = len(agents), len(tasks)
     names = st.one_of(st.none(), st.lists(IDS, max_size=3))
     rate = st.one_of(st.none(), st.just(0.0), MAGNITUDES)
-    shared = set(agents) & set(tasks)
-    pairs = [(one, other) for one in agents + tasks for other in tasks if not shared & {one, other}]
+    names_of_bases = IDS.filter(lambda name: name.strip().lower() not in ("", "true", "false"))
+    bases = draw(st.lists(names_of_bases, max_size=2, unique=True))
+    known = agents + tasks + bases
+    shared = {name for name in known if known.count(name) > 1}
+    pairs = [(one, other) for one in known for other in tasks if not shared & {one, other}]
     pairs += [(other, one) for one, other in pairs if (other, one) not in pairs]
     chosen = draw(st.lists(st.sampled_from(pairs), max_size=4, unique=True)) if pairs else []
     rows = [(*pair, draw(st.floats(0, 1e100))) for pair in chosen]
-    table = DistanceTable.of(rows, agents, tasks, missing=draw(st.sampled_from(["metric", "unreachable"])))
+    table = DistanceTable.of(
+        rows, agents, tasks, missing=draw(st.sampled_from(["metric", "unreachable"])), base_ids=bases
+    )
     fields = {
         "agent_energy_per_distance": draw(st.lists(rate, min_size=n, max_size=n)),
         "returns": draw(st.lists(st.booleans(), min_size=n, max_size=n)),
@@ -185,7 +202,13 @@ def optional_fields(draw: st.DrawFn, agents: list[str], tasks: list[str]) -> dic
         "distances": table,
         "units": Units(*draw(st.lists(LABELS, min_size=4, max_size=4))),
     }
-    return {name: value for name, value in fields.items() if draw(st.booleans())}
+    chosen_fields = {name: value for name, value in fields.items() if draw(st.booleans())}
+    if not bases:
+        return chosen_fields
+    home = draw(st.lists(st.integers(-1, len(bases) - 1), min_size=n, max_size=n))
+    flags = [flag or base >= 0 for flag, base in zip(fields["returns"], home, strict=True)]
+    places = {name: draw(st.one_of(st.none(), _row(free=False))) for name in bases}
+    return chosen_fields | {"returns": flags, "return_base": home, "bases": places}
 
 
 @st.composite

@@ -26,6 +26,9 @@ def section(title: str) -> str:
     return TEXT.partition(f"\n## {title}\n")[2].partition("\n## ")[0]
 
 
+BASES = '{"format": "alloc-instance/1",\n "agents": [{"id": "a1", "ability": 4, "position": [3, 0], "battery"'
+
+
 def example(title: str, first: str) -> str:
     """The indented block of a section that begins with `first`."""
     blocks = re.findall(r"(?:^    .*\n)+", section(title) + "\n", re.MULTILINE)
@@ -70,9 +73,17 @@ def test_the_examples_of_distances_are_read(tmp_path: Path) -> None:
     folder = read_instance(tmp_path)
     assert (folder.skills, folder.needs) == ((("camera", "lidar"), ()), (("camera", "lidar"), ()))
     assert folder.returns.tolist() == [True, False]
+    assert folder.bases.ids == ("harbour",)
     assert folder.agent_energy_per_distance.tolist() == [1.5, 1]
     assert folder.distances is not None
     assert folder.distances.distance.tolist() == [7.9, 20.5]
+
+
+def test_the_example_of_bases_is_read(tmp_path: Path) -> None:
+    """The flights of the example are as long as the text says."""
+    (tmp_path / "x.json").write_text(example("Instance: JSON", BASES))
+    reach = read_instance(tmp_path / "x.json").reach
+    assert reach.cost[reach.origin].ravel().tolist() == [4 + 5, 3 + 3]
 
 
 @pytest.mark.parametrize(
@@ -96,3 +107,4 @@ def test_every_column_is_shown() -> None:
     assert ",".join(MORE_AGENT_COLUMNS) in text
     assert ",".join(MORE_TASK_COLUMNS) in text
     assert ",".join(DISTANCE_COLUMNS) in text
+    assert "id,lon,lat,alt" in text

@@ -102,7 +102,7 @@ TABLES: list[tuple[dict[str, str | bytes], str, str]] = [
         "agents.csv line 2, column lon and lat",
         "must be longitude (-180 to 360) and latitude",
     ),
-    ({"agents.csv": "id,ability,returns\na,1,yes\n"}, "agents.csv line 2, column returns", "must be true or false"),
+    ({"agents.csv": "id,ability,returns\na,1,yes\n"}, "agents.csv line 2, column returns", "no base 'yes'; say true"),
     (
         {"agents.csv": "id,ability,energy_per_distance\na,1,-2\n"},
         "agents.csv line 2, column energy_per_distance",

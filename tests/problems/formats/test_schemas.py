@@ -24,7 +24,7 @@ TEXTS = {path: path.read_text("utf-8") for path in [*ROOT.glob("*.md"), *(ROOT /
 EXAMPLES = sorted((ROOT / "examples").rglob("*.json"))
 
 BEYOND = ("used twice", "there is no", "Unicode", "in smaller units", "must be finite", "id of an agent and of a task")
-BEYOND += ("joins two agents", "that an earlier row gives", "a finite number", "for no limit")
+BEYOND += ("id of two of the", "joins two agents", "that an earlier row gives", "a finite number", "for no limit")
 """What schemas cannot say: that ids are unique and lead somewhere, that numbers of Python are numbers of JSON."""
 
 

@@ -43,7 +43,21 @@ n_a1__north_field                                   2 \t(obj:0)
 n_a3__north_field                                   {value} \t(obj:0)
 y                                                   1 \t(obj:1)
 """
-SOLVERS = {"highs": HIGHS, "cbc": CBC, "gurobi": GUROBI, "scip": SCIP}
+HIGHS_PRETTY = """Columns
+    Index Status        Lower        Upper       Primal         Dual  Type        Name
+        0                   0            1            1               Continuous  y
+        1                   0            2            2               Integer     n_a1__north_field
+        2                   0            1 {value:>12}               Integer     n_a3__north_field
+        3                   0            2            0               Integer     n_a1__t
+Rows
+    Index Status        Lower        Upper       Primal         Dual  Name
+        0                   0          inf            0               task_t
+
+Model status: Optimal
+
+Objective value: 1
+"""
+SOLVERS = {"highs": HIGHS, "highs-pretty": HIGHS_PRETTY, "cbc": CBC, "gurobi": GUROBI, "scip": SCIP}
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
@@ -69,6 +83,8 @@ def test_fractions_are_told(tmp_path: Path, solver: str) -> None:
         ("Infeasible - objective value 0", "line 1: the solver found no solution"),
         ("Integer infeasible - objective value 0", "the solver found no solution"),
         ("Model status\nInfeasible\n", "the solver found no solution"),
+        (HIGHS_PRETTY.replace("Optimal", "Infeasible").format(value=""), "the solver found no solution"),
+        (HIGHS_PRETTY.format(value=""), "line 5: the value of n_a3__north_field must be a number, got ''"),
         ("solution status: infeasible\nno solution available\n", "the solver found no solution"),
         ("# Objective value = 1\nx 1\nz 3\n", "has no variable of a model"),
         ("", "has no variable of a model"),

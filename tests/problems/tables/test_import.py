@@ -17,8 +17,8 @@ from alloc.problems.tables.grid import Grid
 def imported(case: Case, folder: Path) -> tuple[Instance, list[str]]:
     """Return the instance of a case, and the lines about its columns, files by their names alone."""
     lines: list[str] = []
-    grids = [None if path is None else read_grid(path) for path in case.write(folder)]
-    instance = Instance.from_tables(*grids, report=lines.append, **case.options)
+    *grids, bases = [None if path is None else read_grid(path) for path in case.write(folder)]
+    instance = Instance.from_tables(*grids, report=lines.append, bases=bases, **case.options)
     return instance, [line.replace(f"{folder}/", "") for line in lines]
 
 
@@ -30,8 +30,10 @@ def found(instance: Instance, name: str) -> object:
     if name == "missing":
         return table.missing
     if name == "distances":
-        ids = [*instance.agent_ids, *instance.task_ids]
+        ids = [*instance.agent_ids, *instance.task_ids, *instance.bases.ids]
         return [(ids[i], ids[j], d) for i, j, d in zip(table.source, table.target, table.distance, strict=True)]
+    if name == "bases":
+        return dict(zip(instance.bases.ids, instance.bases.position.tolist(), strict=True))
     value = getattr(instance, name)
     if name == "allowed_tasks":
         return [None if tasks is None else tasks.tolist() for tasks in value]

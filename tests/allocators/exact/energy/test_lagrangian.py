@@ -48,7 +48,7 @@ def test_bound_is_below_the_best_plan_and_its_pairs_are_kept(seed, limited, wors
     """However long prices move towards the cost of a worse plan, the best one bounds the bound and loses no pair."""
     model, best, plan = model_of(seed, 4, limited=limited)
     distance = np.abs(np.subtract.outer(np.arange(4.0), np.arange(4.0)))
-    bound = LagrangianBound(model, distance)
+    bound = LagrangianBound(model, distance, np.zeros(len(model.count)))
     bound.ascend(1000, best * worse)
     assert 0.5 * best < bound.bound <= best * (1 + 1e-9)
     used = model.task_of_pair == plan[model.class_of_pair]

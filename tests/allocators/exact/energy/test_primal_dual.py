@@ -12,7 +12,7 @@ from alloc.problems.generate import paper_like
 def primal_dual(instance: Instance, plan: Allocation, makespan: float, seed: int = 0) -> PrimalDual:
     """Both sides at a plan and a makespan that it holds."""
     model = Model.build(instance, agent_classes(instance, by_place=True), int((instance.workload > 0).sum()))
-    return PrimalDual(instance, model, model.at(makespan), plan, seed)
+    return PrimalDual(instance, model, model.at(makespan), plan, seed, 10.0)
 
 
 def narrowed(sides: PrimalDual, instance: Instance, plan: Allocation) -> Allocation:
@@ -69,7 +69,7 @@ def test_pairs_of_the_best_plan_are_kept():
     instance, plan = at_home(60, 10, 2)
     model = Model.build(instance, agent_classes(instance, by_place=True), instance.m)
     demand = model.at(1.0)
-    sides = PrimalDual(instance, model, demand, plan, 0)
+    sides = PrimalDual(instance, model, demand, plan, 0, 10.0)
     plan = narrowed(sides, instance, plan)
     used = np.flatnonzero(model.counts(demand, plan))
     assert set(used) <= set(sides.keep.tolist())

@@ -20,7 +20,7 @@ SERVED = [
 def bound_of(instance: Instance, high: float) -> float:
     """Return the bound between a hundredth of `high` and `high`."""
     model = Model.build(instance, agent_classes(instance, by_place=False), int((instance.workload > 0).sum()))
-    return relaxed_lower_bound(model, high / 100, high, 10.0, lambda: False)
+    return relaxed_lower_bound(model, high / 100, high, 10.0, lambda: False)[0]
 
 
 @pytest.mark.parametrize("seed", SERVED)

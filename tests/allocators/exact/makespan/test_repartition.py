@@ -3,7 +3,13 @@ from itertools import product
 import numpy as np
 import pytest
 
-from alloc.allocators.exact.makespan.repartition import MAX_POOL, MAX_TASKS, best_partition, search_repartitions
+from alloc.allocators.exact.makespan.repartition.partition import (
+    MAX_POOL,
+    MAX_TASKS,
+    best_partition,
+    search_repartitions,
+)
+from alloc.allocators.exact.makespan.repartition.search import partners_of
 
 
 def shortfall(value: np.ndarray, base: np.ndarray, need: np.ndarray, goal: tuple[int, ...]) -> float:
@@ -46,7 +52,7 @@ def test_shortfall_never_grows():
     need = np.full(12, np.floor(work.max(axis=1).sum() / 12))
     place, state, before = work.argmax(axis=1), np.ones(1, dtype=np.uint64), np.inf
     for _ in range(20):
-        total, part, best = search_repartitions(work, need, place, 20, state)
+        total, part, best = search_repartitions(work, need, partners_of(work), place, 20, state)
         has = np.bincount(place, weights=work[np.arange(30), place], minlength=12)
         assert total == pytest.approx(np.maximum(0, need - has).sum())
         assert total <= before
@@ -62,4 +68,4 @@ def test_perfect_partition_is_found():
     ability = np.diff(np.column_stack([np.zeros(20), cuts, np.full(20, 1000)]), axis=1).ravel()
     work = np.repeat(rng.permutation(ability[ability > 0])[:, None], 20, axis=1)
     place, need = rng.integers(0, 20, len(work)), np.full(20, 1000.0 - 2)
-    assert search_repartitions(work, need, place, 20_000, np.ones(1, dtype=np.uint64))[0] == 0.0
+    assert search_repartitions(work, need, partners_of(work), place, 20_000, np.ones(1, dtype=np.uint64))[0] == 0.0

@@ -3,7 +3,7 @@ import pytest
 from oracle import brute_force
 from tiny_instances import seeds_where, tiny_instance
 
-from alloc.allocators.exact.makespan.repartition_search import RepartitionSearch
+from alloc.allocators.exact.makespan.repartition.search import RepartitionSearch
 from alloc.allocators.exact.model import Model
 from alloc.allocators.heuristic.greedy.list_schedule import greedy
 from alloc.problems import Instance, agent_classes, evaluate, fewest_unserved, machine_covering, serve_all

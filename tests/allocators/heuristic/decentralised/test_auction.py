@@ -53,6 +53,7 @@ def test_impossible_deadlines_end() -> None:
     assert not series(Instance(ability=[1, 1], workload=[4, 4], allowed_tasks=[[0], [0]])).meet(4.0)
 
 
+@pytest.mark.slow
 def test_scenarios_are_solved() -> None:
     """The paper's first scenario comes to within 2 %, with less energy where that counts, and messages counted."""
     plain = solve(paper(1, 1000), "auction", iterations=20_000, time_limit_s=None)

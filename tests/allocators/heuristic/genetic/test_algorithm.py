@@ -51,6 +51,7 @@ def test_never_proposes_violations(objective: str) -> None:
     assert all(not step.evaluation.violations for step in told)
 
 
+@pytest.mark.slow
 def test_saves_energy_at_equal_makespan() -> None:
     """With energy in the objective it keeps T = 1 with far less energy than without."""
     instance = paper(1, 3)

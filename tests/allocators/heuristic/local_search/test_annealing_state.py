@@ -56,3 +56,12 @@ def test_helpers_can_reach_the_task():
     state = AnnealingState(instance, 0, 2)
     state.begin(Allocation([0, IDLE, 1, IDLE]), 1.0)
     assert {int(draw_helper(state.arrays, state.plan, np.int32(1))) for _ in range(50)} == {2, 3}
+
+
+def test_prices_lead_out_of_least_shortfalls():
+    """A short task rises in price until it takes an agent from a task that then lacks more, but can be helped."""
+    instance = Instance(ability=[1, 2, 1, 2], workload=[2, 3], allowed_tasks=[[0], [0, 1], [1], [1]])
+    state = AnnealingState(instance, 0, 2)
+    state.begin(Allocation([0, 1, 1, IDLE]), 1.0)
+    state.run(100, state.weights(0.0, 1e-6, 0.0, 1.0))
+    assert state.allocation == Allocation([0, 0, 1, 1])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from alloc.allocators.heuristic.local_search.plan import Weights, workspace
+from alloc.allocators.heuristic.local_search.plan import Needs, Weights, workspace
 from alloc.allocators.heuristic.local_search.subsets import (
     best_by_enumeration,
     best_by_halves,
@@ -21,64 +21,67 @@ def pool_of(seed, size, *, integer):
     work.ability[:size] = work.other_ability[:size] = ability
     work.cost[:size] = rng.normal(size=size)
     missing = float(rng.integers(1, 4 * size)) if integer else rng.uniform(1, 4 * size)
-    return work, missing, float(ability.sum()) - missing - float(rng.integers(-2, 4))
+    other_missing = float(ability.sum()) - missing - float(rng.integers(-2, 4))
+    return work, Needs(missing, other_missing, *rng.uniform(0.5, 2, 2), False, False)
 
 
-def cost_of(work, size, subset, missing, other_missing, weights):
+def cost_of(work, size, subset, needs, weights):
     """Return the cost of a subset for the first task, from the definition."""
     goes = np.array([int(subset) >> bit & 1 for bit in range(size)], dtype=bool)
     cost = float(work.cost[:size][goes].sum())
-    for shortfall in (
-        missing - work.ability[:size][goes].sum(),
-        other_missing - work.other_ability[:size][~goes].sum(),
+    for shortfall, price in (
+        (needs.missing - work.ability[:size][goes].sum(), needs.price),
+        (needs.other_missing - work.other_ability[:size][~goes].sum(), needs.other_price),
     ):
-        cost += weights.short_task + weights.shortfall * shortfall if shortfall > 0 else 0.0
+        cost += weights.short_task + price * weights.shortfall * shortfall if shortfall > 0 else 0.0
     return cost
 
 
-def least_cost(work, size, missing, other_missing, weights):
-    return min(cost_of(work, size, subset, missing, other_missing, weights) for subset in range(1 << size))
+def least_cost(work, size, needs, weights):
+    return min(cost_of(work, size, subset, needs, weights) for subset in range(1 << size))
 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_enumeration_is_exact(seed):
     """Enumeration finds the cheapest subset."""
     size = 1 + seed % 8
-    work, missing, other_missing = pool_of(seed, size, integer=False)
-    subset = best_by_enumeration(work, WEIGHTS, size, missing, other_missing, False, False)
-    found = cost_of(work, size, subset, missing, other_missing, WEIGHTS)
-    assert found == pytest.approx(least_cost(work, size, missing, other_missing, WEIGHTS))
+    work, needs = pool_of(seed, size, integer=False)
+    subset = best_by_enumeration(work, WEIGHTS, size, needs)
+    found = cost_of(work, size, subset, needs, WEIGHTS)
+    assert found == pytest.approx(least_cost(work, size, needs, WEIGHTS))
 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_sums_are_exact(seed):
     """Dynamic programming over all sums finds the cheapest subset where abilities are integers."""
     size = 1 + seed % 8
-    work, missing, other_missing = pool_of(seed, size, integer=True)
+    work, needs = pool_of(seed, size, integer=True)
     total = float(work.ability[:size].sum())
-    subset = best_by_sums(work, WEIGHTS, size, int(total), total, missing, other_missing, False, False)
-    found = cost_of(work, size, subset, missing, other_missing, WEIGHTS)
-    assert found == pytest.approx(least_cost(work, size, missing, other_missing, WEIGHTS))
+    subset = best_by_sums(work, WEIGHTS, size, int(total), total, needs)
+    found = cost_of(work, size, subset, needs, WEIGHTS)
+    assert found == pytest.approx(least_cost(work, size, needs, WEIGHTS))
 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_halves_have_the_least_shortfall(seed):
     """Where agents cost nothing, meeting in the middle finds a subset whose shortfall is as small as any."""
     size = 2 + seed % 8
-    work, missing, other_missing = pool_of(seed, size, integer=False)
+    work, needs = pool_of(seed, size, integer=False)
     work.cost[:size] = 0.0
+    needs = needs._replace(price=1.0, other_price=1.0)
     weights = WEIGHTS._replace(short_task=0.0)
-    subset = best_by_halves(work, weights, size, missing, other_missing)
-    found = cost_of(work, size, subset, missing, other_missing, weights)
-    assert found == pytest.approx(least_cost(work, size, missing, other_missing, weights))
+    subset = best_by_halves(work, weights, size, needs)
+    found = cost_of(work, size, subset, needs, weights)
+    assert found == pytest.approx(least_cost(work, size, needs, weights))
 
 
 def test_no_task_is_left_unserved():
     """A task that would lose its last agent keeps it, whatever that costs."""
     work = workspace(0)
     work.ability[0], work.other_ability[0], work.cost[0] = 1.0, 1.0, 1e6
-    assert best_by_enumeration(work, WEIGHTS, 1, 1e-9, 0.0, True, False) == 1
-    assert best_by_sums(work, WEIGHTS, 1, 1, 1.0, 1e-9, 0.0, True, False) == 1
+    needs = Needs(1e-9, 0.0, 1.0, 1.0, True, False)
+    assert best_by_enumeration(work, WEIGHTS, 1, needs) == 1
+    assert best_by_sums(work, WEIGHTS, 1, 1, 1.0, needs) == 1
 
 
 def test_subsets_are_sorted():

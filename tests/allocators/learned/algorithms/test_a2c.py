@@ -71,6 +71,7 @@ def test_simultaneous_turns_can_be_trained_on() -> None:
     assert not torch.equal(weights(learner), before)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PROBES)
 def test_a2c_solves_probes(name: str) -> None:
     """Games with known answers are solved, all of them."""

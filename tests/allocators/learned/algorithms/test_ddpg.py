@@ -80,6 +80,7 @@ def test_a_job_depends_on_state_and_job_only() -> None:
     assert_resumes_elsewhere(Ddpg)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PROBES)
 def test_ddpg_solves_probes(name: str) -> None:
     """Games with known answers are solved, all of them."""

@@ -83,6 +83,7 @@ def test_a_job_depends_on_state_and_job_only() -> None:
     assert_resumes_elsewhere(Dqn)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PROBES)
 def test_dqn_solves_probes(name: str) -> None:
     """Games with known answers are solved, all of them."""

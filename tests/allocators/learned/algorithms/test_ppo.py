@@ -279,6 +279,7 @@ def test_a_job_depends_on_state_and_job_only(parameters: PpoParameters) -> None:
     assert_resumes_elsewhere(lambda seed: Ppo(SMALL, parameters, seed))
 
 
+@pytest.mark.slow
 def test_it_learns_when_all_choose_at_once() -> None:
     """Rewards rise to nine tenths of the best there is under the other turn rule as well."""
     games, learner = probe("right_task"), Ppo(SMALL, PpoParameters(learning_rate=3e-3))

@@ -77,6 +77,8 @@ def test_a_policy_begins_another(tmp_path: Path) -> None:
         ({"parameters": DqnParameters()}, "parameters: ppo has PpoParameters, got DqnParameters"),
         ({"population": 2}, "population: ppo trains one network"),
         ({"decisions": 0}, "decisions: must be"),
+        ({"steps": -1}, "steps: must be"),
+        ({"minutes": float("nan")}, "minutes: must be"),
         ({"init": "nowhere"}, "nowhere: no such policy file"),
         ({"resume": True}, "no such checkpoint"),
         ({"output": "p.pt"}, "has the suffix '.pt'"),
@@ -120,6 +122,7 @@ def test_an_engine_that_gives_up_is_a_training_error(tmp_path: Path, monkeypatch
     assert isinstance(caught.value.__cause__, EngineError)
 
 
+@pytest.mark.slow
 def test_members_have_the_threads_of_the_engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Torch computes with as many threads as the engine grants to an item."""
     import torch

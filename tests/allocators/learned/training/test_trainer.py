@@ -18,7 +18,7 @@ from alloc.allocators.learned.files.policy_file import load_policy
 from alloc.allocators.learned.files.run_files import RunFiles
 from alloc.allocators.learned.network.actor_critic import NetworkSize
 from alloc.allocators.learned.training import member as module_of_members
-from alloc.allocators.learned.training import trainer as module
+from alloc.allocators.learned.training import population as module
 from alloc.allocators.learned.training.curriculum import Curriculum
 from alloc.allocators.learned.training.limits import Limits
 from alloc.allocators.learned.training.loop import run_training
@@ -97,6 +97,7 @@ def test_a_resumed_run_goes_on_as_if_nothing_had_happened(tmp_path: Path, change
     assert torch.equal(weights(whole), weights(second))
 
 
+@pytest.mark.slow
 def test_processes_train_the_same() -> None:
     """Members that learn in other processes learn the same to the last bit."""
     here, there = trainer(), trainer()

@@ -1,0 +1,79 @@
+"""Local search within a run of an exact method, in turns with other phases or beside them in its own thread."""
+
+from collections import deque
+from concurrent.futures import Future
+from types import TracebackType
+
+from alloc.allocators.contract.search import Search
+from alloc.allocators.contract.tolerance import MakespanTolerance
+from alloc.allocators.exact.solver_model import is_repeatable
+from alloc.allocators.heuristic.local_search.improve import improve
+from alloc.allocators.parallel.pool import Pool
+from alloc.problems import Allocation, Objective
+
+REPEATABLE_ITERATIONS = 50
+"""Iterations of a turn where effort is counted."""
+
+
+class LocalSearchPhase:
+    """Improves the plan of a run by local search; to be used in a `with` statement.
+
+    Parameters
+    ----------
+    search : Search
+        The run; it has a plan.
+    objective : Objective
+        The makespan alone, or the energy within `limit`.
+    until_s : float
+        Seconds since the run began at which the phase must end.
+    limit : float, optional
+        Makespan up to which the energy decides, in hours.
+    """
+
+    def __init__(self, search: Search, objective: Objective, until_s: float, limit: float | None = None) -> None:
+        self._search, self._until_s = search, until_s
+        self._found: deque[Allocation] = deque()
+        self._part = search.part(
+            objective, MakespanTolerance(limit=limit), lambda found: self._found.append(found.allocation)
+        )
+        self._pool = Pool(1) if search.threads > 1 and not is_repeatable(search) else None
+        self._running: Future[None] | None = None
+
+    def __enter__(self) -> "LocalSearchPhase":
+        if self._pool is not None:
+            self._running = self._pool.submit(improve, self._part, until_s=self._until_s)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._pool is not None:
+            self._part.end()
+            self._pool.shutdown()
+        if error is None:
+            self.exchange()
+            if self._running is not None:
+                self._running.result()
+
+    @property
+    def is_beside(self) -> bool:
+        """Whether it works in a thread of its own, so that it needs no turns."""
+        return self._pool is not None
+
+    def turn(self, seconds: float) -> None:
+        """Improve the plan for so long, unless that is done in another thread anyway; submit what was found."""
+        if not self.is_beside:
+            for known in (self._search.fastest, self._search.best):
+                if known is not None:
+                    self._part.submit(known.allocation)
+            if is_repeatable(self._search):
+                improve(self._part, iterations=REPEATABLE_ITERATIONS)
+            else:
+                improve(self._part, until_s=min(self._until_s, self._part.elapsed_s + seconds))
+        self.exchange()
+
+    def exchange(self) -> None:
+        """Submit what was found to the run, and pass its bound on to the local search."""
+        while self._found:
+            self._search.submit(self._found.popleft())
+        self._part.raise_bound(self._search.lower_bound)

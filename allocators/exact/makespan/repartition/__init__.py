@@ -1,0 +1,1 @@
+"""Plans by repartition: the agents of a few tasks assigned anew."""

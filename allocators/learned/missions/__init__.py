@@ -1,0 +1,1 @@
+"""`gappo` in missions: a network that scores what an agent knows, its compiled decisions, and its training."""

@@ -1,0 +1,91 @@
+"""The network of `gappo` in missions: it scores an agent's options, whatever their number and order."""
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from alloc.allocators.learned.missions.feature_names import FEATURES, FIRST_SKIP
+from alloc.allocators.learned.missions.network_arrays import HIDDEN, MissionWeights, Singles
+
+
+class MissionNetwork(nn.Module):
+    """Scores of options, each seen beside all others by attention; and the value of the situation.
+
+    Options are tasks that the agent knows and can take, looking around, and staying. Each becomes a token; the tokens
+    are pooled by attention; the score of an option is read from its token and the pooled one, with a linear part of its
+    features. Without order and of any number, it is invariant to permutations (Zaheer et al. 2017, arXiv:1703.06114;
+    pooling by attention as in Lee et al. 2019, arXiv:1810.00825). The critic has layers of its own, so that what it
+    learns does not disturb the scores.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.inner = nn.Linear(FEATURES, HIDDEN)
+        self.query = nn.Linear(HIDDEN, 1, bias=False)
+        self.own = nn.Linear(HIDDEN, HIDDEN)
+        self.context = nn.Linear(HIDDEN, HIDDEN, bias=False)
+        self.out = nn.Linear(HIDDEN, 1, bias=False)
+        self.skip = nn.Linear(FEATURES, 1, bias=False)
+        self.critic = nn.Sequential(nn.Linear(FEATURES, HIDDEN), nn.LeakyReLU(0.1))
+        self.value = nn.Linear(HIDDEN, 1)
+
+    def forward(self, options: Tensor, is_option: Tensor) -> tuple[Tensor, Tensor]:
+        """Return scores and values.
+
+        Parameters
+        ----------
+        options : Tensor, shape (batch, options, FEATURES)
+        is_option : Tensor of bool, shape (batch, options)
+            False where a row is filled up.
+
+        Returns
+        -------
+        scores : Tensor, shape (batch, options)
+            ``-inf`` where there is no option.
+        values : Tensor, shape (batch,)
+        """
+        token = nn.functional.leaky_relu(self.inner(options), 0.1)
+        attention = self.query(token).squeeze(-1).masked_fill(~is_option, -torch.inf).softmax(-1)
+        pooled = (attention.unsqueeze(-1) * token).sum(-2)
+        both = nn.functional.leaky_relu(self.own(token) + self.context(pooled).unsqueeze(-2), 0.1)
+        scores = (self.out(both) + self.skip(options)).squeeze(-1)
+        weight = is_option.unsqueeze(-1) / is_option.sum(-1)[:, None, None].clamp(min=1)
+        values = self.value((self.critic(options) * weight).sum(-2)).squeeze(-1)
+        return scores.masked_fill(~is_option, -torch.inf), values
+
+
+def compiled_weights(network: MissionNetwork) -> MissionWeights:
+    """Return the weights that score options."""
+
+    def matrix(layer: nn.Linear) -> Singles:
+        return np.ascontiguousarray(layer.weight.detach().numpy().T, dtype=np.float32)
+
+    def bias(layer: nn.Linear) -> Singles:
+        return layer.bias.detach().numpy().astype(np.float32)
+
+    return MissionWeights(
+        inner=matrix(network.inner),
+        inner_bias=bias(network.inner),
+        query=matrix(network.query)[:, 0].copy(),
+        own=matrix(network.own),
+        own_bias=bias(network.own),
+        context=matrix(network.context),
+        out=matrix(network.out)[:, 0].copy(),
+        skip=matrix(network.skip)[:, 0].copy(),
+    )
+
+
+def first_network(seed: int) -> MissionNetwork:
+    """Return a network that begins as a plain rule: near tasks, large shares of work, and what was begun.
+
+    Its hidden part has small random weights.
+    """
+    generator = torch.Generator().manual_seed(seed)
+    network = MissionNetwork()
+    with torch.no_grad():
+        for name, weight in network.named_parameters():
+            scale = 0.0 if name.endswith("bias") else 0.5 / np.sqrt(weight.shape[-1])
+            weight.copy_(torch.randn(weight.shape, generator=generator) * scale)
+        network.out.weight *= 0.2
+        network.skip.weight.copy_(torch.tensor([FIRST_SKIP]))
+    return network

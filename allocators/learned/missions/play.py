@@ -1,0 +1,192 @@
+"""Missions led by the network of `gappo`, in compiled loops."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from alloc.allocators.learned.missions.exploring import CELLS, centre, find_unseen, notice
+from alloc.allocators.learned.missions.feature_names import FEATURES
+from alloc.allocators.learned.missions.forward import score
+from alloc.allocators.learned.missions.network_arrays import HIDDEN, MissionWeights, Singles
+from alloc.allocators.learned.missions.options import WAIT, fill_options
+from alloc.allocators.learned.missions.situation import IS_FLYING, TARGET, Situation, empty, fill
+from alloc.allocators.missions.advance import advance
+from alloc.allocators.missions.layout import MESSAGES, OVER, STAY, TO_PLACE, TO_TASK, MissionArrays
+from alloc.allocators.missions.motion import place_of
+from alloc.allocators.missions.orders import order
+from alloc.allocators.runtime.compiled import compiled, inlined
+from alloc.problems.fields import FloatArray, IntArray
+
+REVIEW = 10
+"""Radio periods after which an agent that is busy considers its options anew, if nothing else makes it do so."""
+
+
+class Room(NamedTuple):
+    """Room for decisions, and what agents remember between them.
+
+    Attributes
+    ----------
+    situation : Situation
+    options, token, scores : ndarray
+        See `score`.
+    choice, rank, others : ndarray of int
+    rate, without : ndarray
+        See `fill_options`.
+    look : ndarray, shape (3,)
+    seen : ndarray, shape (n, cells)
+        Hour at which each agent last saw each cell, -1 for never.
+    goal : ndarray of int, shape (n,)
+        Cell to which it flies to look around.
+    decided : ndarray, shape (n,)
+        Hour at which it last considered its options.
+    tasks : ndarray of int, shape (n,)
+        Open tasks that it knew then.
+    """
+
+    situation: Situation
+    options: Singles
+    token: Singles
+    scores: Singles
+    choice: IntArray
+    rank: IntArray
+    others: IntArray
+    rate: FloatArray
+    without: FloatArray
+    look: FloatArray
+    seen: FloatArray
+    goal: IntArray
+    decided: FloatArray
+    tasks: IntArray
+
+
+def room_for(n: int, m: int) -> Room:
+    """Return room for the decisions of n agents on m tasks."""
+    return Room(
+        situation=empty(n, m),
+        options=np.zeros((m + 2, FEATURES), np.float32),
+        token=np.zeros((m + 2, HIDDEN), np.float32),
+        scores=np.zeros(m + 2, np.float32),
+        choice=np.zeros(m + 2, np.intp),
+        rank=np.zeros(n, np.intp),
+        others=np.zeros(m, np.intp),
+        rate=np.zeros(m),
+        without=np.zeros(m),
+        look=np.zeros(3),
+        seen=np.full((n, CELLS * CELLS), -1.0),
+        goal=np.full(n, -1),
+        decided=np.full(n, -np.inf),
+        tasks=np.zeros(n, np.intp),
+    )
+
+
+@inlined
+def is_due(room: Room, number: int, hour: float, period: float, tasks: int, is_busy: bool) -> bool:
+    """Whether an agent is to consider its options: it is not busy, knows of other tasks, or has not for a while."""
+    return not is_busy or tasks != room.tasks[number] or hour - room.decided[number] >= REVIEW * period
+
+
+@compiled
+def consider(
+    room: Room, area: FloatArray, sensing: float, seed: int, number: int, row: int, weights: MissionWeights
+) -> int:
+    """Return how many options an agent has in the situation that is filled in, with their scores in `room`.
+
+    Parameters
+    ----------
+    room : Room
+    area : ndarray, shape (2, 3)
+    sensing : float
+        ``inf`` where nothing is to be looked for. An agent that has a task does not look around.
+    seed, number : int
+        Of the run and of the agent, for its chances.
+    row : int
+        Of the agent in what is remembered.
+    weights : MissionWeights
+    """
+    own = room.situation.own
+    room.look[:] = 0.0
+    target = int(own[TARGET])
+    if sensing < np.inf and (target < 0 or not room.situation.can[target]):
+        goal = room.goal[row] if own[TARGET] < 0 and own[IS_FLYING] > 0 else -1
+        room.goal[row] = find_unseen(room.situation, area, sensing, room.seen[row], seed, number, goal, room.look)
+    count = fill_options(
+        room.situation, room.look, room.options, room.choice, room.rank, room.others, room.rate, room.without
+    )
+    score(room.options, count, weights, room.token, room.scores)
+    return count
+
+
+@inlined
+def open_tasks(state: MissionArrays, number: int) -> int:
+    """Return how many tasks an agent knows as open."""
+    found = 0
+    for task in range(len(state.tasks)):
+        found += (state.task_hour[number, task] >= 0) & (state.task_left[number, task] >= 0)
+    return found
+
+
+@inlined
+def is_busy(state: MissionArrays, number: int) -> bool:
+    """Whether an agent has a task that is open as far as it knows, or is on its way to look around."""
+    agent = state.agents[number]
+    if agent.order == TO_TASK:
+        return bool(state.task_left[agent.known, agent.order_task] >= 0)
+    return agent.flight != 0
+
+
+@inlined
+def act(state: MissionArrays, room: Room, number: int, choice: int) -> None:
+    """Give the agent the order that its choice needs."""
+    agent = state.agents[number]
+    nowhere = (0.0, 0.0, 0.0)
+    if choice >= 0:
+        order(state, number, TO_TASK, choice, nowhere)
+    elif choice == WAIT:
+        order(state, number, STAY, -1, nowhere)
+    elif agent.order != TO_PLACE:
+        order(state, number, TO_PLACE, -1, centre(state.area, room.goal[number]))
+
+
+@inlined
+def wants(state: MissionArrays, room: Room, number: int) -> bool:
+    """Whether an agent is to consider its options now; what it sees is noticed."""
+    head, agent = state.head[0], state.agents[number]
+    tasks = open_tasks(state, agent.known)
+    is_considered = is_due(room, number, head.hour, head.period, tasks, is_busy(state, number))
+    if (is_considered or agent.flight != 0) and head.sensing < np.inf and head.is_local:
+        x, y, _ = place_of(agent, head.hour)
+        notice(state.area, head.sensing, x, y, head.hour, room.seen[number])
+    if not is_considered:
+        return False
+    room.decided[number], room.tasks[number] = head.hour, tasks
+    fill(state, number, room.situation)
+    return True
+
+
+@compiled
+def play(state: MissionArrays, room: Room, weights: MissionWeights, seed: int) -> int:
+    """Let the network lead all agents to the end of a mission; return how often options were scored.
+
+    Parameters
+    ----------
+    state : MissionArrays
+    room : Room
+        As `room_for` makes it.
+    weights : MissionWeights
+    seed : int
+        Of the run.
+    """
+    head, considered = state.head[0], 0
+    sensing = head.sensing if head.is_local else np.inf
+    while True:
+        wanted = advance(state)
+        if wanted == OVER:
+            return considered
+        if wanted == MESSAGES:
+            continue
+        for place in range(head.deciding):
+            number = state.deciding[place]
+            if wants(state, room, number):
+                count = consider(room, state.area, sensing, seed, number, number, weights)
+                act(state, room, number, room.choice[np.argmax(room.scores[:count])])
+                considered += 1

@@ -1,0 +1,162 @@
+"""Missions led by samples of the network, with a record of each decision, in compiled loops."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from alloc.allocators.learned.missions.feature_names import FEATURES
+from alloc.allocators.learned.missions.network_arrays import MissionWeights, Singles
+from alloc.allocators.learned.missions.play import Room, act, consider, wants
+from alloc.allocators.missions.advance import advance
+from alloc.allocators.missions.chance import first_key, fraction, keyed
+from alloc.allocators.missions.layout import IDLE, MESSAGES, MISSED, OVER, WORKING, MissionArrays
+from alloc.allocators.runtime.compiled import compiled
+from alloc.problems.fields import FloatArray, IntArray
+
+SAMPLING = 12
+"""What chances are for, as `alloc.problems.missions.chance` counts."""
+
+MISSED_COST = 3.0
+"""Cost of missing all priority, in ideal mission times."""
+
+
+class Record(NamedTuple):
+    """Decisions of a mission in the order of time.
+
+    Attributes
+    ----------
+    options : ndarray, shape (most, options, FEATURES)
+    choices, action, agent : ndarray of int, shape (most,)
+        Options of each decision, the one that was taken, and whose decision it was.
+    log_probability, hour : ndarray, shape (most,)
+    idle, cost : ndarray, shape (most,)
+        Up to then: hours in which that agent did not work, and the mean over all agents, by ability, with what missed
+        tasks cost.
+    length : ndarray of int, shape (1,)
+        Decisions.
+    asked, unproductive : ndarray, shape (n,)
+        Hour at which each agent was last asked, and hours in which it did not work until then.
+    is_working : ndarray of bool, shape (n,)
+        Whether it has worked since.
+    total : ndarray, shape (2,)
+        Cost of the mission up to now, and its ideal time.
+    """
+
+    options: Singles
+    choices: IntArray
+    action: IntArray
+    agent: IntArray
+    log_probability: FloatArray
+    hour: FloatArray
+    idle: FloatArray
+    cost: FloatArray
+    length: IntArray
+    asked: FloatArray
+    unproductive: FloatArray
+    is_working: FloatArray
+    total: FloatArray
+
+
+def record_for(n: int, m: int, most: int, ideal: float) -> Record:
+    """Return room for so many decisions of n agents on m tasks in a mission of some ideal time."""
+    return Record(
+        options=np.zeros((most, m + 2, FEATURES), np.float32),
+        choices=np.zeros(most, np.intp),
+        action=np.zeros(most, np.intp),
+        agent=np.zeros(most, np.intp),
+        log_probability=np.zeros(most),
+        hour=np.zeros(most),
+        idle=np.zeros(most),
+        cost=np.zeros(most),
+        length=np.zeros(1, np.intp),
+        asked=np.full(n, -1.0),
+        unproductive=np.zeros(n),
+        is_working=np.zeros(n),
+        total=np.array([0.0, ideal]),
+    )
+
+
+@compiled
+def account(state: MissionArrays, record: Record, number: int) -> None:
+    """Count the hours since an agent was last asked, if it did not work."""
+    head, agent = state.head[0], state.agents[number]
+    if record.asked[number] >= 0 and record.is_working[number] == 0:
+        hours = head.hour - record.asked[number]
+        record.unproductive[number] += hours
+        ability = 0.0
+        for other in range(len(state.agents)):
+            ability += state.agents[other].ability
+        record.total[0] += hours * agent.ability / ability
+    record.asked[number] = head.hour
+
+
+@compiled
+def missed_cost(state: MissionArrays, ideal: float) -> float:
+    """Return what tasks cost that are missed by now."""
+    missed = total = 0.0
+    for number in range(len(state.tasks)):
+        task = state.tasks[number]
+        total += task.priority
+        missed += task.priority * (task.status == MISSED)
+    return MISSED_COST * ideal * missed / total if total > 0 else 0.0
+
+
+@compiled
+def sample(room: Room, count: int, key: int) -> tuple[int, float]:
+    """Return an option that is drawn by the softmax of the scores, and the logarithm of its probability."""
+    highest, chosen = -np.inf, 0
+    largest = room.scores[:count].max()
+    total = 0.0
+    for row in range(count):
+        total += math.exp(room.scores[row] - largest)
+        noisy = room.scores[row] - math.log(-math.log(fraction(keyed(key, row)) + 1e-300) + 1e-300)
+        if noisy > highest:
+            highest, chosen = noisy, row
+    return chosen, room.scores[chosen] - largest - math.log(total)
+
+
+@compiled
+def rollout(state: MissionArrays, room: Room, weights: MissionWeights, seed: int, record: Record) -> None:
+    """Let samples of the network lead all agents to the end of a mission, and record what they decide.
+
+    Parameters
+    ----------
+    state : MissionArrays
+    room : Room
+    weights : MissionWeights
+    seed : int
+        Of the run, the samples included.
+    record : Record
+        As `record_for` makes it; when it is full, decisions are no longer recorded.
+    """
+    head = state.head[0]
+    sensing = head.sensing if head.is_local else np.inf
+    key, drawn = keyed(first_key(SAMPLING), seed), 0
+    while True:
+        wanted = advance(state)
+        if wanted == OVER:
+            for number in range(len(state.agents)):
+                if IDLE <= state.agents[number].status <= WORKING:
+                    account(state, record, number)
+            record.total[0] += missed_cost(state, record.total[1])
+            return
+        if wanted == MESSAGES:
+            continue
+        missed = missed_cost(state, record.total[1])
+        for place in range(head.deciding):
+            number = state.deciding[place]
+            account(state, record, number)
+            if wants(state, room, number):
+                count = consider(room, state.area, sensing, seed, number, number, weights)
+                option, log_probability = sample(room, count, keyed(key, drawn))
+                drawn += 1
+                k = record.length[0]
+                if k < len(record.choices):
+                    record.options[k, :count] = room.options[:count]
+                    record.choices[k], record.action[k], record.agent[k] = count, option, number
+                    record.log_probability[k], record.hour[k] = log_probability, head.hour
+                    record.idle[k], record.cost[k] = record.unproductive[number], record.total[0] + missed
+                    record.length[0] += 1
+                act(state, room, number, room.choice[option])
+            record.is_working[number] = state.agents[number].status == WORKING

@@ -1,0 +1,124 @@
+"""What an agent knows when it decides, in arrays: the same from a compiled mission and from a view of the reference."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from alloc.allocators.missions.layout import NOBODY, TO_TASK, WORKING, MissionArrays
+from alloc.allocators.missions.motion import battery_of, can_fly, distance_between, place_of
+from alloc.allocators.runtime.compiled import compiled
+from alloc.problems.fields import BoolArray, FloatArray, IntArray
+
+MEMORY = 2.0
+"""Hours after which what was heard of others no longer counts."""
+
+
+class Situation(NamedTuple):
+    """What one agent knows of tasks and of other agents.
+
+    Attributes
+    ----------
+    own : ndarray, shape (OWN,)
+        Of the agent itself, by the numbers below.
+    task : ndarray, shape (TASK, m)
+        Of each task, by the numbers below.
+    can : ndarray of bool, shape (m,)
+        Whether the agent knows it as open, and can take it.
+    other : ndarray, shape (OTHER, n)
+        Of each other agent that counts, by the numbers below.
+    target : ndarray of int, shape (n,)
+        Task to which it goes or where it works, -1 for none.
+    counts : ndarray of bool, shape (n,)
+        Whether anything recent is known of an agent, and it is another one.
+    """
+
+    own: FloatArray
+    task: FloatArray
+    can: BoolArray
+    other: FloatArray
+    target: IntArray
+    counts: BoolArray
+
+
+HOUR, X, Y, Z, ABILITY, SPEED, BATTERY, ENERGY_PER_DISTANCE, SPAN, TARGET, IS_WORKING, IS_FLYING, OWN = range(13)
+"""Of the agent; `SPAN` is the longest distance in the area, `TARGET` the task of its order, -1 for none."""
+
+TASK_X, TASK_Y, TASK_Z, LEFT, KNOWN_AT, PRIORITY, DEADLINE, GROWTH, DISTANCE, TASK = range(10)
+"""Of a task; `DISTANCE` is that from the agent."""
+
+ARRIVES, STRENGTH, OTHER_X, OTHER_Y, OTHER_Z, OTHER = range(6)
+"""Of another agent: hour at which it is at its task, ability, place."""
+
+
+def empty(n: int, m: int) -> Situation:
+    """Return room for a situation."""
+    return Situation(
+        own=np.zeros(OWN),
+        task=np.zeros((TASK, m)),
+        can=np.zeros(m, np.bool_),
+        other=np.zeros((OTHER, n)),
+        target=np.full(n, NOBODY),
+        counts=np.zeros(n, np.bool_),
+    )
+
+
+@compiled
+def fill(state: MissionArrays, number: int, situation: Situation) -> None:
+    """Fill in what an agent knows in a compiled mission."""
+    fill_own(state, number, situation.own)
+    fill_tasks(state, number, situation.task, situation.can)
+    fill_others(state, number, situation.other, situation.target, situation.counts)
+
+
+@compiled
+def fill_own(state: MissionArrays, number: int, own: FloatArray) -> None:
+    """Fill in what an agent knows of itself."""
+    head, agent = state.head[0], state.agents[number]
+    own[HOUR] = head.hour
+    own[X], own[Y], own[Z] = place_of(agent, head.hour)
+    own[ABILITY], own[SPEED] = agent.ability, agent.speed
+    own[BATTERY], own[ENERGY_PER_DISTANCE] = battery_of(agent, head.hour), agent.energy_per_distance
+    own[SPAN] = head.span
+    own[TARGET] = agent.order_task if agent.order == TO_TASK else NOBODY
+    own[IS_WORKING], own[IS_FLYING] = agent.task != NOBODY, agent.flight != 0
+
+
+@compiled
+def fill_tasks(state: MissionArrays, number: int, task: FloatArray, can: BoolArray) -> None:
+    """Fill in what an agent knows of tasks."""
+    head, agent = state.head[0], state.agents[number]
+    here, battery = place_of(agent, head.hour), battery_of(agent, head.hour)
+    hours, left, allowed = state.task_hour[agent.known], state.task_left[agent.known], state.allowed[number]
+    for j in range(len(hours)):
+        can[j] = hours[j] >= 0 and left[j] >= 0
+        if can[j]:
+            facts = state.tasks[j]
+            place = (facts.x, facts.y, facts.z)
+            is_order = agent.order == TO_TASK and agent.order_task == j
+            can[j] = is_order or (allowed[j] and can_fly(head.is_manhattan, agent, here, battery, place))
+            task[TASK_X, j], task[TASK_Y, j], task[TASK_Z, j] = place
+            task[LEFT, j], task[KNOWN_AT, j] = left[j], hours[j]
+            task[PRIORITY, j], task[DEADLINE, j] = facts.priority, facts.deadline
+            task[GROWTH, j] = facts.growth
+            task[DISTANCE, j] = distance_between(head.is_manhattan, here, place)
+
+
+@compiled
+def fill_others(state: MissionArrays, number: int, other: FloatArray, target: IntArray, counts: BoolArray) -> None:
+    """Fill in what an agent knows of others."""
+    head, row = state.head[0], state.agents[number].known
+    hours, known, task_hours = state.agent_hour[row], state.agent_report[row], state.task_hour[row]
+    for i in range(len(hours)):
+        counts[i] = i != number and hours[i] >= 0 and head.hour - hours[i] <= MEMORY
+        if not counts[i]:
+            continue
+        report, agent = state.reports[known[i]], state.agents[i]
+        counts[i] = 1 <= report.status <= WORKING
+        other[STRENGTH, i] = agent.ability
+        other[OTHER_X, i], other[OTHER_Y, i], other[OTHER_Z, i] = report.x, report.y, report.z
+        target[i] = report.task if report.task != NOBODY and task_hours[report.task] >= 0 else NOBODY
+        if target[i] != NOBODY:
+            facts = state.tasks[report.task]
+            place = (facts.x, facts.y, facts.z)
+            way = distance_between(head.is_manhattan, (report.x, report.y, report.z), place)
+            other[ARRIVES, i] = -np.inf if report.status == WORKING else hours[i] + way / agent.speed

@@ -1,0 +1,116 @@
+"""The missions of training: of many families, sizes, radii and losses, and harder as training goes on."""
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from alloc.allocators.missions.layout import MissionArrays
+from alloc.allocators.missions.pack import pack
+from alloc.problems.missions.families.draw import random_mission
+from alloc.problems.missions.families.parameters import MissionParameters
+from alloc.problems.missions.mission import Mission
+from alloc.problems.vocabulary import MissionFamily
+
+FAMILIES = tuple(str(family) for family in MissionFamily if not str(family).startswith("paper"))
+"""Families of missions to train on."""
+
+VALIDATION_SEED = 1_000_000_000
+"""Seeds from here on are those of validation missions."""
+
+
+class PackedMission(NamedTuple):
+    """A mission that is ready for compiled runs.
+
+    Attributes
+    ----------
+    arrays : MissionArrays
+    ideal : float
+        Hours that all agents together would need for all work if flights took no time.
+    """
+
+    arrays: MissionArrays
+    ideal: float
+
+
+@dataclass(frozen=True)
+class MissionCurriculum:
+    """Draws missions for training.
+
+    Attributes
+    ----------
+    families : tuple of str
+        Those of `MissionFamily` to draw from.
+    agents, tasks : tuple of int
+        Least and most of each.
+    radii : tuple of float
+        Radio radii and sensing radii to draw from, each by itself.
+    losses : tuple of float
+        Shares of messages lost.
+    varied_from : float
+        Share of the training after which everything varies; before that, missions of the first family and the first
+        radius and loss alone are drawn.
+    missions : tuple of Mission
+        To train on instead, if there are any.
+    """
+
+    families: tuple[str, ...] = FAMILIES
+    agents: tuple[int, int] = (10, 30)
+    tasks: tuple[int, int] = (20, 50)
+    radii: tuple[float, ...] = (0.3, 0.3, 0.2, 0.15)
+    losses: tuple[float, ...] = (0.2, 0.0, 0.8)
+    varied_from: float = 0.1
+    missions: tuple[Mission, ...] = field(default=())
+
+    def draw(self, rng: np.random.Generator, count: int, progress: float) -> list[tuple[PackedMission, int]]:
+        """Return missions and the seeds of their runs.
+
+        Parameters
+        ----------
+        rng : Generator
+        count : int
+        progress : float
+            Share of the training that is done, 0 to 1.
+        """
+        drawn = []
+        for _ in range(count):
+            seed = int(rng.integers(0, VALIDATION_SEED))
+            if self.missions:
+                mission = self.missions[int(rng.integers(len(self.missions)))]
+                drawn.append((packed(mission), seed))
+            else:
+                drawn.append((_generated(self._parameters(rng, progress), seed), seed))
+        return drawn
+
+    def _parameters(self, rng: np.random.Generator, progress: float) -> MissionParameters:
+        n = int(rng.integers(self.agents[0], self.agents[1] + 1))
+        m = int(rng.integers(self.tasks[0], self.tasks[1] + 1))
+        if progress < self.varied_from:
+            radius = self.radii[0]
+            return MissionParameters(self.families[0], n, m, radius=radius, sensing=radius, loss=self.losses[0])
+        family, loss = str(rng.choice(self.families)), float(rng.choice(self.losses))
+        radius, sensing = (float(value) for value in rng.choice(self.radii, 2))
+        return MissionParameters(family, n, m, radius=radius, sensing=sensing, loss=loss)
+
+    def validation(self, count: int) -> list[tuple[PackedMission, int]]:
+        """Return missions that training never draws, of each family in turn, and the seeds of their runs."""
+        seeds = range(VALIDATION_SEED, VALIDATION_SEED + count)
+        if self.missions:
+            return [(packed(self.missions[k % len(self.missions)]), seed) for k, seed in enumerate(seeds)]
+        families = [self.families[k % len(self.families)] for k in range(count)]
+        return [
+            (_generated(MissionParameters(family), seed), seed) for family, seed in zip(families, seeds, strict=True)
+        ]
+
+
+@lru_cache(maxsize=256)
+def _generated(parameters: MissionParameters, seed: int) -> PackedMission:
+    return packed(random_mission(parameters, seed))
+
+
+def packed(mission: Mission) -> PackedMission:
+    """Return a mission ready for compiled runs."""
+    instance = mission.instance
+    ideal = float(instance.workload.sum() / instance.ability.sum())
+    return PackedMission(pack(mission), max(ideal, 1e-9))

@@ -1,0 +1,116 @@
+"""The linear part of the network, evolved: where PPO begins.
+
+References
+----------
+Hansen and Ostermeier (2001), doi:10.1162/106365601750190398, as in DEAP (Fortin et al. 2012, JMLR 13:2171-2175).
+"""
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from deap import base, cma
+
+from alloc.allocators.learned.missions.network import MissionNetwork
+from alloc.allocators.learned.missions.training.curriculum import MissionCurriculum
+from alloc.allocators.learned.missions.training.validation import validate
+from alloc.allocators.learned.training.member import Weights
+from alloc.allocators.parallel.engine import Engine
+
+STEP = 1.0
+"""Initial standard deviation of a weight."""
+
+STATE = ("centroid", "sigma", "pc", "ps", "C", "diagD", "B", "BD", "update_count")
+"""What changes of DEAP's strategy from generation to generation."""
+
+
+class _Fitness(base.Fitness):  # type: ignore[misc]
+    weights = (-1.0,)
+
+
+class _Rule(list[float]):
+    """Linear weights, as DEAP expects individuals."""
+
+    def __init__(self, weights: list[float], cost: float) -> None:
+        super().__init__(weights)
+        self.fitness = _Fitness((cost,))
+
+
+class RuleJob(NamedTuple):
+    """A candidate, and the missions on which it is tried, as they are sent to wherever that is done."""
+
+    network: Weights
+    rule: list[float]
+    curriculum: MissionCurriculum
+    seed: int
+    missions: int
+    progress: float
+
+
+def try_rule(job: RuleJob) -> float:
+    """Return the cost of missions under a candidate: a pure function of the job."""
+    network = MissionNetwork()
+    network.load_state_dict(with_rule(job.network, job.rule))
+    drawn = job.curriculum.draw(np.random.default_rng(job.seed), job.missions, job.progress)
+    return validate(network, drawn).cost
+
+
+def with_rule(network: Weights, rule: Sequence[float]) -> Weights:
+    """Return the weights of a network with other linear ones."""
+    return {**network, "skip.weight": torch.tensor([list(rule)], dtype=torch.float32)}
+
+
+class Evolution:
+    """The evolution of linear weights, generation by generation.
+
+    Parameters
+    ----------
+    network : weights
+        Of the network that begins.
+    population : int
+        Candidates in a generation.
+    missions : int
+        On which all candidates of a generation are compared.
+    """
+
+    def __init__(self, network: Weights, population: int, missions: int) -> None:
+        self._network, self._population, self._missions = network, population, missions
+        first = network["skip.weight"][0].double().numpy()
+        self._strategy = cma.Strategy(centroid=first, sigma=STEP, lambda_=population)
+
+    def advance(
+        self, curriculum: MissionCurriculum, seed: int, progress: float, engine: Engine, should_stop: Callable[[], bool]
+    ) -> Weights | None:
+        """Return the network with the mean of the next generation; None if `should_stop` returned True before.
+
+        Parameters
+        ----------
+        curriculum : MissionCurriculum
+        seed : int
+            Of all random numbers.
+        progress : float
+            Share of the training that is done, 0 to 1.
+        engine : Engine
+            Where candidates are tried.
+        should_stop : callable
+        """
+        strategy, rng = self._strategy, np.random.default_rng(seed)
+        # `Strategy.generate` would draw from the global generator
+        steps = rng.standard_normal((self._population, strategy.dim)) @ strategy.BD.T
+        rules = (strategy.centroid + strategy.sigma * steps).tolist()
+        jobs = [RuleJob(self._network, rule, curriculum, seed, self._missions, progress) for rule in rules]
+        tried = engine.map(try_rule, jobs, should_stop)
+        if tried is None:
+            return None
+        strategy.update([_Rule(rule, cost) for rule, cost in zip(rules, tried, strict=True)])
+        return with_rule(self._network, strategy.centroid.tolist())
+
+    def state_dict(self) -> dict[str, torch.Tensor]:
+        """Return what changes from generation to generation."""
+        return {name: torch.tensor(np.array(getattr(self._strategy, name))) for name in STATE}
+
+    def load_state_dict(self, state: dict[str, torch.Tensor]) -> None:
+        """Restore what `state_dict` returned."""
+        for name, value in state.items():
+            setattr(self._strategy, name, value.numpy() if value.dim() else value.item())

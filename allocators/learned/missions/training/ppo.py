@@ -1,0 +1,200 @@
+"""PPO in missions: agents' decisions, as they come, under one network.
+
+References
+----------
+Schulman et al. (2017), arXiv:1707.06347; all agents share one policy, as in MAPPO (Yu et al. 2022, arXiv:2103.01955).
+Decisions come at irregular hours, so discounts follow the hours between them, as in semi-Markov decision processes
+(Bradtke and Duff 1994).
+"""
+
+import copy
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from alloc.allocators.learned.algorithms.hyperparameters import PpoParameters
+from alloc.allocators.learned.algorithms.ppo import adapted_learning_rate, clipped_surrogate, value_loss
+from alloc.allocators.learned.algorithms.schedules import linear, set_learning_rate
+from alloc.allocators.learned.missions.network import compiled_weights, first_network
+from alloc.allocators.learned.missions.play import room_for
+from alloc.allocators.learned.missions.rollout import Record, record_for, rollout
+from alloc.allocators.learned.missions.training.curriculum import MissionCurriculum, PackedMission
+from alloc.allocators.learned.network.state_dict import StateDict
+from alloc.allocators.missions.pack import begun
+from alloc.problems.fields import FloatArray
+
+OWN_SHARE = 0.5
+"""Part of the reward that is the agent's own; the rest is that of all."""
+
+HORIZON = 0.5
+"""Hours after which rewards count 1/e, in ideal mission times."""
+
+MOST_DECISIONS = 3000
+"""Decisions of a mission that are learned from."""
+
+
+class MissionSamples(NamedTuple):
+    """Decisions of all agents in some missions."""
+
+    options: Tensor
+    is_option: Tensor
+    action: Tensor
+    log_probability: Tensor
+    advantage: Tensor
+    target: Tensor
+
+
+@dataclass(frozen=True)
+class MissionStats:
+    """Statistics of updates: decisions, mean cost of a mission, mean entropy and divergence in nats."""
+
+    decisions: int
+    cost: float
+    entropy: float
+    approx_kl: float
+
+
+class MissionPpo:
+    """A learner by PPO in missions.
+
+    Parameters
+    ----------
+    parameters : PpoParameters
+    seed : int
+        Seed of the initial weights.
+    """
+
+    def __init__(self, parameters: PpoParameters, seed: int = 0) -> None:
+        self.parameters, self.network = parameters, first_network(seed)
+        self.optimiser = torch.optim.Adam(self.network.parameters(), parameters.learning_rate)
+
+    def train_on(
+        self, curriculum: MissionCurriculum, seed: int, decisions: int, missions: int, progress: float
+    ) -> MissionStats:
+        """Play missions with an update after each few of them, until so many decisions are made.
+
+        Parameters
+        ----------
+        curriculum : MissionCurriculum
+        seed : int
+            Of all random numbers.
+        decisions : int
+        missions : int
+            Between two updates.
+        progress : float
+            Share of the training that is done, 0 to 1.
+        """
+        rng, generator = np.random.default_rng(seed), torch.Generator().manual_seed(seed)
+        parameters, done = self.parameters, 0
+        figures: list[tuple[float, float, float]] = []
+        while done < decisions:
+            records = [self._play(*one) for one in curriculum.draw(rng, missions, progress)]
+            samples = self._samples(records)
+            done += len(samples.action)
+            max_rate = linear(parameters.max_learning_rate, parameters.final_lr_fraction, progress)
+            cost = float(np.mean([record.total[0] / record.total[1] for record in records]))
+            figures.append((cost, *self._update(samples, generator, max_rate)))
+        cost, entropy, approx_kl = (float(np.mean(column)) for column in zip(*figures, strict=True))
+        return MissionStats(done, cost, entropy, approx_kl)
+
+    def _play(self, mission: PackedMission, seed: int) -> Record:
+        n, m = len(mission.arrays.agents), len(mission.arrays.tasks)
+        record = record_for(n, m, MOST_DECISIONS, mission.ideal)
+        rollout(begun(mission.arrays, seed), room_for(n, m), compiled_weights(self.network), seed, record)
+        return record
+
+    @torch.no_grad()
+    def _samples(self, records: list[Record]) -> MissionSamples:
+        most = max(int(record.choices[: record.length[0]].max(initial=1)) for record in records)
+        parts = []
+        for record in records:
+            length = int(record.length[0])
+            options = torch.from_numpy(record.options[:length, :most])
+            if options.shape[1] < most:
+                options = nn.functional.pad(options, (0, 0, 0, most - options.shape[1]))
+            is_option = torch.arange(most)[None] < torch.from_numpy(record.choices[:length])[:, None]
+            values = self.network(options, is_option)[1].numpy().astype(np.float64)
+            advantage = record_advantages(record, values, self.parameters)
+            target = torch.from_numpy(advantage + values).float()
+            old = torch.from_numpy(record.log_probability[:length]).float()
+            action = torch.from_numpy(record.action[:length])
+            parts.append((options, is_option, action, old, torch.from_numpy(advantage).float(), target))
+        samples = MissionSamples(*(torch.cat(column) for column in zip(*parts, strict=True)))
+        gain = samples.advantage
+        return samples._replace(advantage=(gain - gain.mean()) / (gain.std(correction=0) + 1e-6))
+
+    def _update(self, samples: MissionSamples, generator: torch.Generator, max_rate: float) -> tuple[float, float]:
+        """Take gradient steps; return mean entropy and divergence in nats."""
+        parameters, figures = self.parameters, []
+        rate = float(self.optimiser.param_groups[0]["lr"])
+        set_learning_rate(self.optimiser, min(max_rate, rate))
+        for _ in range(parameters.update_epochs):
+            order = torch.randperm(len(samples.action), generator=generator)
+            batches = order.split(parameters.minibatch_size)
+            figures += [self._gradient_step(MissionSamples(*(part[index] for part in samples))) for index in batches]
+        entropy, approx_kl = (float(np.mean(column)) for column in zip(*figures, strict=True))
+        rate = float(self.optimiser.param_groups[0]["lr"])
+        set_learning_rate(self.optimiser, adapted_learning_rate(rate, approx_kl, parameters.target_kl, max_rate))
+        return entropy, approx_kl
+
+    def _gradient_step(self, batch: MissionSamples) -> tuple[float, float]:
+        parameters = self.parameters
+        scores, values = self.network(batch.options, batch.is_option)
+        log_all = scores.log_softmax(-1)
+        log_probability = log_all.gather(1, batch.action[:, None])[:, 0]
+        entropy = -(log_all.exp() * log_all.masked_fill(~batch.is_option, 0.0)).sum(-1).mean()
+        log_ratio = log_probability - batch.log_probability
+        gain = clipped_surrogate(log_ratio.exp(), batch.advantage, parameters.clip_coef).mean()
+        loss = parameters.vf_coef * value_loss(values, batch.target) - gain - parameters.ent_coef * entropy
+        self.optimiser.zero_grad(set_to_none=True)
+        loss.backward()
+        nn.utils.clip_grad_norm_(self.network.parameters(), parameters.max_grad_norm)
+        self.optimiser.step()
+        moved = log_ratio.detach()
+        return float(entropy.detach()), float((moved.exp() - 1 - moved).mean())
+
+    def state_dict(self) -> StateDict:
+        """Return weights and optimiser."""
+        return {"network": self.network.state_dict(), "optimiser": self.optimiser.state_dict()}
+
+    def load_state_dict(self, state: StateDict) -> None:
+        """Restore what `state_dict` returned."""
+        state = copy.deepcopy(state)
+        self.network.load_state_dict(state["network"])
+        self.optimiser.load_state_dict(state["optimiser"])
+
+
+def record_advantages(record: Record, values: FloatArray, parameters: PpoParameters) -> FloatArray:
+    """Return the generalised advantage estimates of all decisions in a mission.
+
+    Parameters
+    ----------
+    record : Record
+        Of a mission that is over.
+    values : ndarray, shape (decisions,)
+        Of the critic.
+    parameters : PpoParameters
+    """
+    length, ideal = int(record.length[0]), float(record.total[1])
+    advantage = np.zeros(length)
+    ahead: dict[int, tuple[float, float, float, float, float]] = {}
+    for k in range(length - 1, -1, -1):
+        agent = int(record.agent[k])
+        hour, idle, cost, value, gain = ahead.get(
+            agent, (float(record.asked[agent]), float(record.unproductive[agent]), float(record.total[0]), 0.0, 0.0)
+        )
+        lost = OWN_SHARE * (idle - record.idle[k]) + (1 - OWN_SHARE) * (cost - record.cost[k])
+        discount = float(np.exp(-(hour - record.hour[k]) / (HORIZON * ideal)))
+        error = -parameters.reward_scale * lost / ideal + discount * value - values[k]
+        advantage[k] = error + discount * parameters.gae_lambda * gain
+        ahead[agent] = (
+            float(record.hour[k]),
+            float(record.idle[k]),
+            float(record.cost[k]),
+            float(values[k]),
+            float(advantage[k]),
+        )
+    return advantage

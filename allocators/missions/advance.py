@@ -1,0 +1,202 @@
+"""From event to event, compiled: see `alloc.problems.missions.simulation.simulation`."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from alloc.allocators.missions.agenda import first_hour, pop, push
+from alloc.allocators.missions.channel import deliver, is_silent, send_all
+from alloc.allocators.missions.events import happen
+from alloc.allocators.missions.knowledge import look_around, refresh
+from alloc.allocators.missions.layout import (
+    DONE,
+    IDLE,
+    MESSAGES,
+    MISSED,
+    NOBODY,
+    OPEN,
+    ORDERS,
+    OVER,
+    WORKING,
+    Agent,
+    Head,
+    MissionArrays,
+)
+from alloc.allocators.missions.motion import bring_up_to_date, distance_between, stop_work
+from alloc.allocators.missions.orders import balance, close, land, note_agent
+from alloc.allocators.runtime.compiled import compiled, inlined
+from alloc.problems.fields import IntArray
+from alloc.problems.missions.simulation.agenda import Turn
+from alloc.problems.missions.simulation.motion import CLOSE
+
+COMPLETION, DEADLINE, EVENT, ARRIVAL, DELIVERY, RADIO = (int(turn) for turn in Turn)
+BETWEEN, WITHIN, TALKING, ORDERED = range(4)
+"""Where `advance` goes on: before the next hour, within it, after messages were asked for, after orders were."""
+
+
+@compiled
+def advance(state: MissionArrays) -> int:
+    """Go on to where agents may send messages (`MESSAGES`) or get orders (`ORDERS`), or to the end (`OVER`).
+
+    Who gets orders stands in `deciding`, the first `head.deciding` of them. Who can send does if `Agent.speaks` is set.
+    """
+    head, agents, agenda = state.head[0], state.agents, state.agenda
+    if head.stage == TALKING:
+        send(state)
+    elif head.stage == ORDERED:
+        balance(state)
+        head.stage = BETWEEN
+    while True:
+        if head.stage == BETWEEN:
+            if is_over(head, agents) or not first_hour(head, agenda) <= head.end:
+                finish(state)
+                return OVER
+            head.hour, head.is_news = first_hour(head, agenda), 0
+            head.turn += 1
+            head.stage = WITHIN
+        while first_hour(head, agenda) == head.hour:
+            if take_first(state):
+                head.stage = TALKING
+                return MESSAGES
+            if head.changed_agents or head.changed_tasks:
+                balance(state)
+        head.stage = BETWEEN
+        if find_deciding(head, agents, state.deciding) and not is_over(head, agents):
+            look(state)
+            head.stage = ORDERED
+            return ORDERS
+
+
+@inlined
+def take_first(state: MissionArrays) -> bool:
+    """Let the first entry of the agenda happen, unless it is void by now; return whether messages can be sent."""
+    head = state.head[0]
+    pop(head, state.agenda)
+    entry = state.agenda[head.entries]
+    turn, subject, version = entry.turn, entry.subject, entry.version
+    if turn == RADIO:
+        return talk(state)
+    if turn == EVENT:
+        happen(state, subject)
+    elif turn == DELIVERY:
+        deliver(state, subject)
+    elif turn == ARRIVAL:
+        if state.agents[subject].flight == version:
+            arrive(state, subject)
+    elif turn == COMPLETION:
+        if state.tasks[subject].status == OPEN and state.tasks[subject].version == version:
+            close(state, subject, DONE)
+    elif state.tasks[subject].status == OPEN:
+        task = state.tasks[subject]
+        bring_up_to_date(head, state.agents, task, subject)
+        is_done = task.left <= CLOSE * (task.appeared + task.grown)
+        close(state, subject, DONE if is_done else MISSED)
+    return False
+
+
+@compiled
+def arrive(state: MissionArrays, number: int) -> None:
+    """End a flight; who has nothing to do there is to decide."""
+    agent = state.agents[number]
+    task = agent.order_task if agent.order == 1 else NOBODY
+    land(state, number)
+    note_agent(state, number, task)
+    if agent.status == IDLE:
+        agent.decides = 1
+        state.head[0].is_news = 1
+
+
+@compiled
+def talk(state: MissionArrays) -> bool:
+    """Let all agents look around; return whether any can send a message."""
+    head, can_send = state.head[0], False
+    for number in range(len(state.agents)):
+        agent = state.agents[number]
+        if IDLE <= agent.status <= WORKING:
+            agent.decides = 1
+            agent.looked = head.turn
+            state.looks[number] = True
+            can_send = can_send or not head.silences or not is_silent(state, number)
+    look_around(state)
+    if not can_send:
+        head.tick += 1
+        push(state, head.tick * head.period, RADIO, 0, 0)
+    return can_send
+
+
+@compiled
+def send(state: MissionArrays) -> None:
+    """Let all send that can and will; when they can the next time stands on the agenda."""
+    head = state.head[0]
+    slot = head.tick % len(state.heard)
+    if send_all(state, slot):
+        push(state, head.hour + head.delay, DELIVERY, slot, 0)
+    push(state, head.tick * head.period, RADIO, 0, 0)
+    balance(state)
+    head.stage = WITHIN
+
+
+@compiled
+def find_deciding(head: Head, agents: Sequence[Agent], deciding: IntArray) -> bool:
+    """Fill in who is to get orders now, in their order in the mission; return whether there is anybody."""
+    head.deciding = 0
+    for number in range(len(agents)):
+        agent = agents[number]
+        if IDLE <= agent.status <= WORKING and (agent.decides if head.is_local else head.is_news):
+            deciding[head.deciding] = number
+            head.deciding += 1
+        agent.decides = 0
+    return head.deciding > 0
+
+
+@compiled
+def look(state: MissionArrays) -> None:
+    """Let all who decide look around, unless they have done so in this turn."""
+    head = state.head[0]
+    if not head.is_local:
+        refresh(state)
+        return
+    is_stale = False
+    for place in range(head.deciding):
+        agent = state.agents[state.deciding[place]]
+        if agent.looked != head.turn:
+            agent.looked = head.turn
+            state.looks[state.deciding[place]] = is_stale = True
+    if is_stale:
+        look_around(state)
+
+
+@inlined
+def is_over(head: Head, agents: Sequence[Agent]) -> bool:
+    """Whether no task is open or to come, or nobody is left to do one."""
+    return head.unfinished == 0 or head.failed == len(agents)
+
+
+@compiled
+def finish(state: MissionArrays) -> None:
+    """End the mission: whoever is in flight lands, and whoever returns is home."""
+    head = state.head[0]
+    if not is_over(head, state.agents) and head.end < first_hour(head, state.agenda) < np.inf:
+        head.hour = head.end
+    for number in range(len(state.tasks)):
+        bring_up_to_date(head, state.agents, state.tasks[number], number)
+    for number in range(len(state.agents)):
+        agent = state.agents[number]
+        if agent.flight:
+            fly_home(agent, agent.length)
+            if not np.isnan(agent.goal_x):
+                agent.x, agent.y, agent.z = agent.goal_x, agent.goal_y, agent.goal_z
+        if agent.returns and IDLE <= agent.status <= WORKING:
+            stop_work(head, state.agents, state.tasks, number)
+            home = agent.start_x, agent.start_y, agent.start_z
+            fly_home(agent, distance_between(head.is_manhattan, (agent.x, agent.y, agent.z), home))
+            agent.x, agent.y, agent.z = home
+
+
+@compiled
+def fly_home(agent: Agent, length: float) -> None:
+    """Count a flight that ends after the mission."""
+    agent.distance += length
+    agent.energy += agent.energy_per_distance * length
+    agent.battery -= agent.energy_per_distance * length
+    agent.flight, agent.status = 0, IDLE

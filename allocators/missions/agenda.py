@@ -1,0 +1,112 @@
+"""What is to come in a compiled mission: a heap in the order of hours, turns, and as it was put there."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from alloc.allocators.missions.layout import OPEN, Agent, Entry, Head, MissionArrays, Task
+from alloc.allocators.runtime.compiled import compiled, inlined
+from alloc.problems.missions.simulation.agenda import Turn
+
+ARRIVAL, COMPLETION, DEADLINE = int(Turn.ARRIVAL), int(Turn.COMPLETION), int(Turn.DEADLINE)
+
+
+@inlined
+def first_hour(head: Head, agenda: Sequence[Entry]) -> float:
+    """Return the hour of the first entry, ``inf`` where there is none."""
+    return agenda[0].hour if head.entries > 0 else np.inf
+
+
+@inlined
+def push(state: MissionArrays, hour: float, turn: int, subject: int, version: int) -> None:
+    """Put an entry on the agenda."""
+    head, agenda = state.head[0], state.agenda
+    if head.entries == len(agenda):
+        drop_void(head, agenda, state.agents, state.tasks)
+    insert(head, agenda, hour, turn, subject, version)
+
+
+@compiled
+def insert(head: Head, agenda: Sequence[Entry], hour: float, turn: int, subject: int, version: int) -> None:
+    """Put an entry on an agenda that has room for it."""
+    head.count += 1
+    entry = agenda[head.entries]
+    entry.hour, entry.turn, entry.count, entry.subject, entry.version = hour, turn, head.count, subject, version
+    head.entries += 1
+    rise(agenda, head.entries - 1)
+
+
+@compiled
+def pop(head: Head, agenda: Sequence[Entry]) -> None:
+    """Take the first entry off the agenda; it then stands behind the last one."""
+    head.entries -= 1
+    last = head.entries
+    exchange(agenda[0], agenda[last])
+    place = 0
+    while True:
+        least = place
+        for child in (2 * place + 1, 2 * place + 2):
+            if child < last and comes_before(agenda[child], agenda[least]):
+                least = child
+        if least == place:
+            return
+        exchange(agenda[place], agenda[least])
+        place = least
+
+
+@compiled
+def rise(agenda: Sequence[Entry], place: int) -> None:
+    """Let an entry rise to where it belongs."""
+    while place > 0:
+        parent = (place - 1) // 2
+        if not comes_before(agenda[place], agenda[parent]):
+            return
+        exchange(agenda[place], agenda[parent])
+        place = parent
+
+
+@compiled
+def comes_before(one: Entry, other: Entry) -> bool:
+    """Whether one entry comes before another."""
+    if one.hour != other.hour:
+        return one.hour < other.hour
+    if one.turn != other.turn:
+        return one.turn < other.turn
+    return one.count < other.count
+
+
+@compiled
+def exchange(one: Entry, other: Entry) -> None:
+    """Exchange two entries."""
+    one.hour, other.hour = other.hour, one.hour
+    one.turn, other.turn = other.turn, one.turn
+    one.count, other.count = other.count, one.count
+    one.subject, other.subject = other.subject, one.subject
+    one.version, other.version = other.version, one.version
+
+
+@compiled
+def is_void(agents: Sequence[Agent], tasks: Sequence[Task], entry: Entry) -> bool:
+    """Whether an entry will change nothing any more."""
+    if entry.turn == ARRIVAL:
+        return agents[entry.subject].flight != entry.version
+    if entry.turn == COMPLETION:
+        task = tasks[entry.subject]
+        return task.status != OPEN or task.version != entry.version
+    return False
+
+
+@compiled
+def drop_void(head: Head, agenda: Sequence[Entry], agents: Sequence[Agent], tasks: Sequence[Task]) -> None:
+    """Take all void entries off a full agenda."""
+    kept = 0
+    for place in range(head.entries):
+        if not is_void(agents, tasks, agenda[place]):
+            if kept != place:
+                exchange(agenda[kept], agenda[place])
+            kept += 1
+    if kept == head.entries:
+        raise OverflowError("the agenda of a compiled mission is full")
+    head.entries = kept
+    for place in range(kept):
+        rise(agenda, place)

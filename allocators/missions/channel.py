@@ -1,0 +1,166 @@
+"""The radio, compiled: see `alloc.problems.missions.simulation.channel`."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from alloc.allocators.missions.chance import fraction, keyed
+from alloc.allocators.missions.knowledge import Numbers, length
+from alloc.allocators.missions.layout import IDLE, NOBODY, WORKING, Agent, Head, MissionArrays
+from alloc.allocators.missions.motion import distance_between, place_of
+from alloc.allocators.runtime.compiled import compiled
+from alloc.problems.fields import BoolArray, FloatArray, IntArray
+from alloc.problems.missions.simulation.reports import BYTES_OF_AGENT, BYTES_OF_MESSAGE, BYTES_OF_TASK
+
+
+@compiled
+def is_silent(state: MissionArrays, number: int) -> bool:
+    """Whether an agent can neither send nor hear now."""
+    head = state.head[0]
+    for place in range(head.silences):
+        event = state.events[state.silences[place]]
+        if head.hour >= event.until:
+            continue
+        if event.agent != NOBODY:
+            if event.agent == number:
+                return True
+            continue
+        here = place_of(state.agents[number], head.hour)
+        if distance_between(head.is_manhattan, here, (event.x, event.y, event.z)) <= event.radius:
+            return True
+    return False
+
+
+@compiled
+def send_all(state: MissionArrays, slot: int) -> bool:
+    """Send a message of each agent that can and will, all that it knows; return whether any is heard."""
+    head, agents, speaks = state.head[0], state.agents, state.speaks
+    for number in range(len(agents)):
+        speaks[number] = state.visible[number] and agents[number].speaks != 0
+        if speaks[number] and head.silences and is_silent(state, number):
+            speaks[number] = False
+        if speaks[number]:
+            agents[number].messages += 1
+            agents[number].bytes += BYTES_OF_MESSAGE
+    heard = state.heard[slot]
+    found = find_hearers(head, speaks, state.visible, state.places, heard)
+    of_tasks = state.sent_task_hour[slot], state.sent_task_left[slot]
+    keep(agents, speaks, state.task_hour, state.task_left, of_tasks[0], of_tasks[1], BYTES_OF_TASK)
+    of_agents = state.sent_agent_hour[slot], state.sent_agent_report[slot]
+    keep(agents, speaks, state.agent_hour, state.agent_report, of_agents[0], of_agents[1], BYTES_OF_AGENT)
+    if head.has_burst and found:
+        lose_in_bursts(head, heard, state.link_number, state.link_bad)
+    head.tick += 1
+    return found
+
+
+@compiled
+def keep(
+    agents: Sequence[Agent],
+    speaks: BoolArray,
+    hour: FloatArray,
+    known: FloatArray | Numbers,
+    sent_hour: FloatArray,
+    sent: FloatArray | Numbers,
+    size: int,
+) -> None:
+    """Keep what agents send of tasks, or of agents, and count its bytes: `size` for each of which anything is known."""
+    for number in range(len(speaks)):
+        if speaks[number]:
+            count = 0
+            hours, values, sent_hours, sent_values = hour[number], known[number], sent_hour[number], sent[number]
+            for one in range(len(hours)):
+                sent_hours[one] = hours[one]
+                sent_values[one] = values[one]
+                count += hours[one] >= 0
+            agents[number].bytes += size * count
+
+
+@compiled
+def find_hearers(head: Head, speaks: BoolArray, visible: BoolArray, places: FloatArray, heard: BoolArray) -> bool:
+    """Fill in who will hear the message that each agent sends now; return whether there is anybody."""
+    found = False
+    radius, loss, is_manhattan, tick = head.radius, head.loss, head.is_manhattan, head.tick
+    at_x, at_y, at_z = places[0], places[1], places[2]
+    for sender in range(len(speaks)):
+        hears = heard[sender]
+        hears[:] = False
+        if not speaks[sender]:
+            continue
+        x, y, z = at_x[sender], at_y[sender], at_z[sender]
+        key = keyed(head.loss_key, sender)
+        for number in range(len(visible)):
+            if length(is_manhattan, at_x[number] - x, at_y[number] - y, at_z[number] - z) > radius:
+                continue
+            if not visible[number] or number == sender:
+                continue
+            if loss > 0 and fraction(keyed(keyed(key, number), tick)) < loss:
+                continue
+            hears[number] = found = True
+    return found
+
+
+@compiled
+def lose_in_bursts(head: Head, heard: BoolArray, number: IntArray, bad: IntArray) -> None:
+    """Lose messages of this tick by the state of each link."""
+    for sender in range(len(heard)):
+        for hearer in range(len(heard)):
+            if heard[sender, hearer]:
+                is_bad = is_link_bad(head, sender, hearer, number, bad)
+                key = keyed(keyed(keyed(keyed(head.loss_key, sender), hearer), head.tick), 1)
+                loss = head.burst_loss_bad if is_bad else head.burst_loss_good
+                heard[sender, hearer] = fraction(key) >= loss
+
+
+@compiled
+def is_link_bad(head: Head, sender: int, hearer: int, number: IntArray, bad: IntArray) -> bool:
+    """Whether a link is bad now; a Markov chain over all messages up to this one, whether sent or not."""
+    key = keyed(keyed(head.burst_key, sender), hearer)
+    share = head.burst_bad / (head.burst_good + head.burst_bad)
+    is_bad = bad[sender, hearer]
+    for step in range(number[sender, hearer] + 1, head.tick + 1):
+        hours = head.period if step else np.inf
+        forgotten = -math.expm1(-hours * (1 / head.burst_good + 1 / head.burst_bad))
+        is_bad = int(fraction(keyed(key, step)) < share + (is_bad - share) * (1 - forgotten))
+    number[sender, hearer], bad[sender, hearer] = head.tick, is_bad
+    return bool(is_bad != 0)
+
+
+@compiled
+def deliver(state: MissionArrays, slot: int) -> None:
+    """Let all hear what was sent to them."""
+    head, heard = state.head[0], state.heard[slot]
+    for number in range(len(state.agents)):
+        is_there = IDLE <= state.agents[number].status <= WORKING
+        if not is_there or (head.silences and is_silent(state, number)):
+            heard[:, number] = False
+    hear_of_tasks(heard, state.sent_task_hour[slot], state.sent_task_left[slot], state.task_hour, state.task_left)
+    told = state.sent_agent_hour[slot], state.sent_agent_report[slot]
+    hear_of_agents(heard, told[0], told[1], state.agent_hour, state.agent_report)
+
+
+@compiled
+def hear_of_tasks(
+    heard: BoolArray, told_hour: FloatArray, told_left: FloatArray, hour: FloatArray, left: FloatArray
+) -> None:
+    """Take over what is newer in messages than what is known of tasks."""
+    for sender in range(len(heard)):
+        for number in range(len(heard)):
+            if heard[sender, number]:
+                for task in range(hour.shape[1]):
+                    if told_hour[sender, task] > hour[number, task]:
+                        hour[number, task] = told_hour[sender, task]
+                        left[number, task] = told_left[sender, task]
+
+
+@compiled
+def hear_of_agents(heard: BoolArray, told_hour: FloatArray, told: Numbers, hour: FloatArray, report: Numbers) -> None:
+    """Take over what is newer in messages than what is known of agents."""
+    for sender in range(len(heard)):
+        for number in range(len(heard)):
+            if heard[sender, number]:
+                for agent in range(hour.shape[1]):
+                    if told_hour[sender, agent] > hour[number, agent]:
+                        hour[number, agent] = told_hour[sender, agent]
+                        report[number, agent] = told[sender, agent]

@@ -1,0 +1,201 @@
+"""Flights and work between two events, compiled: see `alloc.problems.missions.simulation.motion`."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from alloc.allocators.missions.chance import fraction, keyed
+from alloc.allocators.missions.layout import FLYING, IDLE, NOBODY, OPEN, WORKING, Agent, Head, Task
+from alloc.allocators.runtime.compiled import compiled
+from alloc.problems.distances.reach import TOLERANCE
+
+Point = tuple[float, float, float]
+
+
+@compiled
+def distance_between(is_manhattan: int, one: Point, other: Point) -> float:
+    """Return the distance of two places, 0 where one is unknown."""
+    x, y, z = one[0] - other[0], one[1] - other[1], one[2] - other[2]
+    distance = abs(x) + abs(y) + abs(z) if is_manhattan else math.sqrt(x * x + y * y + z * z)
+    return 0.0 if math.isnan(distance) else distance
+
+
+@compiled
+def flown_share(agent: Agent, hour: float) -> float:
+    """Return the share of its flight that an agent has behind it."""
+    hours = agent.arrives - agent.departs
+    return 1.0 if hours <= 0 else min(1.0, max(0.0, (hour - agent.departs) / hours))
+
+
+@compiled
+def place_of(agent: Agent, hour: float) -> Point:
+    """Return where an agent is now."""
+    if agent.flight == 0 or math.isnan(agent.x) or math.isnan(agent.goal_x):
+        return agent.x, agent.y, agent.z
+    share = flown_share(agent, hour)
+    return (
+        agent.x + share * (agent.goal_x - agent.x),
+        agent.y + share * (agent.goal_y - agent.y),
+        agent.z + share * (agent.goal_z - agent.z),
+    )
+
+
+@compiled
+def battery_of(agent: Agent, hour: float) -> float:
+    """Return the battery of an agent now."""
+    if agent.flight == 0:
+        return agent.battery
+    return agent.battery - agent.energy_per_distance * (agent.length * flown_share(agent, hour))
+
+
+@compiled
+def can_fly(is_manhattan: int, agent: Agent, place: Point, battery: float, goal: Point) -> bool:
+    """Whether an agent at a place can fly to a goal by its range and battery, and back to its start if it returns."""
+    distance = distance_between(is_manhattan, place, goal)
+    if distance > agent.range + TOLERANCE:
+        return False
+    if agent.returns:
+        distance += distance_between(is_manhattan, goal, (agent.start_x, agent.start_y, agent.start_z))
+    return agent.energy_per_distance * distance <= battery + TOLERANCE
+
+
+@compiled
+def depart(head: Head, agent: Agent, goal: Point) -> None:
+    """Let an agent that stands still begin a flight."""
+    agent.length = distance_between(head.is_manhattan, (agent.x, agent.y, agent.z), goal)
+    agent.goal_x, agent.goal_y, agent.goal_z = goal
+    agent.departs, agent.arrives = head.hour, head.hour + agent.length / agent.speed
+    agent.flights += 1
+    agent.flight, agent.status = agent.flights, FLYING
+
+
+@compiled
+def break_off(agent: Agent, hour: float) -> None:
+    """End a flight, if there is one, where the agent is now."""
+    if agent.flight == 0:
+        return
+    share = flown_share(agent, hour)
+    place = place_of(agent, hour)
+    goes_on = share > 0 and not math.isnan(agent.goal_x)
+    flown = share * agent.length
+    agent.distance += flown
+    agent.energy += agent.energy_per_distance * flown
+    agent.battery -= agent.energy_per_distance * flown
+    agent.flight, agent.status = 0, IDLE
+    if goes_on and share == 1:
+        agent.x, agent.y, agent.z = agent.goal_x, agent.goal_y, agent.goal_z
+    elif goes_on:
+        agent.x, agent.y, agent.z = place
+
+
+@compiled
+def begin_work(head: Head, agents: Sequence[Agent], tasks: Sequence[Task], number: int, at: int) -> None:
+    """Let an agent that is at an open task join those who work there."""
+    agent, task = agents[number], tasks[at]
+    bring_up_to_date(head, agents, task, at)
+    agent.previous, agent.next = task.last, NOBODY
+    if task.last == NOBODY:
+        task.first = number
+    else:
+        agents[task.last].next = number
+    task.last = number
+    task.begun = 1
+    task.version += 1
+    agent.task, agent.status = at, WORKING
+
+
+@compiled
+def stop_work(head: Head, agents: Sequence[Agent], tasks: Sequence[Task], number: int) -> None:
+    """Let an agent leave the task where it works, if there is one."""
+    agent = agents[number]
+    if agent.task == NOBODY:
+        return
+    task = tasks[agent.task]
+    bring_up_to_date(head, agents, task, agent.task)
+    if agent.previous == NOBODY:
+        task.first = agent.next
+    else:
+        agents[agent.previous].next = agent.next
+    if agent.next == NOBODY:
+        task.last = agent.previous
+    else:
+        agents[agent.next].previous = agent.previous
+    task.version += 1
+    agent.task, agent.status = NOBODY, IDLE
+
+
+@compiled
+def ability_at(agents: Sequence[Agent], task: Task) -> float:
+    """Return the ability of all who work at a task."""
+    total, number = 0.0, task.first
+    while number != NOBODY:
+        total += agents[number].ability
+        number = agents[number].next
+    return total
+
+
+@compiled
+def bring_up_to_date(head: Head, agents: Sequence[Agent], task: Task, number: int) -> None:
+    """Count what was worked, or grew, on an open task since it was brought up to date."""
+    hour = head.hour
+    if task.status == OPEN:
+        if task.first != NOBODY:
+            work = min(task.left, ability_at(agents, task) * paced_hours(head, number, task.since, hour))
+            task.left -= work
+            task.done += work
+        elif not task.begun:
+            grown = task.growth * (hour - task.since)
+            task.left += grown
+            task.grown += grown
+    task.since = hour
+
+
+@compiled
+def work_left(head: Head, agents: Sequence[Agent], task: Task, number: int) -> float:
+    """Return the work left of a task now, without a change to it."""
+    hour = head.hour
+    if task.status == OPEN and task.first != NOBODY:
+        return max(0.0, task.left - ability_at(agents, task) * paced_hours(head, number, task.since, hour))
+    if task.status == OPEN and not task.begun:
+        return task.left + task.growth * (hour - task.since)
+    return task.left
+
+
+@compiled
+def completion_hour(head: Head, agents: Sequence[Agent], task: Task, number: int) -> float:
+    """Return when a task that is up to date will be done if nothing changes; ``inf`` if it will not in the mission."""
+    needed = task.left / ability_at(agents, task)
+    if not head.has_pace:
+        return task.since + needed
+    begin, end = task.since, min(head.end, task.deadline)
+    while begin <= end:
+        period = math.floor(begin / head.pace_period)
+        until = max((period + 1) * head.pace_period, np.nextafter(begin, np.inf))
+        factor = pace_factor(head, number, int(period))
+        if factor * (until - begin) >= needed:
+            return begin + needed / factor
+        needed -= factor * (until - begin)
+        begin = until
+    return np.inf
+
+
+@compiled
+def paced_hours(head: Head, number: int, begin: float, end: float) -> float:
+    """Return the hours between two hours, each counted as often as the pace says."""
+    if not head.has_pace:
+        return end - begin
+    total = 0.0
+    while begin < end:
+        period = math.floor(begin / head.pace_period)
+        until = min(end, max((period + 1) * head.pace_period, np.nextafter(begin, np.inf)))
+        total += pace_factor(head, number, int(period)) * (until - begin)
+        begin = until
+    return total
+
+
+@compiled
+def pace_factor(head: Head, number: int, period: int) -> float:
+    """Return how fast any group works on a task in a period."""
+    chance = fraction(keyed(keyed(head.pace_key, number), period))
+    return head.pace_low + (head.pace_high - head.pace_low) * chance

@@ -1,0 +1,260 @@
+"""What a planner believes to be so now: what it was told, and since then that orders are followed."""
+
+import math
+from dataclasses import dataclass, replace
+
+from alloc.allocators.online.planner.checks import check_event, check_hour, check_report
+from alloc.allocators.online.planner.inputs import Input
+from alloc.allocators.online.planner.state import LiveState
+from alloc.allocators.online.planner.telemetry import correct
+from alloc.problems.errors import InputError
+from alloc.problems.missions.events import Event, EventKind
+from alloc.problems.missions.mission import Mission
+from alloc.problems.missions.simulation.agenda import Agenda, Arrival, Changes, Completion, Turn
+from alloc.problems.missions.simulation.changes import happen, land, obey
+from alloc.problems.missions.simulation.motion import close, completion_hour, refusal, status_at_deadline
+from alloc.problems.missions.simulation.reports import AgentReport, TaskReport, View, report_agent, report_task
+from alloc.problems.missions.simulation.state import (
+    ACTIVE,
+    AgentState,
+    AgentStatus,
+    Order,
+    TaskState,
+    TaskStatus,
+)
+
+WORDS = {
+    EventKind.AGENT_JOINS: "joined",
+    EventKind.AGENT_FAILS: "failed",
+    EventKind.AGENT_RECALLED: "was recalled",
+    EventKind.AGENT_RETURNS: "returned",
+    EventKind.AGENT_RECHARGES: "was recharged",
+    EventKind.TASK_APPEARS: "appeared",
+    EventKind.TASK_CANCELLED: "was cancelled",
+    EventKind.TASK_CHANGES: "changed",
+    EventKind.RADIO_SILENT: "radio fell silent",
+}
+
+
+@dataclass(frozen=True)
+class News:
+    """Something by which a plan may change.
+
+    Attributes
+    ----------
+    hour : float
+    text : str
+    agent, task : str or None
+        Whom or what it is about.
+    is_minor : bool
+        Whether it is one of the reports that come all the time: where an agent is, or what is left of a task.
+    """
+
+    hour: float
+    text: str
+    agent: str | None = None
+    task: str | None = None
+    is_minor: bool = False
+
+
+class Picture:
+    """Agents and tasks as they are believed to be.
+
+    Agents are taken to follow their orders and work to go on as in the simulation of missions, until an event or a
+    report says otherwise. A task is done when by that its work is; if work is then reported, it is open again.
+
+    Parameters
+    ----------
+    mission : Mission
+        What is there at hour 0 counts; what it says of later hours has to be told when it happens.
+
+    Attributes
+    ----------
+    state : LiveState
+    news : list of News
+        What happened, in the order of time, until it is forgotten.
+    told : int
+        How much was ever told.
+    """
+
+    def __init__(self, mission: Mission) -> None:
+        self.state = LiveState(mission)
+        self.agenda = Agenda()
+        self.news: list[News] = []
+        self.told = 0
+        self._changes = Changes(self.state, self.agenda)
+        for event in mission.timeline:
+            if event.hour <= 0 and event.kind is not EventKind.RADIO_SILENT:
+                self._apply(event)
+        self._changes.balance()
+        self._tell("the mission began")
+
+    def advance(self, hour: float) -> None:
+        """Let time pass: flights end, work gets done, deadlines pass."""
+        state = self.state
+        while self.agenda.hour <= hour:
+            state.hour = max(state.hour, self.agenda.hour)
+            self._take(self.agenda.pop()[1])
+            self._changes.balance()
+        state.hour = hour
+
+    def take(self, given: Input) -> None:
+        """Take notice of what was said, at its hour; if it cannot be so, that is an error and nothing changes."""
+        said = given.said
+        check_hour(self.state, said.hour)
+        if given.whole is not None:
+            assert isinstance(said, Event)
+            self.state.admit(given.to_dict())
+            if said.task is not None:
+                self._note_deadline(self.state.task(said.task))
+        elif isinstance(said, Event):
+            check_event(self.state, said)
+        else:
+            check_report(self.state, said)
+        self.advance(said.hour)
+        if isinstance(said, Event):
+            self._apply(said)
+            is_minor = said.kind is EventKind.TASK_CHANGES
+            self.tell(News(said.hour, WORDS[said.kind], said.agent, said.task, is_minor))
+        else:
+            agent = self.state.agent(said.agent)
+            left = agent.task
+            problem = correct(self.state, agent, said)
+            self._changes.note_agent(agent, left)
+            text = "reported" if problem is None else f"cannot go on: {problem}"
+            self.tell(News(said.hour, text, said.agent, is_minor=problem is None))
+        self._changes.balance()
+
+    def order(self, name: str, order: Order) -> str | None:
+        """Give an agent an order; return why it is not given, None if it is. `look_ahead` comes after the last."""
+        agent = self.state.agent(name)
+        if order == agent.order:
+            return None
+        if order.task is not None:
+            try:
+                status = self.state.task(order.task).status
+            except InputError as error:
+                return error.message
+            if status is not TaskStatus.OPEN:
+                return f"the task is {status}"
+        left = agent.task
+        problem = obey(self.state, agent, order)
+        if problem is None:
+            self._changes.note_agent(agent, left)
+        return problem
+
+    def look_ahead(self) -> None:
+        """Find out, after some orders, when flights and work will end."""
+        self._changes.balance()
+
+    def active(self) -> list[AgentState]:
+        """Return the agents that take orders."""
+        return [agent for agent in self.state.agents if agent.status in ACTIVE]
+
+    def view(self, pins: dict[str, str | None]) -> View:
+        """Return what is so now: agents in the mission, open tasks, and those to which an agent is under way.
+
+        Parameters
+        ----------
+        pins : dict
+            Agents that may do one task alone, or none.
+        """
+        agents: dict[str, AgentReport] = {}
+        for agent in self.active():
+            report = report_agent(self.state, agent)
+            if agent.facts.id in pins:
+                task = pins[agent.facts.id]
+                only = frozenset(() if task is None else (task,))
+                report = replace(report, facts=replace(report.facts, tasks=only))
+            agents[agent.facts.id] = report
+        wanted = {report.task for report in agents.values()}
+        tasks: dict[str, TaskReport] = {}
+        for task_state in self.state.tasks:
+            if task_state.status is TaskStatus.OPEN or task_state.facts.id in wanted:
+                tasks[task_state.facts.id] = report_task(self.state, task_state)
+        return View(self.state.hour, None, agents, tasks, self.state.distances)
+
+    def refusal(self, name: str, task: str) -> str | None:
+        """Return why an agent cannot take a task now; None if it can."""
+        agent, goal = self.state.agent(name), self.state.task(task)
+        if agent.status not in ACTIVE:
+            return f"the agent is {agent.status}"
+        if goal.status is not TaskStatus.OPEN:
+            return f"the task is {goal.status}"
+        report = report_agent(self.state, agent)
+        if report.task == task:
+            return None
+        return refusal(self.state.distances, report.facts, report.place, report.battery, goal.facts.place, goal.facts)
+
+    def restore_agenda(self) -> None:
+        """Put on an empty agenda what is to come by the state."""
+        for agent in self.state.agents:
+            if agent.flight is not None:
+                self.agenda.push(agent.flight.arrives, Turn.ARRIVAL, Arrival(agent, agent.flight))
+        for task in self.state.tasks:
+            self._note_deadline(task)
+            if task.workers:
+                hour = completion_hour(self.state, task)
+                if hour < math.inf:
+                    self.agenda.push(max(hour, self.state.hour), Turn.COMPLETION, Completion(task, task.version))
+
+    def tell(self, news: News) -> None:
+        """Add to the news."""
+        self.news.append(news)
+        self.told += 1
+
+    def forget(self, count: int) -> None:
+        """Forget the first of all that was ever told, as many as `count`."""
+        del self.news[: len(self.news) - (self.told - count)]
+
+    def _tell(self, text: str, agent: str | None = None, task: str | None = None) -> None:
+        self.tell(News(self.state.hour, text, agent, task))
+
+    def _apply(self, event: Event) -> None:
+        state = self.state
+        if event.kind is EventKind.RADIO_SILENT:
+            return
+        if event.agent is not None:
+            agent = state.agent(event.agent)
+            left = agent.task
+            happen(state, event)
+            self._changes.note_agent(agent, left)
+            return
+        task = state.task(event.task)
+        if event.kind is EventKind.TASK_APPEARS:
+            task.facts = replace(task.facts, appears=event.hour)
+            self._note_deadline(task)
+        elif event.kind is EventKind.TASK_CHANGES and task.status is TaskStatus.DONE and event.workload:
+            task.status, task.since, task.closed = TaskStatus.OPEN, state.hour, math.inf
+            self._note_deadline(task)
+        workers = tuple(task.workers.values())
+        happen(state, event)
+        self._changes.note_task(task)
+        for agent in workers:
+            self._changes.note_agent(agent)
+
+    def _note_deadline(self, task: TaskState) -> None:
+        if task.status in (TaskStatus.TO_COME, TaskStatus.OPEN) and task.facts.deadline < math.inf:
+            self.agenda.push(task.facts.deadline, Turn.DEADLINE, task)
+
+    def _take(self, item: object) -> None:
+        """Let one entry of the agenda happen, unless it is void by now."""
+        if isinstance(item, Arrival):
+            if item.agent.flight is item.flight:
+                land(self.state, item.agent)
+                self._changes.note_agent(item.agent, item.flight.task)
+                if item.agent.status is AgentStatus.IDLE:
+                    self._tell("arrived", agent=item.agent.facts.id)
+        elif isinstance(item, Completion):
+            if item.task.status is TaskStatus.OPEN and item.task.version == item.version:
+                self._close(item.task, TaskStatus.DONE)
+        elif isinstance(item, TaskState) and item.status is TaskStatus.OPEN:
+            self._close(item, status_at_deadline(self.state, item))
+
+    def _close(self, task: TaskState, status: TaskStatus) -> None:
+        workers = tuple(task.workers.values())
+        close(self.state, task, status)
+        self._changes.note_task(task)
+        for agent in workers:
+            self._changes.note_agent(agent)
+        self._tell(f"was {status}", task=task.facts.id)

@@ -1,0 +1,61 @@
+"""Agents that somebody has pinned to a task: no policy sends them elsewhere."""
+
+from alloc.allocators.online.planner.picture import News, Picture
+from alloc.problems.arguments import shown, text
+from alloc.problems.errors import InputError
+from alloc.problems.missions.simulation.state import ACTIVE, STAY, AgentStatus, Order, TaskStatus
+
+
+class Pins:
+    """The task of each pinned agent.
+
+    Parameters
+    ----------
+    picture : Picture
+        What is believed; it is told of each change.
+
+    Attributes
+    ----------
+    tasks : dict of str to str or None
+        Ids of tasks by those of agents; None to stay.
+    """
+
+    def __init__(self, picture: Picture) -> None:
+        self._picture = picture
+        self.tasks: dict[str, str | None] = {}
+
+    def add(self, agent: str, task: str | None) -> None:
+        """Pin an agent, which can be so as things are; else that is an `InputError`."""
+        status = self._picture.state.agent(text(agent, "agent")).status
+        if task is not None:
+            problem = self._picture.refusal(agent, text(task, "task"))
+        else:
+            problem = None if status in ACTIVE else f"the agent is {status}"
+        if problem is not None:
+            raise InputError(f"cannot be pinned: {problem}", "agent")
+        self.tasks[agent] = task
+        self._picture.tell(News(self._picture.state.hour, "was pinned", agent))
+
+    def remove(self, agent: str) -> None:
+        """Let the policy lead an agent again; one that is not pinned is an `InputError`."""
+        if text(agent, "agent") not in self.tasks:
+            raise InputError(f"{shown(agent)} is not pinned", "agent")
+        del self.tasks[agent]
+        self._picture.tell(News(self._picture.state.hour, "was unpinned", agent))
+
+    def lapse(self) -> None:
+        """Forget the pins of tasks that are over, and of agents that have failed."""
+        state = self._picture.state
+        self.tasks = {
+            agent: task
+            for agent, task in self.tasks.items()
+            if (task is None or state.task(task).status is TaskStatus.OPEN)
+            and state.agent(agent).status is not AgentStatus.FAILED
+        }
+
+    def order(self, agent: str) -> Order | None:
+        """Return the order of an agent by its pin; None if it is not pinned."""
+        if agent not in self.tasks:
+            return None
+        task = self.tasks[agent]
+        return STAY if task is None else Order(task)

@@ -1,0 +1,107 @@
+"""A plan: the order of each agent, how it differs from the one before, and what caused that."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+from alloc.allocators.online.planner.picture import News
+from alloc.problems.missions.simulation.state import Order
+
+MOST_CAUSES = 3
+"""Causes that are named of a change for which none is nearer than the others."""
+
+
+@dataclass(frozen=True)
+class OrderChange:
+    """An order that differs from the plan before.
+
+    Attributes
+    ----------
+    agent : str
+    before, after : Order or None
+        None where the agent takes no orders.
+    cause : str
+        What happened since: to the agent, to one of the two tasks, or else in the mission.
+    """
+
+    agent: str
+    before: Order | None
+    after: Order | None
+    cause: str
+
+
+@dataclass(frozen=True)
+class Plan(Mapping[str, Order]):
+    """Orders by the ids of all agents that take some.
+
+    Attributes
+    ----------
+    hour : float
+    orders : mapping of str to Order
+    is_new : bool
+        Whether the policy answered in time; else these are the last orders, less those that cannot be followed now.
+    problem : str or None
+        Why the policy gave no answer, if it failed.
+    changes : tuple of OrderChange
+    """
+
+    hour: float = 0.0
+    orders: Mapping[str, Order] = field(default_factory=lambda: MappingProxyType({}))
+    is_new: bool = False
+    problem: str | None = None
+    changes: tuple[OrderChange, ...] = ()
+
+    def __getitem__(self, agent: str) -> Order:
+        return self.orders[agent]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.orders)
+
+    def __len__(self) -> int:
+        return len(self.orders)
+
+
+def changes_of(
+    before: Mapping[str, Order], after: Mapping[str, Order], news: Sequence[News]
+) -> tuple[OrderChange, ...]:
+    """Return each order that differs, with its cause among the news since the plan before."""
+    names = dict.fromkeys((*before, *after))
+    changed = [name for name in names if before.get(name) != after.get(name)]
+    if not changed:
+        return ()
+    about: dict[tuple[str, str], list[News]] = {}
+    for one in news:
+        for kind, subject in (("agent", one.agent), ("task", one.task)):
+            if subject is not None:
+                about.setdefault((kind, subject), []).append(one)
+    elsewhere = _told(news)
+    more = f" and {len(elsewhere) - MOST_CAUSES} more" if len(elsewhere) > MOST_CAUSES else ""
+    general = "; ".join(elsewhere[:MOST_CAUSES]) + more if elsewhere else "a better plan was found"
+    return tuple(
+        OrderChange(name, before.get(name), after.get(name), _cause(name, before, after, about) or general)
+        for name in changed
+    )
+
+
+def _cause(
+    name: str, before: Mapping[str, Order], after: Mapping[str, Order], about: Mapping[tuple[str, str], list[News]]
+) -> str:
+    """Return what happened to an agent, or to the tasks that it had and has; nothing where that is none."""
+    orders = (before.get(name), after.get(name))
+    tasks = [order.task for order in orders if order is not None and order.task is not None]
+    return "; ".join(
+        _told([*about.get(("agent", name), ()), *(one for task in tasks for one in about.get(("task", task), ()))])
+    )
+
+
+def _told(news: Sequence[News]) -> list[str]:
+    """Return news as words, what agents report all the time only where there is nothing else."""
+    major = [one for one in news if not one.is_minor]
+    return list(dict.fromkeys(map(told, major or news)))
+
+
+def told(news: News) -> str:
+    """Return news as words."""
+    subjects = (("agent", news.agent), ("task", news.task))
+    subject = "".join(f"{kind} {name} " for kind, name in subjects if name is not None)
+    return f"{subject}{news.text} at {news.hour:g}"

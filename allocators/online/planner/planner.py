@@ -1,0 +1,300 @@
+"""A planner for the missions of another program, such as a ground station."""
+
+import math
+import threading
+import time
+from collections.abc import Mapping
+from contextlib import AbstractContextManager
+from types import MappingProxyType
+
+from alloc.allocators.online.contract import Policy
+from alloc.allocators.online.planner import saved
+from alloc.allocators.online.planner.checks import check_hour
+from alloc.allocators.online.planner.inputs import Input, Report
+from alloc.allocators.online.planner.leader import Decision, Leader
+from alloc.allocators.online.planner.picture import Picture
+from alloc.allocators.online.planner.pins import Pins
+from alloc.allocators.online.planner.plan import OrderChange, Plan, changes_of
+from alloc.allocators.online.registry import load_policy
+from alloc.problems import InputError, Instance, Mission
+from alloc.problems.arguments import of_type, real, text, whole
+from alloc.problems.formats.files import PathLike
+from alloc.problems.formats.json_text import require_object
+from alloc.problems.missions.events import LATEST, Event
+from alloc.problems.missions.simulation.reports import View
+from alloc.problems.missions.simulation.state import STAY, Order, TaskStatus
+
+RESERVE_MS, RESERVE_SHARE = 5.0, 0.3
+"""Kept of the deadline, beside what it took before to wake up and to follow orders, as another thread may hold the
+interpreter; and the part of the deadline that this is at the most."""
+
+
+class MissionPlanner(AbstractContextManager["MissionPlanner"]):
+    """Plans for agents and tasks that it is told of, and answers before a deadline.
+
+    It knows what is there at hour 0 of a mission. All that comes later has to be submitted as it happens. Between two
+    events agents are taken to follow their orders, until they report something else. All methods may be called from
+    any thread; a plan is made in a thread of its own.
+
+    Parameters
+    ----------
+    mission : Mission or Instance
+    policy : str or Policy
+        A name, or a policy with its own parameters. Everything is known here, so that any policy will do.
+    deadline_ms : float or None
+        Milliseconds within which `plan` answers; None to wait for the policy.
+    seed : int
+        Of the policy.
+    **settings
+        Single parameters of a policy that is given by name.
+
+    Raises
+    ------
+    InputError
+        If the policy or a parameter is unknown, or an argument is wrong.
+    """
+
+    def __init__(
+        self,
+        mission: Mission | Instance,
+        policy: str | Policy = "replan",
+        deadline_ms: float | None = 100.0,
+        *,
+        seed: int = 0,
+        **settings: object,
+    ) -> None:
+        of_type(mission, (Mission, Instance), "mission")
+        of_type(policy, (str, Policy), "policy")
+        if isinstance(policy, Policy) and settings:
+            raise InputError("is an object with its own parameters; set them where it is made", "policy")
+        self._deadline_s = None if deadline_ms is None else real(deadline_ms, "deadline_ms", above=True) / 1000
+        self._seed = whole(seed, "seed", 0, 2**63 - 1)
+        self._made_of = (policy if isinstance(policy, str) else None, settings)
+        leader = load_policy(policy, **settings) if isinstance(policy, str) else policy
+        self._picture = Picture(mission if isinstance(mission, Mission) else Mission.from_instance(mission))
+        self._lock = threading.RLock()
+        self._pins = Pins(self._picture)
+        self._plan, self._version, self._planned = Plan(), 0, -1
+        self._told: set[str] = set()
+        self._last_s, self._is_closed = 0.0, False
+        self._leader = Leader(leader, self._seed, self._deadline_s, self._picture.state, self._look)
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the planner's thread; it cannot plan any more."""
+        self._is_closed = True
+        self._leader.close()
+
+    @property
+    def hour(self) -> float:
+        """Up to which hour it knows what happened."""
+        return self._picture.state.hour
+
+    def submit(self, event: Event | Report | Mapping[str, object]) -> None:
+        """Take notice of an event of the mission, or of a report of an agent.
+
+        Parameters
+        ----------
+        event : Event, Report or mapping
+            Or its fields as in a file; without an hour it is now. ``task-changes`` says what is left of a task, and
+            ``agent-reports`` where an agent is and what its battery holds.
+
+        Raises
+        ------
+        InputError
+            If a field is wrong, an id unknown, its hour has passed, it was submitted before, or cannot happen. Then
+            nothing has changed.
+        """
+        with self._lock:
+            given = Input.of(event, self.hour)
+            line = repr(given)
+            if line in self._told:
+                raise InputError("was submitted before, at the same hour", "event")
+            before = self.hour
+            self._picture.take(given)
+            if self.hour > before:
+                self._told.clear()
+            self._told.add(line)
+            self._version += 1
+
+    def pin(self, agent: str, task: str | None) -> None:
+        """Let an agent do this task until it is over, whatever the policy says, or None to stay where it is.
+
+        Parameters
+        ----------
+        agent, task : str
+            Their ids.
+
+        Raises
+        ------
+        InputError
+            If one is unknown, or the agent cannot take the task now.
+        """
+        with self._lock:
+            self._pins.add(agent, task)
+            self._version += 1
+
+    def unpin(self, agent: str) -> None:
+        """Let the policy lead an agent again.
+
+        Parameters
+        ----------
+        agent : str
+            Its id; where it is not pinned that is an `InputError`.
+        """
+        with self._lock:
+            self._pins.remove(agent)
+            self._version += 1
+
+    def plan(self, hour: float | None = None) -> Plan:
+        """Return the orders of all agents, by the policy if it answers in time.
+
+        Parameters
+        ----------
+        hour : float, optional
+            What time it is; that of the last event by default.
+
+        Returns
+        -------
+        Plan
+            Orders that can be followed. Where nothing has happened it is the last one.
+
+        Raises
+        ------
+        InputError
+            If the hour has passed, or the planner is closed.
+        """
+        until = self._until()
+        with self._lock:
+            if self._is_closed:
+                raise InputError("is closed", "planner")
+            if hour is not None:
+                self._advance(hour)
+            if self._planned == self._version:
+                return self._plan
+            self._follow_late()
+            decision = self._leader.request(self._version, until)
+        decision.done.wait(None if until == math.inf else max(0.0, until - time.perf_counter()))
+        woken = min(until, time.perf_counter())
+        with self._lock:
+            plan = self._conclude(decision)
+            self._last_s = max(time.perf_counter() - woken, 0.95 * self._last_s)
+        return plan
+
+    def why_changed(self) -> tuple[OrderChange, ...]:
+        """Return each order of the last plan that differs from the one before, and what caused it."""
+        return self._plan.changes
+
+    def save(self, path: PathLike) -> None:
+        """Write all that it knows, its pins and its plan to a file, from which `restore` goes on.
+
+        Parameters
+        ----------
+        path : str or path
+            Where nothing can be written that is an `InputError`.
+        """
+        with self._lock:
+            name, settings = self._made_of
+            document = {
+                "policy": name,
+                "settings": settings,
+                "deadline_ms": None if self._deadline_s is None else self._deadline_s * 1000,
+                "seed": self._seed,
+                "pins": self._pins.tasks,
+                "is_planned": self._planned == self._version,
+                "told": sorted(self._told),
+                **saved.document_of(self._picture, self._plan),
+            }
+        saved.write(document, path)
+
+    @classmethod
+    def restore(cls, path: PathLike, policy: Policy | None = None) -> "MissionPlanner":
+        """Return the planner that was saved: it has the same plan, and goes on from there.
+
+        What a policy remembers of its own begins anew.
+
+        Parameters
+        ----------
+        path : str or path
+        policy : Policy, optional
+            The policy, where it was an object when the planner was saved.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be read, or is none of `save`.
+        """
+        document = saved.read(path)
+        with saved.told_of(path):
+            name, settings = document["policy"], document["settings"]
+            if name is None and policy is None:
+                raise InputError("was an object; give it again", "policy")
+            given = {} if policy is not None else require_object(settings, "settings")
+            leader = text(name, "policy") if policy is None else policy
+            deadline_ms, seed = document["deadline_ms"], document["seed"]
+            planner = cls(saved.mission_of(document), leader, deadline_ms, seed=seed, **given)  # type: ignore[arg-type]
+            planner._plan = saved.restored(document, planner._picture)
+            planner._pins.tasks = dict(document["pins"])  # type: ignore[call-overload]
+            planner._told = set(document["told"])  # type: ignore[call-overload]
+            planner._planned = 0 if document["is_planned"] else -1
+        return planner
+
+    def _advance(self, hour: float) -> None:
+        now = float(real(hour, "hour", 0, LATEST))
+        check_hour(self._picture.state, now)
+        known, before = self._picture.told, self.hour
+        self._picture.advance(now)
+        if now > before:
+            self._told.clear()
+        if self._picture.told > known:
+            self._version += 1
+
+    def _look(self, decision: Decision) -> View:
+        with self._lock:
+            self._pins.lapse()
+            decision.version, decision.seen = self._version, self._picture.told
+            return self._picture.view(self._pins.tasks)
+
+    def _until(self) -> float:
+        """Return when to wait for the policy no more, as `time.perf_counter` says, so that orders are given in time."""
+        if self._deadline_s is None:
+            return math.inf
+        reserve = min(RESERVE_SHARE * self._deadline_s, RESERVE_MS / 1000 + 1.5 * self._last_s)
+        return time.perf_counter() + self._deadline_s - reserve
+
+    def _conclude(self, decision: Decision) -> Plan:
+        """Make the next plan of what was decided; of the last one where that is nothing."""
+        if decision.is_whole and decision.version <= self._planned:
+            return self._plan  # another thread was here with the same
+        self._follow(dict(decision.orders))
+        picture, before = self._picture, self._plan
+        orders = {agent.facts.id: agent.order for agent in picture.active()}
+        changes = changes_of(before.orders, orders, picture.news)
+        self._plan = Plan(self.hour, MappingProxyType(orders), decision.is_whole, decision.problem, changes)
+        if decision.is_whole:
+            self._planned = decision.version
+            picture.forget(decision.seen)
+        return self._plan
+
+    def _follow_late(self) -> None:
+        """Give orders that came after the deadline of the last plan, of what was known then."""
+        late = self._leader.last
+        if late is not None and self._planned < late.version < self._version:
+            self._follow(late.orders)
+            self._leader.last = None
+
+    def _follow(self, orders: Mapping[str, Order]) -> None:
+        """Give the orders that can be followed now, those of pins before all, and end those that lead nowhere."""
+        picture = self._picture
+        self._pins.lapse()
+        for agent in picture.active():
+            name = agent.facts.id
+            wanted = self._pins.order(name) or orders.get(name)
+            if wanted is not None:
+                picture.order(name, wanted)
+            task = agent.order.task
+            if task is not None and picture.state.task(task).status is not TaskStatus.OPEN:
+                picture.order(name, STAY)
+        picture.look_ahead()

@@ -1,0 +1,217 @@
+"""A planner as a file: alloc-planner/1."""
+
+import json
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+
+from alloc.allocators.online.planner.picture import News, Picture
+from alloc.allocators.online.planner.plan import OrderChange, Plan
+from alloc.problems.errors import InputError
+from alloc.problems.formats.columns import require_format
+from alloc.problems.formats.files import PathLike, named, read_text, write_text_atomically
+from alloc.problems.formats.json_columns import Row
+from alloc.problems.formats.json_text import encode, require_object
+from alloc.problems.formats.messages import told
+from alloc.problems.missions.files.document import mission_from_document, mission_to_document
+from alloc.problems.missions.mission import Mission
+from alloc.problems.missions.simulation.places import Place
+from alloc.problems.missions.simulation.state import AgentState, AgentStatus, Flight, Order, TaskState, TaskStatus
+
+PLANNER_FORMAT = "alloc-planner/1"
+
+AGENT_LEDGERS = ("battery", "capacity", "distance", "energy")
+TASK_LEDGERS = ("left", "since", "appeared", "grown", "done", "cancelled", "missed", "closed")
+
+
+def document_of(picture: Picture, plan: Plan) -> Row:
+    """Return what is believed, and the plan, as plain objects."""
+    state = picture.state
+    return {
+        "hour": state.hour,
+        "mission": mission_to_document(state.mission),
+        "arrivals": state.arrivals,
+        "agents": [_agent(agent) for agent in state.agents],
+        "tasks": [_task(task) for task in state.tasks],
+        "news": [vars(news) for news in picture.news],
+        "plan": {
+            "hour": plan.hour,
+            "is_new": plan.is_new,
+            "problem": plan.problem,
+            "orders": {agent: order_to_row(order) for agent, order in plan.items()},
+            "changes": [change_to_row(change) for change in plan.changes],
+        },
+    }
+
+
+def order_to_row(order: Order | None) -> Row | None:
+    """Return an order as plain objects: a task, a position, or neither to stay."""
+    if order is None:
+        return None
+    return {"task": order.task, **({} if order.position is None else {"position": list(order.position)})}
+
+
+def change_to_row(change: OrderChange) -> Row:
+    """Return a change of an order as plain objects."""
+    before, after = order_to_row(change.before), order_to_row(change.after)
+    return {"agent": change.agent, "before": before, "after": after, "cause": change.cause}
+
+
+def write(document: Row, path: PathLike) -> None:
+    """Write a saved planner whole or not at all."""
+    write_text_atomically(path, encode({"format": PLANNER_FORMAT, **document}) + "\n")
+
+
+def read(path: PathLike) -> Row:
+    """Return the document in a file, if it is one of a planner."""
+    source = named(path)
+    try:
+        document = require_object(json.loads(read_text(path)))  # whole numbers stay whole: they may be settings
+        require_format(document.get("format"), (PLANNER_FORMAT,))
+    except InputError as error:
+        raise told(error, source) from error.__cause__
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"is no JSON: {error}", source=source) from error
+    return document
+
+
+@contextmanager
+def told_of(path: PathLike) -> Iterator[None]:
+    """Tell of any fault of a document in which file it is."""
+    try:
+        yield
+    except InputError as error:
+        raise told(error, named(path)) from error.__cause__
+    except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
+        raise InputError(f"is damaged, or was changed by hand: {error!r}", source=named(path)) from error
+
+
+def mission_of(document: Row) -> Mission:
+    """Return the mission with which a planner began."""
+    return mission_from_document(document["mission"])
+
+
+def restored(document: Row, picture: Picture) -> Plan:
+    """Put what was saved into the picture of a new planner of the same mission, and return the plan."""
+    state, hour = picture.state, document["hour"]
+    for arrival in _rows(document["arrivals"]):
+        state.admit(arrival)
+    rows = _rows(document["agents"]), _rows(document["tasks"])
+    for task, row in zip(state.tasks, rows[1], strict=True):
+        _restore_task(task, row)
+    for agent, row in zip(state.agents, rows[0], strict=True):
+        _restore_agent(picture, agent, row)
+    for task, row in zip(state.tasks, rows[1], strict=True):
+        workers = [state.agent(str(name)) for name in row["workers"]]  # type: ignore[attr-defined]
+        task.workers = {agent.index: agent for agent in workers}
+        for agent in workers:
+            agent.task = task
+    state.hour = float(str(hour))
+    picture.restore_agenda()
+    picture.forget(picture.told)
+    for row in _rows(document["news"]):
+        picture.tell(News(**row))  # type: ignore[arg-type]
+    plan = require_object(document["plan"])
+    orders = {name: _order(row) for name, row in require_object(plan["orders"]).items()}
+    changes = tuple(
+        OrderChange(str(row["agent"]), _order(row["before"]), _order(row["after"]), str(row["cause"]))
+        for row in _rows(plan["changes"])
+    )
+    found = {name: order for name, order in orders.items() if order is not None}
+    problem = None if plan["problem"] is None else str(plan["problem"])
+    return Plan(float(str(plan["hour"])), found, bool(plan["is_new"]), problem, changes)
+
+
+def _agent(agent: AgentState) -> Row:
+    flight = agent.flight
+    return {
+        "id": agent.facts.id,
+        "status": str(agent.status),
+        "place": _place(agent.place),
+        "order": order_to_row(agent.order),
+        "flight": None
+        if flight is None
+        else {
+            "source": _place(flight.source),
+            "goal": _place(flight.goal),
+            "task": None if flight.task is None else flight.task.facts.id,
+            "distance": flight.distance,
+            "departs": flight.departs,
+            "arrives": flight.arrives,
+        },
+        **{name: _finite(getattr(agent, name)) for name in AGENT_LEDGERS},
+    }
+
+
+def _task(task: TaskState) -> Row:
+    return {
+        "id": task.facts.id,
+        "status": str(task.status),
+        "appears": task.facts.appears,
+        "begun": task.begun,
+        "version": task.version,
+        "workers": [agent.facts.id for agent in task.workers.values()],
+        **{name: _finite(getattr(task, name)) for name in TASK_LEDGERS},
+    }
+
+
+def _place(place: Place) -> Row:
+    return {"position": place.position, "nodes": place.nodes}
+
+
+def _finite(value: float) -> float | None:
+    return None if value == math.inf else value
+
+
+def _rows(value: object) -> list[Row]:
+    if not isinstance(value, list):
+        raise TypeError(f"{value!r} is no list")
+    return value
+
+
+def _restore_task(task: TaskState, row: Row) -> None:
+    task.status = TaskStatus(str(row["status"]))
+    task.facts = replace(task.facts, appears=float(str(row["appears"])))
+    task.begun, task.version = bool(row["begun"]), int(float(str(row["version"])))
+    _restore_ledgers(task, row, TASK_LEDGERS)
+
+
+def _restore_agent(picture: Picture, agent: AgentState, row: Row) -> None:
+    agent.status, agent.place = AgentStatus(str(row["status"])), _to_place(row["place"])
+    order, flight = _order(row["order"]), row["flight"]
+    assert order is not None
+    agent.order, agent.flight, agent.task = order, None, None
+    if flight is not None:
+        fields = require_object(flight)
+        task = None if fields["task"] is None else picture.state.task(str(fields["task"]))
+        hours = (float(str(fields[name])) for name in ("distance", "departs", "arrives"))
+        agent.flight = Flight(_to_place(fields["source"]), _to_place(fields["goal"]), task, *hours)
+    _restore_ledgers(agent, row, AGENT_LEDGERS)
+
+
+def _restore_ledgers(state: AgentState | TaskState, row: Row, names: tuple[str, ...]) -> None:
+    for name in names:
+        value = row[name]
+        setattr(state, name, math.inf if value is None else float(str(value)))
+
+
+def _to_place(row: object) -> Place:
+    fields = require_object(row)
+    nodes, position = fields["nodes"], fields["position"]
+    return Place(_to_position(position), tuple(int(node) for node in nodes))  # type: ignore[attr-defined]
+
+
+def _to_position(value: object) -> tuple[float, float, float] | None:
+    if value is None:
+        return None
+    x, y, z = (float(str(axis)) for axis in value)  # type: ignore[attr-defined]
+    return x, y, z
+
+
+def _order(row: object) -> Order | None:
+    if row is None:
+        return None
+    fields = require_object(row)
+    task = fields["task"]
+    return Order(None if task is None else str(task), _to_position(fields.get("position")))

@@ -1,0 +1,136 @@
+"""The policy `gappo`: a network scores what an agent knows of tasks and of its neighbours."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from alloc.allocators.learned.missions.exploring import centre, notice
+from alloc.allocators.learned.missions.network import compiled_weights
+from alloc.allocators.learned.missions.network_arrays import MissionWeights
+from alloc.allocators.learned.missions.options import WAIT
+from alloc.allocators.learned.missions.play import Room, consider, is_due, room_for
+from alloc.allocators.learned.missions.policy_file import load_network
+from alloc.allocators.learned.missions.situation import MEMORY, Situation
+from alloc.allocators.missions.layout import NOBODY
+from alloc.allocators.online.contract import AgentDecider, Briefing, Policy, PolicyInfo
+from alloc.problems.missions.simulation.reports import AgentReport, TaskReport, View
+from alloc.problems.missions.simulation.state import ACTIVE, STAY, AgentStatus, Order, TaskStatus
+from alloc.problems.vocabulary import Knowledge
+
+NOWHERE = (math.nan, math.nan, math.nan)
+
+
+class NetworkPolicy(Policy):
+    """Each agent takes the option that the network scores highest: a task, looking around, or staying.
+
+    Parameters
+    ----------
+    policy : Path or str, optional
+        Policy file by ``alloc train gappo --missions``; the shipped one by default.
+    """
+
+    info = PolicyInfo(
+        name="gappo",
+        summary="a network, trained in missions, scores what each agent knows",
+        requires=("torch", "safetensors"),
+        options=("policy",),
+        citation="Fang et al. (2025), doi:10.20944/preprints202502.0192.v1",
+    )
+
+    def __init__(self, policy: Path | str | None = None) -> None:
+        super().__init__()
+        self._weights = compiled_weights(load_network(policy))
+
+    def begin(self, briefing: Briefing) -> AgentDecider:
+        """Return who decides by the network."""
+        return _NetworkDecider(briefing, self._weights)
+
+
+class _NetworkDecider(AgentDecider):
+    def __init__(self, briefing: Briefing, weights: MissionWeights) -> None:
+        self._weights, self._area = weights, np.array(briefing.area)
+        self._span, self._period = math.dist(*briefing.area), briefing.radio.period
+        is_blind = briefing.knowledge is Knowledge.LOCAL
+        self._sensing = briefing.sensing if is_blind else math.inf
+        self._seed, self._number = briefing.seed[0], briefing.seed[1] - 1
+        self._room = room_for(1, 0)
+
+    def decide(self, view: View) -> Order | None:
+        room, own = self._room, view.own
+        tasks = [task for task in view.tasks.values() if task.status is TaskStatus.OPEN]
+        names = [task.facts.id for task in tasks]
+        is_flying = own.status is AgentStatus.FLYING
+        is_busy = own.task in names if own.task is not None else is_flying
+        is_considered = is_due(room, 0, view.hour, self._period, len(tasks), is_busy)
+        if (is_considered or is_flying) and self._sensing < math.inf:
+            x, y, _ = own.place.position or NOWHERE
+            notice(self._area, self._sensing, x, y, view.hour, room.seen[0])
+        if not is_considered:
+            return None
+        room.decided[0], room.tasks[0] = view.hour, len(tasks)
+        room = self._with_room(len(view.agents), len(tasks) + 1)
+        _fill(view, room.situation, tasks, self._span)
+        count = consider(room, self._area, self._sensing, self._seed, self._number, 0, self._weights)
+        choice = int(room.choice[np.argmax(room.scores[:count])])
+        if choice >= 0:
+            return Order(names[choice])
+        if choice == WAIT:
+            return STAY
+        if is_flying and own.task is None:
+            return None
+        x, y, z = centre(self._area, int(room.goal[0]))
+        return Order(position=(float(x), float(y), float(z)))
+
+    def _with_room(self, n: int, m: int) -> Room:
+        """Return room for what is known now, with what the agent remembers."""
+        fresh = room_for(n, m)
+        kept = {name: getattr(self._room, name) for name in ("seen", "goal", "decided", "tasks")}
+        self._room = fresh._replace(**kept)
+        return self._room
+
+
+def _fill(view: View, situation: Situation, tasks: list[TaskReport], span: float) -> None:
+    """Fill in what an agent knows; tasks are the open ones, behind which one stands for all that are over."""
+    own = view.own
+    index = {task.facts.id: j for j, task in enumerate(tasks)}
+    place = own.place.position or NOWHERE
+    is_at_work, is_flying = own.status is AgentStatus.WORKING, own.status is AgentStatus.FLYING
+    facts = own.facts
+    situation.own[:] = (
+        view.hour,
+        *place,
+        facts.ability,
+        facts.speed,
+        own.battery,
+        facts.energy_per_distance,
+        span,
+        NOBODY if own.task is None else index.get(own.task, len(tasks)),
+        is_at_work,
+        is_flying,
+    )
+    for j, task in enumerate(tasks):
+        known = task.facts
+        situation.can[j] = view.refusal(own, task) is None
+        numbers = (task.left, task.hour, known.priority, known.deadline, known.growth, view.distance(own, task))
+        situation.task[:, j] = (*(known.place.position or NOWHERE), *numbers)
+    for i, (name, report) in enumerate(view.agents.items()):
+        is_recent = name != view.id and view.hour - report.hour <= MEMORY and report.status in ACTIVE
+        situation.counts[i] = is_recent
+        if is_recent:
+            situation.target[i] = _target(view, report, index)
+            situation.other[:, i] = (_arrival(view, report), report.facts.ability, *(report.place.position or NOWHERE))
+
+
+def _target(view: View, report: AgentReport, index: dict[str, int]) -> int:
+    """Return the number of another's task; that of a task that is over stands behind all others."""
+    if report.task is None or report.task not in view.tasks:
+        return NOBODY
+    return index.get(report.task, len(index))
+
+
+def _arrival(view: View, report: AgentReport) -> float:
+    task = view.tasks.get(report.task or "")
+    if task is None:
+        return 0.0
+    return -math.inf if report.status is AgentStatus.WORKING else report.hour + view.hours(report, task)

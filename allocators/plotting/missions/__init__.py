@@ -1,0 +1,1 @@
+"""Missions as pictures, films, and pages that play them."""

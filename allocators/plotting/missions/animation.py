@@ -1,0 +1,164 @@
+"""A film of a mission: its map from hour to hour, as .gif or .mp4."""
+
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from alloc.allocators.plotting.missions.map import Plane, agent_colours, name_tasks, plane_of, prepare, task_areas
+from alloc.allocators.plotting.missions.picture import title
+from alloc.allocators.plotting.missions.states import AGENT_COLOURS, TASK_COLOURS, doing, task_states
+from alloc.allocators.plotting.style import in_style, new_figure
+from alloc.problems import InputError
+from alloc.problems.formats import write_bytes_atomically
+from alloc.problems.missions.course import Course
+from alloc.problems.text import labelled
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+SUFFIXES = (".gif", ".mp4", ".html")
+
+FRAMES, PER_SECOND = 120, 12
+
+DPI = 90
+
+TRAIL = 0.08
+"""Share of the mission over which the way behind an agent is drawn."""
+
+
+def check_animation(path: str) -> None:
+    """Raise an `InputError` if the suffix of `path` is not one of an animation, or what writes it is missing."""
+    suffix = Path(path).suffix.lower()
+    if suffix not in SUFFIXES:
+        raise InputError(f"must end in {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}", source=path)
+    if suffix == ".mp4":
+        from matplotlib.animation import FFMpegWriter
+
+        if not FFMpegWriter.isAvailable():
+            raise InputError(
+                "needs the program ffmpeg, which was not found; install it, or write .gif or .html", source=path
+            )
+
+
+def animate_mission(course: Course, path: str, frames: int = FRAMES) -> None:
+    """Write a mission as a film (.gif, .mp4), or as a page that plays it (.html).
+
+    Parameters
+    ----------
+    course : Course
+        Of a `Recorder`, or by `course_of` from a log.
+    path : str
+    frames : int
+        Pictures of a film, evenly spaced in time.
+
+    Raises
+    ------
+    InputError
+        If `path` has another suffix, or cannot be written, or ffmpeg is missing for .mp4; or if no places are known
+        that a film could show.
+    """
+    check_animation(path)
+    if Path(path).suffix.lower() == ".html":
+        from alloc.allocators.plotting.missions.player import write_player
+
+        write_player(course, path)
+        return
+    plane = plane_of(course.mission.instance)
+    if plane.is_empty:
+        raise InputError("cannot show a mission without places of agents or tasks; write .html", source=path)
+    with in_style():
+        write_bytes_atomically(path, _film(course, plane, Path(path).suffix.lower(), frames))
+
+
+def _film(course: Course, plane: Plane, suffix: str, frames: int) -> bytes:
+    from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
+
+    hours = np.linspace(0, course.end, frames)
+    figure = new_figure(8, 7.2)
+    update = _draw(figure, course, plane, hours)
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")  # so that nothing moves but agents
+    name_tasks(figure.axes[0], course, plane)
+    film = FuncAnimation(figure, update, frames=frames, init_func=list, blit=False, cache_frame_data=False)
+    writer = (
+        PillowWriter(fps=PER_SECOND)
+        if suffix == ".gif"
+        else FFMpegWriter(fps=PER_SECOND, extra_args=["-pix_fmt", "yuv420p"])
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        written = Path(folder) / f"film{suffix}"
+        film.save(str(written), writer=writer, dpi=DPI)
+        return written.read_bytes()
+
+
+def _draw(figure: "Figure", course: Course, plane: Plane, hours: np.ndarray) -> "Callable[[int], list[Artist]]":
+    """Draw what stays, and return what draws the picture of a number."""
+    from matplotlib.collections import LineCollection
+
+    axes = figure.subplots()
+    prepare(axes, course, plane)
+    figure.suptitle(title(course), fontsize=10)
+    n = len(course.legs)
+    clock = axes.text(0.985, 0.985, "", transform=axes.transAxes, ha="right", va="top", fontsize=14, zorder=9)
+    area, where = task_areas(course), plane.where.tasks
+    edge = axes.scatter(where[:, 0], where[:, 1], s=area, facecolors="white", linewidths=1.6, zorder=3)
+    fill = axes.scatter(where[:, 0], where[:, 1], s=area, linewidths=0, zorder=4)
+    trails = axes.add_collection(
+        LineCollection([], colors=agent_colours(n), alpha=0.6 if n <= 50 else 0.3, zorder=2), autolim=False
+    )
+    agents = axes.scatter([np.nan] * n, [np.nan] * n, s=60 if n <= 20 else 22 if n <= 100 else 9, marker="s", zorder=5)
+    agents.set(edgecolor="#3d4750", linewidth=0.8 if n <= 100 else 0.3)
+    states, left = task_states(course, hours), course.work_left(hours)
+    most = np.maximum([max(level.left for level in levels) for levels in course.levels], 1e-300)
+    _explain(axes)
+
+    def update(number: int) -> "list[Artist]":
+        hour = float(hours[number])
+        clock.set_text(labelled(f"{hour:.2f}", course.mission.instance.units.time or "h"))
+        now = [row[number] for row in states]
+        colours = [TASK_COLOURS.get(state or "", "none") for state in now]
+        share = np.clip(left[:, number] / most, 0, 1)
+        over = np.array([state in ("done", "missed", "cancelled") for state in now])
+        edge.set(facecolor=["white" if state else "none" for state in now], edgecolor=colours)
+        edge.set_sizes(np.where(over, 0.25 * area, area))
+        fill.set(facecolor=colours)
+        fill.set_sizes(np.where(over, 0.25 * area, area * share))
+        _move(course, plane, hour, agents, trails)
+        return []
+
+    return update
+
+
+def _move(course: Course, plane: Plane, hour: float, agents: "Artist", trails: "Artist") -> None:
+    """Put agents where they are at an hour, and draw the ways behind them."""
+    places, colours, ways = [], [], []
+    for agent, legs in enumerate(course.legs):
+        leg = course.leg(agent, hour)
+        places.append(plane.point(leg.position(hour)) if leg is not None else (np.nan, np.nan))
+        colours.append(AGENT_COLOURS.get((doing(leg) if leg is not None else None) or "", "none"))
+        since = hour - TRAIL * course.end
+        way = [
+            plane.point(one.position(max(one.begin, since))) for one in legs if one.end >= since and one.begin <= hour
+        ]
+        ways.append([*way, places[-1]])
+    agents.set(offsets=places, facecolor=colours)
+    trails.set(segments=ways)
+
+
+def _explain(axes: "Axes") -> None:
+    from matplotlib.lines import Line2D
+
+    entries = [("o", f"task {state}", colour) for state, colour in TASK_COLOURS.items()]
+    entries += [("s", state, colour) for state, colour in AGENT_COLOURS.items()]
+    marks = [
+        Line2D(
+            [], [], marker=shape, linestyle="", color=colour, markeredgecolor="0.4", markeredgewidth=0.5, label=label
+        )
+        for shape, label, colour in entries
+    ]
+    axes.legend(handles=marks, loc="upper center", bbox_to_anchor=(0.5, -0.08), ncols=5, frameon=False, fontsize=8)

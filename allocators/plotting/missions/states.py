@@ -1,0 +1,65 @@
+"""What agents do and what becomes of tasks: names and colours in all drawings of missions, and when each was so."""
+
+import numpy as np
+
+from alloc.problems.instance import FloatArray, IntArray
+from alloc.problems.missions.course import Course, Leg
+from alloc.problems.missions.simulation.state import AgentStatus, TaskStatus
+
+WAITS, WORKED_ON, DONE, MISSED, CANCELLED = "waits", "worked on", "done", "missed", "cancelled"
+
+TASK_COLOURS = {
+    DONE: "#009e73",
+    WORKED_ON: "#e69f00",
+    WAITS: "#cc79a7",
+    MISSED: "#d55e00",
+    CANCELLED: "#999999",
+}
+"""From the palette of Okabe and Ito."""
+
+WORKS, FLIES, EXPLORES, STANDS, AWAY = "works", "flies to a task", "flies elsewhere", "stands", "is away"
+
+AGENT_COLOURS = {
+    WORKS: "#e69f00",
+    FLIES: "#0072b2",
+    EXPLORES: "#9fcdec",
+    STANDS: "#e4e6e8",
+    AWAY: "#8c8c8c",
+}
+
+_OVER = {TaskStatus.DONE: DONE, TaskStatus.MISSED: MISSED, TaskStatus.CANCELLED: CANCELLED}
+
+
+def doing(leg: Leg) -> str | None:
+    """Return what an agent does, in the words of the drawings; None where it is not in the mission."""
+    if leg.status is AgentStatus.FLYING:
+        return FLIES if leg.task >= 0 else EXPLORES
+    return {AgentStatus.WORKING: WORKS, AgentStatus.IDLE: STANDS, AgentStatus.AWAY: AWAY}.get(leg.status)
+
+
+def workers(course: Course, hours: FloatArray) -> IntArray:
+    """Return how many agents work on each task at some hours that ascend, shape (m, hours)."""
+    change = np.zeros((len(course.levels), len(hours) + 1), dtype=np.intp)
+    for legs in course.legs:
+        for leg in legs:
+            if leg.status is AgentStatus.WORKING:
+                begin, end = np.searchsorted(hours, [leg.begin, leg.end])
+                change[leg.task, begin] += 1
+                change[leg.task, end] -= 1
+    count: IntArray = change[:, :-1].cumsum(axis=1)
+    return count
+
+
+def task_states(course: Course, hours: FloatArray) -> list[list[str | None]]:
+    """Return the state of each task at some hours that ascend; None before it appears."""
+    count = workers(course, hours)
+    return [
+        [_state(status, int(here)) for status, here in zip(statuses, row, strict=True)]
+        for statuses, row in zip(course.statuses(hours), count, strict=True)
+    ]
+
+
+def _state(status: TaskStatus, here: int) -> str | None:
+    if status is TaskStatus.OPEN:
+        return WORKED_ON if here else WAITS
+    return _OVER.get(status)

@@ -1,0 +1,121 @@
+"""Agents that must do one task: as ``AGENT=TASK``, and as a file; each is checked on the instance."""
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from alloc.problems import IDLE, Allocation, InputError, Instance
+from alloc.problems.errors import nearest
+from alloc.problems.evaluation import reason_of
+from alloc.problems.formats import read_plan
+from alloc.problems.formats.files import PathLike
+from alloc.problems.formats.messages import told
+
+SIGN = "="
+
+
+def pinned(instance: Instance, agent: str, task: str | None) -> tuple[int, int]:
+    """Return the index of an agent and that of the task it is pinned to, -1 for idle.
+
+    Raises
+    ------
+    InputError
+        If one of them is unknown, or the agent cannot do the task.
+    """
+    if agent not in instance.agent_index:
+        raise InputError(
+            f"no agent {agent!r} in instance {instance.name!r}{nearest(agent, instance.agent_ids)}", "pins"
+        )
+    i = instance.agent_index[agent]
+    if task is None:
+        return i, IDLE
+    if task not in instance.task_index:
+        raise InputError(f"no task {task!r} in instance {instance.name!r}{nearest(task, instance.task_ids)}", "pins")
+    j = instance.task_index[task]
+    if not instance.reach.allows(np.array([i]), np.array([j]))[0]:
+        raise InputError(f"{agent!r} cannot do {task!r}: {reason_of(instance, i, j)}", "pins")
+    return i, j
+
+
+def parse_pin(instance: Instance, pair: str) -> tuple[str, str | None]:
+    """Return the agent and the task in ``AGENT=TASK``, None for the task in ``AGENT=``.
+
+    An id may contain ``=``: the text is split where both sides are ids of the instance. Where no split does, the
+    longest known agent is taken, so that the error is about its task.
+
+    Raises
+    ------
+    InputError
+        If there is no ``=`` after an agent, or several splits are possible.
+    """
+    splits = [(pair[:at], pair[at + 1 :] or None) for at, sign in enumerate(pair) if sign == SIGN and at]
+    if not splits:
+        raise InputError(f"must be AGENT=TASK, got {pair!r}", "pins")
+    known = [(agent, task) for agent, task in splits if agent in instance.agent_index]
+    possible = [(agent, task) for agent, task in known if task is None or task in instance.task_index]
+    if len(possible) > 1:
+        meanings = " or ".join(f"agent {agent!r} to {_named(task)}" for agent, task in possible)
+        raise InputError(f"{pair!r} may pin {meanings}; pin it in a file", "pins")
+    return (possible or known[-1:] or splits)[0]
+
+
+def _named(task: str | None) -> str:
+    return "no task" if task is None else f"task {task!r}"
+
+
+def parse_pins(instance: Instance, pairs: Iterable[str]) -> dict[str, str | None]:
+    """Return the task id of each agent id in several ``AGENT=TASK``.
+
+    Raises
+    ------
+    InputError
+        As `parse_pin` does, and if an agent is pinned to two tasks.
+    """
+    found: dict[str, str | None] = {}
+    for agent, task in (parse_pin(instance, pair) for pair in pairs):
+        if found.setdefault(agent, task) != task:
+            raise InputError(f"{agent!r} is pinned to {_named(found[agent])} and to {_named(task)}", "pins")
+    return found
+
+
+def read_pins(instance: Instance, path: PathLike) -> tuple[dict[str, str | None], str | None]:
+    """Return the task id of each agent id in a file with a plan, all of whose agents are pinned.
+
+    Parameters
+    ----------
+    instance : Instance
+    path : str or path
+        As for `read_plan`. Agents that the instance does not have, or whose task it does not have, are left out.
+
+    Returns
+    -------
+    pins : dict
+    note : str or None
+        One line, where something is left out.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, has no agent of the instance, or an agent cannot do its task.
+    """
+    plan = read_plan(path, instance)
+    given = plan.assignment()
+    try:
+        _, changes = Allocation.carried_over(instance, given)
+        left_out = {*changes.gone_agents, *changes.agents_without_task}
+        pins = {agent: task for agent, task in given.items() if agent not in left_out}
+        for agent, task in pins.items():
+            _require(instance, agent, task)
+    except InputError as error:
+        raise told(error, plan.source) from error.__cause__
+    gone = str(replace(changes, new_agents=()))
+    return pins, f"{plan.source}: {gone} since; these pins are left out" if gone else None
+
+
+def _require(instance: Instance, agent: str, task: str | None) -> None:
+    """Raise an error whose place is that in the file."""
+    try:
+        pinned(instance, agent, task)
+    except InputError as error:
+        raise InputError(error.message, f"assignment.{agent}") from error

@@ -1,0 +1,139 @@
+"""``alloc plan --stdio``."""
+
+import contextlib
+import json
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from queue import SimpleQueue
+from typing import TYPE_CHECKING, Annotated, BinaryIO
+
+import typer
+
+from alloc.cli import options
+from alloc.cli.options import examples
+from alloc.cli.output.console import write_out
+
+if TYPE_CHECKING:
+    from alloc.allocators.online.planner.lines import Lines
+    from alloc.problems import Mission
+
+EXAMPLES = examples(
+    "alloc plan mission.json --stdio",
+    "alloc plan mission.json --stdio --policy greedy --deadline-ms 50 --state planner.json",
+    'echo \'{"request": "plan"}\' | alloc plan mission.json --stdio',
+    closing="Each line in is one of alloc-planner-request/1, each line out one of alloc-planner-orders/1.",
+)
+
+CHUNK = 65536
+"""Bytes that are read at once, if they are there."""
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to `app`."""
+    app.command("plan", epilog=EXAMPLES)(plan_command)
+
+
+def plan_command(
+    mission: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="MISSION",
+            help="A mission as .json, or an instance.",
+            show_default="the first line, or what --state holds",
+        ),
+    ] = None,
+    stdio: Annotated[
+        bool, typer.Option("--stdio", help="Read events from standard input, write orders to standard output.")
+    ] = False,
+    policy: Annotated[
+        str,
+        typer.Option(
+            autocompletion=options.complete_policies,
+            help=f"Who gives the orders: {', '.join(options.BUILT_IN_POLICIES)}, or a plugin.",
+        ),
+    ] = "replan",
+    deadline_ms: Annotated[
+        float, typer.Option(min=0, help="Milliseconds for each plan; the last one stands if it takes longer. 0: none.")
+    ] = 100.0,
+    seed: options.SeedOption = 0,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the policy; may be repeated."),
+    ] = None,
+    state: Annotated[
+        str | None,
+        typer.Option(metavar="FILE", help="Go on from this file if it is there, by its policy; save to it at the end."),
+    ] = None,
+) -> None:
+    """Plan for a program in any language: events in, orders out, one line of JSON each."""
+    from alloc.allocators import MissionPlanner, load_policy
+    from alloc.allocators.online.planner.lines import Lines
+    from alloc.problems import read_mission
+
+    if not stdio:
+        raise typer.BadParameter("is needed: there is no other way of planning yet", param_hint="'--stdio'")
+    if mission == "-":
+        raise typer.BadParameter("cannot be standard input, but for its first line: leave it out", param_hint="MISSION")
+    given = options.values(settings)
+
+    def begin(problem: "Mission") -> MissionPlanner:
+        return MissionPlanner(problem, policy, deadline_ms or None, seed=seed, **given)
+
+    planner = None
+    if state is not None and Path(state).exists():
+        if mission is not None:
+            raise typer.BadParameter(f"{state} has one already; leave it out, or remove the file", param_hint="MISSION")
+        planner = MissionPlanner.restore(state)
+    elif mission is not None:
+        planner = begin(read_mission(mission))
+    else:
+        load_policy(policy, **given)  # what is wrong with it is told now
+    serve(Lines(planner, begin, state))
+
+
+def serve(lines: "Lines") -> None:
+    """Answer all lines that come before the input ends or a signal does, and save the planner."""
+    arrived: SimpleQueue[str | None] = SimpleQueue()
+    threading.Thread(target=read_lines, args=(arrived,), name="alloc-lines", daemon=True).start()
+    with ended_by_signals(arrived):
+        number = 0
+        while (line := arrived.get()) is not None:
+            number += 1
+            write_out(json.dumps(lines.answer(line, number), allow_nan=False) + "\n")
+        lines.save()
+    lines.close()
+
+
+def read_lines(arrived: "SimpleQueue[str | None]") -> None:
+    """Put all lines of standard input on a queue, and None at its end.
+
+    Without a buffer, whose lock would hold up the end of the process while this thread waits for input.
+    """
+    stream: BinaryIO = sys.stdin.buffer
+    source: BinaryIO = getattr(stream, "raw", stream)
+    rest = b""
+    while chunk := source.read(CHUNK):
+        *whole, rest = (rest + chunk).split(b"\n")
+        for line in whole:
+            arrived.put(line.decode("utf-8", "replace"))
+    if rest:
+        arrived.put(rest.decode("utf-8", "replace"))
+    arrived.put(None)
+
+
+@contextlib.contextmanager
+def ended_by_signals(arrived: "SimpleQueue[str | None]") -> Iterator[None]:
+    """Let SIGTERM and Ctrl-C be the end of the input, behind the lines that are there, as long as this lasts."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    numbers = (signal.SIGTERM, signal.SIGINT)
+    before = [signal.signal(number, lambda *_: arrived.put(None)) for number in numbers]
+    try:
+        yield
+    finally:
+        for number, handler in zip(numbers, before, strict=True):
+            signal.signal(number, handler)

@@ -1,0 +1,74 @@
+"""`gappo` in missions: the network in torch and compiled, and its policy in both simulations."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from alloc.allocators.learned.missions.feature_names import FEATURES
+from alloc.allocators.learned.missions.forward import score
+from alloc.allocators.learned.missions.network import compiled_weights, first_network
+from alloc.allocators.learned.missions.network_arrays import HIDDEN
+from alloc.allocators.learned.missions.play import play, room_for
+from alloc.allocators.learned.missions.policy_file import load_network, save_network
+from alloc.allocators.missions.pack import begun, measure, pack
+from alloc.allocators.online.policies.gappo import NetworkPolicy
+from alloc.allocators.online.run import simulate
+from alloc.problems import InputError
+from alloc.problems.missions.families.draw import random_mission
+from alloc.problems.missions.families.parameters import MissionParameters
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]  # loops are compiled first: half a minute, more under load
+
+
+def scored(options: np.ndarray, seed: int) -> np.ndarray:
+    """Return the scores that the compiled network gives."""
+    token, scores = np.zeros((len(options), HIDDEN), np.float32), np.zeros(len(options), np.float32)
+    score(options, len(options), compiled_weights(first_network(seed)), token, scores)
+    return scores
+
+
+def test_compiled_scores_are_those_of_torch() -> None:
+    """The compiled network gives the scores of the torch module, also where the latter has rows that are no option."""
+    options = np.random.default_rng(0).normal(size=(7, FEATURES)).astype(np.float32)
+    filled = torch.zeros(1, 9, FEATURES)
+    filled[0, :7] = torch.tensor(options)
+    with torch.no_grad():
+        expected, _ = first_network(1)(filled, torch.arange(9)[None] < 7)
+    assert scored(options, 1) == pytest.approx(expected[0, :7].numpy(), abs=1e-5)
+    assert expected[0, 7:].isneginf().all()
+
+
+def test_scores_do_not_depend_on_the_order_of_options() -> None:
+    """Options in another order have the same scores in that order."""
+    rng = np.random.default_rng(1)
+    options, order = rng.normal(size=(6, FEATURES)).astype(np.float32), rng.permutation(6)
+    assert scored(options[order], 2) == pytest.approx(scored(options, 2)[order], abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("family", "knowledge"),
+    [("steady", "local"), ("failures", "full"), ("recharging", "local"), ("deadlines", "local")],
+)
+def test_policy_is_the_same_in_both_simulations(tmp_path: Path, family: str, knowledge: str) -> None:
+    """The policy by the contract, and the compiled one, reach the same measures."""
+    network = first_network(3)
+    save_network(tmp_path / "policy.safetensors", network, "gappo")
+    mission = random_mission(MissionParameters(family=family, agents=6, tasks=8, knowledge=knowledge), 4)
+    expected = simulate(mission, NetworkPolicy(tmp_path / "policy.safetensors"), seed=5).result
+    state = begun(pack(mission), 5)
+    play(state, room_for(6, 8), compiled_weights(network), 5)
+    found = measure(mission, state, "gappo", 5)
+    for name in ("mission_time", "tasks_done", "tasks_missed", "energy", "distance", "switches", "messages", "bytes"):
+        value = getattr(expected, name)
+        assert getattr(found, name) == (None if value is None else pytest.approx(value, rel=1e-9)), name
+
+
+def test_policy_file_for_missions_is_checked(tmp_path: Path) -> None:
+    """A policy file for instances is refused with what to do."""
+    from alloc.allocators.learned.missions import policy_file
+
+    instances = policy_file.SHIPPED.with_name("gappo.safetensors")
+    with pytest.raises(InputError, match="alloc train gappo --missions"):
+        load_network(instances)

@@ -1,0 +1,96 @@
+"""Training in missions: tiny runs, resumed to the same curve, and what they learn from."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from alloc.allocators.learned.algorithms.hyperparameters import PpoParameters
+from alloc.allocators.learned.missions.policy_file import load_network
+from alloc.allocators.learned.missions.rollout import record_for
+from alloc.allocators.learned.missions.training.curriculum import FAMILIES, MissionCurriculum
+from alloc.allocators.learned.missions.training.ppo import HORIZON, OWN_SHARE, record_advantages
+from alloc.allocators.learned.missions.training.run import train_on_missions
+from alloc.allocators.learned.missions.training.trainer import MissionTrainer, MissionTrainingParameters
+from alloc.problems import InputError
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]  # loops are compiled first: half a minute, more under load
+
+TINY = MissionTrainingParameters(
+    population=2,
+    decisions=40,
+    missions=1,
+    validations=1,
+    evolved=1,
+    candidates=4,
+    curriculum=MissionCurriculum(agents=(2, 3), tasks=(2, 4)),
+)
+
+
+def weights_of(trainer: MissionTrainer) -> torch.Tensor:
+    """Return all weights of all members in one vector."""
+    members = [member["network"].values() for member in trainer.members]
+    return torch.cat([weight.flatten() for member in members for weight in member])
+
+
+def test_run_is_resumed_to_the_same_curve(tmp_path: Path) -> None:
+    """A run that is stored in its evolution, and one that is not interrupted, have the same members and reports."""
+    whole, stored, resumed = (MissionTrainer(TINY, 3) for _ in range(3))
+    for _ in range(3):
+        whole.advance()
+    stored.advance()
+    stored.save(tmp_path / "run.checkpoint")
+    resumed.resume(tmp_path / "run.checkpoint")
+    for _ in range(2):
+        resumed.advance()
+    assert torch.equal(weights_of(resumed), weights_of(whole))
+    assert [one.cost for one in resumed.history] == [one.cost for one in whole.history]
+    assert not torch.equal(weights_of(whole), weights_of(MissionTrainer(TINY, 3)))
+
+
+def test_run_of_others_is_not_resumed(tmp_path: Path) -> None:
+    """A checkpoint of other parameters is refused."""
+    MissionTrainer(TINY, 3).save(tmp_path / "run.checkpoint")
+    with pytest.raises(InputError, match="candidates"):
+        MissionTrainer(replace(TINY, candidates=6), 3).resume(tmp_path / "run.checkpoint")
+
+
+def test_what_is_trained_can_be_loaded(tmp_path: Path) -> None:
+    """The policy file of a run holds its best network."""
+    trainer = MissionTrainer(TINY, 1)
+    trainer.advance()
+    trainer.write_policy(tmp_path / "policy.safetensors")
+    loaded = load_network(tmp_path / "policy.safetensors").state_dict()
+    assert all(torch.equal(loaded[name], weight) for name, weight in trainer.best[0].items())
+
+
+def test_unknown_families_are_refused(tmp_path: Path) -> None:
+    """A family that there is not is named with the nearest one."""
+    with pytest.raises(InputError, match="steady"):
+        train_on_missions("gappo", tmp_path / "policy.safetensors", families=["stedy"])
+
+
+def test_curriculum_grows_harder() -> None:
+    """At first missions are of one family; later of all sorts, and of sizes within its bounds."""
+    curriculum, rng = MissionCurriculum(agents=(2, 3), tasks=(2, 4)), np.random.default_rng(0)
+    early = {len(mission.arrays.events) > 0 for mission, _ in curriculum.draw(rng, 3, 0.0)}
+    late = curriculum.draw(rng, 12, 1.0)
+    assert early
+    assert {len(mission.arrays.agents) for mission, _ in late} <= {2, 3}
+    assert len({float(mission.arrays.head[0].sensing) for mission, _ in late}) > 1
+    assert len(FAMILIES) == 8
+
+
+def test_advantages_follow_the_hours_between_decisions() -> None:
+    """With traces of length 0 the advantage is minus what was lost until the next decision, and what follows it."""
+    record = record_for(1, 1, 2, ideal=4.0)
+    record.length[0] = 2
+    record.hour[:], record.idle[:], record.cost[:] = (0.0, 1.0), (0.0, 1.0), (0.0, 0.5)
+    record.asked[0], record.unproductive[0], record.total[0] = 3.0, 1.0, 0.5
+    parameters = PpoParameters(gae_lambda=0.0, reward_scale=1.0)
+    lost = OWN_SHARE * 1.0 + (1 - OWN_SHARE) * 0.5
+    assert record_advantages(record, np.zeros(2), parameters) == pytest.approx([-lost / 4.0, 0.0])
+    valued = record_advantages(record, np.array([0.0, 2.0]), parameters)
+    assert valued == pytest.approx([-lost / 4.0 + 2.0 * np.exp(-1.0 / (HORIZON * 4.0)), -2.0])

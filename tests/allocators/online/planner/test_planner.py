@@ -1,0 +1,170 @@
+"""A planner is told what happens and what agents report, and answers with orders, and why they changed."""
+
+import math
+from collections import defaultdict
+
+import numpy as np
+import pytest
+from drawn_missions import random_mission_of_any_kind
+
+from alloc.allocators import AgentDecider, Briefing, MissionPlanner, Policy, PolicyInfo, Report, simulate
+from alloc.problems import Event, InputError, Mission
+from alloc.problems.missions.simulation.state import STAY, Order
+
+
+def tasks(planner):
+    """Return the task of each agent by the plan."""
+    return {agent: order.task for agent, order in planner.plan().items()}
+
+
+def test_orders_follow_events(pair):
+    """The tasks of the plan, and the cause of each change: a failure, a new task, one that is done."""
+    with MissionPlanner(pair, "nearest", None) as planner:
+        assert tasks(planner) == {"ann": "t1", "ben": "t2"}
+        planner.submit(Event(1.5, "agent-fails", agent="ben"))
+        assert tasks(planner) == {"ann": "t1"}
+        (change,) = planner.why_changed()
+        assert (change.agent, change.before, change.after) == ("ben", Order("t2"), None)
+        assert change.cause == "agent ben failed at 1.5"
+        planner.submit({"event": "task-appears", "task": {"id": "t3", "workload": 1, "position": [0, 2]}})
+        planner.submit({"event": "agent-joins", "agent": {"id": "cat", "ability": 1, "position": [0, 2], "speed": 1}})
+        assert tasks(planner) == {"ann": "t1", "cat": "t3"}
+        assert [change.cause for change in planner.why_changed()] == [
+            "agent cat joined at 1.5; task t3 appeared at 1.5"
+        ]
+        assert planner.plan(3.25)["ann"] == Order("t2")  # t1 is done at 3: 1 hour of flight, 2 of work
+        causes = {change.agent: change.cause for change in planner.why_changed()}
+        assert "task t1 was done at 3" in causes["ann"]
+        assert planner.hour == 3.25
+
+
+def test_reports_are_believed(pair):
+    """Where an agent is and what its battery holds count from then on, and so does the work that is left."""
+    with MissionPlanner(pair, "nearest", None) as planner:
+        planner.plan()
+        planner.submit(Report(0.5, "ann", position=(0, 0.2)))  # it is slow
+        planner.submit({"hour": 1.0, "event": "task-changes", "task": "t2", "workload": 0.0})
+        planner.submit(Report(1.0, "ben", position=(4, 0), battery=1.0))
+        assert tasks(planner) == {"ann": "t1", "ben": None}  # t1 is too far for what is left
+        assert planner.plan(3.29)["ann"] == Order("t1")  # without the report it was done at 3
+        assert planner.plan(3.31)["ann"] == STAY
+        planner.submit(Report(4.0, "ben", battery=20))
+        planner.submit({"event": "task-changes", "task": "t1", "workload": 1.0})  # it was not done, after all
+        assert tasks(planner) == {"ann": "t1", "ben": "t1"}
+        planner.submit(Report(4.5, "ben", task="t1"))  # there already: 2 + 3 do the rest of 0 at once
+        assert planner.plan(4.51)["ann"] == STAY
+
+
+def test_an_agent_that_cannot_go_on_has_no_order(pair):
+    """A battery that does not last for the flight ends it, and the cause says so."""
+    with MissionPlanner(pair, "nearest", None) as planner:
+        planner.plan()
+        planner.submit(Report(0.5, "ann", battery=0.25))
+        assert tasks(planner)["ann"] is None
+        (change,) = planner.why_changed()
+        assert "cannot go on: the flight takes 0.5 of energy, battery 0.25" in change.cause
+
+
+def test_pinned_agents_stay_with_their_task(pair):
+    """No policy sends them elsewhere; the pin ends with the task, or when it is taken back."""
+    with MissionPlanner(pair, "nearest", None) as planner:
+        planner.pin("ann", "t2")
+        planner.pin("ben", None)
+        assert tasks(planner) == {"ann": "t2", "ben": None}
+        planner.unpin("ben")
+        assert tasks(planner) == {"ann": "t2", "ben": "t2"}
+        assert planner.why_changed()[0].cause == "agent ben was unpinned at 0"
+        planner.submit(Event(1.0, "task-cancelled", task="t2"))
+        assert tasks(planner) == {"ann": "t1", "ben": "t1"}
+        for agent, task, told in (("ann", "t2", "the task is cancelled"), ("dan", "t1", "no agent 'dan'")):
+            with pytest.raises(InputError, match=told):
+                planner.pin(agent, task)
+
+
+def test_what_will_come_is_not_known(pair):
+    """Of the agents, tasks and events that a mission says of later hours nothing happens before it is submitted."""
+    mission = Mission(pair, appears=[0, 2], joins=[0, 1], events=[Event(0.5, "agent-fails", agent="ann")])
+    with MissionPlanner(mission, "nearest", None) as planner:
+        assert {agent: order.task for agent, order in planner.plan(2.5).items()} == {"ann": "t1"}
+        planner.submit({"event": "agent-joins", "agent": "ben"})
+        planner.submit({"event": "task-appears", "task": "t2"})
+        assert tasks(planner) == {"ann": "t1", "ben": "t2"}
+
+
+def test_deadlines_pass_by_themselves(pair):
+    """A task that is missed gets no more orders."""
+    with MissionPlanner(Mission(pair, deadline=[2, np.nan]), "nearest", None) as planner:
+        assert tasks(planner) == {"ann": "t1", "ben": "t2"}
+        assert planner.plan(2.0)["ann"] == Order("t2")
+        assert "task t1 was missed at 2" in planner.why_changed()[0].cause
+
+
+@pytest.mark.parametrize("policy", ["greedy", "hedonic"])
+def test_it_believes_what_the_simulation_makes_of_its_orders(policy):
+    """Told the events of a mission as they come, it gives the orders of a simulation, at the same hours."""
+    compared = 0
+    for seed in range(40):
+        mission = random_mission_of_any_kind(np.random.default_rng(seed))
+        log = simulate(mission, policy, knowledge="full").log
+        hours = defaultdict(list)
+        for record in log.records:
+            hours[record["hour"]].append(record)
+        start = Mission(
+            mission.instance,
+            joins=np.maximum(mission.joins, 1e-9),
+            appears=np.maximum(mission.appears, 1e-9),
+            deadline=mission.deadline,
+            growth=mission.growth,
+            pace=mission.pace,
+            seed=mission.seed,
+        )
+        with MissionPlanner(start, policy, None) as planner:
+            for hour, records in hours.items():
+                for record in records:
+                    if record["record"] == "event":
+                        row = {name: value for name, value in record.items() if name != "record"}
+                        planner.submit(row)
+                plan = planner.plan(hour)
+                for record in records:
+                    if record["record"] == "order" and record["task"] is not None:
+                        assert plan[record["agent"]].task == record["task"], (seed, hour)
+                        compared += 1
+    assert compared > 50
+
+
+class Stubborn(Policy):
+    """Answers what it is given, or fails."""
+
+    info = PolicyInfo(name="stubborn", summary="for tests")
+
+    def __init__(self, answer):
+        super().__init__()
+        self.answer = answer
+
+    def begin(self, briefing: Briefing) -> AgentDecider:
+        decider = type("Decider", (AgentDecider,), {"decide": lambda _, view: self.answer(view)})
+        return decider()
+
+
+def test_a_policy_that_fails_leaves_the_last_plan(pair):
+    """The plan says why it is not new; orders that cannot be followed are not given."""
+    answers = {"now": lambda view: Order("t1")}
+    with MissionPlanner(pair, Stubborn(lambda view: answers["now"](view)), None) as planner:
+        assert tasks(planner) == {"ann": "t1", "ben": "t1"}
+        answers["now"] = lambda view: 1 / 0
+        planner.submit(Event(0.5, "agent-fails", agent="ann"))
+        plan = planner.plan()
+        assert (dict(plan), plan.is_new) == ({"ben": Order("t1")}, False)
+        assert plan.problem == "ZeroDivisionError: division by zero"
+        for hour, answer in ((0.6, Order("t9")), (0.7, Order(position=(math.nan, 0, 0))), (0.8, "t1")):
+            answers["now"] = lambda view, answer=answer: answer
+            planner.submit(Event(hour, "task-changes", task="t1", workload=5))
+            assert dict(planner.plan()) == {"ben": Order("t1")}
+
+
+def test_settings_belong_to_names(pair):
+    """Parameters of a policy that is an object are an error, and so are those that it does not have."""
+    with pytest.raises(InputError, match="policy: is an object with its own parameters"):
+        MissionPlanner(pair, Stubborn(lambda view: None), stay=1)
+    with pytest.raises(InputError, match="takes no option 'sty'"):
+        MissionPlanner(pair, "greedy", sty=1)
