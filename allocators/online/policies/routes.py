@@ -79,6 +79,7 @@ class RoutePlanner(FleetDecider):
         limit = briefing.deadline_s
         self._time_limit_s = None if limit is None else DEADLINE_SHARE * limit
         self._routes: dict[str, list[str]] = {}
+        self._given_up: set[str] = set()
         self._count = 0
 
     def foresight(self, view: View) -> Foresight:
@@ -96,12 +97,13 @@ class RoutePlanner(FleetDecider):
         self._count += 1
         until = None if self._time_limit_s is None else began + self._time_limit_s
         seed = (self._seed * 1_000_003 + self._count) % 2**31
-        routes, lengths = improved(described, self._routes, iterations, seed, until)
+        routes, lengths = improved(described, self._routes, iterations, seed, until, self._given_up)
         names = [task.facts.id for task in described.tasks]
         self._routes = {
             agent.facts.id: [names[j] for j in routes[i, : lengths[i]].tolist()]
             for i, agent in enumerate(described.agents)
         }
+        self._given_up = set(names).difference(*self._routes.values())
         return dict(self._orders(view, described, first_tasks(described.situation, routes, lengths)))
 
     def _orders(self, view: View, described: Described, first: Ints) -> list[tuple[str, Order]]:

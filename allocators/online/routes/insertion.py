@@ -10,8 +10,9 @@ from alloc.allocators.runtime.compiled import compiled, inlined
 
 
 @compiled
-def tidy(r: Schedule, routes: Ints, lengths: Ints) -> None:
-    """Take visits off routes that come to nothing."""
+def tidy(r: Schedule, routes: Ints, lengths: Ints) -> bool:
+    """Take visits off routes that come to nothing; return whether there were any."""
+    is_changed = False
     for i in range(len(lengths)):
         kept = 0
         for p in range(lengths[i]):
@@ -19,7 +20,9 @@ def tidy(r: Schedule, routes: Ints, lengths: Ints) -> None:
                 routes[i, kept], r.arrive[i, kept] = routes[i, p], r.arrive[i, p]
                 r.leave[i, kept] = r.leave[i, p]
                 kept += 1
+        is_changed = is_changed or kept < lengths[i]
         lengths[i] = kept
+    return is_changed
 
 
 @compiled

@@ -10,10 +10,13 @@ from alloc.allocators.runtime.compiled import compiled
 
 MOVES = 8
 
+AGAIN = 0.3
+"""Chance of one more change: some plans can be reached only through worse ones."""
+
 
 @compiled
 def change(s: Situation, r: Schedule, nearest: Ints, routes: Ints, lengths: Ints) -> bool:
-    """Make a random small change; return whether there is one.
+    """Make one or a few random small changes; return whether there is one.
 
     Parameters
     ----------
@@ -25,6 +28,15 @@ def change(s: Situation, r: Schedule, nearest: Ints, routes: Ints, lengths: Ints
     routes : ndarray of int, shape (n, c)
     lengths : ndarray of int, shape (n,)
     """
+    is_changed = False
+    while True:
+        is_changed = _change_once(s, r, nearest, routes, lengths) or is_changed
+        if np.random.random() >= AGAIN:
+            return is_changed
+
+
+@compiled
+def _change_once(s: Situation, r: Schedule, nearest: Ints, routes: Ints, lengths: Ints) -> bool:
     n = len(lengths)
     i, p = _random_visit(lengths)
     if i < 0:

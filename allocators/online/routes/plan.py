@@ -1,22 +1,30 @@
 """Plans of routes from plans in force: set up, improved until the time is up, read."""
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 
 import numpy as np
 
 from alloc.allocators.online.routes.describe import Described
-from alloc.allocators.online.routes.record import new_schedule
-from alloc.allocators.online.routes.schedule import play
+from alloc.allocators.online.routes.evaluation import play
+from alloc.allocators.online.routes.record import Schedule, new_schedule
 from alloc.allocators.online.routes.search import improve
 from alloc.allocators.online.routes.situation import AGENT, EUCLIDEAN, EVENT, TASK, Ints, Situation, records
 
-PORTION = 25
-"""Changes between two looks at the clock."""
+PORTION, PORTION_S = 8, 0.001
+"""Changes before the first look at the clock, and seconds between two looks that are aimed at."""
+
+TOLERATED = 0.05
+"""By what share a plan may be worse than the best one at first; it shrinks to none."""
 
 
 def improved(
-    described: Described, before: Mapping[str, Sequence[str]], iterations: int, seed: int, until: float | None
+    described: Described,
+    before: Mapping[str, Sequence[str]],
+    iterations: int,
+    seed: int,
+    until: float | None,
+    given_up: Set[str] = frozenset(),
 ) -> tuple[Ints, Ints]:
     """Return routes that begin with those in force.
 
@@ -30,6 +38,8 @@ def improved(
     seed : int
     until : float or None
         Second of `time.perf_counter` at which to stop; None for no limit.
+    given_up : set of str
+        Tasks that were tried before and have no place; they are tried again only as the search comes to them.
 
     Returns
     -------
@@ -45,15 +55,30 @@ def improved(
         kept = [column[name] for name in before.get(agent.facts.id, ()) if name in column][: routes.shape[1]]
         routes[i, : len(kept)] = kept
         lengths[i] = len(kept)
-    schedule = new_schedule(n, m, routes.shape[1], len(situation.events))
-    planned = {j for i in range(n) for j in routes[i, : lengths[i]].tolist()}
-    is_new, done = len(planned) < m, 0
-    while is_new or done < iterations:
-        portion = iterations if until is None else min(PORTION, iterations - done)
-        improve(situation, schedule, described.nearest, routes, lengths, portion, (seed + 7919 * done) % 2**31, is_new)
-        is_new, done = False, done + portion
-        if until is not None and time.perf_counter() >= until:
+    pair = _new_schedules(situation, routes)
+    fresh = np.array([task.facts.id not in given_up for task in described.tasks])
+    fresh[[j for i in range(n) for j in routes[i, : lengths[i]].tolist()]] = False
+    done, began = 0, time.perf_counter()
+    portion, hour = iterations if until is None else PORTION, began
+    while fresh.any() or done < iterations:
+        share = 0.0 if until is None else min(1.0, (hour - began) / max(1e-9, until - began))
+        tolerated = TOLERATED * (1 - share), 0.0 if until is None else TOLERATED * (1 - share)
+        portion = min(portion, iterations - done)
+        improve(
+            situation,
+            pair,
+            described.nearest,
+            (routes, lengths),
+            portion,
+            (seed + 7919 * done) % 2**31,
+            fresh,
+            tolerated,
+        )
+        fresh[:] = False
+        done, last, hour = done + portion, hour, time.perf_counter()
+        if until is not None and hour >= until:
             break
+        portion *= 2 if hour - last < PORTION_S else 1
     return routes, lengths
 
 
@@ -73,6 +98,13 @@ def warm_up() -> None:
     situation = Situation(
         0.0, 9.0, agents, tasks, events, allowed, table, table, table, site, site, EUCLIDEAN, 1.0, False, 0.0, 1.0
     )
-    routes, lengths = np.zeros((1, 1), np.int64), np.zeros(1, np.int64)
-    improve(situation, new_schedule(1, 1, 1, 0), np.zeros((1, 1), np.int64), routes, lengths, 1, 0, True)
-    first_tasks(situation, routes, lengths)
+    plan = np.zeros((1, 1), np.int64), np.zeros(1, np.int64)
+    pair = _new_schedules(situation, plan[0])
+    improve(situation, pair, np.zeros((1, 1), np.int64), plan, 1, 0, np.ones(1, np.bool_), (0.0, 0.0))
+    first_tasks(situation, *plan)
+
+
+def _new_schedules(situation: Situation, routes: Ints) -> tuple[Schedule, Schedule]:
+    n, m = situation.start_distance.shape
+    size = n, m, routes.shape[1], len(situation.events)
+    return new_schedule(*size), new_schedule(*size)

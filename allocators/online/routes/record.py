@@ -9,13 +9,13 @@ from alloc.allocators.online.routes.situation import Floats, Records
 
 AGENT = np.dtype(
     [
-        *((name, np.int64) for name in ("first", "pointer", "target", "state", "node", "version", "following")),
-        *((name, np.float64) for name in ("fuel", "departs", "arrives", "way")),
+        *((name, np.int64) for name in ("first", "pointer", "target", "state", "node", "version", "following", "touched")),
+        *((name, np.float64) for name in ("fuel", "energy", "hours", "departs", "arrives", "way")),
     ]
 )
 TASK = np.dtype(
     [
-        *((name, np.int64) for name in ("closed", "is_open", "begun", "edition", "head")),
+        *((name, np.int64) for name in ("closed", "is_open", "begun", "edition", "head", "touched", "visitors")),
         *((name, np.float64) for name in ("left", "since", "rate", "finish")),
     ]
 )
@@ -28,7 +28,7 @@ class Schedule(NamedTuple):
     ----------
     agents, tasks : ndarray of `AGENT` and `TASK`, shape (n,) and (m,)
         Among others ``first``, the task to which each agent goes first, -1 for none, and ``finish``, the hour at which
-        each task is done, ``inf`` if it is not.
+        each task is done, ``inf`` if it is not; ``touched``, whether it is to be scheduled anew.
     point : ndarray, shape (n, 3)
         Where an agent is that was diverted in flight.
     arrive, leave : ndarray, shape (n, c)

@@ -7,31 +7,19 @@ where it is over, too far, or cannot be reached before its deadline.
 
 import numpy as np
 
+from alloc.allocators.online.routes.flights import FLYING, IDLE, KIND, PRESENT, AWAY, depart, land
 from alloc.allocators.online.routes.queue import drop_first, push
 from alloc.allocators.online.routes.record import Schedule
-from alloc.allocators.online.routes.situation import (
-    CANCELLED,
-    CHARGED,
-    FIXED,
-    IN,
-    MANHATTAN,
-    OPENS,
-    OUT,
-    Ints,
-    Situation,
-)
+from alloc.allocators.online.routes.situation import CANCELLED, CHARGED, IN, OPENS, OUT, Ints, Situation
 from alloc.allocators.runtime.compiled import compiled, inlined
-from alloc.problems.distances.reach import TOLERANCE
 
-IDLE, FLYING, PRESENT, AWAY = 0, 1, 2, 3
-DONE, OVER = 1, 2
-KIND = 1 << 40
-"""Items of the queue are a kind times this, plus an index: completions, deadlines, events, arrivals."""
+DONE, OVER, GONE = 1, 2, 3
+"""How a task is closed: done, missed, cancelled."""
 
 
 @compiled
-def play(s: Situation, r: Schedule, routes: Ints, lengths: Ints) -> None:
-    """Fill in the schedule of a plan.
+def play_touched(s: Situation, r: Schedule, routes: Ints, lengths: Ints) -> None:
+    """Fill in the schedule of the agents and tasks that are marked as touched; they share no task with others.
 
     Parameters
     ----------
@@ -43,8 +31,6 @@ def play(s: Situation, r: Schedule, routes: Ints, lengths: Ints) -> None:
     lengths : ndarray of int, shape (n,)
     """
     size = _begin(s, r, routes, lengths)
-    for i in range(len(s.agents)):
-        r.agents[i].first = r.agents[i].target
     while size > 0 and r.queue[0].hour <= s.end:
         hour, item, version = r.queue[0].hour, r.queue[0].item, r.queue[0].version
         size = drop_first(r.queue, size)
@@ -61,105 +47,50 @@ def play(s: Situation, r: Schedule, routes: Ints, lengths: Ints) -> None:
 @compiled
 def _begin(s: Situation, r: Schedule, routes: Ints, lengths: Ints) -> int:
     """Begin at the hour of the situation; return the size of the queue."""
-    n, m, size = len(s.agents), len(s.tasks), 0
-    r.totals[:] = 0.0
-    for j in range(m):
-        r.tasks[j].left, r.tasks[j].since, r.tasks[j].rate, r.tasks[j].closed = s.tasks[j].left, s.hour, 0.0, 0
-        r.tasks[j].is_open, r.tasks[j].begun = s.tasks[j].is_open, s.tasks[j].begun
-        r.tasks[j].edition, r.tasks[j].head, r.tasks[j].finish = 0, -1, np.inf
-        r.totals[0] += s.tasks[j].weight
+    n, size = len(s.agents), 0
+    for j in range(len(s.tasks)):
+        if r.tasks[j].touched:
+            r.tasks[j].left, r.tasks[j].since, r.tasks[j].rate, r.tasks[j].closed = s.tasks[j].left, s.hour, 0.0, 0
+            r.tasks[j].is_open, r.tasks[j].begun = s.tasks[j].is_open, s.tasks[j].begun
+            r.tasks[j].edition, r.tasks[j].head, r.tasks[j].finish = 0, -1, np.inf
     for k in range(len(s.events)):
-        size = push(r.queue, size, s.events[k].hour, 2 * KIND + k, 0)
+        kind, index = s.events[k].kind, s.events[k].index
+        if r.agents[index].touched if kind < OPENS else r.tasks[index].touched:
+            size = push(r.queue, size, s.events[k].hour, 2 * KIND + k, 0)
     for i in range(n):
-        r.agents[i].pointer, r.agents[i].target, r.agents[i].node, r.agents[i].fuel, r.agents[i].version = (
-            0,
-            -1,
-            -1,
-            s.agents[i].battery,
-            0,
-        )
-        r.agents[i].state = IDLE if s.agents[i].active else AWAY
-        for p in range(lengths[i]):
-            r.arrive[i, p] = r.leave[i, p] = np.nan
+        if r.agents[i].touched:
+            r.agents[i].pointer, r.agents[i].target, r.agents[i].node, r.agents[i].version = 0, -1, -1, 0
+            r.agents[i].fuel, r.agents[i].energy, r.agents[i].hours = s.agents[i].battery, 0.0, 0.0
+            r.agents[i].state = IDLE if s.agents[i].active else AWAY
+            for p in range(lengths[i]):
+                r.arrive[i, p] = r.leave[i, p] = np.nan
     for i in range(n):
-        if s.agents[i].active and lengths[i] > 0 and s.agents[i].at >= 0 and routes[i, 0] == s.agents[i].at:
+        if r.agents[i].touched and is_at_first(s, routes, lengths, i):
             j = s.agents[i].at
             r.agents[i].target, r.agents[i].state, r.agents[i].node, r.arrive[i, 0] = j, PRESENT, j, s.hour
             r.agents[i].following, r.tasks[j].head = r.tasks[j].head, i
             size = _join(s, r, i, j, s.hour, size)
     for i in range(n):
-        if r.agents[i].state == IDLE:
-            size = _depart(s, r, routes, lengths, i, max(s.hour, s.agents[i].free), size)
+        if r.agents[i].touched:
+            if r.agents[i].state == IDLE:
+                size = depart(s, r, routes, lengths, i, max(s.hour, s.agents[i].free), size)
+            r.agents[i].first = r.agents[i].target
     return size
 
 
 @inlined
-def _distance(s: Situation, r: Schedule, i: int, j: int) -> float:
-    node = r.agents[i].node
-    if node == -1:
-        return s.start_distance[i, j]
-    if node >= 0:
-        return s.distance[node, j]
-    if np.isnan(s.site[j, 0]) or np.isnan(r.point[i, 0]):
-        return 0.0
-    x, y, z = r.point[i, 0] - s.site[j, 0], r.point[i, 1] - s.site[j, 1], r.point[i, 2] - s.site[j, 2]
-    return abs(x) + abs(y) + abs(z) if s.metric == MANHATTAN else np.sqrt(x * x + y * y + z * z)
-
-
-@compiled
-def _depart(s: Situation, r: Schedule, routes: Ints, lengths: Ints, i: int, hour: float, size: int) -> int:
-    """Let an agent go to the next task of its route that it can do; return the size of the queue."""
-    while r.agents[i].pointer < lengths[i]:
-        j = routes[i, r.agents[i].pointer]
-        if r.tasks[j].closed == 0 and s.allowed[i, j]:
-            way = _distance(s, r, i, j)
-            arrives = hour + way / s.agents[i].speed
-            needed = s.agents[i].consumption * (way + s.home[j, i])
-            if (
-                way <= s.agents[i].reach + TOLERANCE
-                and needed <= r.agents[i].fuel + TOLERANCE
-                and arrives < s.tasks[j].deadline
-            ):
-                r.agents[i].target, r.agents[i].state, r.agents[i].way = j, FLYING, way
-                r.agents[i].departs, r.agents[i].arrives = hour, arrives
-                r.agents[i].version += 1
-                r.agents[i].following, r.tasks[j].head = r.tasks[j].head, i
-                return push(r.queue, size, arrives, 3 * KIND + i, r.agents[i].version)
-        r.agents[i].pointer += 1
-    r.agents[i].target, r.agents[i].state = -1, IDLE
-    return size
-
-
-@inlined
-def _land(s: Situation, r: Schedule, i: int, hour: float) -> bool:
-    """End a flight where the agent is, if it can be ended there; return whether it is."""
-    j = r.agents[i].target
-    length = r.agents[i].arrives - r.agents[i].departs
-    share = 1.0 if length <= 0 or hour >= r.agents[i].arrives else max(0.0, (hour - r.agents[i].departs) / length)
-    if share < 1 and s.metric == FIXED:
-        return False
-    r.agents[i].fuel -= s.agents[i].consumption * share * r.agents[i].way
-    r.totals[3] += s.agents[i].consumption * share * r.agents[i].way
-    r.totals[4] += share * length
-    if share == 1:
-        r.agents[i].node = j
-    elif share > 0:
-        for axis in range(3):
-            node = r.agents[i].node
-            begin = s.place[i, axis] if node == -1 else (s.site[node, axis] if node >= 0 else r.point[i, axis])
-            r.point[i, axis] = begin + share * (s.site[j, axis] - begin)
-        r.agents[i].node = -2
-    r.agents[i].version += 1
-    return True
+def is_at_first(s: Situation, routes: Ints, lengths: Ints, i: int) -> bool:
+    """Return whether an agent works at the first task of its route already."""
+    return s.agents[i].active and lengths[i] > 0 and s.agents[i].at >= 0 and routes[i, 0] == s.agents[i].at
 
 
 @compiled
 def _arrive(s: Situation, r: Schedule, routes: Ints, lengths: Ints, i: int, hour: float, size: int) -> int:
     j = r.agents[i].target
-    _land(s, r, i, hour)
+    land(s, r, i, hour)
     if r.tasks[j].closed != 0:
         r.agents[i].pointer += 1
-        return _depart(s, r, routes, lengths, i, hour, size)
+        return depart(s, r, routes, lengths, i, hour, size)
     r.agents[i].state = PRESENT
     r.arrive[i, r.agents[i].pointer] = hour
     return _join(s, r, i, j, hour, size) if r.tasks[j].is_open else size
@@ -201,8 +132,6 @@ def _close(s: Situation, r: Schedule, routes: Ints, lengths: Ints, j: int, how: 
     if how == DONE:
         r.tasks[j].finish = hour
         r.totals[0] -= s.tasks[j].weight
-        r.totals[1] = max(r.totals[1], hour)
-        r.totals[2] += s.tasks[j].weight * (hour - s.tasks[j].appears)
     i = r.tasks[j].head
     r.tasks[j].head = -1
     while i >= 0:
@@ -210,10 +139,10 @@ def _close(s: Situation, r: Schedule, routes: Ints, lengths: Ints, j: int, how: 
         if r.agents[i].state == PRESENT:
             r.leave[i, r.agents[i].pointer] = hour
             r.agents[i].pointer += 1
-            size = _depart(s, r, routes, lengths, i, hour, size)
-        elif _land(s, r, i, hour):
+            size = depart(s, r, routes, lengths, i, hour, size)
+        elif land(s, r, i, hour):
             r.agents[i].pointer += 1
-            size = _depart(s, r, routes, lengths, i, hour, size)
+            size = depart(s, r, routes, lengths, i, hour, size)
         i = after
     return size
 
@@ -228,12 +157,11 @@ def _happen(s: Situation, r: Schedule, routes: Ints, lengths: Ints, k: int, hour
         return _leave(s, r, index, hour, size)
     elif kind == IN:
         if r.agents[index].state == AWAY:
-            return _depart(s, r, routes, lengths, index, hour, size)
+            return depart(s, r, routes, lengths, index, hour, size)
     elif r.tasks[index].closed != 0:
         return size
     elif kind == CANCELLED:
-        r.totals[0] -= s.tasks[index].weight
-        return _close(s, r, routes, lengths, index, OVER, hour, size)
+        return _close(s, r, routes, lengths, index, GONE, hour, size)
     else:
         return _change(s, r, routes, lengths, k, hour, size)
     return size
@@ -274,7 +202,7 @@ def _leave(s: Situation, r: Schedule, i: int, hour: float, size: int) -> int:
                 before = r.agents[before].following
             r.agents[before].following = r.agents[i].following
         if r.agents[i].state == FLYING:
-            if not _land(s, r, i, hour):
+            if not land(s, r, i, hour):
                 r.agents[i].version += 1
         elif r.tasks[j].is_open:
             _update(s, r, j, hour)

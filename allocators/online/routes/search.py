@@ -5,11 +5,11 @@
 import numpy as np
 
 from alloc.allocators.online.routes.cheapest import insert_cheapest
+from alloc.allocators.online.routes.evaluation import play, replay, settle
 from alloc.allocators.online.routes.insertion import find_slack, insert_best, tidy
 from alloc.allocators.online.routes.moves import change
 from alloc.allocators.online.routes.record import Schedule
-from alloc.allocators.online.routes.schedule import play
-from alloc.allocators.online.routes.situation import Floats, Ints, Situation
+from alloc.allocators.online.routes.situation import Bools, Floats, Ints, Situation
 from alloc.allocators.runtime.compiled import compiled
 
 UNDONE = 1e4
@@ -18,8 +18,11 @@ UNDONE = 1e4
 HOURS, FLIGHT, MISSED_HOURS, MISSED_FLIGHT = 0.02, 0.02, 0.02, 0.5
 """What hours to completion and hours of flight count beside: where all is done, and where something is missed."""
 
-RUIN, BLINK, TOLERATED = 0.5, 0.02, 0.05
-"""Share of the changes that rebuild, share of the places passed over, by what share a plan may be worse at first."""
+RUIN, BLINK = 0.5, 0.02
+"""Share of the changes that rebuild, and share of the places passed over."""
+
+Plan = tuple[Ints, Ints]
+"""Routes and their lengths."""
 
 MOST_OUT, MOST_WAITING, BY_TIME = 7, 8, 0.6
 """Most tasks of a stretch, unplanned tasks tried with those near it, and share of the stretches in time."""
@@ -75,28 +78,58 @@ def _take_out(r: Schedule, nearest: Ints, routes: Ints, lengths: Ints, near: Int
 
 @compiled
 def rebuild(
-    s: Situation, r: Schedule, nearest: Ints, routes: Ints, lengths: Ints, slack: Floats, is_partial: bool
+    s: Situation, r: Schedule, nearest: Ints, plan: Plan, before: Plan, slack: Floats, fresh: Bools, is_partial: bool
 ) -> None:
-    """Take some tasks out of all routes, and put them and unplanned tasks where they fit best."""
-    m = len(s.tasks)
-    near, planned = np.zeros(m, np.int64), np.zeros(m, np.bool_)
+    """Take some tasks out of all routes, and put them and unplanned tasks where they fit best.
+
+    Parameters
+    ----------
+    s : Situation
+    r : Schedule
+        Of the plan before.
+    nearest : ndarray of int, shape (m, k)
+        Tasks near each task, nearest first.
+    plan, before : tuple of ndarray
+        Routes and their lengths, to be changed, and as they were.
+    slack : ndarray, shape (n, c)
+        Room.
+    fresh : ndarray of bool, shape (m,)
+        Tasks that are put in where `is_partial` is false.
+    is_partial : bool
+        Whether tasks are taken out, and put back together with some of those that lie near them.
+    """
+    routes, lengths = plan
+    near = np.where(fresh, 1, 0)
     if is_partial:
-        play(s, r, routes, lengths)
-        tidy(r, routes, lengths)
+        near[:] = 0
         _take_out(r, nearest, routes, lengths, near)
-    play(s, r, routes, lengths)
-    tidy(r, routes, lengths)
+        replay(s, r, routes, lengths, *before)
+        tidy(r, routes, lengths)
     for i in range(len(lengths)):
         find_slack(s, r, routes, lengths, slack, i)
+    has_deadline = False
+    for j in range(len(s.tasks)):
+        has_deadline = has_deadline or s.tasks[j].deadline < np.inf
+    waiting = _waiting(s, routes, lengths, near, has_deadline, MOST_WAITING if is_partial else 0)
+    balance = 0.02 if has_deadline else 1.0
+    if has_deadline and (not is_partial or np.random.random() < 0.5):
+        insert_cheapest(s, r, routes, lengths, slack, waiting, balance)
+    for j in waiting:
+        if j >= 0:
+            insert_best(s, r, routes, lengths, slack, j, balance, BLINK)
+
+
+@compiled
+def _waiting(s: Situation, routes: Ints, lengths: Ints, near: Ints, has_deadline: bool, others: int) -> Ints:
+    """Return the tasks without a place that are near, and some others, in a random order or one that suits them."""
+    m = len(s.tasks)
+    planned = np.zeros(m, np.bool_)
+    for i in range(len(lengths)):
         for p in range(lengths[i]):
             planned[routes[i, p]] = True
-    has_deadline, unplanned = False, 0
-    for j in range(m):
-        unplanned += not planned[j] and near[j] != 2
-        has_deadline = has_deadline or s.tasks[j].deadline < np.inf
-    chance = min(1.0, MOST_WAITING / max(1, unplanned)) if is_partial else 1.0
+    unplanned = m - planned.sum()
     waiting, key = np.empty(m, np.int64), np.empty(m)
-    count, order = 0, np.random.randint(4)
+    count, order, chance = 0, np.random.randint(4), others / max(1, unplanned)
     for j in range(m):
         if planned[j] or (near[j] == 0 and np.random.random() >= chance):
             continue
@@ -111,63 +144,68 @@ def rebuild(
             if not has_deadline:
                 key[count] = -key[count]
         count += 1
-    balance = 0.02 if has_deadline else 1.0
-    waiting = waiting[:count][np.argsort(key[:count])]
-    if has_deadline and (not is_partial or np.random.random() < 0.5):
-        insert_cheapest(s, r, routes, lengths, slack, waiting, balance)
-    for j in waiting:
-        if j >= 0:
-            insert_best(s, r, routes, lengths, slack, j, balance, BLINK)
+    return waiting[:count][np.argsort(key[:count])]
 
 
 @compiled
 def improve(
-    s: Situation, r: Schedule, nearest: Ints, routes: Ints, lengths: Ints, iterations: int, seed: int, is_new: bool
+    s: Situation,
+    pair: tuple[Schedule, Schedule],
+    nearest: Ints,
+    plan: Plan,
+    iterations: int,
+    seed: int,
+    fresh: Bools,
+    tolerated: tuple[float, float],
 ) -> float:
     """Improve routes in place; return their value.
 
     Parameters
     ----------
     s : Situation
-    r : Schedule
-        With room for the routes.
+    pair : tuple of Schedule
+        Two with room for the routes.
     nearest : ndarray of int, shape (m, k)
         Tasks near each task, nearest first.
-    routes : ndarray of int, shape (n, c)
-    lengths : ndarray of int, shape (n,)
+    plan : tuple of ndarray
+        Routes, shape (n, c), and their lengths, shape (n,).
     iterations : int
         Changes that are tried.
     seed : int
-    is_new : bool
-        Whether tasks without a place are to be put into the routes first.
+    fresh : ndarray of bool, shape (m,)
+        Tasks that are to be put into the routes first.
+    tolerated : tuple of float
+        By what share a plan may be worse than the best one, at first and at last.
     """
     np.random.seed(seed)
-    n = len(s.agents)
+    r, trial_r = pair
+    routes, lengths = plan
     slack = np.zeros(routes.shape)
     now, now_lengths = routes.copy(), lengths.copy()
     trial, trial_lengths = routes.copy(), lengths.copy()
     play(s, r, routes, lengths)
+    play(s, trial_r, routes, lengths)
+    settle(trial_r, r, now, now_lengths, trial_r, trial, trial_lengths)
     best, undone = value(s, r), max(0.0, r.totals[0])
-    for step in range(-1 if is_new else 0, iterations):
-        for i in range(n):
-            trial_lengths[i] = now_lengths[i]
-            trial[i, : now_lengths[i]] = now[i, : now_lengths[i]]
-        if step < 0:
-            rebuild(s, r, nearest, trial, trial_lengths, slack, False)
-        elif np.random.random() < RUIN:
-            rebuild(s, r, nearest, trial, trial_lengths, slack, True)
+    for step in range(-1 if fresh.any() else 0, iterations):
+        if step < 0 or np.random.random() < RUIN:
+            rebuild(s, trial_r, nearest, (trial, trial_lengths), (now, now_lengths), slack, fresh, step >= 0)
         elif not change(s, r, nearest, trial, trial_lengths):
             continue
-        play(s, r, trial, trial_lengths)
-        reached = value(s, r)
-        share = TOLERATED * (1 - max(0, step) / max(1, iterations))
-        if reached < best + share * (best - UNDONE * undone):
-            tidy(r, trial, trial_lengths)
-            now, trial = trial, now
-            now_lengths, trial_lengths = trial_lengths, now_lengths
+        replay(s, trial_r, trial, trial_lengths, now, now_lengths)
+        share = tolerated[0] + (tolerated[1] - tolerated[0]) * max(0, step) / max(1, iterations)
+        limit = best + share * (best - UNDONE * undone)
+        reached = value(s, trial_r)
+        while reached < limit and tidy(trial_r, trial, trial_lengths):
+            replay(s, trial_r, trial, trial_lengths, now, now_lengths)
+            reached = value(s, trial_r)
+        if reached < limit:
+            settle(trial_r, trial_r, trial, trial_lengths, r, now, now_lengths)
             if reached < best:
-                best, undone = reached, max(0.0, r.totals[0])
+                best, undone = reached, max(0.0, trial_r.totals[0])
                 lengths[:] = now_lengths
-                for i in range(n):
+                for i in range(len(lengths)):
                     routes[i, : lengths[i]] = now[i, : lengths[i]]
+        else:
+            settle(trial_r, r, now, now_lengths, trial_r, trial, trial_lengths)
     return best
