@@ -4,7 +4,7 @@
 
 import numpy as np
 
-from alloc.allocators.online.routes.insertion import hours_of_work, insert, place_between
+from alloc.allocators.online.routes.insertion import hours_of_work, insert, is_hopeless, place_between
 from alloc.allocators.online.routes.record import Schedule
 from alloc.allocators.online.routes.situation import Floats, Ints, Situation
 from alloc.allocators.runtime.compiled import compiled
@@ -20,27 +20,27 @@ def insert_cheapest(
     """Put tasks where one agent can do them in time, while there are such places; -1 in `waiting` for those put."""
     n, count = len(lengths), len(waiting)
     cost, place, leaves = np.empty((count, n)), np.empty((count, n), np.int64), np.empty((count, n))
-    blur = 1 + NOISE * np.random.random(count)
+    cheapest, blur = np.empty(count, np.int64), 1 + NOISE * np.random.random(count)
     for k in range(count):
         for i in range(n):
             cost[k, i], place[k, i], leaves[k, i] = _best_of(s, r, routes, lengths, slack, i, waiting[k], balance)
+        cheapest[k] = np.argmin(cost[k])
     while True:
-        best, best_k, best_i = np.inf, -1, -1
-        for k in range(count):
-            for i in range(n if waiting[k] >= 0 else 0):
-                blurred = cost[k, i] * blur[k] / s.tasks[waiting[k]].weight
-                if blurred < best:
-                    best, best_k, best_i = blurred, k, i
-        if best_k < 0:
-            return
-        at, end = place[best_k, best_i], leaves[best_k, best_i]
-        insert(s, r, routes, lengths, slack, best_i, at, waiting[best_k], end)
-        waiting[best_k] = -1
+        best, best_k = np.inf, -1
         for k in range(count):
             if waiting[k] >= 0:
-                cost[k, best_i], place[k, best_i], leaves[k, best_i] = _best_of(
-                    s, r, routes, lengths, slack, best_i, waiting[k], balance
-                )
+                blurred = cost[k, cheapest[k]] * blur[k] / s.tasks[waiting[k]].weight
+                if blurred < best:
+                    best, best_k = blurred, k
+        if best_k < 0:
+            return
+        i = cheapest[best_k]
+        insert(s, r, routes, lengths, slack, i, place[best_k, i], waiting[best_k], leaves[best_k, i])
+        waiting[best_k] = -1
+        for k in range(count):
+            if waiting[k] >= 0 and cost[k, i] < np.inf:  # where there was no place there is none now
+                cost[k, i], place[k, i], leaves[k, i] = _best_of(s, r, routes, lengths, slack, i, waiting[k], balance)
+                cheapest[k] = np.argmin(cost[k])
 
 
 @compiled
@@ -51,7 +51,10 @@ def _best_of(
     best, place, left, count = np.inf, -1, 0.0, lengths[i]
     if not s.allowed[i, j] or count >= routes.shape[1]:
         return best, place, left
+    least = s.tasks[j].left / (s.agents[i].ability * s.pace)
     for p in range(count + 1):
+        if is_hopeless(s, r, lengths, slack, i, p, least):
+            continue
         arrives, latest, detour = place_between(s, r, routes, lengths, slack, i, p, j)
         if arrives >= s.tasks[j].deadline:
             if arrives < np.inf:

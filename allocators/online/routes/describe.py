@@ -1,6 +1,5 @@
 """A situation as arrays, from what is known of a mission."""
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -21,15 +20,10 @@ from alloc.allocators.online.routes.situation import (
     Situation,
     records,
 )
-from alloc.problems.distances.metric import distance_table, distances, manhattan_distances
-from alloc.problems.missions.simulation.places import Place
+from alloc.allocators.online.routes.tables import TaskTables, by_metric, is_fixed, positions
 from alloc.problems.missions.simulation.reports import AgentReport, TaskReport, View
 from alloc.problems.missions.simulation.state import ACTIVE, AgentStatus, TaskStatus
-from alloc.problems.vocabulary import GEOGRAPHIC
 from alloc.problems.vocabulary import MANHATTAN as MANHATTAN_METRIC
-
-NEAR = 24
-"""Tasks that count as near another one."""
 
 PRIORITY_OF_NONE = 1e-3
 """Priority that tasks without any count by, over the greatest, as they have to be done as well."""
@@ -81,7 +75,7 @@ class Describer:
         self._end, self._pace, self._price = end, pace, price
         self._begun: set[str] = set()
         self._seen: dict[str, tuple[float, float]] = {}
-        self._ways: dict[tuple[str, str], float] = {}
+        self._tables = TaskTables()
 
     def describe(self, view: View, foresight: Foresight) -> Described | None:
         """Return the situation that a view shows; None where nobody can come, or nothing is left."""
@@ -93,10 +87,9 @@ class Describer:
         tasks += [one for name, one in foresight.tasks.items() if name not in view.tasks]
         if not agents or not tasks:
             return None
-        situation = self._situation(view, agents, tasks, foresight)
-        near = min(NEAR, len(tasks) - 1)
-        nearest = np.argpartition(situation.distance, near, axis=1)[:, : near + 1].astype(np.int64)
-        return Described(situation, agents, tasks, nearest)
+        self._tables.look_up(view, tasks)
+        distance, nearest = self._tables.distances()
+        return Described(self._situation(view, agents, tasks, foresight, distance), agents, tasks, nearest)
 
     def _note_begun(self, hour: float, agents: list[AgentReport], tasks: list[TaskReport]) -> None:
         """A growing task is begun when somebody works there, or it no longer grows."""
@@ -110,11 +103,17 @@ class Describer:
                 self._seen[name] = hour, task.left
 
     def _situation(
-        self, view: View, agents: list[AgentReport], tasks: list[TaskReport], foresight: Foresight
+        self,
+        view: View,
+        agents: list[AgentReport],
+        tasks: list[TaskReport],
+        foresight: Foresight,
+        distance: Floats,
     ) -> Situation:
+        known, now = self._tables, self._tables.rows
         row = {one.facts.id: i for i, one in enumerate(agents)}
         column = {one.facts.id: j for j, one in enumerate(tasks)}
-        place, site = _positions([one.place for one in agents]), _positions([one.facts.place for one in tasks])
+        place, site = positions([one.place for one in agents]), known.site[now]
         ability, left = _array([one.facts.ability for one in agents]), _array([one.left for one in tasks])
         aim = np.array([column.get(one.task or "", -1) for one in agents])
         works = np.array([one.status is AgentStatus.WORKING for one in agents])
@@ -135,10 +134,10 @@ class Describer:
             TASK,
             len(tasks),
             left=left,
-            growth=[one.facts.growth for one in tasks],
-            weight=_weights(_array([one.facts.priority for one in tasks])),
-            deadline=[one.facts.deadline for one in tasks],
-            appears=[one.facts.appears for one in tasks],
+            growth=known.growth[now],
+            weight=_weights(known.priority[now]),
+            deadline=known.deadline[now],
+            appears=known.appears[now],
             is_open=[one.status is TaskStatus.OPEN for one in tasks],
             begun=[one.facts.id in self._begun for one in tasks],
         )
@@ -147,7 +146,7 @@ class Describer:
             for hour, kind, name, amount in foresight.events
             if name in row or name in column
         ]
-        is_fixed = view.has_table or view.metric == GEOGRAPHIC
+        fixed = is_fixed(view)
         return Situation(
             hour=float(view.hour),
             end=float(self._end),
@@ -155,43 +154,25 @@ class Describer:
             tasks=columns,
             events=np.array(events, EVENT),
             allowed=_allowed(agents, tasks),
-            start_distance=self._starts(view, agents, tasks) if is_fixed else _by_metric(view.metric, place, site),
-            distance=self._between(view, tasks) if is_fixed else _by_metric(view.metric, site, site),
+            start_distance=_starts(view, agents, tasks) if fixed else by_metric(view.metric, place, site),
+            distance=distance,
             home=_home(view, agents, tasks),
             place=place,
             site=site,
-            metric=FIXED if is_fixed else MANHATTAN if view.metric == MANHATTAN_METRIC else EUCLIDEAN,
+            metric=FIXED if fixed else MANHATTAN if view.metric == MANHATTAN_METRIC else EUCLIDEAN,
             pace=float(self._pace),
             has_missed=any(one.status is TaskStatus.MISSED for one in view.tasks.values()),
             price=float(self._price),
             scale=max(1e-9, float(left.sum() / (ability.sum() * self._pace))),
         )
 
-    def _starts(self, view: View, agents: list[AgentReport], tasks: list[TaskReport]) -> Floats:
-        return np.array([[view.distance(agent, task) for task in tasks] for agent in agents])
-
-    def _between(self, view: View, tasks: list[TaskReport]) -> Floats:
-        table = np.zeros((len(tasks), len(tasks)))
-        for i, one in enumerate(tasks):
-            for j, other in enumerate(tasks):
-                pair = one.facts.id, other.facts.id
-                if pair not in self._ways:
-                    self._ways[pair] = view.between(one, other)
-                table[i, j] = self._ways[pair]
-        return table
-
 
 def _array(values: list[float]) -> Floats:
     return np.array(values, np.float64)
 
 
-def _positions(places: list[Place]) -> Floats:
-    return np.array([place.position or (math.nan,) * 3 for place in places], np.float64)
-
-
-def _by_metric(metric: str, sources: Floats, goals: Floats) -> Floats:
-    table = distance_table(sources, goals, manhattan_distances if metric == MANHATTAN_METRIC else distances)
-    return np.ascontiguousarray(table, np.float64)
+def _starts(view: View, agents: list[AgentReport], tasks: list[TaskReport]) -> Floats:
+    return np.array([[view.distance(agent, task) for task in tasks] for agent in agents])
 
 
 def _weights(priority: Floats) -> Floats:

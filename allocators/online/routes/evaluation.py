@@ -43,7 +43,7 @@ def replay(s: Situation, r: Schedule, routes: Ints, lengths: Ints, before: Ints,
     lengths, before_lengths : ndarray of int, shape (n,)
     """
     for i in range(len(lengths)):
-        if not r.agents[i].touched and _differs(routes, lengths, before, before_lengths, i):
+        if r.agents[i].touched or _differs(routes, lengths, before, before_lengths, i):
             r.agents[i].touched = 1
     grows = True
     while grows:
@@ -109,6 +109,7 @@ def _play_alone(s: Situation, r: Schedule, routes: Ints, lengths: Ints, i: int) 
     """Fill in the schedule of an agent that meets nobody."""
     hour, node, first, p = max(s.hour, s.agents[i].free), -1, -1, 0
     r.agents[i].fuel, r.agents[i].energy, r.agents[i].hours = s.agents[i].battery, 0.0, 0.0
+    r.agents[i].works = 0.0
     for q in range(lengths[i]):
         r.arrive[i, q] = r.leave[i, q] = np.nan
     rate, speed, consumption = s.agents[i].ability * s.pace, s.agents[i].speed, s.agents[i].consumption
@@ -141,6 +142,7 @@ def _play_alone(s: Situation, r: Schedule, routes: Ints, lengths: Ints, i: int) 
         r.tasks[j].closed = DONE if end <= limit else OVER
         r.tasks[j].finish = end if end <= limit else np.inf
         r.leave[i, p] = hour
+        r.agents[i].works += hour - arrives
         p += 1
     r.agents[i].first = first
 
@@ -158,6 +160,7 @@ def _sum_up(s: Situation, r: Schedule) -> None:
     for i in range(len(s.agents)):
         r.totals[3] += r.agents[i].energy
         r.totals[4] += r.agents[i].hours
+        r.totals[5] += r.agents[i].works
 
 
 @compiled
@@ -192,6 +195,7 @@ def settle(
                 other.arrive[i, p], other.leave[i, p] = r.arrive[i, p], r.leave[i, p]
             other.agents[i].first, other.agents[i].fuel = r.agents[i].first, r.agents[i].fuel
             other.agents[i].energy, other.agents[i].hours = r.agents[i].energy, r.agents[i].hours
+            other.agents[i].works = r.agents[i].works
     for j in range(len(r.tasks)):
         if marks.tasks[j].touched:
             marks.tasks[j].touched = 0

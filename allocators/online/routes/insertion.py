@@ -47,6 +47,13 @@ def hours_of_work(s: Situation, j: int, arrives: float, ability: float) -> float
 
 
 @inlined
+def is_hopeless(s: Situation, r: Schedule, lengths: Ints, slack: Floats, i: int, p: int, hours: float) -> bool:
+    """Return whether work of so many hours does not fit before a visit of an agent, wherever it is to be done."""
+    begins = max(s.hour, s.agents[i].free) if p == 0 else r.leave[i, p - 1]
+    return p < lengths[i] and r.arrive[i, p] + slack[i, p] - begins < hours
+
+
+@inlined
 def place_between(
     s: Situation, r: Schedule, routes: Ints, lengths: Ints, slack: Floats, i: int, p: int, j: int
 ) -> tuple[float, float, float]:
@@ -96,7 +103,7 @@ def insert(
 def insert_best(
     s: Situation, r: Schedule, routes: Ints, lengths: Ints, slack: Floats, j: int, balance: float, blink: float
 ) -> bool:
-    """Put a task where the least time is lost, into one route or, where none can do it in time, into several.
+    """Put a task into one route, where the least time is lost.
 
     Parameters
     ----------
@@ -116,7 +123,10 @@ def insert_best(
         if not s.allowed[i, j] or count >= routes.shape[1]:
             continue
         end = max(s.hour, s.agents[i].free) if count == 0 else r.leave[i, count - 1]
+        least = s.tasks[j].left / (s.agents[i].ability * s.pace)
         for p in range(count + 1):
+            if is_hopeless(s, r, lengths, slack, i, p, least):
+                continue
             arrives, latest, detour = place_between(s, r, routes, lengths, slack, i, p, j)
             if arrives >= s.tasks[j].deadline:
                 if arrives < np.inf:
@@ -133,18 +143,23 @@ def insert_best(
     if best_i >= 0:
         insert(s, r, routes, lengths, slack, best_i, best_p, j, best_leaves)
         return True
-    return s.tasks[j].deadline < np.inf and _insert_coalition(s, r, routes, lengths, slack, j)
+    return False
 
 
 @compiled
-def _insert_coalition(s: Situation, r: Schedule, routes: Ints, lengths: Ints, slack: Floats, j: int) -> bool:
-    """Let as few agents as can do it in time meet at a task: those first that have most time for it."""
+def insert_coalition(s: Situation, r: Schedule, routes: Ints, lengths: Ints, slack: Floats, j: int) -> bool:
+    """Let as few agents as can do it in time meet at a task: those first that have most time for it.
+
+    Return whether there are enough.
+    """
     n = len(lengths)
     window, place, arrival, limit = np.zeros(n), np.zeros(n, np.int64), np.zeros(n), np.zeros(n)
     for i in range(n):
         if not s.allowed[i, j] or lengths[i] >= routes.shape[1]:
             continue
         for p in range(lengths[i] + 1):
+            if is_hopeless(s, r, lengths, slack, i, p, window[i] / s.agents[i].ability):
+                continue
             arrives, latest, _ = place_between(s, r, routes, lengths, slack, i, p, j)
             if arrives >= s.tasks[j].deadline:
                 if arrives < np.inf:

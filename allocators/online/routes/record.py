@@ -9,8 +9,11 @@ from alloc.allocators.online.routes.situation import Floats, Records
 
 AGENT = np.dtype(
     [
-        *((name, np.int64) for name in ("first", "pointer", "target", "state", "node", "version", "following", "touched")),
-        *((name, np.float64) for name in ("fuel", "energy", "hours", "departs", "arrives", "way")),
+        *(
+            (name, np.int64)
+            for name in ("first", "pointer", "target", "state", "node", "version", "following", "touched")
+        ),
+        *((name, np.float64) for name in ("fuel", "energy", "hours", "works", "departs", "arrives", "way")),
     ]
 )
 TASK = np.dtype(
@@ -33,9 +36,9 @@ class Schedule(NamedTuple):
         Where an agent is that was diverted in flight.
     arrive, leave : ndarray, shape (n, c)
         Hours of each visit of the routes; NaN where there is none.
-    totals : ndarray, shape (5,)
+    totals : ndarray, shape (6,)
         Weight of what is not done, hour of the last completion, weighted hours from appearance to completion, energy,
-        hours of flight.
+        hours of flight, hours at tasks.
     queue : ndarray of `ENTRY`
         What comes next.
     """
@@ -57,6 +60,6 @@ def new_schedule(n: int, m: int, capacity: int, events: int) -> Schedule:
         np.empty((n, 3)),
         np.empty((n, capacity)),
         np.empty((n, capacity)),
-        np.empty(5),
+        np.empty(6),
         np.zeros(2 * n * capacity + 3 * events + 2 * n + m + 16, ENTRY),
     )

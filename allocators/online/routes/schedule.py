@@ -7,7 +7,7 @@ where it is over, too far, or cannot be reached before its deadline.
 
 import numpy as np
 
-from alloc.allocators.online.routes.flights import FLYING, IDLE, KIND, PRESENT, AWAY, depart, land
+from alloc.allocators.online.routes.flights import AWAY, FLYING, IDLE, KIND, PRESENT, depart, land
 from alloc.allocators.online.routes.queue import drop_first, push
 from alloc.allocators.online.routes.record import Schedule
 from alloc.allocators.online.routes.situation import CANCELLED, CHARGED, IN, OPENS, OUT, Ints, Situation
@@ -61,6 +61,7 @@ def _begin(s: Situation, r: Schedule, routes: Ints, lengths: Ints) -> int:
         if r.agents[i].touched:
             r.agents[i].pointer, r.agents[i].target, r.agents[i].node, r.agents[i].version = 0, -1, -1, 0
             r.agents[i].fuel, r.agents[i].energy, r.agents[i].hours = s.agents[i].battery, 0.0, 0.0
+            r.agents[i].works = 0.0
             r.agents[i].state = IDLE if s.agents[i].active else AWAY
             for p in range(lengths[i]):
                 r.arrive[i, p] = r.leave[i, p] = np.nan
@@ -138,6 +139,7 @@ def _close(s: Situation, r: Schedule, routes: Ints, lengths: Ints, j: int, how: 
         after = r.agents[i].following
         if r.agents[i].state == PRESENT:
             r.leave[i, r.agents[i].pointer] = hour
+            r.agents[i].works += hour - r.arrive[i, r.agents[i].pointer]
             r.agents[i].pointer += 1
             size = depart(s, r, routes, lengths, i, hour, size)
         elif land(s, r, i, hour):

@@ -6,7 +6,7 @@ import numpy as np
 
 from alloc.allocators.online.routes.cheapest import insert_cheapest
 from alloc.allocators.online.routes.evaluation import play, replay, settle
-from alloc.allocators.online.routes.insertion import find_slack, insert_best, tidy
+from alloc.allocators.online.routes.insertion import find_slack, insert_best, insert_coalition, tidy
 from alloc.allocators.online.routes.moves import change
 from alloc.allocators.online.routes.record import Schedule
 from alloc.allocators.online.routes.situation import Bools, Floats, Ints, Situation
@@ -15,8 +15,9 @@ from alloc.allocators.runtime.compiled import compiled
 UNDONE = 1e4
 """What all tasks left undone would count, beside the mission time in units of the situation's scale."""
 
-HOURS, FLIGHT, MISSED_HOURS, MISSED_FLIGHT = 0.02, 0.02, 0.02, 0.5
-"""What hours to completion and hours of flight count beside: where all is done, and where something is missed."""
+HOURS, FLIGHT, MISSED_HOURS, MISSED_BUSY = 0.02, 0.02, 0.02, 0.5
+"""What hours to completion and of flight count where all is done, and hours to completion and of flight and work where
+something is missed: who is done with its tasks earlier has time for more."""
 
 RUIN, BLINK = 0.5, 0.02
 """Share of the changes that rebuild, and share of the places passed over."""
@@ -24,8 +25,9 @@ RUIN, BLINK = 0.5, 0.02
 Plan = tuple[Ints, Ints]
 """Routes and their lengths."""
 
-MOST_OUT, MOST_WAITING, BY_TIME = 7, 8, 0.6
-"""Most tasks of a stretch, unplanned tasks tried with those near it, and share of the stretches in time."""
+MOST_OUT, MOST_NEAR, MOST_WAITING, MOST_MEETINGS, BY_TIME = 7, 10, 4, 2, 0.6
+"""Most tasks of a stretch, unplanned tasks near it and elsewhere that are tried with them, tasks for which a coalition
+is sought, and share of the stretches in time."""
 
 
 @compiled
@@ -40,7 +42,7 @@ def value(s: Situation, r: Schedule) -> float:
     if undone < 1e-12 and not s.has_missed:
         time = max(0.0, r.totals[1] - s.hour) + HOURS * r.totals[2] + FLIGHT * r.totals[4] / n
     else:
-        time = MISSED_HOURS * r.totals[2] + MISSED_FLIGHT * r.totals[4] / n
+        time = MISSED_HOURS * r.totals[2] + MISSED_BUSY * (r.totals[4] + r.totals[5]) / n
     return cost + time / s.scale
 
 
@@ -99,6 +101,7 @@ def rebuild(
         Whether tasks are taken out, and put back together with some of those that lie near them.
     """
     routes, lengths = plan
+    m = len(s.tasks)
     near = np.where(fresh, 1, 0)
     if is_partial:
         near[:] = 0
@@ -108,30 +111,43 @@ def rebuild(
     for i in range(len(lengths)):
         find_slack(s, r, routes, lengths, slack, i)
     has_deadline = False
-    for j in range(len(s.tasks)):
+    for j in range(m):
         has_deadline = has_deadline or s.tasks[j].deadline < np.inf
-    waiting = _waiting(s, routes, lengths, near, has_deadline, MOST_WAITING if is_partial else 0)
+    waiting = _waiting(
+        s, routes, lengths, near, has_deadline, MOST_WAITING if is_partial else 0, MOST_NEAR if is_partial else m
+    )
     balance = 0.02 if has_deadline else 1.0
-    if has_deadline and (not is_partial or np.random.random() < 0.5):
+    alone = has_deadline and (not is_partial or np.random.random() < 0.5)
+    if alone:
         insert_cheapest(s, r, routes, lengths, slack, waiting, balance)
+    meetings = MOST_MEETINGS if is_partial else len(waiting)
     for j in waiting:
-        if j >= 0:
-            insert_best(s, r, routes, lengths, slack, j, balance, BLINK)
+        if j < 0 or (not alone and insert_best(s, r, routes, lengths, slack, j, balance, BLINK)):
+            continue
+        if meetings > 0 and s.tasks[j].deadline < np.inf:
+            meetings -= 1
+            insert_coalition(s, r, routes, lengths, slack, j)
 
 
 @compiled
-def _waiting(s: Situation, routes: Ints, lengths: Ints, near: Ints, has_deadline: bool, others: int) -> Ints:
+def _waiting(
+    s: Situation, routes: Ints, lengths: Ints, near: Ints, has_deadline: bool, others: int, most_near: int
+) -> Ints:
     """Return the tasks without a place that are near, and some others, in a random order or one that suits them."""
     m = len(s.tasks)
     planned = np.zeros(m, np.bool_)
     for i in range(len(lengths)):
         for p in range(lengths[i]):
             planned[routes[i, p]] = True
+    beside = 0
+    for j in range(m):
+        beside += not planned[j] and near[j] == 1
     unplanned = m - planned.sum()
     waiting, key = np.empty(m, np.int64), np.empty(m)
-    count, order, chance = 0, np.random.randint(4), others / max(1, unplanned)
+    count, order = 0, np.random.randint(4)
+    chances = others / max(1, unplanned), most_near / max(1, beside), 1.0
     for j in range(m):
-        if planned[j] or (near[j] == 0 and np.random.random() >= chance):
+        if planned[j] or np.random.random() >= chances[near[j]]:
             continue
         waiting[count] = j
         draw = np.random.random()

@@ -8,14 +8,16 @@ import pytest
 from alloc.allocators import load_policy, simulate
 from alloc.allocators.online.contract import Briefing
 from alloc.allocators.online.routes.describe import Describer, Foresight
+from alloc.allocators.online.routes.evaluation import play, replay
 from alloc.allocators.online.routes.plan import improved
 from alloc.allocators.online.routes.record import new_schedule
-from alloc.allocators.online.routes.evaluation import play, replay
 from alloc.allocators.online.routes.search import value
 from alloc.problems import MissionParameters, random_mission
 from alloc.problems.missions.simulation.simulation import Simulation
 from alloc.problems.missions.simulation.state import TaskStatus
 from alloc.problems.vocabulary import Knowledge, MissionFamily
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]  # loops are compiled first: half a minute, more under load
 
 FAMILIES = ("steady", "failures", "recharging", "growth", "deadlines", "cfstp")
 
