@@ -17,6 +17,7 @@ from alloc.allocators.online.routes.situation import (
     Bools,
     Floats,
     Ints,
+    Records,
     Situation,
     records,
 )
@@ -110,10 +111,9 @@ class Describer:
         foresight: Foresight,
         distance: Floats,
     ) -> Situation:
-        known, now = self._tables, self._tables.rows
         row = {one.facts.id: i for i, one in enumerate(agents)}
         column = {one.facts.id: j for j, one in enumerate(tasks)}
-        place, site = positions([one.place for one in agents]), known.site[now]
+        place, site = positions([one.place for one in agents]), self._tables.site[self._tables.rows]
         ability, left = _array([one.facts.ability for one in agents]), _array([one.left for one in tasks])
         aim = np.array([column.get(one.task or "", -1) for one in agents])
         works = np.array([one.status is AgentStatus.WORKING for one in agents])
@@ -130,17 +130,6 @@ class Describer:
             at=np.where(works, aim, -1),
             aim=aim,
         )
-        columns = records(
-            TASK,
-            len(tasks),
-            left=left,
-            growth=known.growth[now],
-            weight=_weights(known.priority[now]),
-            deadline=known.deadline[now],
-            appears=known.appears[now],
-            is_open=[one.status is TaskStatus.OPEN for one in tasks],
-            begun=[one.facts.id in self._begun for one in tasks],
-        )
         events = [
             (hour, amount, kind, (row if kind < OPENS else column)[name])
             for hour, kind, name, amount in foresight.events
@@ -151,7 +140,7 @@ class Describer:
             hour=float(view.hour),
             end=float(self._end),
             agents=rows,
-            tasks=columns,
+            tasks=self._task_rows(tasks, left),
             events=np.array(events, EVENT),
             allowed=_allowed(agents, tasks),
             start_distance=_starts(view, agents, tasks) if fixed else by_metric(view.metric, place, site),
@@ -164,6 +153,20 @@ class Describer:
             has_missed=any(one.status is TaskStatus.MISSED for one in view.tasks.values()),
             price=float(self._price),
             scale=max(1e-9, float(left.sum() / (ability.sum() * self._pace))),
+        )
+
+    def _task_rows(self, tasks: list[TaskReport], left: Floats) -> Records:
+        known, now = self._tables, self._tables.rows
+        return records(
+            TASK,
+            len(tasks),
+            left=left,
+            growth=known.growth[now],
+            weight=_weights(known.priority[now]),
+            deadline=known.deadline[now],
+            appears=known.appears[now],
+            is_open=[one.status is TaskStatus.OPEN for one in tasks],
+            begun=[one.facts.id in self._begun for one in tasks],
         )
 
 

@@ -164,7 +164,7 @@ def _sum_up(s: Situation, r: Schedule) -> None:
 
 
 @compiled
-def settle(
+def copy_touched(
     marks: Schedule,
     r: Schedule,
     routes: Ints,

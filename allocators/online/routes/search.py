@@ -5,7 +5,7 @@
 import numpy as np
 
 from alloc.allocators.online.routes.cheapest import insert_cheapest
-from alloc.allocators.online.routes.evaluation import play, replay, settle
+from alloc.allocators.online.routes.evaluation import copy_touched, play, replay
 from alloc.allocators.online.routes.insertion import find_slack, insert_best, insert_coalition, tidy
 from alloc.allocators.online.routes.moves import change
 from alloc.allocators.online.routes.record import Schedule
@@ -201,7 +201,7 @@ def improve(
     trial, trial_lengths = routes.copy(), lengths.copy()
     play(s, r, routes, lengths)
     play(s, trial_r, routes, lengths)
-    settle(trial_r, r, now, now_lengths, trial_r, trial, trial_lengths)
+    copy_touched(trial_r, r, now, now_lengths, trial_r, trial, trial_lengths)
     best, undone = value(s, r), max(0.0, r.totals[0])
     for step in range(-1 if fresh.any() else 0, iterations):
         if step < 0 or np.random.random() < RUIN:
@@ -216,12 +216,12 @@ def improve(
             replay(s, trial_r, trial, trial_lengths, now, now_lengths)
             reached = value(s, trial_r)
         if reached < limit:
-            settle(trial_r, trial_r, trial, trial_lengths, r, now, now_lengths)
+            copy_touched(trial_r, trial_r, trial, trial_lengths, r, now, now_lengths)
             if reached < best:
                 best, undone = reached, max(0.0, trial_r.totals[0])
                 lengths[:] = now_lengths
                 for i in range(len(lengths)):
                     routes[i, : lengths[i]] = now[i, : lengths[i]]
         else:
-            settle(trial_r, r, now, now_lengths, trial_r, trial, trial_lengths)
+            copy_touched(trial_r, r, now, now_lengths, trial_r, trial, trial_lengths)
     return best
