@@ -34,7 +34,7 @@ class RoutesParameters(CheckedParameters):
 
     iterations: int = bounded(1000, low=0)
     first_iterations: int = bounded(3000, low=0)
-    switch_price: float = bounded(0.01, low=0)
+    switch_price: float = bounded(0.2, low=0)
 
 
 class Routes(Policy):

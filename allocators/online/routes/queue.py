@@ -10,7 +10,7 @@ ENTRY = np.dtype([("hour", np.float64), ("item", np.int64), ("version", np.int64
 
 @inlined
 def _is_before(queue: Records, index: int, hour: float, item: int) -> bool:
-    return queue[index].hour < hour or (queue[index].hour == hour and queue[index].item <= item)
+    return bool(queue[index].hour < hour or (queue[index].hour == hour and queue[index].item <= item))
 
 
 @inlined
