@@ -20,13 +20,13 @@ def distance_to(s: Situation, r: Schedule, i: int, j: int) -> float:
     """Return how far an agent is from a task."""
     node = r.agents[i].node
     if node == -1:
-        return s.start_distance[i, j]
+        return float(s.start_distance[i, j])
     if node >= 0:
-        return s.distance[node, j]
+        return float(s.distance[node, j])
     if np.isnan(s.site[j, 0]) or np.isnan(r.point[i, 0]):
         return 0.0
     x, y, z = r.point[i, 0] - s.site[j, 0], r.point[i, 1] - s.site[j, 1], r.point[i, 2] - s.site[j, 2]
-    return abs(x) + abs(y) + abs(z) if s.metric == MANHATTAN else np.sqrt(x * x + y * y + z * z)
+    return float(abs(x) + abs(y) + abs(z) if s.metric == MANHATTAN else np.sqrt(x * x + y * y + z * z))
 
 
 @compiled

@@ -43,14 +43,14 @@ def hours_of_work(s: Situation, j: int, arrives: float, ability: float) -> float
     left = s.tasks[j].left
     if s.tasks[j].growth > 0 and not s.tasks[j].begun:
         left += s.tasks[j].growth * (arrives - max(s.hour, s.tasks[j].appears))
-    return left / (ability * s.pace)
+    return float(left / (ability * s.pace))
 
 
 @inlined
 def is_hopeless(s: Situation, r: Schedule, lengths: Ints, slack: Floats, i: int, p: int, hours: float) -> bool:
     """Return whether work of so many hours does not fit before a visit of an agent, wherever it is to be done."""
     begins = max(s.hour, s.agents[i].free) if p == 0 else r.leave[i, p - 1]
-    return p < lengths[i] and r.arrive[i, p] + slack[i, p] - begins < hours
+    return bool(p < lengths[i] and r.arrive[i, p] + slack[i, p] - begins < hours)
 
 
 @inlined

@@ -117,7 +117,7 @@ def _latest(r: Schedule, routes: Ints, lengths: Ints) -> int:
             finish = r.tasks[routes[i, p]].finish
             if finish > hour:
                 last, hour = routes[i, p], finish
-    return last
+    return int(last)
 
 
 @compiled

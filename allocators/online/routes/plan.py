@@ -84,7 +84,7 @@ def improved(
 
 def first_tasks(situation: Situation, routes: Ints, lengths: Ints) -> Ints:
     """Return the task to which each agent goes first, -1 for none."""
-    schedule = new_schedule(*situation.start_distance.shape, routes.shape[1], len(situation.events))
+    schedule, _ = _new_schedules(situation, routes)
     play(situation, schedule, routes, lengths)
     return schedule.agents["first"]
 

@@ -82,7 +82,7 @@ def _begin(s: Situation, r: Schedule, routes: Ints, lengths: Ints) -> int:
 @inlined
 def is_at_first(s: Situation, routes: Ints, lengths: Ints, i: int) -> bool:
     """Return whether an agent works at the first task of its route already."""
-    return s.agents[i].active and lengths[i] > 0 and s.agents[i].at >= 0 and routes[i, 0] == s.agents[i].at
+    return bool(s.agents[i].active and lengths[i] > 0 and s.agents[i].at >= 0 and routes[i, 0] == s.agents[i].at)
 
 
 @compiled

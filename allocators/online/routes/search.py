@@ -43,7 +43,7 @@ def value(s: Situation, r: Schedule) -> float:
         time = max(0.0, r.totals[1] - s.hour) + HOURS * r.totals[2] + FLIGHT * r.totals[4] / n
     else:
         time = MISSED_HOURS * r.totals[2] + MISSED_BUSY * (r.totals[4] + r.totals[5]) / n
-    return cost + time / s.scale
+    return float(cost + time / s.scale)
 
 
 @compiled
