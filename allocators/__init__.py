@@ -27,6 +27,8 @@ from alloc.problems import AllocError, InputError, MissingPackageError, RefusedE
 if TYPE_CHECKING:
     from alloc.allocators.exact.cpsat import CpSat
     from alloc.allocators.exact.milp import Milp
+    from alloc.allocators.experiments.differences import Interval, PolicyDifference, paired_differences
+    from alloc.allocators.experiments.policies import PolicyRow, compare_policies
     from alloc.allocators.heuristic.decentralised.auction import Auction
     from alloc.allocators.heuristic.decentralised.hedonic import Hedonic
     from alloc.allocators.heuristic.genetic.algorithm import GeneticAlgorithm
@@ -66,6 +68,7 @@ __all__ = [
     "Hedonic",
     "Improvement",
     "InputError",
+    "Interval",
     "Kind",
     "LocalSearch",
     "LpRound",
@@ -79,8 +82,10 @@ __all__ = [
     "OrderChange",
     "Plan",
     "Policy",
+    "PolicyDifference",
     "PolicyError",
     "PolicyInfo",
+    "PolicyRow",
     "Ppo",
     "Proposal",
     "RefusedError",
@@ -95,6 +100,7 @@ __all__ = [
     "WhatIf",
     "animate_mission",
     "compare",
+    "compare_policies",
     "describe",
     "describe_policy",
     "explain",
@@ -102,6 +108,7 @@ __all__ = [
     "load_policy",
     "method_parameters",
     "names",
+    "paired_differences",
     "pareto",
     "plot",
     "plot_convergence",
@@ -124,6 +131,11 @@ _LAZY = {
     "plot_mission": "alloc.allocators.plotting",
     "train": "alloc.allocators.learned.training",
     "write_result": "alloc.allocators.plan.files",
+    "PolicyDifference": "alloc.allocators.experiments.differences",
+    "Interval": "alloc.allocators.experiments.differences",
+    "PolicyRow": "alloc.allocators.experiments.policies",
+    "compare_policies": "alloc.allocators.experiments.policies",
+    "paired_differences": "alloc.allocators.experiments.differences",
     "AgentDecider": "alloc.allocators.online.contract",
     "Briefing": "alloc.allocators.online.contract",
     "FleetDecider": "alloc.allocators.online.contract",

@@ -38,17 +38,24 @@ def _bound_without_plan(search: Search, seconds: float) -> float | None:
 def _bound_below_plan(search: Search, seconds: float) -> float | None:
     """Return the bound by the linear programmes of exact methods, which know travel times and whole abilities."""
     instance = search.instance
-    pairs = count_classes(instance, by_place=False) * instance.m
-    if pairs > min(LP_SIZE_LIMIT, LP_PAIRS_PER_SECOND * seconds) or not (instance.workload > 0).any():
+    if not (instance.workload > 0).any():
         return None
+    assert search.fastest is not None
+    makespan = search.fastest.evaluation.served_makespan
+    low, stopped = min(search.lower_bound, makespan), lambda: search.interrupted
+    pairs = count_classes(instance, by_place=False) * instance.m
+    if pairs > min(LP_SIZE_LIMIT, LP_PAIRS_PER_SECOND * seconds):
+        reach = instance.reach
+        if reach.has_table or reach.is_complete or reach.neighbours is None:
+            return None
+        from alloc.allocators.exact.makespan.task_prices import bound_by_task_prices  # loads numba
+
+        return bound_by_task_prices(instance, low, makespan, time.monotonic() + seconds, stopped)
     from alloc.allocators.exact.makespan.relaxation import relaxed_lower_bound  # loads scipy
     from alloc.allocators.exact.model import Model
 
-    assert search.fastest is not None
-    makespan = search.fastest.evaluation.served_makespan
     classes = agent_classes(instance, by_place=False)
     model = Model.build(instance, classes, int(np.count_nonzero(instance.workload)))
-    low, stopped = min(search.lower_bound, makespan), lambda: search.interrupted
     return relaxed_lower_bound(model, low, makespan, seconds, stopped)[0]
 
 

@@ -25,7 +25,7 @@ from alloc.cli.commands import (
     validate,
     whatif,
 )
-from alloc.cli.commands.missions import plan, replay, simulate
+from alloc.cli.commands.missions import import_mission, plan, replay, simulate
 from alloc.cli.commands.training import train, tune
 from alloc.cli.options import Parameter, examples, option_of
 from alloc.cli.output.console import INTERRUPTED, complain, flush, interrupted, write_out
@@ -59,6 +59,7 @@ COMMANDS = (
     plot,
     generate,
     import_,
+    import_mission,
     validate,
     convert,
     export,

@@ -1,5 +1,6 @@
 """Arguments and options that several commands share."""
 
+import re
 from collections.abc import Sequence
 from enum import StrEnum
 from typing import Annotated
@@ -36,6 +37,7 @@ BUILT_IN_POLICIES = (
     "hedonic",
     "auction",
     "gappo",
+    "ppo",
     "replan",
     "routes",
     "clairvoyant",
@@ -43,6 +45,9 @@ BUILT_IN_POLICIES = (
 """For completion, likewise."""
 
 READABLE = "a .json or .npz file, a folder with agents.csv and tasks.csv, or - for JSON on standard input"
+
+BETWEEN_SETTINGS = re.compile(r",(?=\s*\w+=)")
+"""A comma before the name of the next parameter; others are part of a value."""
 
 PLAN = "A result of `alloc solve`, an allocation, a table of it, or a solver's solution of what `alloc export` wrote"
 """What every command that takes a plan reads."""
@@ -71,6 +76,12 @@ def complete_policies(incomplete: str) -> list[str]:
     return [name for name in dict.fromkeys(names) if name.startswith(incomplete)]
 
 
+def complete_policy_list(incomplete: str) -> list[str]:
+    """Return the policies that begin with `incomplete`, or continue its list after a comma."""
+    done, comma, last = incomplete.rpartition(",")
+    return [done + comma + name for name in complete_policies(last)]
+
+
 InstanceArgument = Annotated[str, typer.Argument(metavar="INSTANCE", help=f"The instance: {READABLE}.")]
 InstancesArgument = Annotated[list[str], typer.Argument(metavar="INSTANCE...", help=f"Instances, each {READABLE}.")]
 
@@ -95,7 +106,9 @@ IterationsOption = Annotated[
 ]
 TargetGapOption = Annotated[float | None, typer.Option(help="Stop at this relative gap of the makespan; 0.01 is 1 %.")]
 SeedOption = Annotated[int, typer.Option(min=0, max=2**63 - 1, help="Seed of all random numbers.")]
-ThreadsOption = Annotated[int | None, typer.Option(min=1, max=1024, help="Threads.", show_default="all processors")]
+ThreadsOption = Annotated[
+    int | None, typer.Option(min=1, max=1024, help="Threads that share the work.", show_default="all processors")
+]
 PlotOption = Annotated[str | None, typer.Option(metavar="FILE", help="Draw it as .png, .svg or .pdf.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON to standard output.")]
 QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Print no summary, no notes, no progress.")]
@@ -127,7 +140,7 @@ def option_of(place: str, parameters: Sequence[Parameter], arguments: Sequence[s
     parameter of a method is the ``--set`` among the `arguments` that names it.
     """
     name = OPTION_NAMES.get(place, place)
-    for known in (name, f"{name}s"):
+    for known in (name, f"{name}s", f"{name.removesuffix('y')}ies"):
         for parameter in parameters:
             if parameter.name == known:
                 is_option = isinstance(parameter, typer.core.TyperOption)

@@ -28,12 +28,15 @@ if TYPE_CHECKING:
     from alloc.problems.matching.unservable import fewest_unserved, minimal_unservable_set
     from alloc.problems.missions.course import Course
     from alloc.problems.missions.events import Event
+    from alloc.problems.missions.families.cfstp import random_cfstp
     from alloc.problems.missions.families.draw import random_mission
     from alloc.problems.missions.families.parameters import MissionParameters
     from alloc.problems.missions.files.log_file import MissionLog, read_log, write_log
     from alloc.problems.missions.files.mission_file import read_mission, write_mission
     from alloc.problems.missions.mission import Mission
     from alloc.problems.missions.radio import Burst, Pace, Radio
+    from alloc.problems.missions.readers.options import RecordOptions
+    from alloc.problems.missions.readers.read import import_mission
     from alloc.problems.missions.recorder import Recorder, course_of
     from alloc.problems.missions.replay import replay
     from alloc.problems.missions.simulation.measures import MissionResult
@@ -63,6 +66,7 @@ __all__ = [
     "Pace",
     "Radio",
     "Reach",
+    "RecordOptions",
     "Recorder",
     "RefusedError",
     "Shortage",
@@ -76,6 +80,7 @@ __all__ = [
     "evaluate",
     "fewest_unserved",
     "find_shortage",
+    "import_mission",
     "lp_makespan_lower_bound",
     "machine_covering",
     "makespan_lower_bound",
@@ -83,6 +88,7 @@ __all__ = [
     "only_allowed",
     "paper",
     "paper_like",
+    "random_cfstp",
     "random_instance",
     "random_mission",
     "read_allocation",
@@ -121,6 +127,7 @@ _MODULE_OF = {
     "Pace": "missions.radio",
     "Radio": "missions.radio",
     "Reach": "distances.reach",
+    "RecordOptions": "missions.readers.options",
     "Recorder": "missions.recorder",
     "RefusedError": "errors",
     "Shortage": "matching.shortage",
@@ -134,6 +141,7 @@ _MODULE_OF = {
     "evaluate": "evaluation",
     "fewest_unserved": "matching.unservable",
     "find_shortage": "matching.shortage",
+    "import_mission": "missions.readers.read",
     "lp_makespan_lower_bound": "bounds",
     "machine_covering": "generate.covering",
     "makespan_lower_bound": "bounds",
@@ -141,6 +149,7 @@ _MODULE_OF = {
     "only_allowed": "matching.serving",
     "paper": "generate.paper_scenarios",
     "paper_like": "generate.paper_scenarios",
+    "random_cfstp": "missions.families.cfstp",
     "random_instance": "generate.random_family",
     "random_mission": "missions.families.draw",
     "read_allocation": "formats.allocation_file",

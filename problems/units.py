@@ -1,5 +1,6 @@
 """Labels of the units that an instance is in, for text, tables and pictures; only speeds can be in others."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING
@@ -45,6 +46,13 @@ def labels(instance: "Instance") -> Units:
     """Return what the units of an instance are called: as it says, and km for distances on the earth."""
     units = instance.units
     return replace(units, distance=instance.distance_unit) if instance.metric == GEOGRAPHIC else units
+
+
+def common_units(units: Iterable[Units]) -> Units:
+    """Return the labels on which all of some units agree."""
+    given = list(units)
+    found = {field.name: {getattr(one, field.name) for one in given} for field in fields(Units)}
+    return Units(**{name: names.pop() for name, names in found.items() if len(names) == 1})
 
 
 METRES = {name: Fraction(length) for name, length in (

@@ -82,6 +82,15 @@ class Knowledge(StrEnum):
     LOCAL = "local"
 
 
+class ForeignFormat(StrEnum):
+    """Files of others that are read as missions."""
+
+    CFSTP = "cfstp"
+    SPACE = "space"
+    LONDON = "london"
+    NEW_BRUNSWICK = "new-brunswick"
+
+
 class MissionFamily(StrEnum):
     """What makes a generated mission hard."""
 

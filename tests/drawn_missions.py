@@ -6,6 +6,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from alloc.problems import Burst, Event, Instance, Mission, Pace, Radio
+from alloc.problems.changes.remove import replaced
 from alloc.problems.missions.simulation.agenda import Wanted
 from alloc.problems.missions.simulation.simulation import Simulation
 from alloc.problems.missions.simulation.state import STAY, Order
@@ -15,17 +16,20 @@ from alloc.problems.missions.simulation.state import STAY, Order
 def missions(draw: st.DrawFn) -> Mission:
     """Draw a mission with up to 4 agents, 5 tasks and any events that are possible in their order."""
     seed = draw(st.integers(0, 2**32))
-    return random_mission_of_any_kind(np.random.default_rng(seed))
+    return random_mission_of_any_kind(np.random.default_rng(seed), bases=draw(st.booleans()))
 
 
-def random_mission_of_any_kind(rng: np.random.Generator) -> Mission:
-    """Return a mission whose every setting is drawn."""
+def random_mission_of_any_kind(rng: np.random.Generator, *, bases: bool = False) -> Mission:
+    """Return a mission whose every setting is drawn; with `bases`, some of the agents that return do so to a base."""
 
     def chance(share: float = 0.5) -> bool:
         return bool(rng.random() < share)
 
     n, m = int(rng.integers(1, 5)), int(rng.integers(1, 6))
     instance = _instance(rng, n, m)
+    if bases:
+        homes = np.where(instance.returns, rng.integers(-1, 1, n), -1)
+        instance = replaced(instance, return_base=homes, bases={"dock": rng.random(3)})
     limit = (lambda high: np.where(rng.random(m) < 0.5, rng.uniform(3, high, m), np.nan)) if chance() else None
     joins = np.where(rng.random(n) < 0.3, rng.uniform(0, 2, n), np.nan)
     appears = np.where(rng.random(m) < 0.4, rng.uniform(0, 3, m), np.nan)

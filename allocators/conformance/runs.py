@@ -18,10 +18,11 @@ class RunChecks(Runner):
     """What must hold of every run."""
 
     @every_objective
-    def test_same_seed_gives_same_answer(self, subject: Allocator, objective: Objective) -> None:
-        """With a budget in iterations, the seed alone decides; the clock does not."""
-        first = self.solve(subject, medium_case(), objective=objective, seed=7)
-        again = self.solve(subject, medium_case(), objective=objective, seed=7)
+    @pytest.mark.parametrize("threads", [1, 2])
+    def test_same_seed_gives_same_answer(self, subject: Allocator, objective: Objective, threads: int) -> None:
+        """With a budget in iterations, the seed and the number of threads decide; the clock does not."""
+        first = self.solve(subject, medium_case(), objective=objective, seed=7, threads=threads)
+        again = self.solve(subject, medium_case(), objective=objective, seed=7, threads=threads)
         assert first.allocation == again.allocation
 
     @every_objective

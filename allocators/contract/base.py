@@ -87,8 +87,8 @@ class Allocator(Parameterised):
         """Search for the best allocation of ``search.instance``.
 
         Call ``search.submit`` with every improvement and ``search.should_stop()`` at least every 0.1 s. Increment
-        ``search.iteration`` in each iteration. With a budget in iterations, the same ``search.seed`` must give the same
-        answer.
+        ``search.iteration`` in each iteration. With a budget in iterations, the same ``search.seed`` and
+        ``search.threads`` must give the same answer.
 
         Parameters
         ----------

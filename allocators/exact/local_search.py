@@ -4,10 +4,16 @@ from collections import deque
 from concurrent.futures import Future
 from types import TracebackType
 
+import numpy as np
+
+from alloc.allocators.contract.clock import Clock
 from alloc.allocators.contract.search import Search
 from alloc.allocators.contract.tolerance import MakespanTolerance
 from alloc.allocators.exact.solver_model import is_repeatable
-from alloc.allocators.heuristic.local_search.improve import improve
+from alloc.allocators.heuristic.local_search.annealing_state import AnnealingState
+from alloc.allocators.heuristic.local_search.improve import MakespanReduction, improve
+from alloc.allocators.heuristic.local_search.parameters import LocalSearchParameters
+from alloc.allocators.heuristic.local_search.parts import Team
 from alloc.allocators.parallel.pool import Pool
 from alloc.problems import Allocation, Objective
 
@@ -38,6 +44,7 @@ class LocalSearchPhase:
         )
         self._pool = Pool(1) if search.threads > 1 and not is_repeatable(search) else None
         self._running: Future[None] | None = None
+        self._reduction: MakespanReduction | None = None
 
     def __enter__(self) -> "LocalSearchPhase":
         if self._pool is not None:
@@ -67,10 +74,22 @@ class LocalSearchPhase:
                 if known is not None:
                     self._part.submit(known.allocation)
             if is_repeatable(self._search):
-                improve(self._part, iterations=REPEATABLE_ITERATIONS)
+                self._improve(np.inf, REPEATABLE_ITERATIONS)
             else:
-                improve(self._part, until_s=min(self._until_s, self._part.elapsed_s + seconds))
+                self._improve(min(self._until_s, self._part.elapsed_s + seconds), np.inf)
         self.exchange()
+
+    def _improve(self, until_s: float, iterations: float) -> None:
+        """Improve the plan; for the makespan, from where the last turn ended unless there is a better plan."""
+        part = self._part
+        if part.objective is not Objective.MAKESPAN:
+            improve(part, until_s=until_s, iterations=iterations)
+            return
+        if self._reduction is None:
+            parameters = LocalSearchParameters()
+            state = AnnealingState(part.instance, part.seed, parameters.neighbours)
+            self._reduction = MakespanReduction(part, Team([state], map), parameters)
+        self._reduction.run(Clock(part, until_s, part.iteration + iterations))
 
     def exchange(self) -> None:
         """Submit what was found to the run, and pass its bound on to the local search."""

@@ -213,10 +213,10 @@ def summarise(instance: Instance, method: str, results: Sequence[Result], reason
     first = Row(instance=instance.name, method=method, agents=instance.n, tasks=instance.m, reason=reason)
     if not results:
         return first
-    makespan_mean, makespan_worst = _mean_and_worst([result.makespan for result in results])
-    gap_mean, gap_worst = _mean_and_worst([result.gap for result in results])
-    energy_mean, energy_worst = _mean_and_worst([result.energy for result in results])
-    runtime_mean_s, runtime_worst_s = _mean_and_worst([result.runtime_s for result in results])
+    makespan_mean, makespan_worst = mean_and_worst([result.makespan for result in results])
+    gap_mean, gap_worst = mean_and_worst([result.gap for result in results])
+    energy_mean, energy_worst = mean_and_worst([result.energy for result in results])
+    runtime_mean_s, runtime_worst_s = mean_and_worst([result.runtime_s for result in results])
     scores = [result.evaluation for result in results]
     return replace(
         first,
@@ -258,7 +258,7 @@ def share_bounds(rows: Sequence[Row]) -> list[Row]:
 
 
 def _against(row: Row, bound: float) -> Row:
-    gap_mean, gap_worst = _mean_and_worst([relative_gap(makespan, bound) for makespan in row.makespans])
+    gap_mean, gap_worst = mean_and_worst([relative_gap(makespan, bound) for makespan in row.makespans])
     return replace(row, lower_bound=bound, gap_mean=gap_mean, gap_worst=gap_worst)
 
 
@@ -275,7 +275,7 @@ def _load(name: str) -> str | Allocator | Exception:
         return ImportError(f"cannot be loaded: {type(error).__name__}: {error}")
 
 
-def _mean_and_worst(values: Sequence[float | None]) -> tuple[float | None, float | None]:
+def mean_and_worst(values: Sequence[float | None]) -> tuple[float | None, float | None]:
     """Return mean and maximum; None where a value is missing, as a mean over the others alone would be too good."""
     known = [value for value in values if value is not None]
     return (float(np.mean(known)), max(known)) if len(known) == len(values) else (None, None)

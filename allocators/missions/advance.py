@@ -186,9 +186,9 @@ def finish(state: MissionArrays) -> None:
             fly_home(agent, agent.length)
             if not np.isnan(agent.goal_x):
                 agent.x, agent.y, agent.z = agent.goal_x, agent.goal_y, agent.goal_z
-        if agent.returns and IDLE <= agent.status <= WORKING:
+        if agent.returns and agent.flown and IDLE <= agent.status <= WORKING:
             stop_work(head, state.agents, state.tasks, number)
-            home = agent.start_x, agent.start_y, agent.start_z
+            home = agent.home_x, agent.home_y, agent.home_z
             fly_home(agent, distance_between(head.is_manhattan, (agent.x, agent.y, agent.z), home))
             agent.x, agent.y, agent.z = home
 
@@ -196,6 +196,7 @@ def finish(state: MissionArrays) -> None:
 @compiled
 def fly_home(agent: Agent, length: float) -> None:
     """Count a flight that ends after the mission."""
+    agent.flown = 1
     agent.distance += length
     agent.energy += agent.energy_per_distance * length
     agent.battery -= agent.energy_per_distance * length

@@ -32,7 +32,8 @@ class Agent:
     order : int
         `STAY`, `TO_TASK` with `order_task`, or `TO_PLACE` with `order_x` and so on.
     flight : int
-        Number of the flight that goes on, 0 for none; `flights` counts them.
+        Number of the flight that goes on, 0 for none; `flights` counts them, and `flown` says whether one has ended
+        anywhere but where it began.
     task, previous, next : int
         Where it works, and who came there before and after it.
     speaks : int
@@ -51,9 +52,9 @@ class Agent:
     speed: float
     energy_per_distance: float
     range: float
-    start_x: float
-    start_y: float
-    start_z: float
+    home_x: float
+    home_y: float
+    home_z: float
     returns: int
     status: int
     x: float
@@ -68,6 +69,7 @@ class Agent:
     order_z: float
     flight: int
     flights: int
+    flown: int
     goal_x: float
     goal_y: float
     goal_z: float

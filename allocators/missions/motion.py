@@ -51,12 +51,13 @@ def battery_of(agent: Agent, hour: float) -> float:
 
 @compiled
 def can_fly(is_manhattan: int, agent: Agent, place: Point, battery: float, goal: Point) -> bool:
-    """Whether an agent at a place can fly to a goal by its range and battery, and back to its start if it returns."""
+    """Whether an agent at a place can fly to a goal by its range and battery, and home if it returns."""
     distance = distance_between(is_manhattan, place, goal)
     if distance > agent.range + TOLERANCE:
         return False
     if agent.returns:
-        distance += distance_between(is_manhattan, goal, (agent.start_x, agent.start_y, agent.start_z))
+        reached = place if math.isnan(goal[0]) else goal
+        distance += distance_between(is_manhattan, reached, (agent.home_x, agent.home_y, agent.home_z))
     return agent.energy_per_distance * distance <= battery + TOLERANCE
 
 
@@ -83,6 +84,8 @@ def break_off(agent: Agent, hour: float) -> None:
     agent.energy += agent.energy_per_distance * flown
     agent.battery -= agent.energy_per_distance * flown
     agent.flight, agent.status = 0, IDLE
+    if share > 0:
+        agent.flown = 1
     if goes_on and share == 1:
         agent.x, agent.y, agent.z = agent.goal_x, agent.goal_y, agent.goal_z
     elif goes_on:

@@ -148,8 +148,10 @@ def _agents(mission: Mission, knowledge: Knowledge) -> Records:
     agents["ability"], agents["speed"], agents["returns"] = instance.ability, instance.speed, instance.returns
     agents["energy_per_distance"] = instance.agent_energy_per_distance
     agents["range"] = instance.communication_range
+    has_base = instance.return_base >= 0
     for axis, name in enumerate("xyz"):
-        agents[name] = agents[f"start_{name}"] = instance.start_position[:, axis]
+        agents[name] = agents[f"home_{name}"] = instance.start_position[:, axis]
+        agents[f"home_{name}"][has_base] = instance.bases.position[instance.return_base[has_base], axis]
     agents["battery"] = agents["capacity"] = instance.battery
     for name in ("task", "previous", "next", "order_task", "report"):
         agents[name] = NOBODY

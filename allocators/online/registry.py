@@ -19,6 +19,7 @@ POLICIES = {
     "hedonic": "alloc.allocators.online.policies.hedonic:HedonicCoalitions",
     "auction": "alloc.allocators.online.policies.auction:ConsensusAuction",
     "gappo": "alloc.allocators.online.policies.gappo:NetworkPolicy",
+    "ppo": "alloc.allocators.online.policies.gappo:PpoPolicy",
     "replan": "alloc.allocators.online.policies.replan:Replan",
     "routes": "alloc.allocators.online.policies.routes:Routes",
     "clairvoyant": "alloc.allocators.online.policies.clairvoyant:Clairvoyant",

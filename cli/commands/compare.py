@@ -1,7 +1,6 @@
 """``alloc compare``."""
 
 import re
-import sys
 import threading
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated
@@ -9,13 +8,17 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from alloc.cli import options
-from alloc.cli.options import examples
-from alloc.cli.output.console import is_terminal, note, say, table, to_json
-from alloc.cli.output.files import check_outputs, save
+from alloc.cli.commands.experiments import options as kept
+from alloc.cli.commands.missions.compare import compare_missions
+from alloc.cli.options import BETWEEN_SETTINGS, examples
+from alloc.cli.output.console import note, say, table
+from alloc.cli.output.files import check_outputs
+from alloc.cli.output.rows import show_done, write_rows
 from alloc.problems.text import heading, labelled, number, percent
+from alloc.problems.vocabulary import Knowledge
 
 if TYPE_CHECKING:
-    from alloc.allocators import Allocator
+    from alloc.allocators import Allocator, Budget
     from alloc.allocators.experiments.compare import Row
     from alloc.problems import Units
 
@@ -24,15 +27,42 @@ EXAMPLES = examples(
     "alloc compare instances/*.json --methods ga,gappo --seeds 5 --time-limit 3 --csv table.csv",
     "alloc compare demo.json --methods 'ga[population=40],ga[population=400]' --time-limit 1",
     "alloc compare demo.json --methods milp,gappo --objective makespan-energy --seeds 7,8,9 --json",
-    closing="A method that refuses an instance has a row with the reason. Ctrl-C prints the finished rows, with exit "
+    "alloc compare paper-1:0-99 --methods greedy,gappo --seeds 3 --time-limit 5 --store runs.db --report table.tex",
+    "alloc compare missions/*.json --policies nearest,greedy,gappo --seeds 3",
+    closing="A method or policy that refuses has a row with the reason. Ctrl-C prints the finished rows, with exit "
     "code 1.",
 )
 
 BETWEEN_METHODS = re.compile(r",(?![^\[]*\])")
 """A comma outside of brackets."""
 
-BETWEEN_SETTINGS = re.compile(r",(?=\s*\w+=)")
-"""A comma before the name of the next parameter; others are part of a value."""
+MethodsOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME,NAME,...",
+        autocompletion=options.complete_methods,
+        help="Methods; see `alloc methods`. Parameters stand in brackets, as in ga[population=200].",
+    ),
+]
+PoliciesOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME,NAME,...",
+        autocompletion=options.complete_policy_list,
+        help=f"Policies for missions, likewise, the first to compare with: {', '.join(options.BUILT_IN_POLICIES)}, "
+        "or plugins.",
+    ),
+]
+SeedsOption = Annotated[
+    str, typer.Option(metavar="SEEDS", help="Seeds such as 0,1,2, or one number N for the seeds 0 to N - 1.")
+]
+DeadlineOption = Annotated[
+    float | None,
+    typer.Option(min=0, help="Milliseconds for each decision of a policy; 0 for no limit.", show_default="no limit"),
+]
+CsvOption = Annotated[
+    str | None, typer.Option(metavar="FILE", help="Write the table here as CSV; - is standard output.")
+]
 
 
 def register(app: typer.Typer) -> None:
@@ -41,63 +71,154 @@ def register(app: typer.Typer) -> None:
 
 
 def compare_command(
-    instances: options.InstancesArgument,
-    methods: Annotated[
-        str,
-        typer.Option(
-            metavar="NAME,NAME,...",
-            autocompletion=options.complete_methods,
-            help="Methods; see `alloc methods`. Parameters stand in brackets, as in ga[population=200].",
-        ),
+    instances: Annotated[
+        list[str],
+        typer.Argument(metavar="INSTANCE...", help=f"Instances, or with --policies missions, each {options.READABLE}."),
     ],
-    seeds: Annotated[
-        str, typer.Option(metavar="SEEDS", help="Seeds such as 0,1,2, or one number N for the seeds 0 to N - 1.")
-    ] = "1",
+    methods: MethodsOption = None,
+    policies: PoliciesOption = None,
+    seeds: SeedsOption = "1",
     objective: options.ObjectiveOption = options.PlainObjective.MAKESPAN,
     time_limit: options.TimeLimitOption = None,
     iterations: options.IterationsOption = None,
     target_gap: options.TargetGapOption = None,
     threads: options.ThreadsOption = None,
-    csv: Annotated[
-        str | None, typer.Option(metavar="FILE", help="Write the table here as CSV; - is standard output.")
+    knowledge: Annotated[
+        Knowledge | None, typer.Option(help="What agents in missions know.", show_default="as each mission says")
     ] = None,
+    deadline_ms: DeadlineOption = None,
+    csv: CsvOption = None,
     json: options.JsonOption = False,
+    store: kept.StoreOption = None,
+    workers: kept.WorkersOption = None,
+    memory: kept.MemoryOption = None,
+    kill_after: kept.KillAfterOption = None,
+    retry: kept.RetryOption = False,
+    report: kept.ReportOption = None,
 ) -> None:
-    """Run several methods on several instances and seeds, and print a table."""
+    """Run several methods on instances, or policies in missions, with several seeds, and print a table."""
     from alloc.allocators import Budget
-    from alloc.allocators.experiments.compare import compare, share_bounds
-    from alloc.allocators.runtime.interrupts import signals_set
-    from alloc.problems.formats import is_standard_output, read_instance
+    from alloc.problems.formats import is_standard_output
 
-    check_outputs(("--csv", csv), read=[("INSTANCE", instance) for instance in instances])
+    keeping = kept.checked(store, workers, memory, kill_after, report, retry=retry)
+    written = [("--csv", csv), *(("--report", file) for file in report or ())]
+    check_outputs(*written, read=[("--store", store), *(("INSTANCE", instance) for instance in instances)])
     if json and csv is not None and is_standard_output(csv):
         raise typer.BadParameter("and --json cannot both be standard output", param_hint="'--csv'")
-    wanted, numbers = _methods(methods), _seeds(seeds)
-    limit = options.time_limit(time_limit, iterations)
-    Budget(limit, iterations, target_gap)
-    problems = [read_instance(instance) for instance in instances]
-    units = _common_units([problem.units for problem in problems])
-    stop, rows, total = threading.Event(), [], len(problems) * len(wanted)
+    of_methods: dict[str, object] = {
+        "--time-limit": time_limit,
+        "--iterations": iterations,
+        "--target-gap": target_gap,
+        "--threads": threads,
+        "--store": store,
+        "--objective": None if objective is options.PlainObjective.MAKESPAN else objective,
+    }
+    _check_kind(methods, policies, of_methods, {"--knowledge": knowledge, "--deadline-ms": deadline_ms})
+    numbers = _seeds(seeds)
+    if policies is not None:
+        listed = _listed(policies, "--policies")
+        raise typer.Exit(compare_missions(instances, listed, numbers, knowledge, deadline_ms, csv, json=json))
+    assert methods is not None
+    budget = Budget(options.time_limit(time_limit, iterations), iterations, target_gap)
+    if keeping is not None:
+        asked = (instances, methods, numbers, objective, budget, threads, csv)
+        raise typer.Exit(_compare_in_store(keeping, *asked, json=json))
+    raise typer.Exit(_compare(instances, _methods(methods), numbers, objective, budget, threads, csv, json=json))
+
+
+def _check_kind(
+    methods: str | None, policies: str | None, of_methods: dict[str, object], of_policies: dict[str, object]
+) -> None:
+    """Raise an error unless either methods or policies are given, with their own options alone."""
+    if (methods is None) == (policies is None):
+        message = "give either --methods, for instances, or --policies, for missions"
+        raise typer.BadParameter(message, param_hint="'--methods'")
+    others, kind = (of_policies, "--policies") if policies is None else (of_methods, "--methods")
+    for option, value in others.items():
+        if value is not None:
+            raise typer.BadParameter(f"goes with {kind} only", param_hint=f"'{option}'")
+
+
+def _compare_in_store(
+    keeping: kept.Keeping,
+    files: Sequence[str],
+    methods: str,
+    seeds: list[int],
+    objective: options.PlainObjective,
+    budget: "Budget",
+    threads: int | None,
+    csv: str | None,
+    *,
+    json: bool,
+) -> int:
+    """Make the runs that the store has not yet, print the rows of all, and return the exit code."""
+    from alloc.cli.commands.experiments.stored import compare_in_store
+    from alloc.problems.formats import is_standard_output
+    from alloc.problems.units import common_units
+
+    variants = {label: (name, settings or {}) for label, (name, settings) in _listed(methods, "--methods").items()}
+    found = compare_in_store(keeping, files, variants, seeds, objective.value, budget, threads)
+    _write(found.rows, csv, common_units([one.units for one in found.comparison.instances]), json=json)
+    return found.conclude(keeping.reports, quiet=json or (csv is not None and is_standard_output(csv)))
+
+
+def _compare(
+    files: Sequence[str],
+    methods: "dict[str, str | Allocator]",
+    seeds: list[int],
+    objective: options.PlainObjective,
+    budget: "Budget",
+    threads: int | None,
+    csv: str | None,
+    *,
+    json: bool,
+) -> int:
+    """Run the methods on all instances, print the rows, and return the exit code."""
+    from alloc.allocators.experiments.compare import compare, share_bounds
+    from alloc.allocators.runtime.interrupts import signals_set
+    from alloc.problems.formats import read_instance
+    from alloc.problems.units import common_units
+
+    problems = [read_instance(name) for name in files]
+    units = common_units([problem.units for problem in problems])
+    stop, rows, total = threading.Event(), list["Row"](), len(problems) * len(methods)
     with signals_set(stop):
         for row in compare(
             problems,
-            wanted,
-            numbers,
+            methods,
+            seeds,
             objective=objective.value,
-            time_limit_s=limit,
-            iterations=iterations,
-            target_gap=target_gap,
+            time_limit_s=budget.time_limit_s,
+            iterations=budget.iterations,
+            target_gap=budget.target_gap,
             threads=threads,
             stop=stop,
         ):
             rows.append(row)
-            _show_done(row, len(rows), total, units.time)
-    _print(share_bounds(rows), csv, units, json=json)
+            outcome = row.reason or f"T {labelled(number(row.makespan_mean), units.time)}, gap {percent(row.gap_mean)}"
+            show_done(f"{row.instance}, {row.method}: {outcome}", len(rows), total)
+    _write(share_bounds(rows), csv, units, json=json)
     if stop.is_set():
         note(f"interrupted after {len(rows)} of {total} rows")
-    complete = len(rows) == total and all(row.reason or row.runs == len(numbers) for row in rows)
+    complete = len(rows) == total and all(row.reason or row.runs == len(seeds) for row in rows)
     served = any(row.runs for row in rows) and not any(row.unserved for row in rows)
-    raise typer.Exit(0 if complete and served else 1)
+    return 0 if complete and served else 1
+
+
+def _listed(text: str, option: str) -> dict[str, tuple[str, dict[str, object] | None]]:
+    """Return names and, where there are brackets, parameters of methods or policies, by how they are written."""
+    found: dict[str, tuple[str, dict[str, object] | None]] = {}
+    for label in dict.fromkeys(part.strip() for part in BETWEEN_METHODS.split(text) if part.strip()):
+        name, bracket, settings = label.partition("[")
+        if bracket and not settings.endswith("]"):
+            raise typer.BadParameter(f"{label!r} must be like ga[population=200]", param_hint=f"'{option}'")
+        found[label] = (name, options.values(BETWEEN_SETTINGS.split(settings[:-1])) if bracket else None)
+    if not found:
+        see = "see `alloc methods`" if option == "--methods" else f"such as {', '.join(options.BUILT_IN_POLICIES)}"
+        raise typer.BadParameter(
+            f"names no {'method' if option == '--methods' else 'policy'}; {see}", param_hint=f"'{option}'"
+        )
+    return found
 
 
 def _methods(text: str) -> "dict[str, str | Allocator]":
@@ -105,15 +226,10 @@ def _methods(text: str) -> "dict[str, str | Allocator]":
     from alloc.allocators import describe, load
 
     found: dict[str, str | Allocator] = {}
-    for label in dict.fromkeys(part.strip() for part in BETWEEN_METHODS.split(text) if part.strip()):
-        name, bracket, settings = label.partition("[")
-        if bracket and not settings.endswith("]"):
-            raise typer.BadParameter(f"{label!r} must be like ga[population=200]", param_hint="'--methods'")
+    for label, (name, settings) in _listed(text, "--methods").items():
         if name != "auto":
             describe(name)
-        found[label] = load(name, **options.values(BETWEEN_SETTINGS.split(settings[:-1]))) if bracket else name
-    if not found:
-        raise typer.BadParameter("names no method; see `alloc methods`", param_hint="'--methods'")
+        found[label] = name if settings is None else load(name, **settings)
     return found
 
 
@@ -130,31 +246,9 @@ def _seeds(text: str) -> list[int]:
     return list(range(int(text)))
 
 
-def _common_units(units: "Sequence[Units]") -> "Units":
-    """Return the labels on which all instances agree."""
-    from dataclasses import fields
-
-    from alloc.problems import Units
-
-    labels = {field.name: {getattr(one, field.name) for one in units} for field in fields(Units)}
-    return Units(**{name: found.pop() for name, found in labels.items() if len(found) == 1})
-
-
-def _show_done(row: "Row", count: int, total: int, unit: str) -> None:
-    """On a terminal, print each row as soon as it is known; the table follows at the end."""
-    if is_terminal(sys.stderr):
-        outcome = row.reason or f"T {labelled(number(row.makespan_mean), unit)}, gap {percent(row.gap_mean)}"
-        say(f"[{count}/{total}] {row.instance}, {row.method}: {outcome}")
-
-
-def _print(rows: "list[Row]", csv: str | None, units: "Units", *, json: bool) -> None:
-    from alloc.problems.formats import is_standard_output
-
-    def document() -> str:
-        return to_json({"format": "alloc-comparison/1", "rows": [row.to_dict() for row in rows]})
-
-    is_table_wanted = not json and not (csv is not None and is_standard_output(csv))
-    save(lambda: _csv(rows), csv, document if json else None, [lambda: _tell(rows, units)] if is_table_wanted else [])
+def _write(rows: "list[Row]", csv: str | None, units: "Units", *, json: bool) -> None:
+    document: dict[str, object] = {"format": "alloc-comparison/1", "rows": [row.to_dict() for row in rows]}
+    write_rows(document, _columns(), csv, lambda: _tell(rows, units), json=json)
 
 
 def _tell(rows: "list[Row]", units: "Units") -> None:
@@ -185,17 +279,10 @@ def _cells(row: "Row") -> list[str]:
     ]
 
 
-def _csv(rows: "list[Row]") -> str:
-    """Return a header with the names of the fields, and a line per row; None is empty."""
-    import csv
-    import io
+def _columns() -> list[str]:
+    """Return the columns of the CSV: the names of the fields."""
     from dataclasses import fields
 
     from alloc.allocators.experiments.compare import Row
 
-    text = io.StringIO()
-    names = [field.name for field in fields(Row) if field.name != "makespans"]
-    writer = csv.DictWriter(text, names, lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(row.to_dict() for row in rows)
-    return text.getvalue()
+    return [field.name for field in fields(Row) if field.name != "makespans"]

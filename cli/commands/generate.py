@@ -20,6 +20,7 @@ EXAMPLES = examples(
     "alloc generate paper-4 --seed 100 --count 20 --output instances",
     "alloc generate covering --agents 40 --tasks 16 --ability-max 100 --workload uniform --seed 3 --output demo.json",
     "alloc generate mission --family failures --agents 20 --tasks 40 --seed 7 --output mission.json",
+    "alloc generate cfstp --agents 10 --seed 1 --count 100 --output cfstp",
     closing="SPREAD is one value for all, LOW:HIGH for a uniform draw, or none for no limit.",
 )
 
@@ -48,6 +49,7 @@ class Family(StrEnum):
     RANDOM = "random"
     COVERING = "covering"
     MISSION = "mission"
+    CFSTP = "cfstp"
 
 
 def _option(text: str, default: str, *names: str, metavar: str | None = None) -> object:
@@ -66,7 +68,8 @@ def generate_command(
             metavar="FAMILY",
             help="paper-1 to paper-4, a scenario of the paper; random, with the options below; covering, machine "
             "covering without places: 100 agents with abilities from 1 to 1000, 25 tasks, workloads equal or uniform; "
-            "or mission, 20 agents and 40 tasks in time, of the kind that --family says.",
+            "mission, 20 agents and 40 tasks in time, of the kind that --family says; or cfstp, a mission of 20 agents "
+            "and 300 tasks with deadlines on a grid.",
         ),
     ],
     seed: SEED = 0,
@@ -117,7 +120,7 @@ def generate_command(
         instance = _instance(family, wanted, number)
         _write(instance, output, into_folder=count > 1)
     if output != STANDARD:
-        what = "missions" if family is Family.MISSION else "instances"
+        what = "missions" if family in (Family.MISSION, Family.CFSTP) else "instances"
         say(f"wrote {output}" if count == 1 else f"wrote {count} {what} into {output}")
 
 
@@ -125,7 +128,11 @@ def _check_options(family: Family, wanted: dict[str, Any]) -> None:
     """Raise an error for an option that is not for this family."""
     for name in wanted:
         owner = "mission" if name in MISSION and name not in ("agents", "tasks") else "random"
-        taken = {Family.RANDOM: name not in MISSION or name in COVERING, Family.COVERING: name in COVERING}
+        taken = {
+            Family.RANDOM: name not in MISSION or name in COVERING,
+            Family.COVERING: name in COVERING,
+            Family.CFSTP: name in ("agents", "tasks"),
+        }
         if not taken.get(family, family is Family.MISSION and name in MISSION):
             raise typer.BadParameter(f"is for {owner}, not for {family}", param_hint=f"'{_flag(name)}'")
 
@@ -135,11 +142,12 @@ FIXED = ("family", "seed", "count", "output")
 
 def _instance(family: Family, wanted: dict[str, Any], seed: int) -> "Instance | Mission":
     from alloc.problems import Family as Parameters
-    from alloc.problems import MissionParameters, paper, random_instance, random_mission
+    from alloc.problems import MissionParameters, paper, random_cfstp, random_instance, random_mission
 
     if family is Family.MISSION:
         return random_mission(MissionParameters(**{MISSION[name]: value for name, value in wanted.items()}), seed)
-
+    if family is Family.CFSTP:
+        return random_cfstp(**wanted, seed=seed)
     if family is Family.COVERING:
         return _covering(seed=seed, **wanted)
     if family is not Family.RANDOM:

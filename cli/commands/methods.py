@@ -1,5 +1,7 @@
 """``alloc methods``."""
 
+from collections.abc import Callable
+from functools import partial
 from typing import Annotated, TypedDict
 
 import typer
@@ -13,7 +15,7 @@ EXAMPLES = examples(
     "alloc methods",
     "alloc methods --json",
     "alloc methods --prepare",
-    closing="Some methods compile loops when first used; --prepare does this for all of them.",
+    closing="Some methods and policies compile loops when first used; --prepare does this for all of them.",
 )
 
 MOVES = (
@@ -49,7 +51,8 @@ def register(app: typer.Typer) -> None:
 def methods_command(
     json: options.JsonOption = False,
     prepare: Annotated[
-        bool, typer.Option("--prepare", help="Compile the loops of all methods now instead of in their first runs.")
+        bool,
+        typer.Option("--prepare", help="Compile the loops of all methods and policies now, not in first runs."),
     ] = False,
 ) -> None:
     """List the methods, what each can do, and which packages it still needs."""
@@ -69,15 +72,17 @@ def methods_command(
 
 
 def _prepare() -> None:
-    """Load each installed method, which compiles its loops; a plugin that fails gives a note.
+    """Load each installed method and policy, which compiles its loops; a plugin that fails gives a note.
 
     Methods of one kind share loops, so each kind has a process of its own. The learned ones take longest, and begin.
     """
-    from alloc.allocators import describe, names
+    from alloc.allocators import describe, load, names
+    from alloc.allocators.heuristic.greedy import tree_search
+    from alloc.allocators.online.registry import describe_policy, load_policy, policy_names
     from alloc.allocators.parallel.processes import ProcessEngine
     from alloc.problems import InputError
 
-    kinds: dict[str, list[str]] = {"learned": []}
+    kinds: dict[str, list[Callable[[], object]]] = {"learned": [], "policies": []}
     for name in names():
         try:
             method = describe(name)
@@ -85,27 +90,31 @@ def _prepare() -> None:
             note(str(error))
             continue
         if not method.missing:
-            kinds.setdefault(str(method.kind), []).append(name)
+            kinds.setdefault(str(method.kind), []).append(partial(load, name))
+        if name == "greedy":
+            kinds[str(method.kind)].append(tree_search.compile_loops)  # for large instances only, and loaded then
+    for name in policy_names():
+        try:
+            if not describe_policy(name).missing:
+                kinds["policies"].append(partial(load_policy, name))
+        except InputError as error:
+            note(str(error))
     with ProcessEngine() as engine:
         for messages in engine.map(_load, list(kinds.values())) or ():
             for message in messages:
                 note(message)
 
 
-def _load(methods: list[str]) -> list[str]:
-    """Load methods and return the messages of those that fail."""
-    from alloc.allocators import load
-    from alloc.allocators.heuristic.greedy import tree_search
+def _load(loaders: list[Callable[[], object]]) -> list[str]:
+    """Load methods and policies, and return the messages of those that fail."""
     from alloc.problems import InputError
 
     failures = []
-    for name in methods:
+    for load in loaders:
         try:
-            load(name)
+            load()
         except InputError as error:
             failures.append(str(error))
-    if "greedy" in methods:
-        tree_search.compile_loops()  # which `greedy` needs on large instances only, and loads then
     return failures
 
 

@@ -98,7 +98,7 @@ def _unplaced(instance: Instance) -> Iterator[Finding]:
     for lost, ids, noun in ((lost_agents, instance.agent_ids, "agent"), (lost_tasks, instance.task_ids, "task")):
         if lost.any():
             verb = "has" if lost.sum() == 1 else "have"
-            yield Finding("position", f"{_named(lost, ids, noun)} {verb} no place: the way there counts as 0")
+            yield Finding("position", f"{named(lost, ids, noun)} {verb} no place: the way there counts as 0")
 
 
 def _bases(instance: Instance) -> Iterator[Finding]:
@@ -106,14 +106,14 @@ def _bases(instance: Instance) -> Iterator[Finding]:
     table, ids = instance.distances, instance.bases.ids
     used = np.isin(np.arange(len(ids)), instance.return_base)
     if not used.all():
-        yield Finding("bases", f"nobody returns to {_named(~used, ids, 'base')}")
+        yield Finding("bases", f"nobody returns to {named(~used, ids, 'base')}")
     lost = used & np.isnan(instance.bases.position[:, 0])
     if table is not None:
         node = instance.n + instance.m + np.arange(len(ids))
         lost &= ~np.isin(node, np.concatenate([table.source, table.target]))
     if lost.any() and not np.isnan(instance.task_position[:, 0]).all():
         verb = "has" if lost.sum() == 1 else "have"
-        yield Finding("bases", f"{_named(lost, ids, 'base')} {verb} no place: the way back there counts as 0")
+        yield Finding("bases", f"{named(lost, ids, 'base')} {verb} no place: the way back there counts as 0")
 
 
 def _unreaching(instance: Instance) -> Iterator[Finding]:
@@ -190,7 +190,7 @@ def _too_few_agents(instance: Instance) -> Iterator[Finding]:
         yield Finding("agents", f"{few}; for sequences of tasks and due times see PyVRP or PyJobShop")
 
 
-def _named(which: BoolArray, ids: Sequence[str], noun: str) -> str:
+def named(which: BoolArray, ids: Sequence[str], noun: str) -> str:
     """Return some of the ids that are marked, and how many there are."""
     count = int(which.sum())
     names = ", ".join(ids[index] for index in np.flatnonzero(which)[:MOST_NAMES].tolist())

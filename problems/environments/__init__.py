@@ -1,7 +1,9 @@
-"""The game for other people's learners: a PettingZoo and a Gymnasium environment; needs the extra ``env``."""
+"""The game, and missions, for other people's learners: PettingZoo and Gymnasium; needs the extra ``env``."""
 
 try:
     from alloc.problems.environments.bidding import BiddingEnv
+    from alloc.problems.environments.missions.agents import MissionEnv
+    from alloc.problems.environments.missions.fleet import MissionFleetEnv
     from alloc.problems.environments.simultaneous import SimultaneousEnv
 except ModuleNotFoundError as error:
     if error.name not in ("gymnasium", "pettingzoo"):
@@ -9,4 +11,4 @@ except ModuleNotFoundError as error:
     message = f"the environments need {error.name}: pip install 'alloc-mrta[env]'"
     raise ModuleNotFoundError(message, name=error.name) from error
 
-__all__ = ["BiddingEnv", "SimultaneousEnv"]
+__all__ = ["BiddingEnv", "MissionEnv", "MissionFleetEnv", "SimultaneousEnv"]

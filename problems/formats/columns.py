@@ -190,7 +190,8 @@ def require_format(found: object, expected: Sequence[str] = (INSTANCE_FORMAT,)) 
     if found is None:
         raise InputError(f'is missing; add "format": "{expected[0]}"', "format")
     if found not in expected:
-        raise InputError(f"must be {' or '.join(map(repr, expected))}, got {described(found)}", "format")
+        hint = "; `alloc simulate` and `alloc compare --policies` take missions" if found == "alloc-mission/1" else ""
+        raise InputError(f"must be {' or '.join(map(repr, expected))}, got {described(found)}{hint}", "format")
 
 
 def unknown_field(name: str, known: Sequence[str], kind: str = "field") -> str:

@@ -44,9 +44,8 @@ def read_instance(path: PathLike) -> Instance:
     try:
         if is_stream(path):
             return from_document(json_text.parse(read_text(path)))
-        file = Path(path)
+        file, name = Path(path), name_of(path)
         suffix = file.suffix.lower()
-        name = _name(file.stem if suffix in (".json", ".npz") else Path(os.path.abspath(file)).name)
         if suffix == ".json":
             return from_document(json_text.parse(read_text(file)), default_name=name)
         if suffix == ".npz":
@@ -59,8 +58,10 @@ def read_instance(path: PathLike) -> Instance:
         raise told(error, source) from error.__cause__
 
 
-def _name(stem: str) -> str:
-    """Return the name of a file as Unicode; bytes of it that are no UTF-8 become U+FFFD."""
+def name_of(path: PathLike) -> str:
+    """Return the name of an instance that has none in its file, as Unicode; other bytes become U+FFFD."""
+    file = Path(path)
+    stem = file.stem if file.suffix.lower() in (".json", ".npz") else Path(os.path.abspath(file)).name
     return os.fsencode(stem).decode("utf-8", "replace")
 
 

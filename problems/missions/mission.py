@@ -129,10 +129,6 @@ class Mission(fields.ReadOnly):
             row = int(np.argmax(self.instance.returns))
             message = "cannot be combined with distances of one's own: who stops on the way has no way back"
             raise InputError(message, f"agents[{row}].returns")
-        if (self.instance.return_base >= 0).any():
-            row = int(np.argmax(self.instance.return_base >= 0))
-            message = "names a base; in missions agents return to where they start (true), or not at all"
-            raise InputError(message, f"agents[{row}].returns")
         check_sequence(self._numbered_timeline)
 
     def __repr__(self) -> str:

@@ -11,6 +11,7 @@ from pathlib import Path
 from alloc.allocators import load, solve
 from alloc.allocators.exact.makespan.configuration import ConfigurationProgramme
 from alloc.allocators.exact.makespan.enumeration import enumerate_groups
+from alloc.allocators.exact.makespan.relaxation import relaxed_lower_bound
 from alloc.allocators.exact.makespan.set_partitioning import solve_set_partitioning
 from alloc.allocators.exact.model import Model
 from alloc.allocators.exact.solver_model import Verdict
@@ -71,8 +72,9 @@ def entry(family: str, shape: tuple[int, int, int, int], seed: int, *, equal: bo
 
 
 def proof(instance: Instance, bound: float) -> str:
-    """Return the simplest means that proves the bound on its own: `simple`, `prices`, `groups`, or else `search`."""
-    if makespan_lower_bound(instance) >= bound * (1 - CLOSE):
+    """Return the simplest means that proves the bound by itself: simple, fractions, prices or groups; else search."""
+    low = makespan_lower_bound(instance)
+    if low >= bound * (1 - CLOSE):
         return "simple"
     until_s, below = time.monotonic() + PROOF_S, bound * (1 - CLOSE)
 
@@ -80,17 +82,24 @@ def proof(instance: Instance, bound: float) -> str:
         return time.monotonic() > until_s
 
     model = Model.build(instance, agent_classes(instance, by_place=False), len(instance.workload))
-    configurations = ConfigurationProgramme(model, makespan_lower_bound(instance))
-    prices = configurations.dual_prices(below, over, converge=True)
-    if prices is None:
-        return "search"
-    if prices.theta > 1:
-        return "prices"
-    programme = enumerate_groups(configurations, prices, below, over)
-    if programme is None or over():
-        return "search"
-    verdict, _ = solve_set_partitioning(programme, 0, over)
-    return "groups" if verdict is Verdict.INFEASIBLE else "search"
+    if not instance.reach.is_complete and relaxed_lower_bound(model, low, bound, PROOF_S, over)[0] >= below:
+        return "fractions"
+    configurations = ConfigurationProgramme(model, low)
+    finer = configurations if configurations.is_tractable else None
+    while finer is not None:
+        configurations = finer
+        prices = configurations.dual_prices(below, over, converge=True)
+        if prices is None:
+            return "search"
+        if prices.theta > 1:
+            return "prices"
+        programme = enumerate_groups(configurations, prices, below, over)
+        if programme is not None and not over():
+            verdict, _ = solve_set_partitioning(programme, 0, over)
+            if verdict is Verdict.INFEASIBLE:
+                return "groups"
+        finer = configurations.refined(low)
+    return "search"
 
 
 def write_table(entries: list[Entry], file: Path) -> None:

@@ -88,7 +88,7 @@ def test_methods_survives_a_broken_plugin(alloc, monkeypatch):
 
 
 def test_methods_are_prepared_once_for_all(alloc, monkeypatch):
-    """Every method that is installed is loaded, what loading leaves out is compiled, and nothing is printed.
+    """Every method and policy that is installed is loaded, what loading leaves out is compiled, and nothing is printed.
 
     A broken plugin is a note. Here everything runs in one process, where what is loaded can be seen.
     """
@@ -101,10 +101,11 @@ def test_methods_are_prepared_once_for_all(alloc, monkeypatch):
     monkeypatch.setattr("alloc.allocators.contract.plugins.entry_points", lambda group: [broken])
     loaded = []
     monkeypatch.setattr("alloc.allocators.load", loaded.append)
+    monkeypatch.setattr("alloc.allocators.online.registry.load_policy", lambda name: loaded.append(f"policy {name}"))
     monkeypatch.setattr(
         "alloc.allocators.heuristic.greedy.tree_search.compile_loops", lambda: loaded.append("the tree of greedy")
     )
     ran = alloc("methods", "--prepare")
     assert (ran.code, ran.out) == (0, "")
-    assert {"greedy", "cpsat", "local-search", "gappo", "the tree of greedy"} <= set(loaded)
+    assert {"greedy", "cpsat", "local-search", "gappo", "the tree of greedy", "policy gappo"} <= set(loaded)
     assert "plugin 'broken'" in ran.err

@@ -52,7 +52,7 @@ class Clusters:
         classes = len(model.count)
         spare = model.max_weight[0] - model.need[0] if model.max_weight[0] >= 0 else -1
         everywhere = np.bincount(model.class_of_pair, minlength=classes)
-        need = member @ model.need
+        need: WholeArray = member.astype(np.int64) @ model.need.astype(np.int64, copy=False)
         parts, rows, columns, entries = [], [], [], 0
         for f, inside in enumerate(member[:, model.task_of_pair]):
             pairs = np.flatnonzero(inside)

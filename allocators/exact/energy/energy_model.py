@@ -1,4 +1,4 @@
-"""The least-energy problem in small whole numbers: what the Lagrangian relaxation bounds."""
+"""The least-energy problem in small whole numbers, or in parts of needs: what the Lagrangian relaxation bounds."""
 
 from dataclasses import dataclass, replace
 
@@ -12,16 +12,18 @@ from alloc.problems.instance import FloatArray
 
 Mask = NDArray[np.bool_]
 
-GRID = 2048
-"""Steps into which a need is divided where it is no small whole number."""
-
 MAX_NEED = 5000
 """Whole needs up to this are left as they are."""
+
+SMALLEST_WEIGHT = 1e-12
+"""Part of a need to which smaller weights are raised."""
 
 
 @dataclass(frozen=True, eq=False)
 class EnergyModel:
-    """(work), (agents) and (energy) of `exact.model` in whole weights and needs, the pairs in the order of tasks.
+    """(work), (agents) and (energy) of `exact.model`, the pairs in the order of tasks.
+
+    Weights and needs are whole numbers, or all floats: then needs are about 1 and have no `max_weight`.
 
     A plan gives each task j agents with weights that sum to ``need[j]`` at least and ``max_weight[j]`` at most, and has
     from `min_agents` to `count` agents of each class at work.
@@ -30,14 +32,15 @@ class EnergyModel:
     ----------
     class_of_pair, task_of_pair : ndarray of int, shape (p,)
         Class and task of each pair.
-    weight : ndarray of int, shape (p,)
+    weight : ndarray of int or float, shape (p,)
         What one agent adds to the task.
     copies : ndarray of int, shape (p,)
         Agents that the task could use.
     cost : ndarray, shape (p,)
         Distance of one agent.
-    need, max_weight : ndarray of int, shape (t,)
-        `max_weight` is -1 where there is no limit.
+    need : ndarray of int or float, shape (t,)
+    max_weight : ndarray of int, shape (t,)
+        -1 where there is no limit.
     count, min_agents : ndarray of int, shape (k,)
     ability : ndarray of int, shape (k,), or None
         What one agent adds to any task, for the clusters; None where that depends on the task.
@@ -45,10 +48,10 @@ class EnergyModel:
 
     class_of_pair: WholeArray
     task_of_pair: WholeArray
-    weight: WholeArray
+    weight: WholeArray | FloatArray
     copies: WholeArray
     cost: FloatArray
-    need: WholeArray
+    need: WholeArray | FloatArray
     max_weight: WholeArray
     count: WholeArray
     min_agents: WholeArray
@@ -66,13 +69,18 @@ class EnergyModel:
         )
 
     @property
+    def is_whole(self) -> bool:
+        """Whether weights and needs are whole numbers."""
+        return self.need.dtype.kind == "i"
+
+    @property
     def first(self) -> WholeArray:
         """Where the pairs of each task begin, shape (t + 1,)."""
         return np.searchsorted(self.task_of_pair, np.arange(len(self.need) + 1)).astype(np.int64)
 
 
 def round_demand(demand: Demand, cost: FloatArray) -> tuple[EnergyModel, WholeArray]:
-    """Round `demand` to small whole numbers such that every plan that meets it meets these.
+    """Write `demand` in small whole numbers, or else in parts of needs, such that every plan that meets it meets these.
 
     Parameters
     ----------
@@ -90,21 +98,24 @@ def round_demand(demand: Demand, cost: FloatArray) -> tuple[EnergyModel, WholeAr
     agent_class, task, need = demand.class_of_pair[order], demand.task_of_pair[order], demand.need
     limited = demand.spare < demand.ability.max()
     usable = np.ones(len(order), dtype=bool)
+    weight: WholeArray | FloatArray
     if demand.integral and need.max() <= MAX_NEED:
         ability = demand.ability.astype(np.int64)
         weight = ability[agent_class] if limited else demand.weight[order].astype(np.int64)
         max_weight = demand.max_weight if limited else np.full(len(need), -1)
         usable = weight <= max_weight[task] if limited else usable
+        need = need.astype(np.int64)
     else:
-        weight = np.ceil(demand.weight[order] / need[task] * (GRID * (1 - ROUNDING))).astype(np.int64)
-        ability, limited, need, max_weight = None, False, np.full(len(need), GRID), np.full(len(need), -1)
+        weight = np.maximum(demand.weight[order] / need[task], SMALLEST_WEIGHT)
+        ability, limited, max_weight = None, False, np.full(len(need), -1)
+        need = np.full(len(need), 1 - 100 * ROUNDING)  # sums of many floats are not exact
     model = EnergyModel(
         class_of_pair=agent_class.astype(np.int64),
         task_of_pair=task.astype(np.int64),
         weight=weight,
         copies=demand.max_count[order].astype(np.int64),
         cost=cost[order],
-        need=need.astype(np.int64),
+        need=need,
         max_weight=max_weight.astype(np.int64),
         count=demand.count.astype(np.int64),
         min_agents=demand.min_agents.astype(np.int64) if limited else np.zeros(len(demand.count), dtype=np.int64),

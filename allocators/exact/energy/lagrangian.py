@@ -161,8 +161,8 @@ class LagrangianBound:
             price += clusters.link @ self._cluster_price
             cluster_group, _, cluster_cost = solve_subproblems(clusters.model, -self._cluster_price, compare=False)
             value += cluster_cost
-        # where sums of weights are not limited, the excess takes much longer than the groups
-        compare = self._rounds % COMPARE_EVERY == 0 or bool(model.max_weight[0] >= 0)
+        # where sums of weights are whole and not limited, the excess takes much longer than the groups
+        compare = self._rounds % COMPARE_EVERY == 0 or bool(model.max_weight[0] >= 0) or not model.is_whole
         group, excess, task_cost = solve_subproblems(model, price, compare=compare)
         return Relaxed(value + task_cost, group, excess, cluster_group)
 

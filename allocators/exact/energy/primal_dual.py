@@ -18,6 +18,9 @@ from alloc.problems.instance import FloatArray, IntArray
 MAX_WORK = 100_000_000
 """Cells of all tables that a round of prices, or a descent over all pairs of tasks, may fill: some 0.1 s."""
 
+STATES = 2000
+"""Cells that count for a pair where weights are no whole numbers."""
+
 MAX_TASKS = 2000
 """Tasks above which neither side is used, for its memory."""
 
@@ -38,9 +41,9 @@ def compile_loops() -> None:
     plans.descend()
     plans.anneal(1, 0.0)
     one, two = np.ones(2, dtype=np.int64), np.array([0, 1])
-    LagrangianBound(
-        EnergyModel(two, two, one, one, np.ones(2), one, one, one, one, None), np.zeros((2, 2)), np.zeros(2)
-    ).ascend(1, 3.0)
+    for weight in (one, np.ones(2)):
+        model = EnergyModel(two, two, weight, one, np.ones(2), weight, one, one, one, None)
+        LagrangianBound(model, np.zeros((2, 2)), np.zeros(2)).ascend(1, 3.0)
 
 
 class Timer:
@@ -186,8 +189,8 @@ class PrimalDual:
         """Start the dual side; None where its tables are too large."""
         cost = self._model.cost[self._model.pairs_at(self._demand)]
         rounded, pairs = round_demand(self._demand, cost)
-        cells = np.maximum(rounded.need, rounded.max_weight)[rounded.task_of_pair].sum()
-        if cells > MAX_WORK:
+        cells = np.maximum(rounded.need, rounded.max_weight) if rounded.is_whole else np.full(len(rounded.need), STATES)
+        if cells[rounded.task_of_pair].sum() > MAX_WORK:
             return None
         self._pairs = pairs
         return LagrangianBound(rounded, task_distance, class_prices(self._demand, cost, seconds))

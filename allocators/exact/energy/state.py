@@ -37,7 +37,7 @@ class EnergyState:
     primal_dual : PrimalDual or None
         None where the solver is quick enough by itself, or neither side can be had.
     local_search : LocalSearchPhase or None
-        None where `primal_dual` finds plans, or the solver is quick enough by itself.
+        None where `primal_dual` finds plans without rounding, or the solver is quick enough by itself.
     """
 
     search: Search
@@ -60,7 +60,9 @@ class EnergyState:
             seconds = np.inf if is_repeatable(search) else LINEAR_SHARE * min(STAGE_S, search.remaining_s)
             both = PrimalDual(search.instance, model, demand, search.best.allocation, search.seed, seconds)
             primal_dual = None if both.is_empty else both
-        if len(demand.class_of_pair) > FEW_PAIRS and (primal_dual is None or not primal_dual.finds_plans):
+        # the primal side rounds weights, and so has few plans at the very least makespan where they are no integers
+        enough = primal_dual is not None and primal_dual.finds_plans and demand.integral
+        if len(demand.class_of_pair) > FEW_PAIRS and not enough:
             local_search = LocalSearchPhase(search, Objective.MAKESPAN_ENERGY, until_s, search.makespan_limit)
         return cls(
             search=search,

@@ -3,6 +3,7 @@
 import numpy as np
 
 from alloc.allocators.exact.energy.energy_model import EnergyModel
+from alloc.allocators.exact.energy.knapsack_floats import cheapest_in_floats
 from alloc.allocators.exact.knapsack import WholeArray, fill_table, read_group
 from alloc.allocators.exact.knapsack_core import cheapest_by_core
 from alloc.allocators.runtime.compiled import compiled
@@ -28,11 +29,37 @@ def solve_subproblems(
     ndarray, shape (p,) or (0,)
         Excess: how much dearer the best group with an agent of the pair is, or less than that.
     float
-        What all groups cost; ``inf`` if a task has none, the arrays then meaning nothing.
+        What all groups cost, or less than that; ``inf`` if a task has none, the arrays then meaning nothing.
     """
     group, excess = np.zeros(len(price), dtype=np.int64), np.zeros(len(price) if compare else 0)
-    total = solve_all(model.first, model.weight, model.copies, price, model.need, model.max_weight, group, excess)
+    if model.is_whole:
+        weight, need = model.weight.astype(np.int64, copy=False), model.need.astype(np.int64, copy=False)
+        total = solve_all(model.first, weight, model.copies, price, need, model.max_weight, group, excess)
+    else:
+        part, whole = model.weight.astype(np.float64, copy=False), model.need.astype(np.float64, copy=False)
+        total = solve_in_floats(model.first, part, model.copies, price, whole, group, excess)
     return group, excess, total
+
+
+@compiled
+def solve_in_floats(
+    first: WholeArray,
+    weight: FloatArray,
+    copies: WholeArray,
+    price: FloatArray,
+    need: FloatArray,
+    group: WholeArray,
+    excess: FloatArray,
+) -> float:
+    """Do the work of `solve_subproblems` where weights and needs are floats."""
+    total = 0.0
+    for j in range(len(need)):
+        a, b = first[j], first[j + 1]
+        cost = cheapest_in_floats(weight[a:b], price[a:b], copies[a:b], need[j], group[a:b], excess[a:b])
+        if not np.isfinite(cost):
+            return np.inf
+        total += cost
+    return total
 
 
 @compiled

@@ -1,9 +1,9 @@
 """The configuration bound by a subgradient method, for where column generation takes too long.
 
-The dual prices of the linear programme of single agents are a good start: each agent costs the value of its work on
-its best task. From there prices follow a deflected subgradient: agents that the cheapest groups of all tasks use more
-than once get dearer, unused ones cheaper. As soon as the groups together cost more than all agents, T is proven
-impossible, and the next larger T comes.
+At first each agent costs the value of its work on its best task. From there prices follow a deflected subgradient:
+agents that the cheapest groups of all tasks use more than once get dearer, unused ones cheaper. As soon as the groups
+together cost more than all agents, T is proven impossible, and the next larger T comes. Once prices have converged
+below a T that stays possible, it starts again halfway to that T, with more patience.
 
 References
 ----------
@@ -14,23 +14,23 @@ doi:10.1007/BFb0120697.
 import numpy as np
 
 from alloc.allocators.exact.knapsack import WholeArray
-from alloc.allocators.exact.knapsack_core import cheapest_by_core
+from alloc.allocators.exact.knapsack_states import MAX_STATES, cheapest_by_states, room_for_states
 from alloc.allocators.exact.makespan.configuration import PRICE_SUM
 from alloc.allocators.exact.model import Model
 from alloc.allocators.runtime.compiled import compiled
 from alloc.problems.instance import FloatArray
 
-GRID = 4096
+GRID = 2**40
 """Steps into which the need of a task is divided: weights are rounded up to them."""
 
-MAX_PAIRS = 200_000
+MAX_PAIRS = 1_000_000
 """Pairs of class and task above which there is no such bound."""
 
-FIRST_LEVEL, LAST_LEVEL = 2e-3, 1e-5
-"""How much above its best value the subgradient method wants theta, at first and at the end."""
+FIRST_LEVEL, NEXT_LEVEL, LAST_LEVEL = 1e-2, 5e-4, 1e-5
+"""How much above its best value the subgradient method wants theta: at first, after a new start, and at the end."""
 
-PATIENCE = 12
-"""Rounds without progress after which it wants half as much."""
+PATIENCE, MAX_PATIENCE = 12, 100
+"""Rounds without progress after which it wants half as much; doubled with each start up to the largest."""
 
 DEFLECTION = 0.5
 """Part of the last direction that is added to the subgradient."""
@@ -38,8 +38,9 @@ DEFLECTION = 0.5
 LEAST_RISE = 1e-6
 """Rise of theta that counts as progress."""
 
-LARGEST_RISE = 0.005
-"""Largest relative rise of T at once."""
+SMALL_RISE, LARGEST_RISE = 0.005, 0.1
+"""Relative rise of T up to which all that theta is above 1 counts, and the largest at once: of more, a quarter counts,
+as theta falls by more than T rises where travel takes long."""
 
 
 class ConfigurationAscent:
@@ -51,8 +52,8 @@ class ConfigurationAscent:
         All of its tasks must be served.
     low : float
         Proven bound in hours.
-    price : ndarray, shape (t,)
-        Value of a unit of each workload by the linear programme of single agents.
+    price : ndarray, shape (t,), optional
+        Value of a unit of each workload to begin with; all the same by default.
 
     Attributes
     ----------
@@ -60,21 +61,25 @@ class ConfigurationAscent:
         Whether its tables are of a size that can be computed.
     proven : float
         The largest T that has been proven impossible; 0 at first.
+    task_price : ndarray, shape (t,)
+        Cost of the cheapest group of each task per unit of its workload, at the best prices so far.
     """
 
-    def __init__(self, model: Model, low: float, price: FloatArray) -> None:
+    def __init__(self, model: Model, low: float, price: FloatArray | None = None) -> None:
         self._model, self._time, self.proven = model, low, 0.0
         self._count = model.classes.count.astype(np.int64)
         self.is_tractable = len(model.class_of_pair) <= MAX_PAIRS
-        value = (model.uncapped(low)[0] * price).max(axis=1)
-        self._price = self._best_price = value / (value @ self._count)
-        self._direction = np.zeros(len(value))
-        self._best, self._stale, self._level = 0.0, 0, FIRST_LEVEL
+        self.task_price = np.ones(len(model.tasks)) if price is None else price
+        self._best, self._stale, self._level, self._patience = 0.0, 0, FIRST_LEVEL, PATIENCE
+        if self.is_tractable:
+            value = (model.uncapped(low)[0] * self.task_price).max(axis=1)
+            self._price = self._best_price = value / max(1e-300, value @ self._count)
+            self._direction = np.zeros(len(value))
 
     @property
     def converged(self) -> bool:
         """Whether prices hardly change any more."""
-        return self._level < LAST_LEVEL
+        return self._patience > MAX_PATIENCE
 
     def round(self, low: float) -> bool:
         """Solve the knapsacks at the current prices, and change these; return whether a T was proven impossible.
@@ -89,22 +94,32 @@ class ConfigurationAscent:
         count, price = self._count, np.round(self._price * PRICE_SUM)
         used = np.zeros(len(count))
         weight, need = _in_steps(self._model, self._time)
-        cost, total = cheapest_groups(weight, price, count, need, used), float(price @ count)
+        costs = cheapest_groups(weight, price, count, need, used)
+        cost, total = float(costs.sum()), float(price @ count)
         theta = cost / total
         is_excluded = cost > total  # a comparison of whole numbers
         if is_excluded:
             self.proven = self._time
-            self._time *= 1 + min(LARGEST_RISE, theta - 1)
+            self._time *= 1 + max(min(SMALL_RISE, theta - 1), min(LARGEST_RISE, (theta - 1) / 4))
         if is_excluded or theta > self._best + LEAST_RISE:
             self._best, self._best_price, self._stale = min(1.0, theta), self._price, 0
+            if np.isfinite(theta):
+                self.task_price = costs / self._model.workload
         else:
             self._stale += 1
-        if self._stale > PATIENCE:
-            self._price, self._direction = self._best_price, np.zeros(len(count))
-            self._level, self._stale = self._level / 2, 0
+        if self._stale > self._patience:
+            self._restart()
         elif np.isfinite(theta):
             self._change_prices(used - count, self._best + self._level - min(1.0, theta))
         return is_excluded
+
+    def _restart(self) -> None:
+        """Go back to the best prices: for a smaller rise of theta, or at last for a smaller T, with more patience."""
+        self._price, self._direction = self._best_price, np.zeros(len(self._count))
+        self._level, self._stale = self._level / 2, 0
+        if self._level < LAST_LEVEL:
+            self._level, self._patience = NEXT_LEVEL, 2 * self._patience
+            self._time, self._best = (max(self.proven, self._time / 2) + self._time) / 2, 0.0
 
     def _change_prices(self, subgradient: FloatArray, rise: float) -> None:
         """Step along the subgradient, deflected by the last direction, to where theta may have risen by `rise`."""
@@ -126,8 +141,8 @@ def _in_steps(model: Model, time: float) -> tuple[WholeArray, WholeArray]:
 @compiled
 def cheapest_groups(
     weight: WholeArray, price: FloatArray, count: WholeArray, need: WholeArray, used: FloatArray
-) -> float:
-    """Return the cost of the cheapest groups of all tasks, and add their agents of each class to `used`.
+) -> FloatArray:
+    """Return the cost of the cheapest group of each task, shape (t,), and add their agents of each class to `used`.
 
     Parameters
     ----------
@@ -138,22 +153,19 @@ def cheapest_groups(
     need : ndarray of int64, shape (t,)
     used : ndarray, shape (k,)
     """
-    total, classes = 0.0, len(price)
+    costs, classes, states = np.empty(len(need)), len(price), room_for_states(MAX_STATES)
     some, these, cost = np.empty(classes, dtype=np.int64), np.empty(classes, dtype=np.int64), np.empty(classes)
-    copies = np.empty(classes, dtype=np.int64)
+    copies, group = np.empty(classes, dtype=np.int64), np.empty(classes, dtype=np.int64)
     for j in range(len(need)):
-        size, largest = 0, 1
+        size = 0
         for k in range(classes):
             if weight[j, k] > 0:
                 some[size], these[size], cost[size], copies[size] = k, weight[j, k], price[k], count[k]
-                largest = max(largest, weight[j, k])
                 size += 1
-        most = need[j] + largest - 1  # without an agent that can be spared
-        paid, group = cheapest_by_core(these[:size], cost[:size], copies[:size], need[j], most)
-        total += paid
+        costs[j] = cheapest_by_states(these[:size], cost[:size], copies[:size], need[j], states, group[:size])
         for q in range(size):
             used[some[q]] += group[q]
-    return total
+    return costs
 
 
 def compile_loops() -> None:

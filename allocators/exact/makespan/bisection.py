@@ -11,8 +11,8 @@ from alloc.allocators.exact.makespan.state import TIGHT, MakespanState
 from alloc.allocators.exact.model import FEW_PAIRS
 from alloc.allocators.exact.solver_model import Solver, Verdict
 
-SHARES = ((0.03, 0.01, 0.02), (0.1, 0.05, 0.05), (0.25, 0.15, 0.1))
-"""Shares of the time in which repartitions, configurations and local search take turns before the solver."""
+SHARES = ((0.02, 0.02, 0.03), (0.07, 0.05, 0.08), (0.2, 0.15, 0.2))
+"""Shares of the time of repartitions, configurations and local search, which take turns before the solver."""
 
 PROBE_SHARE = 0.1
 """Share of the time of a probe; as much goes to plans after one that stayed open."""
@@ -47,9 +47,9 @@ def least_makespan(search: Search, solver: Solver, min_served: int, until_s: flo
 def take_turns(state: MakespanState) -> None:
     """Find plans and bounds that often meet, so that no solver is needed."""
     for plans, bounds, local in SHARES if state.descent and len(state.model.class_of_pair) > FEW_PAIRS else ():
-        search_repartitions(state, plans)
-        raise_bound_by_configurations(state, bounds)
         state.search_locally(local)
+        search_repartitions(state, plans + (1 - state.local_weight) * local)
+        raise_bound_by_configurations(state, bounds)
 
 
 def bisect(state: MakespanState, solver: Solver) -> None:
@@ -65,11 +65,11 @@ def bisect(state: MakespanState, solver: Solver) -> None:
             if probe.purpose is Purpose.LAST or state.would_prove(state.lower):
                 return
             if probe.purpose is Purpose.BISECT:
-                state.unresolved = max(state.unresolved, probe.time)
+                state.unresolved = max(state.unresolved, state.model.next_makespan(probe.time))
             if not state.bounds_tried:
                 raise_bound_by_configurations(state, 2 * PROBE_SHARE)
             if state.descent:
-                search_repartitions(state, PROBE_SHARE)
+                search_repartitions(state, PROBE_SHARE * (1.5 - state.local_weight / 2))
                 state.search_locally(PROBE_SHARE / 2)
                 raise_bound_by_configurations(state, PROBE_SHARE / 2)
         probe = _next_probe(state, verdict)
@@ -77,11 +77,11 @@ def bisect(state: MakespanState, solver: Solver) -> None:
 
 def _next_probe(state: MakespanState, last: Verdict) -> Probe:
     """Choose the next T, given the verdict on the last one."""
-    upper, floor = state.upper, max(state.lower, state.unresolved)
+    upper, floor, seconds = state.upper, max(state.lower, state.unresolved), state.share_s(PROBE_SHARE)
     if state.would_prove(floor) and state.unresolved > state.lower:
         state.unresolved = 0.0
         return Probe(upper * (1 - 0.9 * PROVEN), np.inf, Purpose.LAST)
     if state.would_prove(floor) or (last is Verdict.INFEASIBLE and not state.bounds_tried):
-        return Probe(upper * (1 - TIGHT / 2), state.share_s(PROBE_SHARE), Purpose.BELOW_PLAN)
+        return Probe(upper * (1 - TIGHT / 2), seconds, Purpose.BELOW_PLAN)
     middle = float(np.sqrt(floor * upper)) if upper > 2 * floor else (floor + upper) / 2
-    return Probe(middle, state.share_s(PROBE_SHARE))
+    return Probe(middle, seconds)

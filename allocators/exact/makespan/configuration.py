@@ -28,8 +28,8 @@ from alloc.problems.instance import FloatArray, IntArray
 MAX_NEED = 20_000
 """Largest need in units up to which needs are kept as they are."""
 
-GRID = 8192
-"""Steps of the largest need otherwise: weights are rounded up to them, needs are rounded down."""
+GRID, FINE_GRID = 2**13, 2**17
+"""Steps of the largest need otherwise, at first and in the end: weights are rounded up to them, needs down."""
 
 MAX_CELLS = 30_000_000
 """Agents times steps times tables above which no prices are computed."""
@@ -39,6 +39,9 @@ PRICE_SUM = 2.0**40
 
 SMOOTHING = 0.6
 """Part of the best prices so far in those that are tried next."""
+
+WHOLE, ROUNDED = 1e-8, 0.1
+"""Relative precision of T where needs are whole, and otherwise, as a part of a step."""
 
 MAX_REUSED = 2000
 """Groups found at one T that are offered at the next, the latest ones."""
@@ -73,6 +76,8 @@ class ConfigurationProgramme:
         All of its tasks must be served.
     low : float
         Hours; no smaller T will be asked for.
+    grid : int
+        Steps of the largest need where these are no whole numbers.
 
     Attributes
     ----------
@@ -80,10 +85,12 @@ class ConfigurationProgramme:
         Agents in each class.
     is_tractable : bool
         Whether its tables are of a size that can be computed.
+    precision : float
+        Relative difference of T up to which no further solution is sought.
     """
 
-    def __init__(self, model: Model, low: float) -> None:
-        self._model = model
+    def __init__(self, model: Model, low: float, grid: int = GRID) -> None:
+        self._model, self._grid = model, grid
         _, need = model.uncapped(low)
         mask = model.classes.mask[:, model.tasks]
         if model.travel_time is None:
@@ -95,10 +102,24 @@ class ConfigurationProgramme:
         self.count = model.classes.count.astype(np.int64)
         largest = np.array([need[tasks].max() for tasks in self._tasks_alike])
         is_whole = model.unit is not None and need.max() <= MAX_NEED
-        self._steps = np.ones(len(largest)) if is_whole else largest / GRID
-        agents = np.minimum(self.count, GRID) @ (mask[:, [tasks[0] for tasks in self._tasks_alike]])
+        self._steps = np.ones(len(largest)) if is_whole else largest / grid
+        self.precision = WHOLE if is_whole else ROUNDED / grid
+        agents = np.minimum(self.count, grid) @ (mask[:, [tasks[0] for tasks in self._tasks_alike]])
         self.is_tractable = bool(agents @ (largest / self._steps) <= MAX_CELLS)
         self._known: list[WholeArray] = []
+
+    def refined(self, low: float) -> "ConfigurationProgramme | None":
+        """Return the programme in the finest steps that can be computed, or None where there are no finer ones."""
+        if self.precision == WHOLE or self._grid == FINE_GRID:
+            return None
+        grid = FINE_GRID
+        while grid > self._grid:
+            finer = ConfigurationProgramme(self._model, low, grid)
+            if finer.is_tractable:
+                finer._known = self._known
+                return finer
+            grid //= 2
+        return None
 
     def needs(self, time: float) -> list[TaskNeeds]:
         """Return the needs at T = `time`, rounded such that what is impossible so is impossible indeed."""

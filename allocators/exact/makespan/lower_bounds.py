@@ -5,8 +5,15 @@ from alloc.allocators.exact.makespan.configuration import ConfigurationProgramme
 from alloc.allocators.exact.makespan.enumeration import enumerate_groups
 from alloc.allocators.exact.makespan.relaxation import relaxed_lower_bound
 from alloc.allocators.exact.makespan.set_partitioning import solve_set_partitioning
-from alloc.allocators.exact.makespan.state import TIGHT, MakespanState
+from alloc.allocators.exact.makespan.state import MakespanState
 from alloc.allocators.exact.solver_model import Verdict
+
+FIRST_ASCENT, ASCENT = 0.05, 0.5
+"""Share of the time of the first ascent, enough as a rule for prices that guide the search for plans, and the part of
+the time for bounds that later ones take, as they soon gain little."""
+
+LEAST_ASCENT_S = 0.05
+"""Least seconds of an ascent."""
 
 REPEATABLE_ROUNDS = 60
 """Rounds of one ascent where effort is counted."""
@@ -18,20 +25,32 @@ def raise_bound_by_configurations(state: MakespanState, share: float) -> None:
     if state.ended or state.partial:
         return
     if state.model.travel_time is not None:
-        _ascend(state, state.search.elapsed_s + state.share_s(share))
+        _ascend(state, state.search.elapsed_s + state.share_s(ASCENT * share, LEAST_ASCENT_S))
         return
     if first:
         configurations = ConfigurationProgramme(state.model, state.lower)
         state.configurations = configurations if configurations.is_tractable else None
-    if state.configurations is not None:
-        _bisect_by_prices(state, state.configurations, state.search.elapsed_s + state.share_s(share))
+    until_s = state.search.elapsed_s + state.share_s(share)
+    while not state.bounds_converged and state.configurations is not None:
+        if not _bisect_by_prices(state, state.configurations, until_s):
+            return
+        finer = state.configurations.refined(state.lower)
+        state.configurations, state.bounds_converged = finer or state.configurations, finer is None
 
 
 def raise_bound_by_relaxation(state: MakespanState) -> None:
-    """Raise the lower bound by linear programmes of single agents, where not all agents can be everywhere at once."""
+    """Raise the lower bound by what fractions of agents could do, where not all agents can be everywhere at once.
+
+    Where travel takes time, prices for whole agents do so sooner than linear programmes.
+    """
     instance = state.search.instance
     if state.ended or state.partial or not (instance.has_travel_time or not instance.reach.is_complete):
         return
+    if instance.has_travel_time:
+        state.ascent = ConfigurationAscent(state.model, state.lower)
+        if state.ascent.is_tractable:
+            _ascend(state, state.search.elapsed_s + state.share_s(FIRST_ASCENT, LEAST_ASCENT_S))
+            return
     bound, state.price = relaxed_lower_bound(
         state.model, state.lower, state.upper, state.share_s(0.2), lambda: state.over
     )
@@ -68,8 +87,6 @@ def probe_by_groups(state: MakespanState, time: float, seconds: float) -> Verdic
 
 def _ascend(state: MakespanState, until_s: float) -> None:
     """Raise the lower bound by a subgradient method, where each task has a knapsack of its own."""
-    if state.ascent is None and state.price is not None:
-        state.ascent = ConfigurationAscent(state.model, state.lower, state.price)
     if state.ascent is None or not state.ascent.is_tractable:
         return
     rounds = 0
@@ -78,18 +95,20 @@ def _ascend(state: MakespanState, until_s: float) -> None:
             state.rule_out(state.ascent.proven)
         rounds += 1
         if state.repeatable and rounds >= REPEATABLE_ROUNDS:
-            return
+            break
+    state.price = state.ascent.task_price
 
 
-def _bisect_by_prices(state: MakespanState, configurations: ConfigurationProgramme, until_s: float) -> None:
-    """Bisect on T between the lower bound and the least T that dual prices do not exclude."""
+def _bisect_by_prices(state: MakespanState, configurations: ConfigurationProgramme, until_s: float) -> bool:
+    """Bisect on T between the bound and the least T that dual prices do not exclude; return whether that ended."""
     time, possible = state.lower, state.upper
-    while not state.ended and possible > state.lower * (1 + TIGHT):
+    while not state.ended and possible > state.lower * (1 + configurations.precision):
         prices = configurations.dual_prices(time, lambda: state.over or state.search.elapsed_s > until_s)
         if prices is None or not (prices.converged or prices.theta > 1):
-            return
+            return False
         if prices.theta > 1:
             state.rule_out(configurations.largest_infeasible(prices, time, possible))
         else:
             possible = max(state.lower, state.model.earliest_with_same_needs(time))
         time = (state.lower + min(possible, state.upper)) / 2
+    return not state.ended

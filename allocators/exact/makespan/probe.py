@@ -10,6 +10,9 @@ from alloc.allocators.exact.makespan.state import MakespanState
 from alloc.allocators.exact.monitor import SolverMonitor
 from alloc.allocators.exact.solver_model import Solver, SolverLimits, SolverModel, Verdict
 
+SOLVER_PART = 0.5
+"""Part of the time of a probe that the solver gets, after groups have had all of it."""
+
 
 class Purpose(Enum):
     """What a probe is for."""
@@ -43,14 +46,19 @@ def probe_makespan(state: MakespanState, solver: Solver, probe: Probe) -> Verdic
         if state.descent and find_plan(state, probe.time):
             return Verdict.FEASIBLE
         verdict = probe_by_groups(state, probe.time, probe.seconds)
-        if verdict is not Verdict.UNKNOWN:
+        if verdict is not Verdict.UNKNOWN or _building_s(state, solver) > SOLVER_PART * probe.seconds:
             return verdict
     return _probe_by_solver(state, solver, demand, probe)
 
 
+def _building_s(state: MakespanState, solver: Solver) -> float:
+    """Seconds that the solver's model takes to be built: a probe that is shorter does without it."""
+    return 2 * len(state.model.class_of_pair) / solver.pairs_per_second
+
+
 def _probe_by_solver(state: MakespanState, solver: Solver, demand: Demand, probe: Probe) -> Verdict:
-    search, build_s = state.search, 2 * len(state.model.class_of_pair) / solver.pairs_per_second
-    until_s = min(search.elapsed_s + probe.seconds + build_s, state.until_s)
+    search = state.search
+    until_s = min(search.elapsed_s + SOLVER_PART * probe.seconds + _building_s(state, solver), state.until_s)
     model = SolverModel(
         demand=demand,
         cost=None,

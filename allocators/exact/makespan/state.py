@@ -24,6 +24,12 @@ TIGHT = 1e-8
 UNLIMITED_S = 60.0
 """Seconds of which phases get their shares where there is no time limit."""
 
+LEAST_WEIGHT = 1 / 8
+"""Part of its usual time that a phase which finds nothing still gets."""
+
+TELLING_SHARE = 0.05
+"""Share of the time from which on it tells something that local search finds nothing."""
+
 
 @dataclass(eq=False)
 class MakespanState:
@@ -45,9 +51,12 @@ class MakespanState:
     lower : float
         Proven: no plan that serves `model.min_served` tasks has a smaller makespan, in hours.
     unresolved : float
-        Largest T whose probe ended without a verdict; no bound, but the lower end of the bisection.
+        Least makespan above the largest T whose probe ended without a verdict; no bound, but the lower end of the
+        bisection.
     bounds_tried : bool
         Whether linear programmes have been used for a bound; after that, a probe tries more before the solver.
+    bounds_converged : bool
+        Whether the configuration linear programme has nothing more to prove.
     configurations : ConfigurationProgramme or None
         None before that, and where the programme is too large.
     price : ndarray, shape (t,), or None
@@ -56,6 +65,8 @@ class MakespanState:
         None before it is needed.
     local_search : LocalSearchPhase or None
         None where the solver is quick enough by itself, or must find plans alone, or some tasks stay unserved.
+    local_weight : float
+        Part of its usual time that local search gets: less after each turn that found nothing.
     """
 
     search: Search
@@ -68,10 +79,12 @@ class MakespanState:
     lower: float
     unresolved: float = 0.0
     bounds_tried: bool = False
+    bounds_converged: bool = False
     configurations: ConfigurationProgramme | None = None
     price: FloatArray | None = None
     ascent: ConfigurationAscent | None = None
     local_search: LocalSearchPhase | None = None
+    local_weight: float = 1.0
 
     @classmethod
     def begin(cls, search: Search, min_served: int, until_s: float, *, descent: bool) -> "MakespanState":
@@ -162,13 +175,21 @@ class MakespanState:
     def search_locally(self, share: float) -> None:
         """Improve the fastest plan by local search for this share of the time, where it is at hand."""
         if self.local_search is not None and not self.ended:
-            self.local_search.turn(self.share_s(share, 0.05))
+            upper = self.upper
+            self.local_search.turn(self.share_s(share * self.local_weight, 0.08))
+            if share >= TELLING_SHARE or self.upper < upper:
+                self.local_weight = reweighted(self.local_weight, found=self.upper < upper)
 
     def share_s(self, share: float, least_s: float = 0.1) -> float:
         """Return this share of the stage's time in seconds, at least `least_s`; ``inf`` where effort is counted."""
         if self.repeatable:
             return float("inf")
         return max(least_s, share * (self.until_s if np.isfinite(self.until_s) else UNLIMITED_S))
+
+
+def reweighted(weight: float, *, found: bool) -> float:
+    """Return the part of its usual time that a phase gets next: all of it where its last turn found something."""
+    return 1.0 if found else max(LEAST_WEIGHT, weight / 2)
 
 
 def _simple_bound(search: Search, model: Model) -> float:

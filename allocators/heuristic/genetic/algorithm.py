@@ -10,12 +10,10 @@ from alloc.allocators.contract.built_in import BUILT_IN
 from alloc.allocators.contract.parameters import with_settings
 from alloc.allocators.contract.search import Search
 from alloc.allocators.heuristic.genetic.encoding import Encoding
-from alloc.allocators.heuristic.genetic.evolution import Evolution, GeneticParameters
+from alloc.allocators.heuristic.genetic.evolution import GeneticParameters
+from alloc.allocators.heuristic.genetic.islands import Island, evolve_islands
 from alloc.allocators.heuristic.greedy.list_schedule import greedy
 from alloc.problems import Allocation, Instance, Objective, serve_all
-
-TARGETS = (0.0, 0.5, 0.8, 0.95)
-"""Target makespans of successive epochs, between the lower bound (0) and the best so far (1)."""
 
 MOST_AGENTS = 200_000
 """Agents beyond which a generation takes longer than a run may exceed its time limit."""
@@ -29,7 +27,8 @@ class GeneticAlgorithm(Allocator):
 
     Elitist without duplicates, and restarted around the best upon stagnation, as in CHC (Eshelman 1991,
     doi:10.1016/B978-0-08-050684-5.50020-3); each epoch has another target makespan between the lower bound and the
-    best. An iteration is a generation. Populations begin with list schedules, that of `greedy` among them.
+    best. An iteration is a generation. Populations begin with list schedules, that of `greedy` among them. Each thread
+    has a population of its own, and these exchange their best; see `evolve_islands`.
 
     Parameters
     ----------
@@ -72,17 +71,9 @@ class GeneticAlgorithm(Allocator):
         assert search.best is not None
         if search.best.evaluation.served_makespan == 0:  # no task that takes time can be served
             return Proposal(Allocation.idle(instance))
-        encoding, epoch = Encoding(instance), 0
-        rng = np.random.default_rng(search.seed)
-        while not search.should_stop():
-            Evolution(search, encoding, self.parameters, rng, _target_makespan(search, epoch)).run()
-            epoch += 1
+        encoding = Encoding(instance)
+        if search.threads > 1:
+            evolve_islands(search, encoding, self.parameters)
+        else:
+            Island(search, encoding, self.parameters, np.random.default_rng(search.seed)).run()
         return Proposal()
-
-
-def _target_makespan(search: Search, epoch: int) -> float:
-    """Return the target makespan of an epoch, in hours."""
-    assert search.best is not None
-    best = search.best.evaluation.served_makespan
-    bound = min(search.lower_bound, best)
-    return max(bound + TARGETS[epoch % len(TARGETS)] * (best - bound), np.finfo(float).tiny)

@@ -1,5 +1,6 @@
 """One epoch of the genetic algorithm, on DEAP's toolbox: a population evolves towards one target makespan."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +12,7 @@ from alloc.allocators.heuristic.genetic.encoding import Encoding, Genes
 from alloc.allocators.heuristic.genetic.list_schedules import list_schedules
 from alloc.allocators.heuristic.genetic.mutation import mutate
 from alloc.allocators.heuristic.genetic.operators import cross_groups, tournament
-from alloc.problems import Objective
+from alloc.problems import Allocation, Objective
 from alloc.problems.instance import FloatArray
 
 
@@ -102,6 +103,8 @@ class Evolution:
     ) -> None:
         self.search, self.encoding, self.parameters, self.rng = search, encoding, parameters, rng
         self.target_makespan = target_makespan
+        self._population: list[Individual] = []
+        self._stagnation = 0
         self.size = parameters.population_size(encoding)
         self.energy_counts = search.objective is Objective.MAKESPAN_ENERGY
         self.toolbox = base.Toolbox()
@@ -117,15 +120,32 @@ class Evolution:
         )
         self.toolbox.register("survive", tools.selBest, k=self.size)
 
-    def run(self) -> None:
-        """Evolve until there was no better individual for `patience` generations, or the search should stop."""
-        population = self._survivors(self._evaluated(self._initial_genes()))
-        best, stagnation = population[0].fitness, 0
-        while stagnation < self.parameters.patience and not self.search.should_stop():
-            population = self._survivors(population + self._evaluated(self._offspring(population)))
-            stagnation = 0 if population[0].fitness > best else stagnation + 1
-            best = population[0].fitness
+    @property
+    def is_over(self) -> bool:
+        """Whether there was no better individual for `patience` generations."""
+        return self._stagnation >= self.parameters.patience
+
+    def run(self, generations: float = math.inf) -> int:
+        """Evolve for so many generations, or until the epoch is over or the search should stop; return how many."""
+        if not self._population:
+            self._population = self._survivors(self._evaluated(self._initial_genes()))
+        done = 0
+        while done < generations and not self.is_over and not self.search.should_stop():
+            self._select(self._offspring(self._population))
             self.search.iteration += 1
+            done += 1
+        return done
+
+    def receive(self, allocation: Allocation) -> None:
+        """Let an allocation compete with the population."""
+        if self._population:
+            self._select(self.encoding.encode(allocation)[None, :])
+
+    def _select(self, genes: Genes) -> None:
+        """Keep the best of the population and of some rows of genes."""
+        best = self._population[0].fitness
+        self._population = self._survivors(self._population + self._evaluated(genes))
+        self._stagnation = 0 if self._population[0].fitness > best else self._stagnation + 1
 
     def _initial_genes(self) -> Genes:
         """Return the best so far, the start if there is one, and noisy list schedules."""

@@ -9,6 +9,7 @@ from alloc.allocators.contract.base import Allocator, Proposal
 from alloc.allocators.contract.built_in import BUILT_IN
 from alloc.allocators.contract.search import Search
 from alloc.allocators.heuristic.greedy.swaps import reduce_distance
+from alloc.allocators.parallel.pool import side_by_side
 from alloc.problems import IDLE, Allocation, Instance, Objective, makespan_lower_bound
 
 CHECK_EVERY = 256
@@ -20,11 +21,19 @@ MOST_SCANNED = 20_000
 SLICE = 4_096
 """Agents that compiled code assigns between two checks of the clock."""
 
+LEAST_SHARED = 25_000
+"""Agents that each thread has at least."""
+
+SHARED = 0.9
+"""Part of the agents, the ablest, that several threads assign; the others make up for what is uneven then."""
+
 
 class Greedy(Allocator):
     """List scheduling for machine covering: the task with the lowest W / h next, ties to the largest workload.
 
     With travel times, an agent counts with what it does until the lower bound on the makespan. It has no parameters.
+    From 50,000 agents on, where not all reach every task at once, threads share the ablest nine tenths of them: each
+    serves all tasks by some agents of every size, and the other agents even out what is left.
 
     References
     ----------
@@ -75,10 +84,25 @@ def _by_tree(instance: Instance, search: Search | None) -> NDArray[np.intp]:
         return np.full(instance.n, IDLE, dtype=np.intp)
     horizon = makespan_lower_bound(instance) if search is None else search.lower_bound
     tree, order = TreeGreedy(instance, horizon), np.array(_order(instance))
-    for begin in range(0, instance.n, SLICE):
-        if search is not None and search.should_stop():
-            break
-        tree.assign(order[begin : begin + SLICE])
+    threads = 1 if search is None else min(search.threads, instance.n // LEAST_SHARED)
+    shared = int(SHARED * instance.n) if threads > 1 else 0
+
+    def assign(part: TreeGreedy, agents: NDArray[np.intp]) -> None:
+        for begin in range(0, len(agents), SLICE):
+            if search is not None and search.should_stop():
+                break
+            part.assign(agents[begin : begin + SLICE])
+
+    if shared:
+        twins = [tree.twin() for _ in range(threads)]
+        with side_by_side(threads) as run_all:  # every thread serves all tasks, by agents of all sizes
+            list(
+                run_all(
+                    lambda part: assign(twins[part], np.ascontiguousarray(order[part:shared:threads])), range(threads)
+                )
+            )
+        tree.join(twins)
+    assign(tree, order[shared:])
     return tree.task
 
 

@@ -4,6 +4,7 @@ An agent visits a node only if the bounding box is within its range and the node
 than the best candidate so far; where that task is within reach, the rest of the node is skipped.
 """
 
+from copy import copy
 from typing import NamedTuple, TypedDict
 
 import numpy as np
@@ -108,6 +109,24 @@ class TreeGreedy:
     def assign(self, agents: Indices) -> None:
         """Assign each of `agents`, in this order, to the worst-served task within its reach."""
         _assign(agents, self._tree, self._tasks, self._agents)
+
+    def twin(self) -> "TreeGreedy":
+        """Return one for other agents, which counts those of this one so far and shares the array of tasks."""
+        twin = copy(self)
+        twin._tree = self._tree._replace(worst=self._tree.worst.copy())
+        twin._tasks = self._tasks._replace(
+            group_ability=self._tasks.group_ability.copy(), coverage=self._tasks.coverage.copy()
+        )
+        return twin
+
+    def join(self, twins: "list[TreeGreedy]") -> None:
+        """Count what agents of twins do as well; they had none in common, and began when this one had none."""
+        for twin in twins:
+            self._tasks.group_ability[:] += twin._tasks.group_ability
+        self._tasks.coverage[:] = self._tasks.group_ability / np.where(
+            self._tasks.workload > 0, self._tasks.workload, 1
+        )
+        update_all(self._tree, self._tasks)
 
 
 class _Lists(TypedDict):

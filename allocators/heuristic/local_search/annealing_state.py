@@ -1,8 +1,11 @@
-"""The state of simulated annealing: a plan, its target makespan, and the arrays for the compiled loops."""
+"""The state of simulated annealing: a plan, its target makespan, arrays for the loops, and penalties that adapt."""
+
+import math
+from copy import copy, deepcopy
 
 import numpy as np
 
-from alloc.allocators.heuristic.local_search.annealing import anneal
+from alloc.allocators.heuristic.local_search.annealing import SMALLEST_GAIN, anneal
 from alloc.allocators.heuristic.local_search.candidates import arrays_and_candidates, mean_candidate_cost
 from alloc.allocators.heuristic.local_search.instance_arrays import Int32Array
 from alloc.allocators.heuristic.local_search.moves import recompute
@@ -18,12 +21,28 @@ from alloc.allocators.heuristic.local_search.plan import (
     workspace,
 )
 from alloc.problems import IDLE, Allocation, Instance
+from alloc.problems.instance import IntArray
 
 PRICE_DECAY = 0.99
 """Power by which the prices of tasks fall towards 1 in each run in which the cost counts."""
 
 ROUNDING = 1e-12
 """Relative part by which demands are lowered, against rounding errors of sums."""
+
+RISE, FALL = 1.2, 0.9
+"""Factors by which the penalty changes after a period that ends with a shortfall, and without one."""
+
+LOWEST, HIGHEST = 0.1, 100.0
+"""Limits of the factor; 1 to begin with."""
+
+EXCHANGES_PER_AGENT = 5.0
+"""Length of a period."""
+
+LEAST_EXCHANGES = 250.0
+"""Exchanges per agent that the budget must allow, for it takes many periods."""
+
+PATIENCE = 3
+"""Periods in a row that end with a shortfall, after one more of which the search returns to the best plan."""
 
 
 class AnnealingState:
@@ -58,6 +77,14 @@ class AnnealingState:
         self.mean_ability = float(self.arrays.ability.mean())
         self._integer_ability = float(self.arrays.ability.max()) if self.arrays.integer_ability else np.inf
 
+    def twin(self, seed: int | list[int]) -> "AnnealingState":
+        """Return another state for the same instance, with the same arrays and random numbers of its own."""
+        twin = copy(self)
+        twin.workspace = workspace(seed)
+        random = np.random.default_rng(seed).integers(1, 2**63, 1, dtype=np.uint64)
+        twin.plan = idle_plan(self.instance.n, self.instance.m, random)
+        return twin
+
     @property
     def n_short(self) -> int:
         """Number of tasks with a shortfall."""
@@ -86,9 +113,60 @@ class AnnealingState:
         self.plan.cost[BEST] = np.inf
         self.plan.counter[N_MOVES] = self.instance.n + 1  # so that all of the first best plan is written
 
+    def return_to_best(self) -> None:
+        """Continue from `best`, if there is one, with the prices as they are."""
+        if self.best_cost < np.inf:
+            self._set_groups(self.plan.best_group.copy())
+            self.recompute()
+            self.plan.counter[N_MOVES] = 0
+
     def weights(self, cost: float, noise: float, short_task: float, shortfall: float) -> Weights:
         """Return the weights of exchanges; see `Weights`."""
         return Weights(cost, noise, short_task, shortfall, 2.0, self._integer_ability)
+
+    def begin_part(self, whole: "AnnealingState", part: int, part_of_task: IntArray, part_of_agent: IntArray) -> None:
+        """Continue from another state, with some of its tasks and agents; those of other parts stay as they are.
+
+        Parameters
+        ----------
+        whole : AnnealingState
+        part : int
+            The number of this part.
+        part_of_task, part_of_agent : ndarray of int, shape (m,) and (n,)
+            Agents belong to the part of their task; idle ones to any. At least one task is of another part.
+        """
+        plan, idle = deepcopy(whole.plan), self.instance.m
+        self.makespan, self._least_slots = whole.makespan, whole._least_slots
+        elsewhere = np.flatnonzero(part_of_task != part)
+        plan.demand[elsewhere] = 0.0  # no exchange is made with tasks that need nothing
+        spare = plan.slot[plan.begin[idle] : plan.begin[idle] + plan.size[idle]].copy()
+        mine = spare[part_of_agent[spare] == part]
+        plan.group_of_agent[spare[part_of_agent[spare] != part]] = elsewhere[0]
+        plan.slot[plan.begin[idle] : plan.begin[idle] + len(mine)] = mine
+        plan.size[idle], plan.position[mine] = len(mine), np.arange(len(mine))
+        short = np.flatnonzero(plan.group_ability[:-1] < plan.demand[:-1])
+        plan.short_task[: len(short)], plan.counter[N_SHORT] = short, len(short)
+        plan.short_position[:] = -1
+        plan.short_position[short] = np.arange(len(short))
+        plan.best_group[:], plan.counter[N_MOVES] = plan.group_of_agent, 0
+        plan.cost[BEST] = np.inf if len(short) else plan.cost[CURRENT]
+        self.plan = plan._replace(random=self.plan.random)
+
+    def join(self, parts: "list[AnnealingState]", part_of_task: IntArray, part_of_agent: IntArray) -> None:
+        """Take over the plans of parts that began from this state; see `begin_part`."""
+        group, best = self.plan.group_of_agent.copy(), self.plan.group_of_agent.copy()
+        cost = self.cost
+        for number, part in enumerate(parts):
+            is_mine, tasks = part_of_agent == number, np.flatnonzero(part_of_task == number)
+            group[is_mine], best[is_mine] = part.plan.group_of_agent[is_mine], part.plan.best_group[is_mine]
+            self.plan.price[tasks] = part.plan.price[tasks]
+            self._least_slots = np.maximum(self._least_slots, part._least_slots)
+            cost += part.best_cost - self.cost
+        if cost < self.best_cost * (1 - SMALLEST_GAIN):
+            self.plan.best_group[:], self.plan.cost[BEST] = best, cost
+        self._set_groups(group)
+        self.recompute()
+        self.plan.counter[N_MOVES] = self.instance.n + 1  # the journal of moves is that of no plan
 
     def run(self, steps: int, weights: Weights, cooling: float = 1.0) -> float:
         """Make exchanges; return the last noise."""
@@ -145,6 +223,45 @@ class AnnealingState:
         is_full = self.plan.size >= capacity
         self._least_slots = np.where(is_full, np.minimum(2 * capacity, self.instance.n), capacity)
         self._set_groups(self.plan.group_of_agent.copy())
+
+
+class PenaltyFactor:
+    """Strategic oscillation: the factor on the penalties of shortfalls, and the returns to the best plan.
+
+    The factor rises where plans stay short, and falls where none is. Where the makespan leaves much room, a low penalty
+    lets shortfalls pass from task to task for less energy. At the very least makespan few plans have none, and a search
+    that has lost them seldom finds another: it returns to the best one.
+
+    Parameters
+    ----------
+    state : AnnealingState
+    exchanges : int
+        Exchanges in an iteration.
+    allowed : float
+        Exchanges per agent that the budget allows.
+
+    Attributes
+    ----------
+    value : float
+    """
+
+    def __init__(self, state: AnnealingState, exchanges: int, allowed: float) -> None:
+        self.value, self._state = 1.0, state
+        self._period = EXCHANGES_PER_AGENT * state.instance.n / exchanges if allowed >= LEAST_EXCHANGES else math.inf
+        self._iterations, self._short_periods = 0, 0
+
+    def update(self, iterations: int) -> None:
+        """Take note of so many iterations more."""
+        self._iterations += iterations
+        if self._iterations < self._period:
+            return
+        self._iterations = 0
+        is_short = self._state.n_short > 0
+        self.value = min(HIGHEST, max(LOWEST, self.value * (RISE if is_short else FALL)))
+        self._short_periods = self._short_periods + 1 if is_short else 0
+        if self._short_periods > PATIENCE:
+            self._state.return_to_best()
+            self._short_periods = 0
 
 
 def _as_allocation(group: Int32Array, idle: int) -> Allocation:

@@ -2,13 +2,16 @@
 
 import math
 import time
+from dataclasses import dataclass
 
 import numpy as np
 
+from alloc.allocators.contract.clock import Clock
 from alloc.allocators.contract.search import Search
-from alloc.allocators.heuristic.local_search.annealing_state import AnnealingState
-from alloc.allocators.heuristic.local_search.clock import Clock
+from alloc.allocators.heuristic.local_search.annealing_state import AnnealingState, PenaltyFactor
 from alloc.allocators.heuristic.local_search.parameters import LocalSearchParameters
+from alloc.allocators.heuristic.local_search.parts import MOST_STATES, Parts, Team
+from alloc.allocators.parallel.pool import side_by_side
 from alloc.problems import IDLE, Allocation, Objective, only_allowed
 from alloc.problems.evaluation import RELATIVE_TOLERANCE
 from alloc.problems.instance import FloatArray, IntArray
@@ -29,6 +32,9 @@ energy has its turn."""
 REPORT_INTERVAL = 20.0
 """Time between two reports, as a multiple of the time that scoring one plan takes."""
 
+REPORT_ITERATIONS, AGENTS_PER_ITERATION = 20, 500
+"""Iterations between two reports where the clock must not matter; more where there are so many times more agents."""
+
 MOVES_NOISE = 1.0
 """First noise where moves have a price, relative to the mean cost: much, as nearly all moves cost the same."""
 
@@ -43,9 +49,7 @@ def improve(
     iterations: float = math.inf,
     parameters: LocalSearchParameters | None = None,
 ) -> None:
-    """Improve ``search.best``, which must exist, and submit better plans.
-
-    Ends when the search should stop, and before that at either limit.
+    """Improve ``search.best``, which must exist, and submit better plans until the search or a limit ends.
 
     Parameters
     ----------
@@ -65,122 +69,176 @@ def improve(
     if clock.is_over:
         return
     parameters = parameters or LocalSearchParameters()
+    with side_by_side(min(search.threads, MOST_STATES)) as run_all:
+        _improve(search, Team.of(search, parameters.neighbours, run_all), parameters, clock)
+
+
+def _improve(search: Search, team: Team, parameters: LocalSearchParameters, clock: Clock) -> None:
     energy_counts = search.objective is Objective.MAKESPAN_ENERGY
     if clock.is_endless and energy_counts:
-        _improve_endlessly(search, parameters, clock)
+        _improve_endlessly(search, team, parameters, clock)
         return
-    state = AnnealingState(search.instance, search.seed, parameters.neighbours)
-    if energy_counts:
-        reduce_makespan(search, state, parameters, clock.part(parameters.makespan_share), patience=PATIENCE)
-    else:
-        reduce_makespan(search, state, parameters, clock)
-    if energy_counts and clock.is_long:
-        reduce_energy(search, state, parameters, clock.part(FIRST_CYCLE_SHARE))
-    if energy_counts:
-        reduce_energy(search, state, parameters, clock)
+    reduction = MakespanReduction(search, team, parameters)
+    if not energy_counts:
+        reduction.run(clock)
+        return
+    reduction.run(clock.part(parameters.makespan_share), patience=PATIENCE)
+    if clock.is_long:
+        reduce_energy(search, team, parameters, clock.part(FIRST_CYCLE_SHARE))
+    reduce_energy(search, team, parameters, clock)
 
 
-def _improve_endlessly(search: Search, parameters: LocalSearchParameters, clock: Clock) -> None:
+def _improve_endlessly(search: Search, team: Team, parameters: LocalSearchParameters, clock: Clock) -> None:
     """Alternate between makespan and energy, each turn twice as long as the one before."""
-    state = AnnealingState(search.instance, search.seed, parameters.neighbours)
     cycle = parameters.first_cycle
     while not clock.is_over:
-        reduce_makespan(search, state, parameters, Clock(search, until_iteration=search.iteration + cycle))
-        reduce_energy(search, state, parameters, Clock(search, until_iteration=search.iteration + cycle))
+        MakespanReduction(search, team, parameters).run(Clock(search, until_iteration=search.iteration + cycle))
+        reduce_energy(search, team, parameters, Clock(search, until_iteration=search.iteration + cycle))
         cycle *= 2
 
 
-def reduce_makespan(
-    search: Search,
-    state: AnnealingState,
-    parameters: LocalSearchParameters,
-    clock: Clock,
-    *,
-    patience: float | None = None,
-) -> None:
-    """Attempt target makespans between the lower bound and the best, closer to the best after each failure.
+class MakespanReduction:
+    """Attempts at target makespans between the lower bound and the best plan, closer to the best after each failure.
 
-    With `patience`, ends early when the last improvement was that many times as long ago as it took, but not in the
-    first `LEAST_SHARE` of the clock.
+    Several threads make the next attempts ahead of time, as if all before failed; most do.
+
+    Parameters
+    ----------
+    search : Search
+        It has a plan.
+    team : Team
+    parameters : LocalSearchParameters
     """
-    assert search.fastest is not None
-    state.begin(search.fastest.allocation, search.fastest.evaluation.served_makespan)
-    iterations, fraction, attempts, improved = float(parameters.attempt_iterations), 0.0, 0, 0.0
-    while not clock.is_over and not search.fast_enough:
-        fastest = search.fastest.evaluation
-        best = fastest.served_makespan
-        bound = min(search.lower_bound, best) if fastest.makespan is not None else 0.5 * best
-        if bound >= best * (1 - RELATIVE_TOLERANCE):
-            return
-        if patience is not None and clock.progress > max(LEAST_SHARE, (1 + patience) * improved):
-            return
-        initial = parameters.attempt_noise[attempts % len(parameters.attempt_noise)]
-        noise = state.mean_ability * np.geomspace(initial, parameters.attempt_final_noise, int(iterations) + 1)[1:]
-        reached = _attempt(search, state, clock, bound + fraction * (best - bound), noise, parameters.exchanges)
-        fraction = 0.5 * fraction if reached else min(0.5 * (1 + fraction), 0.999)
-        iterations *= 1.0 if reached else parameters.attempt_growth
-        attempts += 1
-        if search.fastest.evaluation.served_makespan < best:
-            improved = clock.progress
+
+    def __init__(self, search: Search, team: Team, parameters: LocalSearchParameters) -> None:
+        self._search, self._team, self._parameters = search, team, parameters
+        self._iterations, self._fraction, self._count = float(parameters.attempt_iterations), 0.0, 0
+        self._known: Allocation | None = None
+
+    def run(self, clock: Clock, *, patience: float | None = None) -> None:
+        """Go on until the clock ends, from where the last run ended or from a better plan found elsewhere.
+
+        With `patience`, ends early when the last improvement was that many times as long ago as it took, but not in the
+        first `LEAST_SHARE` of the clock.
+        """
+        search, improved = self._search, 0.0
+        assert search.fastest is not None
+        if search.fastest.allocation is not self._known:
+            for state in self._team.states:
+                state.begin(search.fastest.allocation, search.fastest.evaluation.served_makespan)
+            self._iterations, self._fraction = float(self._parameters.attempt_iterations), 0.0
+        while not clock.is_over and not search.fast_enough:
+            fastest = search.fastest.evaluation
+            best = fastest.served_makespan
+            bound = min(search.lower_bound, best) if fastest.makespan is not None else 0.5 * best
+            has_waited = patience is not None and clock.progress > max(LEAST_SHARE, (1 + patience) * improved)
+            if has_waited or bound >= best * (1 - RELATIVE_TOLERANCE):
+                return
+            self._attempt(clock, bound, best)
+            if search.fastest.evaluation.served_makespan < best:
+                improved = clock.progress
+        self._known = search.fastest.allocation
+
+    def _attempt(self, clock: Clock, bound: float, best: float) -> None:
+        """Make an attempt by each thread, and choose how the next ones go on."""
+        attempts = [self._next_attempt(number, clock, bound, best) for number in range(len(self._team.states))]
+        for attempt in self._team.run_all(lambda one: one.run(clock, self._parameters.exchanges), attempts):
+            self._search.iteration += attempt.done
+            attempt.submit(self._search)
+        self._count += len(attempts)
+        for attempt in attempts:
+            if attempt.is_reached:
+                self._fraction, self._iterations = 0.5 * attempt.fraction, attempt.iterations
+                break
+
+    def _next_attempt(self, number: int, clock: Clock, bound: float, best: float) -> "_Attempt":
+        parameters, state = self._parameters, self._team.states[number]
+        initial = parameters.attempt_noise[(self._count + number) % len(parameters.attempt_noise)]
+        levels = np.geomspace(initial, parameters.attempt_final_noise, int(self._iterations) + 1)[1:]
+        most = int(min(clock.iterations_of(number, len(self._team.states)), len(levels)))
+        makespan = bound + self._fraction * (best - bound)
+        attempt = _Attempt(state, self._fraction, makespan, state.mean_ability * levels[:most], self._iterations)
+        self._fraction = min(0.5 * (1 + self._fraction), 0.999)
+        self._iterations *= parameters.attempt_growth
+        return attempt
 
 
-def _attempt(
-    search: Search, state: AnnealingState, clock: Clock, makespan: float, noise: FloatArray, exchanges: int
-) -> bool:
-    """Look for a plan within a target makespan, with the noise of each iteration; return whether one was found."""
-    assert search.fastest is not None
-    state.set_target(makespan)
-    for level in noise.tolist():
-        if clock.is_over or not state.n_short:
-            break
-        state.run(exchanges, state.weights(0.0, level, 0.0, 1.0))
-        search.iteration += 1
-    fastest = search.fastest.evaluation.served_makespan
-    # where travel takes time, only the evaluation knows the makespan
-    if not state.n_short or not state.arrays.instant_travel or state.current_makespan < fastest:
-        search.submit(state.allocation)
-    return not state.n_short
+@dataclass
+class _Attempt:
+    """An attempt at a target makespan, with the noise of each iteration."""
+
+    state: AnnealingState
+    fraction: float
+    makespan: float
+    noise: FloatArray
+    iterations: float
+    done: int = 0
+
+    def run(self, clock: Clock, exchanges: int) -> "_Attempt":
+        """Look for a plan within the target makespan."""
+        self.state.set_target(self.makespan)
+        for level in self.noise.tolist():
+            if clock.is_over or not self.state.n_short:
+                break
+            self.state.run(exchanges, self.state.weights(0.0, level, 0.0, 1.0))
+            self.done += 1
+        return self
+
+    @property
+    def is_reached(self) -> bool:
+        return not self.state.n_short
+
+    def submit(self, search: Search) -> None:
+        """Submit the plan if it may be faster than the fastest."""
+        assert search.fastest is not None
+        fastest = search.fastest.evaluation.served_makespan
+        # where travel takes time, only the evaluation knows the makespan
+        if self.is_reached or not self.state.arrays.instant_travel or self.state.current_makespan < fastest:
+            search.submit(self.state.allocation)
 
 
-def reduce_energy(search: Search, state: AnnealingState, parameters: LocalSearchParameters, clock: Clock) -> None:
+def reduce_energy(search: Search, team: Team, parameters: LocalSearchParameters, clock: Clock) -> None:
     """Anneal within the makespan of the best plan; what is left of the budget is one cooling cycle."""
-    best = search.best
+    best, state = search.best, team.states[0]
     assert best is not None
     if clock.is_over or best.evaluation.cost == 0:
         return
     plan = _plan_in_force(search)
-    state.begin(
-        best.allocation if plan is None else _serving(plan, best.allocation, search.instance.m), search.makespan_limit
-    )
+    start = best.allocation if plan is None else _serving(plan, best.allocation, search.instance.m)
+    state.begin(start, search.makespan_limit)
     clock = Clock(search, clock.until_s, clock.until_iteration)
-    report = _Reporter(search, state)
+    report, parts = _Reporter(search, state), Parts(team, search.seed)
     final = parameters.final_noise
-    state.run(parameters.exchanges, parameters.weights(state, final, HARD))  # measures the pace
-    search.iteration += 1
+    search.iteration += parts.run(parts.count, parameters.exchanges, parameters.weights(state, final, HARD))  # the pace
     exchanges = parameters.exchanges * clock.iterations_left / search.instance.n
     initial = parameters.initial_noise if plan is None else MOVES_NOISE
     initial *= parameters.noise_reduction(exchanges)
+    factor = PenaltyFactor(state, parameters.exchanges, exchanges)
     while not clock.is_over:
         progress = clock.progress
         noise = initial * (final / initial) ** progress
         is_hard = initial <= final * 1.001 or progress > HARD_FROM
-        state.run(parameters.exchanges, parameters.weights(state, noise, HARD if is_hard else 1.0))
-        search.iteration += 1
+        weights = parameters.weights(state, noise, HARD if is_hard else factor.value)
+        made = parts.run(clock.until_iteration - search.iteration, parameters.exchanges, weights)
+        search.iteration += made
+        factor.update(made)
         report()
     report(at_once=True)
 
 
 class _Reporter:
-    """Submits the best plan of an annealing state, at intervals that keep the time for scoring small."""
+    """Submits the best plan of an annealing state, at intervals that keep the time for scoring small.
+
+    A plan may be faster than it has to be, and is the fastest then: without a time limit, the intervals are counted.
+    """
 
     def __init__(self, search: Search, state: AnnealingState) -> None:
         self.search, self.state = search, state
-        self.submitted_cost, self.next_s = np.inf, 0.0
+        self.submitted_cost, self.next_s, self.next_iteration = np.inf, 0.0, 0
 
     def __call__(self, *, at_once: bool = False) -> None:
         """Submit the best plan if it is new, and if it is time to or `at_once`."""
-        is_new = self.state.best_cost < self.submitted_cost
-        if not is_new or not (at_once or time.monotonic() >= self.next_s):
+        if self.state.best_cost >= self.submitted_cost or not (at_once or self._is_due()):
             return
         begin = time.monotonic()
         self.submitted_cost = self.state.best_cost
@@ -188,6 +246,13 @@ class _Reporter:
         if found is not None:
             self.search.submit(found)
         self.next_s = time.monotonic() + REPORT_INTERVAL * (time.monotonic() - begin)
+        wait = max(REPORT_ITERATIONS, self.search.instance.n // AGENTS_PER_ITERATION)
+        self.next_iteration = self.search.iteration + wait
+
+    def _is_due(self) -> bool:
+        if self.search.budget.time_limit_s is None:
+            return self.search.iteration >= self.next_iteration
+        return time.monotonic() >= self.next_s
 
 
 def repair(search: Search, *, seconds: float) -> None:

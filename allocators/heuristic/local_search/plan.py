@@ -196,7 +196,7 @@ def idle_plan(n: int, m: int, random: NDArray[np.uint64]) -> Plan:
     )
 
 
-def workspace(seed: int) -> Workspace:
+def workspace(seed: int | list[int]) -> Workspace:
     """Return buffers for exchanges, with noise from `seed`."""
     uniform = np.random.default_rng(seed).uniform(1e-9, 1 - 1e-9, NOISE_SIZE)
     ability, other_ability, extra_cost, cost = (np.empty(2 * POOL_BY_SUMS) for _ in range(4))

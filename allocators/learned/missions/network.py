@@ -9,13 +9,12 @@ from alloc.allocators.learned.missions.network_arrays import HIDDEN, MissionWeig
 
 
 class MissionNetwork(nn.Module):
-    """Scores of options, each seen beside all others by attention; and the value of the situation.
+    """Scores of options, each seen beside all others by attention.
 
     Options are tasks that the agent knows and can take, looking around, and staying. Each becomes a token; the tokens
     are pooled by attention; the score of an option is read from its token and the pooled one, with a linear part of its
     features. Without order and of any number, it is invariant to permutations (Zaheer et al. 2017, arXiv:1703.06114;
-    pooling by attention as in Lee et al. 2019, arXiv:1810.00825). The critic has layers of its own, so that what it
-    learns does not disturb the scores.
+    pooling by attention as in Lee et al. 2019, arXiv:1810.00825).
     """
 
     def __init__(self) -> None:
@@ -26,11 +25,9 @@ class MissionNetwork(nn.Module):
         self.context = nn.Linear(HIDDEN, HIDDEN, bias=False)
         self.out = nn.Linear(HIDDEN, 1, bias=False)
         self.skip = nn.Linear(FEATURES, 1, bias=False)
-        self.critic = nn.Sequential(nn.Linear(FEATURES, HIDDEN), nn.LeakyReLU(0.1))
-        self.value = nn.Linear(HIDDEN, 1)
 
-    def forward(self, options: Tensor, is_option: Tensor) -> tuple[Tensor, Tensor]:
-        """Return scores and values.
+    def forward(self, options: Tensor, is_option: Tensor) -> Tensor:
+        """Return the scores of options.
 
         Parameters
         ----------
@@ -42,16 +39,13 @@ class MissionNetwork(nn.Module):
         -------
         scores : Tensor, shape (batch, options)
             ``-inf`` where there is no option.
-        values : Tensor, shape (batch,)
         """
         token = nn.functional.leaky_relu(self.inner(options), 0.1)
         attention = self.query(token).squeeze(-1).masked_fill(~is_option, -torch.inf).softmax(-1)
         pooled = (attention.unsqueeze(-1) * token).sum(-2)
         both = nn.functional.leaky_relu(self.own(token) + self.context(pooled).unsqueeze(-2), 0.1)
-        scores = (self.out(both) + self.skip(options)).squeeze(-1)
-        weight = is_option.unsqueeze(-1) / is_option.sum(-1)[:, None, None].clamp(min=1)
-        values = self.value((self.critic(options) * weight).sum(-2)).squeeze(-1)
-        return scores.masked_fill(~is_option, -torch.inf), values
+        scores: Tensor = (self.out(both) + self.skip(options)).squeeze(-1)
+        return scores.masked_fill(~is_option, -torch.inf)
 
 
 def compiled_weights(network: MissionNetwork) -> MissionWeights:

@@ -37,7 +37,7 @@ def expect(situation: Situation, rank: IntArray, others: IntArray, rate: FloatAr
     ----------
     situation : Situation
     rank : ndarray of int, shape (n,)
-        Others by the hours at which they arrive; those that have no task last.
+        Others by the hours at which they arrive; then -1, and -2 - i for each i that has no task.
     others, rate, without : ndarray, shape (m,)
         Others at each task or on their way, their ability, and the hour at which they have done it.
     """
@@ -46,9 +46,13 @@ def expect(situation: Situation, rank: IntArray, others: IntArray, rate: FloatAr
     rate[:] = 0.0
     without[:] = np.inf
     done = np.zeros(len(without))
-    found = 0
+    rank[:] = -1
+    found, last = 0, len(rank)
     for i in range(len(target)):
-        if counts[i] and target[i] >= 0:
+        if counts[i] and target[i] < 0:
+            last -= 1
+            rank[last] = -2 - i
+        elif counts[i]:
             place = found
             while place > 0 and arrives[rank[place - 1]] > arrives[i]:
                 rank[place] = rank[place - 1]
@@ -64,36 +68,45 @@ def expect(situation: Situation, rank: IntArray, others: IntArray, rate: FloatAr
             rate[j] += situation.other[known.STRENGTH, i]
             done[j] += situation.other[known.STRENGTH, i] * begin
             without[j] = (situation.task[known.LEFT, j] + done[j]) / rate[j]
-    rank[found:] = -1
 
 
 @compiled
-def done_with(situation: Situation, rank: IntArray, j: int, arrival: float, left: float) -> float:
-    """Return the hour at which a task is done if the agent arrives at an hour."""
-    arrives, since = situation.other[known.ARRIVES], situation.task[known.KNOWN_AT, j]
+def in_turn(rank: IntArray, target: IntArray, tasks: int) -> tuple[IntArray, IntArray]:
+    """Return who comes to each task first, and who comes there after each other agent; -1 for nobody."""
+    first, following = np.full(tasks, -1), np.full(len(rank), -1)
+    for place in range(len(rank) - 1, -1, -1):
+        i = rank[place]
+        if i >= 0:
+            following[i] = first[target[i]]
+            first[target[i]] = i
+    return first, following
+
+
+@inlined
+def done_with(
+    situation: Situation, first: int, following: IntArray, arrival: float, left: float, since: float
+) -> float:
+    """Return the hour at which a task is done if the agent arrives at an hour, with others who come there in turn."""
+    arrives, strength, ability = (
+        situation.other[known.ARRIVES],
+        situation.other[known.STRENGTH],
+        situation.own[known.ABILITY],
+    )
     rate = work = 0.0
-    hour = np.inf
-    is_in = False
-    for place in range(len(rank) + 1):
-        i = rank[place] if place < len(rank) else -1
-        if i >= 0 and situation.target[i] != j:
-            continue
-        if not is_in and (i < 0 or arrives[i] > arrival):
-            begin = max(arrival, since)
-            if begin >= hour:
-                return hour
-            is_in = True
-            rate += situation.own[known.ABILITY]
-            work += situation.own[known.ABILITY] * begin
-            hour = (left + work) / rate
-        if i < 0:
-            return hour
-        begin = max(arrives[i], since)
+    hour, i, is_in = np.inf, first, False
+    while i >= 0 or not is_in:
+        is_next = not is_in and (i < 0 or arrives[i] > arrival)
+        begin = max(arrival if is_next else arrives[i], since)
         if begin >= hour:
-            return hour
-        rate += situation.other[known.STRENGTH, i]
-        work += situation.other[known.STRENGTH, i] * begin
+            break
+        added = ability if is_next else strength[i]
+        rate += added
+        work += added * begin
         hour = (left + work) / rate
+        if is_next:
+            is_in = True
+        else:
+            i = following[i]
     return hour
 
 
@@ -122,6 +135,7 @@ def fill_options(
         Scratch, see `expect`.
     """
     expect(situation, rank, others, rate, without)
+    first, following = in_turn(rank, situation.target, len(without))
     count = 0
     for j in range(len(situation.can)):
         if situation.can[j]:
@@ -135,9 +149,9 @@ def fill_options(
     count += 1
     options[:count] = 0
     for row in range(tasks):
-        fill_task(situation, choice[row], options[row], rank, others[choice[row]], without[choice[row]])
-    for row in range(tasks):
-        options[row, names.CROWDING] = crowding(situation, choice, tasks, row)
+        j = choice[row]
+        fill_task(situation, j, options[row], rank, first[j], following, others[j], without[j])
+    fill_crowding(situation, choice[:tasks], options)
     for row in range(tasks, count):
         option = options[row]
         if choice[row] == LOOK:
@@ -150,7 +164,16 @@ def fill_options(
 
 
 @inlined
-def fill_task(situation: Situation, j: int, option: Singles, rank: IntArray, others: int, without: float) -> None:
+def fill_task(
+    situation: Situation,
+    j: int,
+    option: Singles,
+    rank: IntArray,
+    first: int,
+    following: IntArray,
+    others: int,
+    without: float,
+) -> None:
     """Fill the features of a task."""
     own, task = situation.own, situation.task
     hour, scale = own[known.HOUR], time_scale(own)
@@ -161,7 +184,7 @@ def fill_task(situation: Situation, j: int, option: Singles, rank: IntArray, oth
     left = task[known.LEFT, j]
     if others == 0 and not is_there:
         left += task[known.GROWTH, j] * (arrival - task[known.KNOWN_AT, j])
-    with_me = max(hour, done_with(situation, rank, j, arrival, left))
+    with_me = max(hour, done_with(situation, first, following, arrival, left, task[known.KNOWN_AT, j]))
     option[names.TRAVEL] = min(distance / own[known.SPAN], 2.0) if own[known.SPAN] > 0 else 0.0
     option[names.WITH_ME] = squashed((with_me - hour) / scale)
     option[names.WITHOUT] = squashed(max(0.0, without - hour) / scale)
@@ -179,34 +202,35 @@ def fill_task(situation: Situation, j: int, option: Singles, rank: IntArray, oth
     option[names.GROWTH] = squashed(task[known.GROWTH, j] / own[known.ABILITY])
     energy = own[known.ENERGY_PER_DISTANCE] * distance
     option[names.ENERGY] = min(1.0, energy / own[known.BATTERY]) if energy > 0 else 0.0
-    option[names.RIVALS] = squashed(rivals(situation, j, distance) / 3.0)
+    option[names.RIVALS] = squashed(rivals(situation, rank, j, distance) / 3.0)
 
 
 @inlined
-def rivals(situation: Situation, j: int, distance: float) -> float:
+def rivals(situation: Situation, rank: IntArray, j: int, distance: float) -> float:
     """Return how many others that have no task are nearer to one."""
     other, found = situation.other, 0.0
-    for i in range(len(situation.counts)):
-        if situation.counts[i] and situation.target[i] < 0:
-            x = other[known.OTHER_X, i] - situation.task[known.TASK_X, j]
-            y = other[known.OTHER_Y, i] - situation.task[known.TASK_Y, j]
-            z = other[known.OTHER_Z, i] - situation.task[known.TASK_Z, j]
-            found += x * x + y * y + z * z < distance * distance
+    x, y, z = situation.task[known.TASK_X, j], situation.task[known.TASK_Y, j], situation.task[known.TASK_Z, j]
+    for place in range(len(rank) - 1, -1, -1):
+        if rank[place] >= -1:
+            break
+        i = -2 - rank[place]
+        dx, dy, dz = other[known.OTHER_X, i] - x, other[known.OTHER_Y, i] - y, other[known.OTHER_Z, i] - z
+        found += dx * dx + dy * dy + dz * dz < distance * distance
     return found
 
 
-@inlined
-def crowding(situation: Situation, choice: IntArray, tasks: int, row: int) -> float:
-    """Return how much other work there is near a task."""
-    at, j, found = situation.task, choice[row], 0.0
-    near = (NEAR * situation.own[known.SPAN]) ** 2
-    for place in range(tasks):
-        u = choice[place]
-        x = at[known.TASK_X, u] - at[known.TASK_X, j]
-        y = at[known.TASK_Y, u] - at[known.TASK_Y, j]
-        z = at[known.TASK_Z, u] - at[known.TASK_Z, j]
-        found += x * x + y * y + z * z < near and place != row
-    return squashed(found / 3.0)
+@compiled
+def fill_crowding(situation: Situation, tasks: IntArray, options: Singles) -> None:
+    """Fill in how much other work there is near each task."""
+    task, near = situation.task, (NEAR * situation.own[known.SPAN]) ** 2
+    x, y, z = task[known.TASK_X][tasks], task[known.TASK_Y][tasks], task[known.TASK_Z][tasks]
+    for row in range(len(tasks)):
+        at_x, at_y, at_z, found = x[row], y[row], z[row], 0
+        for place in range(len(tasks)):
+            dx, dy, dz = x[place] - at_x, y[place] - at_y, z[place] - at_z
+            found += dx * dx + dy * dy + dz * dz < near
+        is_near_itself = near > 0.0 and at_x == at_x
+        options[row, names.CROWDING] = squashed((found - is_near_itself) / 3.0)
 
 
 @compiled

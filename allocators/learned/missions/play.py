@@ -10,8 +10,20 @@ from alloc.allocators.learned.missions.forward import score
 from alloc.allocators.learned.missions.network_arrays import HIDDEN, MissionWeights, Singles
 from alloc.allocators.learned.missions.options import WAIT, fill_options
 from alloc.allocators.learned.missions.situation import IS_FLYING, TARGET, Situation, empty, fill
+from alloc.allocators.learned.missions.talking import is_to_send
 from alloc.allocators.missions.advance import advance
-from alloc.allocators.missions.layout import MESSAGES, OVER, STAY, TO_PLACE, TO_TASK, MissionArrays
+from alloc.allocators.missions.channel import is_silent
+from alloc.allocators.missions.layout import (
+    IDLE,
+    MESSAGES,
+    NOBODY,
+    OVER,
+    STAY,
+    TO_PLACE,
+    TO_TASK,
+    WORKING,
+    MissionArrays,
+)
 from alloc.allocators.missions.motion import place_of
 from alloc.allocators.missions.orders import order
 from alloc.allocators.runtime.compiled import compiled, inlined
@@ -41,6 +53,9 @@ class Room(NamedTuple):
         Hour at which it last considered its options.
     tasks : ndarray of int, shape (n,)
         Open tasks that it knew then.
+    periods : int
+    saved, counted, news : ndarray of int, shape (n,)
+        See `is_to_send`.
     """
 
     situation: Situation
@@ -57,10 +72,14 @@ class Room(NamedTuple):
     goal: IntArray
     decided: FloatArray
     tasks: IntArray
+    periods: int
+    saved: IntArray
+    counted: IntArray
+    news: IntArray
 
 
-def room_for(n: int, m: int) -> Room:
-    """Return room for the decisions of n agents on m tasks."""
+def room_for(n: int, m: int, periods: int = 1) -> Room:
+    """Return room for the decisions of n agents on m tasks, who send a message every so many radio periods."""
     return Room(
         situation=empty(n, m),
         options=np.zeros((m + 2, FEATURES), np.float32),
@@ -76,6 +95,10 @@ def room_for(n: int, m: int) -> Room:
         goal=np.full(n, -1),
         decided=np.full(n, -np.inf),
         tasks=np.zeros(n, np.intp),
+        periods=periods,
+        saved=np.zeros(n, np.intp),
+        counted=np.zeros(n, np.intp),
+        news=np.zeros(n, np.intp),
     )
 
 
@@ -135,10 +158,29 @@ def is_busy(state: MissionArrays, number: int) -> bool:
 
 
 @inlined
+def note_choice(room: Room, row: int, choice: int) -> None:
+    """Note whether a choice is another than the last order, which is news for others."""
+    if max(choice, NOBODY) != int(room.situation.own[TARGET]):
+        room.news[row] = 1
+
+
+@compiled
+def talk(state: MissionArrays, room: Room) -> None:
+    """Say which agents send a message now."""
+    head = state.head[0]
+    for number in range(len(state.agents)):
+        agent = state.agents[number]
+        agent.speaks = 0
+        if IDLE <= agent.status <= WORKING and not (head.silences and is_silent(state, number)):
+            agent.speaks = is_to_send(room.periods, room.saved, room.counted, room.news, number, head.tick)
+
+
+@inlined
 def act(state: MissionArrays, room: Room, number: int, choice: int) -> None:
     """Give the agent the order that its choice needs."""
     agent = state.agents[number]
     nowhere = (0.0, 0.0, 0.0)
+    note_choice(room, number, choice)
     if choice >= 0:
         order(state, number, TO_TASK, choice, nowhere)
     elif choice == WAIT:
@@ -183,6 +225,7 @@ def play(state: MissionArrays, room: Room, weights: MissionWeights, seed: int) -
         if wanted == OVER:
             return considered
         if wanted == MESSAGES:
+            talk(state, room)
             continue
         for place in range(head.deciding):
             number = state.deciding[place]

@@ -18,7 +18,8 @@ from alloc.problems.formats import read_bytes, write_bytes_atomically
 POLICY_FORMAT = "alloc-mission-policy/1"
 
 SHIPPED = Path(__file__).parents[1] / "files" / "policies" / "missions.safetensors"
-"""The policy that is used where none is given."""
+SHIPPED_PPO = SHIPPED.with_name("missions-ppo.safetensors")
+"""The policies that are used where none is given."""
 
 
 def save_network(

@@ -7,7 +7,7 @@ import numpy as np
 
 from alloc.allocators.learned.missions.feature_names import FEATURES
 from alloc.allocators.learned.missions.network_arrays import MissionWeights, Singles
-from alloc.allocators.learned.missions.play import Room, act, consider, wants
+from alloc.allocators.learned.missions.play import Room, act, consider, talk, wants
 from alloc.allocators.missions.advance import advance
 from alloc.allocators.missions.chance import first_key, fraction, keyed
 from alloc.allocators.missions.layout import IDLE, MESSAGES, MISSED, OVER, WORKING, MissionArrays
@@ -30,13 +30,12 @@ class Record(NamedTuple):
     choices, action, agent : ndarray of int, shape (most,)
         Options of each decision, the one that was taken, and whose decision it was.
     log_probability, hour : ndarray, shape (most,)
-    idle, cost : ndarray, shape (most,)
-        Up to then: hours in which that agent did not work, and the mean over all agents, by ability, with what missed
-        tasks cost.
+    cost : ndarray, shape (most,)
+        Up to then: hours in which agents did not work, the mean by ability, with what missed tasks cost.
     length : ndarray of int, shape (1,)
         Decisions.
-    asked, unproductive : ndarray, shape (n,)
-        Hour at which each agent was last asked, and hours in which it did not work until then.
+    asked : ndarray, shape (n,)
+        Hour at which each agent was last asked.
     is_working : ndarray of bool, shape (n,)
         Whether it has worked since.
     total : ndarray, shape (2,)
@@ -49,11 +48,9 @@ class Record(NamedTuple):
     agent: IntArray
     log_probability: FloatArray
     hour: FloatArray
-    idle: FloatArray
     cost: FloatArray
     length: IntArray
     asked: FloatArray
-    unproductive: FloatArray
     is_working: FloatArray
     total: FloatArray
 
@@ -67,11 +64,9 @@ def record_for(n: int, m: int, most: int, ideal: float) -> Record:
         agent=np.zeros(most, np.intp),
         log_probability=np.zeros(most),
         hour=np.zeros(most),
-        idle=np.zeros(most),
         cost=np.zeros(most),
         length=np.zeros(1, np.intp),
         asked=np.full(n, -1.0),
-        unproductive=np.zeros(n),
         is_working=np.zeros(n),
         total=np.array([0.0, ideal]),
     )
@@ -83,7 +78,6 @@ def account(state: MissionArrays, record: Record, number: int) -> None:
     head, agent = state.head[0], state.agents[number]
     if record.asked[number] >= 0 and record.is_working[number] == 0:
         hours = head.hour - record.asked[number]
-        record.unproductive[number] += hours
         ability = 0.0
         for other in range(len(state.agents)):
             ability += state.agents[other].ability
@@ -142,6 +136,7 @@ def rollout(state: MissionArrays, room: Room, weights: MissionWeights, seed: int
             record.total[0] += missed_cost(state, record.total[1])
             return
         if wanted == MESSAGES:
+            talk(state, room)
             continue
         missed = missed_cost(state, record.total[1])
         for place in range(head.deciding):
@@ -156,7 +151,7 @@ def rollout(state: MissionArrays, room: Room, weights: MissionWeights, seed: int
                     record.options[k, :count] = room.options[:count]
                     record.choices[k], record.action[k], record.agent[k] = count, option, number
                     record.log_probability[k], record.hour[k] = log_probability, head.hour
-                    record.idle[k], record.cost[k] = record.unproductive[number], record.total[0] + missed
+                    record.cost[k] = record.total[0] + missed
                     record.length[0] += 1
                 act(state, room, number, room.choice[option])
             record.is_working[number] = state.agents[number].status == WORKING

@@ -1,7 +1,7 @@
 """From a policy to a plan: games on the whole instance, then on regions of it until the budget ends."""
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import astuple, dataclass, fields
 from functools import cached_property
 
@@ -19,7 +19,7 @@ from alloc.allocators.learned.play.rollout import Best, position
 from alloc.allocators.learned.search.fine_tuning import FineTuning
 from alloc.allocators.learned.search.regions import partition, reach_graph
 from alloc.allocators.learned.search.target_makespan import TargetMakespan
-from alloc.allocators.parallel.pool import Pool
+from alloc.allocators.parallel.pool import RunAll, side_by_side
 from alloc.problems import IDLE, Allocation, Objective, serve_all
 from alloc.problems.game import Board, at_slot, make_board, reset
 from alloc.problems.game.candidates import Candidates, candidate_tasks
@@ -121,7 +121,7 @@ class Planner:
         self.search, self.networks = search, networks
         self.parameters = parameters or PlannerParameters()
         self.tuning = tuning
-        self.run_all: Callable[..., Iterable[Best]] = map
+        self.run_all: RunAll = map
         self.rng = np.random.default_rng(search.seed)
         self.instance = search.instance
         self.target = TargetMakespan(search, self.instance, self.parameters.patience, self.parameters.makespan_share)
@@ -134,8 +134,8 @@ class Planner:
             return
         if self.search.objective is Objective.MAKESPAN_ENERGY and self.target.spent < SECOND_GAME:
             self.play_whole(self.parameters.second_energy_weight)
-        with self.search.improving("playing on regions"), Pool(STREAMS) as pool:
-            self.run_all = pool.map if self.search.threads > 1 else map
+        threads = min(self.search.threads, STREAMS)
+        with self.search.improving("playing on regions"), side_by_side(threads) as self.run_all:
             while not self.search.should_stop():
                 self._sweep()
                 self.search.iteration += 1

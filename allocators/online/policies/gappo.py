@@ -1,24 +1,44 @@
-"""The policy `gappo`: a network scores what an agent knows of tasks and of its neighbours."""
+"""The policies `gappo` and `ppo`: a network scores what an agent knows of tasks and of its neighbours."""
 
 import math
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
+from alloc.allocators.contract.parameters import CheckedParameters, bounded
 from alloc.allocators.learned.missions.exploring import centre, notice
 from alloc.allocators.learned.missions.network import compiled_weights
 from alloc.allocators.learned.missions.network_arrays import MissionWeights
 from alloc.allocators.learned.missions.options import WAIT
-from alloc.allocators.learned.missions.play import Room, consider, is_due, room_for
-from alloc.allocators.learned.missions.policy_file import load_network
+from alloc.allocators.learned.missions.play import Room, consider, is_due, note_choice, room_for
+from alloc.allocators.learned.missions.policy_file import SHIPPED, SHIPPED_PPO, load_network
 from alloc.allocators.learned.missions.situation import MEMORY, Situation
+from alloc.allocators.learned.missions.talking import is_to_send
 from alloc.allocators.missions.layout import NOBODY
 from alloc.allocators.online.contract import AgentDecider, Briefing, Policy, PolicyInfo
-from alloc.problems.missions.simulation.reports import AgentReport, TaskReport, View
+from alloc.problems.missions.simulation.reports import AgentReport, Message, TaskReport, View
 from alloc.problems.missions.simulation.state import ACTIVE, STAY, AgentStatus, Order, TaskStatus
 from alloc.problems.vocabulary import Knowledge
 
+REMEMBERED = ("seen", "goal", "decided", "tasks", "periods", "saved", "counted", "news")
+"""What a decider keeps from decision to decision; all else is scratch."""
+
 NOWHERE = (math.nan, math.nan, math.nan)
+
+
+@dataclass(frozen=True)
+class NetworkParameters(CheckedParameters):
+    """Parameters of a policy that is a network.
+
+    Attributes
+    ----------
+    periods : int
+        Radio periods that an agent saves up for each message; one message is kept back for when its order changes.
+    """
+
+    periods: int = bounded(1, low=1)
 
 
 class NetworkPolicy(Policy):
@@ -26,8 +46,11 @@ class NetworkPolicy(Policy):
 
     Parameters
     ----------
+    parameters : NetworkParameters, optional
     policy : Path or str, optional
         Policy file by ``alloc train gappo --missions``; the shipped one by default.
+    **settings
+        Single parameters by name.
     """
 
     info = PolicyInfo(
@@ -38,23 +61,50 @@ class NetworkPolicy(Policy):
         citation="Fang et al. (2025), doi:10.20944/preprints202502.0192.v1",
     )
 
-    def __init__(self, policy: Path | str | None = None) -> None:
-        super().__init__()
-        self._weights = compiled_weights(load_network(policy))
+    parameters_type: ClassVar[type] = NetworkParameters
+    shipped: ClassVar[Path] = SHIPPED
+
+    def __init__(
+        self, parameters: NetworkParameters | None = None, *, policy: Path | str | None = None, **settings: object
+    ) -> None:
+        super().__init__(parameters, **settings)
+        self._weights = compiled_weights(load_network(self.shipped if policy is None else policy))
+        _compile_loops(self._weights)
 
     def begin(self, briefing: Briefing) -> AgentDecider:
         """Return who decides by the network."""
-        return _NetworkDecider(briefing, self._weights)
+        return _NetworkDecider(briefing, self._weights, self.parameters.periods)
+
+
+class PpoPolicy(NetworkPolicy):
+    """The same network, trained by PPO alone: what `gappo` is to be compared with.
+
+    Parameters
+    ----------
+    parameters : NetworkParameters, optional
+    policy : Path or str, optional
+        Policy file by ``alloc train ppo --missions``; the shipped one by default.
+    **settings
+        Single parameters by name.
+    """
+
+    info = replace(
+        NetworkPolicy.info,
+        name="ppo",
+        summary="the network of gappo, trained by PPO alone",
+        citation="Schulman et al. (2017), arXiv:1707.06347",
+    )
+    shipped: ClassVar[Path] = SHIPPED_PPO
 
 
 class _NetworkDecider(AgentDecider):
-    def __init__(self, briefing: Briefing, weights: MissionWeights) -> None:
+    def __init__(self, briefing: Briefing, weights: MissionWeights, periods: int) -> None:
         self._weights, self._area = weights, np.array(briefing.area)
         self._span, self._period = math.dist(*briefing.area), briefing.radio.period
         is_blind = briefing.knowledge is Knowledge.LOCAL
         self._sensing = briefing.sensing if is_blind else math.inf
         self._seed, self._number = briefing.seed[0], briefing.seed[1] - 1
-        self._room = room_for(1, 0)
+        self._room = room_for(1, 0, periods)
 
     def decide(self, view: View) -> Order | None:
         room, own = self._room, view.own
@@ -73,6 +123,7 @@ class _NetworkDecider(AgentDecider):
         _fill(view, room.situation, tasks, self._span)
         count = consider(room, self._area, self._sensing, self._seed, self._number, 0, self._weights)
         choice = int(room.choice[np.argmax(room.scores[:count])])
+        note_choice(room, 0, choice)
         if choice >= 0:
             return Order(names[choice])
         if choice == WAIT:
@@ -82,12 +133,28 @@ class _NetworkDecider(AgentDecider):
         x, y, z = centre(self._area, int(room.goal[0]))
         return Order(position=(float(x), float(y), float(z)))
 
+    def message(self, view: View) -> Message | None:
+        room, tick = self._room, round(view.hour / self._period)
+        return view.message() if is_to_send(room.periods, room.saved, room.counted, room.news, 0, tick) else None
+
     def _with_room(self, n: int, m: int) -> Room:
         """Return room for what is known now, with what the agent remembers."""
         fresh = room_for(n, m)
-        kept = {name: getattr(self._room, name) for name in ("seen", "goal", "decided", "tasks")}
+        kept = {name: getattr(self._room, name) for name in REMEMBERED}
         self._room = fresh._replace(**kept)
         return self._room
+
+
+def _compile_loops(weights: MissionWeights) -> None:
+    """Compile all loops that a decision needs, so that the first one is in time as well."""
+    room, area = room_for(1, 1), np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
+    room.situation.own[:] = 1.0
+    is_due(room, 0, 0.0, 1.0, 1, False)
+    notice(area, 1.0, 0.0, 0.0, 0.0, room.seen[0])
+    consider(room, area, 1.0, 0, 0, 0, weights)
+    note_choice(room, 0, WAIT)
+    is_to_send(room.periods, room.saved, room.counted, room.news, 0, 1)
+    centre(area, 0)
 
 
 def _fill(view: View, situation: Situation, tasks: list[TaskReport], span: float) -> None:

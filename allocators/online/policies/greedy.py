@@ -1,5 +1,6 @@
 """The policy `greedy`: each agent goes where most of its time is work."""
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -13,7 +14,7 @@ from alloc.problems.missions.simulation.state import Order
 
 @dataclass(frozen=True)
 class GreedyParameters(CheckedParameters):
-    """Parameters of the utility.
+    """Parameters of the utility; the defaults are tuned on missions as `gappo` is evolved on.
 
     Attributes
     ----------
@@ -23,11 +24,17 @@ class GreedyParameters(CheckedParameters):
         Hours after which what was heard of others no longer counts.
     missed : float
         Factor on the utility of a task that will miss its deadline even with the agent.
+    crowding : float
+        How much each other agent that is at a task, or on its way there, takes away from its utility.
+    flight : float
+        How fast utility falls with the hours of the flight.
     """
 
-    stay: float = bounded(1.25, low=0)
-    memory: float = bounded(2.0, low=0)
-    missed: float = bounded(0.05, low=0)
+    stay: float = bounded(2.3, low=0)
+    memory: float = bounded(1.8, low=0)
+    missed: float = bounded(0.025, low=0)
+    crowding: float = bounded(0.05, low=0)
+    flight: float = bounded(0.07, low=0)
 
 
 class GreedyUtility(Policy):
@@ -63,7 +70,8 @@ class _Greedy(AgentDecider):
         facts, parameters = prospect.task.facts, self._parameters
         hours = prospect.with_me - view.hour
         share = 1.0 if hours <= 0 else (prospect.with_me - prospect.arrival) / hours
-        value = share * (facts.priority + 1e-6)
+        value = share * (facts.priority + 1e-6) / (1 + parameters.crowding * prospect.group)
+        value *= math.exp(-parameters.flight * (prospect.arrival - view.hour))
         if prospect.with_me > facts.deadline:
             value *= parameters.missed
         return value * (parameters.stay if view.own.task == facts.id else 1.0)

@@ -17,6 +17,7 @@ SCHEMAS = {
     "alloc-mission-policy/1": "the metadata of a policy file for missions",
     "alloc-mission/1": "an instance, and what happens in time",
     "alloc-mission-result/1": "the measures that `alloc simulate --json` prints",
+    "alloc-mission-comparison/1": "the rows that `alloc compare --policies --json` prints",
     "alloc-mission-log/1": "the first line of what `alloc simulate --log` writes",
     "alloc-planner-request/1": "the lines that `alloc plan --stdio` reads",
     "alloc-planner-orders/1": "the lines that `alloc plan --stdio` writes",

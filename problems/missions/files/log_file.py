@@ -1,7 +1,6 @@
 """Logs of missions as text: JSON lines, alloc-mission-log/1."""
 
 import json
-from collections.abc import Iterable
 from dataclasses import dataclass
 from json import JSONDecodeError
 
@@ -75,13 +74,38 @@ def read_log(path: PathLike) -> MissionLog:
     """
     source = named(path)
     try:
-        return _parsed(read_text(path).split("\n"))
+        return log_from_text(read_text(path))
     except InputError as error:
         raise told(error, source) from error.__cause__
 
 
-def _parsed(lines: Iterable[str]) -> MissionLog:
-    documents = [_line(text, number) for number, text in enumerate(lines, 1) if text.strip()]
+def is_log(text: str) -> bool:
+    """Whether the first line of a text is the header of a log.
+
+    Parameters
+    ----------
+    text : str
+    """
+    try:
+        header = json.loads(text.partition("\n")[0])
+    except (ValueError, RecursionError):
+        return False
+    return isinstance(header, dict) and str(header.get("format")).startswith("alloc-mission-log/")
+
+
+def log_from_text(text: str) -> MissionLog:
+    """Return the log that JSON lines hold.
+
+    Parameters
+    ----------
+    text : str
+
+    Raises
+    ------
+    InputError
+        If it is no log.
+    """
+    documents = [_line(line, number) for number, line in enumerate(text.split("\n"), 1) if line.strip()]
     if len(documents) < 2:
         raise InputError("is no log of a mission: it needs a header, and a result as its last line; is it cut off?")
     header, *records, result = documents

@@ -6,7 +6,7 @@ from alloc.problems.arguments import of_type
 from alloc.problems.errors import InputError
 from alloc.problems.formats import json_text
 from alloc.problems.formats.files import PathLike, is_stream, named, read_text, write_text_atomically
-from alloc.problems.formats.instance_file import read_instance
+from alloc.problems.formats.instance_file import name_of, read_instance
 from alloc.problems.formats.messages import told
 from alloc.problems.missions.files.document import mission_from_document, mission_to_document
 from alloc.problems.missions.mission import Mission
@@ -32,7 +32,7 @@ def read_mission(path: PathLike) -> Mission:
     if not is_stream(path) and Path(path).suffix.lower() != ".json":
         return Mission(read_instance(path))
     try:
-        name = {} if is_stream(path) else {"default_name": Path(path).stem}
+        name = {} if is_stream(path) else {"default_name": name_of(path)}
         return mission_from_document(json_text.parse(read_text(path)), **name)
     except InputError as error:
         raise told(error, named(path)) from error.__cause__

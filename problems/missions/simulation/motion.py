@@ -28,8 +28,8 @@ def refusal(
 ) -> str | None:
     """Return why an agent at a place cannot fly to a goal, and work there if it is a task; None if it can.
 
-    It must be allowed to, within its range, and its battery must be enough for the flight, and for the way back to its
-    start if it returns.
+    It must be allowed to, within its range, and its battery must be enough for the flight, and for the way home if it
+    returns.
     """
     if task is not None:
         if agent.tasks is not None and task.id not in agent.tasks:
@@ -41,7 +41,7 @@ def refusal(
         return "there is no way"
     if distance > agent.range + TOLERANCE:
         return f"it is {distance:g} away, range {agent.range:g}"
-    home = distances.between(goal, agent.start) if agent.returns else 0.0
+    home = distances.between(_reached(place, goal), agent.home) if agent.returns else 0.0
     if home == math.inf:
         return "there is no way back"
     energy = agent.energy_per_distance * (distance + home)
@@ -80,6 +80,7 @@ def break_off(state: MissionState, agent: AgentState) -> None:
         share = flight.share(state.hour)
         place = _reached(flight.source, flight.goal) if share == 1 else place_at(state, agent)
         _land(agent, flight, share * flight.distance, flight.source if share == 0 else place)
+        agent.has_flown = agent.has_flown or share > 0
 
 
 def _reached(source: Place, goal: Place) -> Place:
@@ -202,12 +203,16 @@ def pace_factor(seed: int, task: int, period: int, pace: Pace) -> float:
 
 
 def end_flights(state: MissionState) -> None:
-    """Let agents in flight land at their goals after the end of the mission, and those that return fly home."""
+    """Let agents in flight land at their goals after the end of the mission, and those that return fly home.
+
+    Who has flown can afford that; who has not is still where it began, whatever its base.
+    """
     for agent in state.agents:
         if agent.flight is not None:
             _land(agent, agent.flight, agent.flight.distance, _reached(agent.flight.source, agent.flight.goal))
-        if agent.facts.returns and agent.status in ACTIVE:
+            agent.has_flown = True
+        if agent.facts.returns and agent.has_flown and agent.status in ACTIVE:
             stop_work(state, agent)
-            distance = state.distances.between(agent.place, agent.facts.start)
-            flight = Flight(agent.place, agent.facts.start, None, distance, state.hour, state.hour)
-            _land(agent, flight, distance, agent.facts.start)
+            distance = state.distances.between(agent.place, agent.facts.home)
+            flight = Flight(agent.place, agent.facts.home, None, distance, state.hour, state.hour)
+            _land(agent, flight, distance, agent.facts.home)

@@ -122,6 +122,12 @@ def starting_places(instance: Instance) -> list[Place]:
     ]
 
 
+def bases_of_agents(instance: Instance) -> list[Place | None]:
+    """Return the base of each agent that returns to one, None for the others."""
+    places = [Place(position) for position in _positions(instance.bases.position)]
+    return [places[base] if base >= 0 else None for base in instance.return_base.tolist()]
+
+
 def task_places(instance: Instance) -> list[Place]:
     """Return where each task is."""
     return [Place(position, (instance.n + task,)) for task, position in enumerate(_positions(instance.task_position))]

@@ -9,7 +9,14 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from alloc.problems.missions.mission import Mission
-from alloc.problems.missions.simulation.places import Distances, Place, Position, starting_places, task_places
+from alloc.problems.missions.simulation.places import (
+    Distances,
+    Place,
+    Position,
+    bases_of_agents,
+    starting_places,
+    task_places,
+)
 
 
 class AgentStatus(StrEnum):
@@ -48,7 +55,9 @@ class AgentFacts:
         ``inf`` for a speed means that flights take no time; for a range, that there is none.
     start : Place
     returns : bool
-        Whether it must be able to fly back to its start, and does so at the end.
+        Whether it must be able to fly home, and does so at the end if it has flown at all.
+    base : Place or None
+        Where home is; None for its start.
     skills : frozenset of str
     tasks : frozenset of str, or None
         Ids of the tasks that it may do; None for all.
@@ -61,8 +70,14 @@ class AgentFacts:
     range: float
     start: Place
     returns: bool
+    base: Place | None
     skills: frozenset[str]
     tasks: frozenset[str] | None
+
+    @property
+    def home(self) -> Place:
+        """Where it returns to, if it does."""
+        return self.start if self.base is None else self.base
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,6 +151,8 @@ class AgentState:
         Where it works.
     distance, energy : float
         Flown so far, and what that took.
+    has_flown : bool
+        Whether a flight of it has ended anywhere but where it began.
     """
 
     index: int
@@ -149,6 +166,7 @@ class AgentState:
     task: "TaskState | None" = None
     distance: float = 0.0
     energy: float = 0.0
+    has_flown: bool = False
 
 
 @dataclass(eq=False, slots=True)
@@ -225,6 +243,7 @@ class MissionState:
             instance.communication_range.tolist(),
             starting_places(instance),
             instance.returns.tolist(),
+            bases_of_agents(instance),
             map(frozenset, skills),
             (None if some is None else frozenset(instance.task_ids[j] for j in some.tolist()) for some in allowed),
             strict=True,

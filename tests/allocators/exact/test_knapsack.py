@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from alloc.allocators.exact.knapsack import cheapest_group, fill_table, read_group
 from alloc.allocators.exact.knapsack_core import cheapest_by_core
+from alloc.allocators.exact.knapsack_states import MAX_STATES, cheapest_by_states, room_for_states
 
 classes = st.lists(st.tuples(st.integers(1, 7), st.integers(-2, 9), st.integers(0, 3)), min_size=1, max_size=4)
 
@@ -83,3 +84,30 @@ def test_core_has_the_cheapest_group(seed, spare, classes):
         assert group @ price == pytest.approx(cost)
         assert need <= group @ weight <= need + spare
         assert (group <= copies).all()
+
+
+@given(st.integers(0, 2**32), st.integers(1, 60), st.sampled_from([1, 2**30]))
+def test_states_have_the_cheapest_group(seed, classes, scale):
+    """Lists of states find what the table does, also where numbers are far beyond any table."""
+    rng = np.random.default_rng(seed)
+    weight, copies = rng.integers(1, 40, classes), rng.integers(1, 4, classes)
+    price = rng.integers(0, 500, classes).astype(float)
+    need, group = int(rng.integers(1, 2 + weight @ copies)), np.zeros(classes, dtype=np.int64)
+    cost = cheapest_by_states(weight * scale, price, copies, need * scale, room_for_states(MAX_STATES), group)
+    assert cost == cheapest_group(weight, price, copies, need, -1)[0]
+    if np.isfinite(cost):
+        assert group @ price == cost
+        assert group @ weight >= need
+        assert (group >= 0).all()
+        assert (group <= copies).all()
+
+
+@given(st.integers(0, 2**32), st.integers(2, 6))
+def test_without_room_for_states_the_cost_is_a_bound(seed, size):
+    """Where states do not fit, no group is cheaper than the cost returned, and the group is one that meets the need."""
+    rng = np.random.default_rng(seed)
+    weight, price, copies = rng.integers(5, 40, 30), rng.integers(1, 500, 30).astype(float), np.ones(30, dtype=np.int64)
+    need, group = int(weight.sum() // 2), np.zeros(30, dtype=np.int64)
+    cost = cheapest_by_states(weight, price, copies, need, room_for_states(size), group)
+    assert cost <= cheapest_group(weight, price, copies, need, -1)[0] <= group @ price
+    assert group @ weight >= need

@@ -80,6 +80,7 @@ def random_mission(seed: int) -> Mission:
         else (lambda: (rng.random(), rng.random()))
     )
     known = rng.random() < 0.9
+    returns = [rng.random() < 0.3 for _ in range(n)]
     instance = Instance(
         ability=[rng.choice([1.0, 2.0, rng.uniform(0.5, 4)]) for _ in range(n)],
         workload=[rng.choice([0.0, rng.uniform(1, 9), rng.uniform(1, 9)]) for _ in range(m)],
@@ -89,7 +90,9 @@ def random_mission(seed: int) -> Mission:
         battery=[rng.choice([math.inf, rng.uniform(2, 20)]) for _ in range(n)],
         communication_range=[rng.choice([math.inf, math.inf, 0.7]) for _ in range(n)],
         energy_per_distance=6.0,
-        returns=[rng.random() < 0.3 for _ in range(n)],
+        returns=returns,
+        return_base=[rng.choice([-1, 0, 1]) if one else -1 for one in returns],
+        bases={"dock": place(), "yard": place()},
         priority=[rng.choice([0.0, 1.0, 3.0]) for _ in range(m)],
         skills=[rng.choice([["x"], ["x", "y"]]) for _ in range(n)],
         needs=[rng.choice([[], [], ["y"]]) for _ in range(m)],

@@ -44,6 +44,10 @@ class TestGappo(PolicyConformance):
     name = "gappo"
 
 
+class TestPpo(PolicyConformance):
+    name = "ppo"
+
+
 class TestReplan(PolicyConformance):
     name = "replan"
     settings = {"method": "greedy", "iterations": 1}  # noqa: RUF012

@@ -97,6 +97,19 @@ def test_orders_that_cannot_be_followed_are_logged():
     ]
 
 
+def test_nothing_is_compiled_within_a_mission():
+    """Loading `gappo` compiles its loops, for the types that missions call them by: the first decision is in time."""
+    from alloc.allocators.learned.missions import play, talking
+
+    policy = load_policy("gappo")
+    loops = (play.consider, play.notice, play.centre, play.is_due, talking.is_to_send)
+    before = [list(loop.signatures) for loop in loops if hasattr(loop, "signatures")]
+    result = simulate(random_mission(MissionParameters(agents=3, tasks=4), seed=1), policy).result
+    assert result.decisions > 0
+    assert all(before)
+    assert [list(loop.signatures) for loop in loops if hasattr(loop, "signatures")] == before
+
+
 def test_central_policies_need_full_knowledge():
     """Who leads all agents cannot do so by what one of them knows."""
     with pytest.raises(RefusedError, match="needs full knowledge"):

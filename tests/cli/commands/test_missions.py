@@ -106,3 +106,114 @@ def test_wrong_names_of_films_are_told_before_the_run(alloc, mission):
     found = alloc("simulate", mission, "--policy", "greedy", "--animate", "x.avi")
     assert (found.code, found.err.strip()) == (2, "alloc: x.avi: must end in .gif, .mp4 or .html")
     assert alloc("plot", mission, "--output", "x.png").code == 2
+
+
+def test_policies_are_compared(alloc, mission):
+    """Each mission and policy has a row, as JSON, CSV and a table, and the policies differ from the first in pairs."""
+    arguments = ("compare", mission, mission, "--policies", "nearest,greedy[stay=2],replan", "--seeds", "2")
+    ran = alloc(*arguments, "--json")
+    rows = ran.json["rows"]
+    assert [(row["policy"], row["runs"], row["number"]) for row in rows[2:4]] == [("replan", 0, 1), ("nearest", 2, 2)]
+    assert "needs full knowledge" in rows[2]["reason"]
+    assert [(one["policy"], one["against"]) for one in ran.json["differences"]] == [
+        ("greedy[stay=2]", "nearest"),
+        ("replan", "nearest"),
+    ]
+    table = alloc(*arguments, "--csv", "table.csv")
+    assert "Against nearest, in the same missions" in table.err
+    header, first, *_ = Path("table.csv").read_text().splitlines()
+    assert dict(zip(header.split(","), first.split(","), strict=True))["mission_time_mean"] == str(
+        rows[0]["mission_time_mean"]
+    )
+    assert (table.code, table.out) == (0, "")
+
+
+def test_policies_and_methods_are_not_mixed(alloc, mission, small):
+    """One line says what goes with what, whether options or files are mixed up."""
+    for arguments, told in (
+        ((mission, "--methods", "greedy"), "`alloc compare --policies` take missions"),
+        ((mission,), "give either --methods, for instances, or --policies, for missions"),
+        ((mission, "--methods", "greedy", "--policies", "greedy"), "give either --methods"),
+        ((mission, "--policies", "greedy", "--iterations", "3"), "'--iterations': goes with --methods only"),
+        (("small.json", "--methods", "greedy", "--knowledge", "full"), "'--knowledge': goes with --policies only"),
+        ((mission, "--policies", "gredy"), "--policies: there is no policy 'gredy'"),
+    ):
+        ran = alloc("compare", *arguments)
+        assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
+        assert told in ran.err
+
+
+def test_missions_and_logs_are_validated(alloc, mission, small):
+    """Missions, logs and instances are checked side by side, with the facts of each and what may not be meant."""
+    alloc("simulate", mission, "--policy", "greedy", "--log", "run.jsonl")
+    document = json.loads(Path(mission).read_text())
+    document |= {"knowledge": "full", "horizon": 0.1, "sensing": 1}
+    document["tasks"][0] |= {"deadline": 1e-6}
+    Path("odd.json").write_text(json.dumps(document))
+    ran = alloc("validate", mission, "run.jsonl", "small.json", "odd.json", "--json")
+    assert ran.code == 0
+    first, log, instance, odd = ran.json
+    assert (first["format"], first["agents"], first["tasks"], first["findings"]) == ("alloc-mission/1", 3, 4, [])
+    assert (log["format"], log["policy"], log["status"]) == ("alloc-mission-log/1", "greedy", "done")
+    assert "format" not in instance
+    assert [finding["field"] for finding in odd["findings"]] == ["deadline", "horizon", "sensing"]
+    told = alloc("validate", "-", "run.jsonl", stdin=Path(mission).read_text()).err
+    assert "-: ok, a mission of 3 agents" in told
+    assert "run.jsonl: ok, a log of " in told
+
+
+def test_each_fault_of_a_mission_is_a_line(alloc, mission):
+    """Every fault has a line with file, place and mend, and the code is 2; so has the first false line of a log."""
+    document = json.loads(Path(mission).read_text())
+    document["agents"][0]["ability"] = -1
+    document["radio"]["period"] = 0
+    Path("bad.json").write_text(json.dumps(document))
+    ran = alloc("validate", "bad.json")
+    assert (ran.code, ran.out) == (2, "")
+    assert sorted(line.split(": ")[:3] for line in ran.err.splitlines()) == [
+        ["alloc", "bad.json", "agents[0].ability"],
+        ["alloc", "bad.json", "radio.period"],
+    ]
+    alloc("simulate", mission, "--policy", "greedy", "--log", "run.jsonl")
+    lines = Path("run.jsonl").read_text().splitlines(keepends=True)
+    Path("run.jsonl").write_text("".join([*lines[:3], *lines[4:]]))
+    ran = alloc("validate", "run.jsonl")
+    assert (ran.code, ran.err.count("\n")) == (2, 1)
+    assert "run.jsonl: line 4: is not what comes of the orders before it" in ran.err
+
+
+def test_cfstp_is_generated(alloc):
+    """A CFSTP takes numbers of agents and tasks, and no option of other families."""
+    ran = alloc("generate", "cfstp", "--agents", "2", "--tasks", "3", "--seed", "1", "--output", "-")
+    assert (len(ran.json["agents"]), len(ran.json["tasks"]), ran.json["metric"]) == (2, 3, "manhattan")
+    ran = alloc("generate", "cfstp", "--loss", "0.1")
+    assert (ran.code, ran.err.count("\n")) == (2, 1)
+    assert "'--loss': is for mission, not for cfstp" in ran.err
+
+
+def test_files_of_others_are_imported(alloc):
+    """The example files become missions that validate; options of records are refused for others, in one line."""
+    folder = Path(__file__).parents[3] / "examples" / "records"
+    for kind, name in (
+        ("london", "calls.csv"),
+        ("new-brunswick", "fires.csv"),
+        ("space", "space.yaml"),
+        ("cfstp", "cfstp.txt"),
+    ):
+        ran = alloc("import-mission", kind, str(folder / name), "--output", f"{kind}.json")
+        assert (ran.code, ran.out) == (0, "")
+        assert f"wrote {kind}.json: " in ran.err
+    assert alloc("validate", "london.json", "new-brunswick.json", "space.json", "cfstp.json").code == 0
+    dated = ("--from", "2021-07-06", "--until", "2021-07-06", "--compress", "24", "--output", "-")
+    ran = alloc("import-mission", "london", str(folder / "calls.csv"), *dated)
+    assert len(ran.json["tasks"]) == 3
+    for arguments, told in (
+        (("space", str(folder / "space.yaml"), "--compress", "2"), "'--compress': is for records, not for space"),
+        (("london", str(folder / "calls.csv"), "--until", "soon"), "'--until'"),
+        (("london", str(folder / "calls.csv"), "--compress", "0"), "--compress: must be a finite number > 0"),
+        (("london", str(folder / "calls.csv"), "--from", "2022-01-01", "--until", "2021-01-01"), "--until: must not"),
+        (("london", str(folder / "cfstp.txt")), "has no column 'IncidentNumber'"),
+    ):
+        ran = alloc("import-mission", *arguments, "--output", "x.json", "--quiet")
+        assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
+        assert told in ran.err

@@ -99,6 +99,11 @@ def units(**labels: Any) -> dict[str, Any]:
 DOCUMENTS = [
     (changed(format="alloc-instance/2"), "format", "must be 'alloc-instance/1', got 'alloc-instance/2'"),
     (changed(format="alloc-result/1"), "format", "must be 'alloc-instance/1', got 'alloc-result/1'"),
+    (
+        changed(format="alloc-mission/1"),
+        "format",
+        "must be 'alloc-instance/1', got 'alloc-mission/1'; `alloc simulate` and",
+    ),
     (changed(format=1), "format", "got 1"),
     (changed(format=["alloc-instance/1"]), "format", "got a list"),
     (changed(format={}), "format", "got an object"),

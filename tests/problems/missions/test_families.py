@@ -3,7 +3,16 @@
 import numpy as np
 import pytest
 
-from alloc.problems import Event, InputError, Instance, Mission, MissionParameters, random_mission, snapshot_at
+from alloc.problems import (
+    Event,
+    InputError,
+    Instance,
+    Mission,
+    MissionParameters,
+    random_cfstp,
+    random_mission,
+    snapshot_at,
+)
 from alloc.problems.missions.files.document import mission_to_document
 from alloc.problems.missions.simulation.measures import DecisionTimes, measured
 from alloc.problems.missions.simulation.simulation import Simulation
@@ -94,3 +103,20 @@ def test_measures_are_as_defined():
     assert result.battery_remaining_percent == pytest.approx(100 * (0.75 + 1) / 2)
     assert result.work_given_up == pytest.approx(2)  # of t4, which a2 works on from hour 3 to 10
     assert result.mission_time_lower_bound == 8.5
+
+
+def test_cfstp_is_as_its_benchmark():
+    """Cells of 50 x 50, deadlines from 5 to 600, workloads from 10 to 50, agents alike; seeded."""
+    mission = random_cfstp(4, 2000, 7)
+    instance = mission.instance
+    assert (instance.n, instance.m, instance.metric, mission.horizon) == (4, 2000, "manhattan", np.inf)
+    for values, low, high in (
+        (instance.task_position[:, :2], 0, 49),
+        (mission.deadline, 5, 600),
+        (instance.workload, 10, 50),
+    ):
+        assert (values.min(), values.max()) == (low, high)
+        assert (values == values.round()).all()
+    assert set(instance.ability) == set(instance.speed) == {1.0}
+    assert mission_to_document(random_cfstp(4, 2000, 7)) == mission_to_document(mission)
+    assert mission_to_document(random_cfstp(4, 2000, 8)) != mission_to_document(mission)

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from strategies import instances
 
 from alloc.problems import Allocation, DistanceTable, Event, Instance, Mission, Pace, evaluate
+from alloc.problems.changes.remove import replaced
 from alloc.problems.missions.simulation import conservation
 from alloc.problems.missions.simulation.agenda import Wanted
 from alloc.problems.missions.simulation.conservation import ConservationError
@@ -198,6 +199,23 @@ def test_whoever_flies_at_the_end_lands_and_whoever_returns_is_home():
     )  # fmt: skip
     state = run(Mission(instance, horizon=1), {0: {"a1": Order("t1"), "a2": Order("t2")}}).state
     assert [agent.distance for agent in state.agents] == [4, 6]
+
+
+def test_agents_return_to_their_base_if_they_have_flown():
+    """A base costs energy for the way there; who never flew stays, and who cannot afford it does not set out."""
+    instance = Instance(
+        ability=[1, 1, 1], workload=[1, 1], agent_position=[[0, 0], [0, 0], [0, 0]], task_position=[[4, 0], [0, 3]],
+        speed=[1, 1, 1], battery=[9, 9, 9], energy_per_distance=1.0, return_base=[0, 0, 0], bases={"dock": [4, 3]},
+    )  # fmt: skip
+    state = run(Mission(instance), {0: {"a1": Order("t1"), "a2": Order("t2")}}).state
+    assert [agent.distance for agent in state.agents] == [4 + 3, 3 + 4, 0]
+    assert [agent.battery for agent in state.agents] == [2, 2, 9]
+    assert [agent.place.position for agent in state.agents] == [(4, 3, 0), (4, 3, 0), (0, 0, 0)]
+    weak = replaced(instance, battery=[6.9, 7, 9])
+    simulation = Simulation(Mission(weak))
+    simulation.advance()
+    assert simulation.order("a1", Order("t1")) == "the flight takes 7 of energy, battery 6.9"
+    assert simulation.order("a2", Order("t2")) is None
 
 
 def test_the_same_seed_gives_the_same_course():

@@ -28,10 +28,13 @@ class PackedMission(NamedTuple):
     arrays : MissionArrays
     ideal : float
         Hours that all agents together would need for all work if flights took no time.
+    periods : int
+        Radio periods for each message, see `is_to_send`.
     """
 
     arrays: MissionArrays
     ideal: float
+    periods: int = 1
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,8 @@ class MissionCurriculum:
         Radio radii and sensing radii to draw from, each by itself.
     losses : tuple of float
         Shares of messages lost.
+    periods : tuple of int
+        Radio periods that agents save up for each message.
     varied_from : float
         Share of the training after which everything varies; before that, missions of the first family and the first
         radius and loss alone are drawn.
@@ -60,6 +65,7 @@ class MissionCurriculum:
     tasks: tuple[int, int] = (20, 50)
     radii: tuple[float, ...] = (0.3, 0.3, 0.2, 0.15)
     losses: tuple[float, ...] = (0.2, 0.0, 0.8)
+    periods: tuple[int, ...] = (1, 10)
     varied_from: float = 0.1
     missions: tuple[Mission, ...] = field(default=())
 
@@ -76,11 +82,12 @@ class MissionCurriculum:
         drawn = []
         for _ in range(count):
             seed = int(rng.integers(0, VALIDATION_SEED))
+            periods = int(rng.choice(self.periods))
             if self.missions:
-                mission = self.missions[int(rng.integers(len(self.missions)))]
-                drawn.append((packed(mission), seed))
+                mission = packed(self.missions[int(rng.integers(len(self.missions)))])
             else:
-                drawn.append((_generated(self._parameters(rng, progress), seed), seed))
+                mission = _generated(self._parameters(rng, progress), seed)
+            drawn.append((mission._replace(periods=periods), seed))
         return drawn
 
     def _parameters(self, rng: np.random.Generator, progress: float) -> MissionParameters:
@@ -96,12 +103,15 @@ class MissionCurriculum:
     def validation(self, count: int) -> list[tuple[PackedMission, int]]:
         """Return missions that training never draws, of each family in turn, and the seeds of their runs."""
         seeds = range(VALIDATION_SEED, VALIDATION_SEED + count)
-        if self.missions:
-            return [(packed(self.missions[k % len(self.missions)]), seed) for k, seed in enumerate(seeds)]
-        families = [self.families[k % len(self.families)] for k in range(count)]
-        return [
-            (_generated(MissionParameters(family), seed), seed) for family, seed in zip(families, seeds, strict=True)
-        ]
+        kinds = len(self.missions or self.families)
+        chosen = []
+        for k, seed in enumerate(seeds):
+            if self.missions:
+                mission = packed(self.missions[k % kinds])
+            else:
+                mission = _generated(MissionParameters(self.families[k % kinds]), seed)
+            chosen.append((mission._replace(periods=self.periods[k // kinds % len(self.periods)]), seed))
+        return chosen
 
 
 @lru_cache(maxsize=256)

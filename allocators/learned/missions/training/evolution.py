@@ -1,4 +1,4 @@
-"""The linear part of the network, evolved: where PPO begins.
+"""The linear part of the network and its last layer, evolved: where PPO begins.
 
 References
 ----------
@@ -21,6 +21,9 @@ from alloc.allocators.parallel.engine import Engine
 STEP = 1.0
 """Initial standard deviation of a weight."""
 
+EVOLVED = ("skip.weight", "out.weight")
+"""What is evolved: the weights of features, and those of the last layer, whose inputs stay as they were drawn."""
+
 STATE = ("centroid", "sigma", "pc", "ps", "C", "diagD", "B", "BD", "update_count")
 """What changes of DEAP's strategy from generation to generation."""
 
@@ -30,7 +33,7 @@ class _Fitness(base.Fitness):  # type: ignore[misc]
 
 
 class _Rule(list[float]):
-    """Linear weights, as DEAP expects individuals."""
+    """Evolved weights, as DEAP expects individuals."""
 
     def __init__(self, weights: list[float], cost: float) -> None:
         super().__init__(weights)
@@ -57,12 +60,13 @@ def try_rule(job: RuleJob) -> float:
 
 
 def with_rule(network: Weights, rule: Sequence[float]) -> Weights:
-    """Return the weights of a network with other linear ones."""
-    return {**network, "skip.weight": torch.tensor([list(rule)], dtype=torch.float32)}
+    """Return the weights of a network with other ones where they are evolved."""
+    parts = torch.tensor(list(rule), dtype=torch.float32).split([network[name].numel() for name in EVOLVED])
+    return {**network, **{name: part[None] for name, part in zip(EVOLVED, parts, strict=True)}}
 
 
 class Evolution:
-    """The evolution of linear weights, generation by generation.
+    """The evolution of the weights of scores, generation by generation.
 
     Parameters
     ----------
@@ -76,7 +80,7 @@ class Evolution:
 
     def __init__(self, network: Weights, population: int, missions: int) -> None:
         self._network, self._population, self._missions = network, population, missions
-        first = network["skip.weight"][0].double().numpy()
+        first = torch.cat([network[name][0] for name in EVOLVED]).double().numpy()
         self._strategy = cma.Strategy(centroid=first, sigma=STEP, lambda_=population)
 
     def advance(

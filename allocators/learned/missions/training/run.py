@@ -54,7 +54,7 @@ def train_on_missions(
     Parameters
     ----------
     method : {"gappo", "ppo"}
-        A population that is bred, or a single network.
+        Evolution, and then a population that learns by PPO and is bred; or a single network that learns by PPO.
     output : Path or str
         Policy file to write.
     families : sequence of str
@@ -90,6 +90,7 @@ def train_on_missions(
         MissionTrainingParameters(
             method=method,
             population=size if method == "gappo" else 1,
+            evolved=MissionTrainingParameters.evolved if method == "gappo" else 0,
             decisions=whole(decisions, "decisions", 1),
             learner=_learner(parameters or {}),
             curriculum=replace(MissionCurriculum(_families(families)), missions=tuple(missions)),

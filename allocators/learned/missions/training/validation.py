@@ -31,14 +31,19 @@ def validate(network: MissionNetwork, missions: list[tuple[PackedMission, int]])
     weights, rows = compiled_weights(network), []
     for mission, seed in missions:
         state = begun(mission.arrays, seed)
-        play(state, room_for(len(state.agents), len(state.tasks)), weights, seed)
-        rows.append(_figures(state, mission.ideal))
+        play(state, room_for(len(state.agents), len(state.tasks), mission.periods), weights, seed)
+        rows.append(figures(state, mission.ideal))
     time, unserved, undone, distance = np.array(rows).mean(axis=0).tolist()
-    cost = time + MISSED_WEIGHT * undone + DISTANCE_WEIGHT * distance
+    cost = cost_of(time, unserved, undone, distance)
     return Validation(cost, unserved, time, distance, 0.0, -cost)
 
 
-def _figures(state: MissionArrays, ideal: float) -> tuple[float, float, float, float]:
+def cost_of(time: float, unserved: float, undone: float, distance: float) -> float:
+    """Return the cost of missions by the means of their `figures`."""
+    return time + MISSED_WEIGHT * undone + DISTANCE_WEIGHT * distance
+
+
+def figures(state: MissionArrays, ideal: float) -> tuple[float, float, float, float]:
     """Return mission time, tasks not done, their share of all priority, and distance per agent."""
     tasks, agents, head = records(state.tasks), records(state.agents), state.head[0]
     undone = tasks["status"] != DONE

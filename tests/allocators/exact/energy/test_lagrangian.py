@@ -3,10 +3,15 @@ from itertools import product
 
 import numpy as np
 import pytest
+from oracle import brute_force, least_energy_within
+from tiny_instances import all_can_be_served, seeds_where, tiny_instance
 
-from alloc.allocators.exact.energy.energy_model import EnergyModel
+from alloc.allocators.exact.energy.energy_model import EnergyModel, round_demand
 from alloc.allocators.exact.energy.lagrangian import LagrangianBound
 from alloc.allocators.exact.energy.subproblems import solve_subproblems
+from alloc.allocators.exact.model import Model
+from alloc.problems import agent_classes
+from alloc.problems.evaluation import last_equal
 
 
 @cache
@@ -72,3 +77,31 @@ def test_excess_is_what_a_pair_costs_more(seed, limited):
         for p, pair in enumerate(pairs):
             best_with = cost[groups[:, p] > 0].min(initial=np.inf)
             assert excess[pair] <= best_with - cost.min() + 1e-9
+
+
+def has_float_weights(instance):
+    """Whether weights are no whole numbers, and there are flights that cost something."""
+    model = Model.build(instance, agent_classes(instance, by_place=True), instance.m)
+    return all_can_be_served(instance) and model.unit is None and model.cost.any()
+
+
+@pytest.mark.parametrize("slack", [1.0, 1.2])
+@pytest.mark.parametrize("seed", seeds_where(has_float_weights, 30))
+def test_bound_in_floats_is_below_the_least_energy(seed, slack):
+    """With speeds and real-valued abilities, brute force finds no plan in time that costs less than the bound."""
+    instance = tiny_instance(seed)
+    best = brute_force(instance)
+    time = best.makespan * slack
+    if time == 0:
+        return
+    energy = least_energy_within(instance, time)
+    model = Model.build(instance, agent_classes(instance, by_place=True), int((instance.workload > 0).sum()))
+    demand = model.at(last_equal(time))
+    rounded, _ = round_demand(demand, model.cost[model.pairs_at(demand)])
+    assert not rounded.is_whole
+    tasks = len(rounded.need)
+    bound = LagrangianBound(rounded, np.zeros((tasks, tasks)), np.zeros(len(rounded.count)))
+    least = energy / instance.energy_per_distance
+    bound.ascend(200, least * 1.1 + 1e-9)
+    assert bound.bound <= least * (1 + 1e-9) + 1e-12
+    assert bound.bound >= 0.3 * least

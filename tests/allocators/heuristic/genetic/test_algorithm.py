@@ -2,14 +2,18 @@
 
 import random
 import threading
+from unittest.mock import patch
 
 import numpy as np
 import pytest
 
-from alloc.allocators import Improvement, Result, StopReason, load, solve
+from alloc.allocators import Budget, Improvement, Result, Search, StopReason, load, solve
 from alloc.allocators.heuristic.genetic.algorithm import GeneticAlgorithm
+from alloc.allocators.heuristic.genetic.encoding import Encoding
 from alloc.allocators.heuristic.genetic.evolution import GeneticParameters
-from alloc.problems import Allocation, InputError, Instance, evaluate, fewest_unserved
+from alloc.allocators.heuristic.genetic.islands import GENERATIONS, Island, evolve_islands
+from alloc.allocators.heuristic.greedy.list_schedule import greedy
+from alloc.problems import Allocation, InputError, Instance, Objective, evaluate, fewest_unserved, serve_all
 from alloc.problems.generate import paper
 
 
@@ -188,3 +192,28 @@ def test_parameters_are_keywords() -> None:
         with pytest.raises(InputError) as caught:
             GeneticAlgorithm(**{name: value})
         assert caught.value.place == name
+
+
+def test_islands_can_be_repeated() -> None:
+    """Counted in generations, which all islands share, populations in three threads give the same answer again."""
+    settings = {"objective": "makespan-energy", "iterations": 70, "time_limit_s": None, "threads": 3}
+    first, again = (solve(hard(), GeneticAlgorithm(population=16), **settings) for _ in range(2))
+    assert first.allocation == again.allocation
+    assert first.makespan < solve(hard(), "greedy").makespan
+
+
+def test_islands_exchange_their_best() -> None:
+    """What one island finds, the populations of all have after the next exchange, and no more generations are made."""
+    instance = hard()
+    search = Search(instance, Objective.MAKESPAN, Budget(None, 3 * GENERATIONS), threads=3)
+    search.submit(serve_all(instance, greedy(instance)))
+    received = []
+    with patch.object(Island, "receive", lambda island, allocation: received.append(allocation)):
+        evolve_islands(search, Encoding(instance), GeneticParameters(population=16))
+    assert search.iteration == 3 * GENERATIONS
+    assert not received, "the budget was over"
+    longer = Search(instance, Objective.MAKESPAN, Budget(None, 3 * GENERATIONS + 1), threads=3)
+    longer.submit(serve_all(instance, greedy(instance)))
+    with patch.object(Island, "receive", lambda island, allocation: received.append(allocation)):
+        evolve_islands(longer, Encoding(instance), GeneticParameters(population=16))
+    assert received == [search.best.allocation] * 3

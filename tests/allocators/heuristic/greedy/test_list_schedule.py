@@ -10,8 +10,10 @@ from hypothesis import strategies as st
 from strategies import instances
 
 from alloc.allocators import Budget, Search, solve
+from alloc.allocators.heuristic.greedy import list_schedule
 from alloc.allocators.heuristic.greedy.list_schedule import greedy
 from alloc.problems import Allocation, Instance, Objective, Reach, evaluate, fewest_unserved
+from alloc.problems.generate import Family, random_instance
 
 
 def test_by_hand() -> None:
@@ -114,3 +116,19 @@ def test_alone_it_looks_ahead_as_far_as_in_a_run() -> None:
     search = Search(instance, Objective.MAKESPAN, Budget(None))
     assert greedy(instance) == greedy(instance, search)
     assert (greedy(instance).task_of_agent >= 0).any()
+
+
+def test_threads_share_the_agents() -> None:
+    """Threads that assign agents side by side leave tasks about as even as one does, and no agent out."""
+    instance = random_instance(Family(agents=6000, tasks=20, communication_range=0.8), 0)
+    with patch.multiple(list_schedule, LEAST_SHARED=500, MOST_SCANNED=0):
+        plans = [
+            greedy(instance, Search(instance, Objective.MAKESPAN, Budget(None), threads=threads))
+            for threads in (1, 3, 3)
+        ]
+    one, three = (evaluate(instance, plan) for plan in plans[:2])
+    assert plans[1] == plans[2]
+    assert plans[0] != plans[1]
+    assert not three.violations
+    assert (plans[1].task_of_agent >= 0).all() == (plans[0].task_of_agent >= 0).all()
+    assert three.makespan <= 1.01 * one.makespan

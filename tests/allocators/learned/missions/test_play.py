@@ -12,6 +12,7 @@ from alloc.allocators.learned.missions.network import compiled_weights, first_ne
 from alloc.allocators.learned.missions.network_arrays import HIDDEN
 from alloc.allocators.learned.missions.play import play, room_for
 from alloc.allocators.learned.missions.policy_file import load_network, save_network
+from alloc.allocators.learned.missions.talking import is_to_send
 from alloc.allocators.missions.pack import begun, measure, pack
 from alloc.allocators.online.policies.gappo import NetworkPolicy
 from alloc.allocators.online.run import simulate
@@ -35,7 +36,7 @@ def test_compiled_scores_are_those_of_torch() -> None:
     filled = torch.zeros(1, 9, FEATURES)
     filled[0, :7] = torch.tensor(options)
     with torch.no_grad():
-        expected, _ = first_network(1)(filled, torch.arange(9)[None] < 7)
+        expected = first_network(1)(filled, torch.arange(9)[None] < 7)
     assert scored(options, 1) == pytest.approx(expected[0, :7].numpy(), abs=1e-5)
     assert expected[0, 7:].isneginf().all()
 
@@ -49,20 +50,31 @@ def test_scores_do_not_depend_on_the_order_of_options() -> None:
 
 @pytest.mark.parametrize(
     ("family", "knowledge"),
-    [("steady", "local"), ("failures", "full"), ("recharging", "local"), ("deadlines", "local")],
+    [("steady", "local"), ("failures", "full"), ("recharging", "local"), ("deadlines", "local"), ("silence", "local")],
 )
 def test_policy_is_the_same_in_both_simulations(tmp_path: Path, family: str, knowledge: str) -> None:
     """The policy by the contract, and the compiled one, reach the same measures."""
     network = first_network(3)
     save_network(tmp_path / "policy.safetensors", network, "gappo")
     mission = random_mission(MissionParameters(family=family, agents=6, tasks=8, knowledge=knowledge), 4)
-    expected = simulate(mission, NetworkPolicy(tmp_path / "policy.safetensors"), seed=5).result
+    expected = simulate(mission, NetworkPolicy(policy=tmp_path / "policy.safetensors", periods=3), seed=5).result
     state = begun(pack(mission), 5)
-    play(state, room_for(6, 8), compiled_weights(network), 5)
+    play(state, room_for(6, 8, 3), compiled_weights(network), 5)
     found = measure(mission, state, "gappo", 5)
     for name in ("mission_time", "tasks_done", "tasks_missed", "energy", "distance", "switches", "messages", "bytes"):
         value = getattr(expected, name)
         assert getattr(found, name) == (None if value is None else pytest.approx(value, rel=1e-9)), name
+
+
+def test_agents_send_seldom_and_sooner_with_news() -> None:
+    """Nobody sends more than every tenth time; news goes out as soon as that allows; one message is kept for it."""
+    saved, counted, news = (np.zeros(1, np.intp) for _ in range(3))
+    sent = []
+    for tick in range(100):
+        news[0] |= 15 <= tick < 60
+        if is_to_send(10, saved, counted, news, 0, tick):
+            sent.append(tick)
+    assert sent == [15, 20, 30, 40, 50, 60, 80, 90]
 
 
 def test_policy_file_for_missions_is_checked(tmp_path: Path) -> None:

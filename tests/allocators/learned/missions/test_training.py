@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 import torch
 
-from alloc.allocators.learned.algorithms.hyperparameters import PpoParameters
 from alloc.allocators.learned.missions.policy_file import load_network
 from alloc.allocators.learned.missions.rollout import record_for
 from alloc.allocators.learned.missions.training.curriculum import FAMILIES, MissionCurriculum
-from alloc.allocators.learned.missions.training.ppo import HORIZON, OWN_SHARE, record_advantages
+from alloc.allocators.learned.missions.training.ppo import WINDOW, group_advantages
 from alloc.allocators.learned.missions.training.run import train_on_missions
 from alloc.allocators.learned.missions.training.trainer import MissionTrainer, MissionTrainingParameters
 from alloc.problems import InputError
@@ -22,6 +21,7 @@ TINY = MissionTrainingParameters(
     population=2,
     decisions=40,
     missions=1,
+    groups=1,
     validations=1,
     evolved=1,
     candidates=4,
@@ -83,14 +83,13 @@ def test_curriculum_grows_harder() -> None:
     assert len(FAMILIES) == 8
 
 
-def test_advantages_follow_the_hours_between_decisions() -> None:
-    """With traces of length 0 the advantage is minus what was lost until the next decision, and what follows it."""
-    record = record_for(1, 1, 2, ideal=4.0)
-    record.length[0] = 2
-    record.hour[:], record.idle[:], record.cost[:] = (0.0, 1.0), (0.0, 1.0), (0.0, 0.5)
-    record.asked[0], record.unproductive[0], record.total[0] = 3.0, 1.0, 0.5
-    parameters = PpoParameters(gae_lambda=0.0, reward_scale=1.0)
-    lost = OWN_SHARE * 1.0 + (1 - OWN_SHARE) * 0.5
-    assert record_advantages(record, np.zeros(2), parameters) == pytest.approx([-lost / 4.0, 0.0])
-    valued = record_advantages(record, np.array([0.0, 2.0]), parameters)
-    assert valued == pytest.approx([-lost / 4.0 + 2.0 * np.exp(-1.0 / (HORIZON * 4.0)), -2.0])
+def test_advantages_are_what_a_play_gained_beside_the_others() -> None:
+    """The advantage of a decision is what other plays lost more in the same hours, 0 on average."""
+    group = [record_for(1, 1, 2, ideal=4.0) for _ in range(3)]
+    for record, lost in zip(group, (0.0, 1.0, 2.0), strict=True):
+        record.length[0], record.asked[0] = 2, 10.0
+        record.hour[:], record.cost[:], record.total[0] = (0.0, 5.0), (0.0, lost), lost
+    early = [float(gained[0]) for gained in group_advantages(group)]
+    share = WINDOW * 4.0 / 5.0
+    assert early == pytest.approx([1.5 * share / 4.0, 0.0, -1.5 * share / 4.0])
+    assert [float(gained[1]) for gained in group_advantages(group)] == pytest.approx([0.0] * 3)

@@ -65,6 +65,11 @@ class Clock:
         in_time = (self.until_s - search.elapsed_s) / max(pace_s, 1e-9) if self.until_s < math.inf else math.inf
         return max(0.0, min(in_time, self.until_iteration - search.iteration))
 
+    def iterations_of(self, number: int, count: int) -> float:
+        """Return how many of the iterations until the end are those of one of `count` threads."""
+        left = self.until_iteration - self.search.iteration
+        return left if left == math.inf else (left + count - 1 - number) // count
+
     @property
     def is_over(self) -> bool:
         """Whether this part has ended, or the search should stop."""

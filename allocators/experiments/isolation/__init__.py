@@ -1,0 +1,1 @@
+"""Runs in processes of their own, which can crash, hang or eat memory without harm to anything else."""

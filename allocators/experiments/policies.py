@@ -1,0 +1,266 @@
+"""Several policies in several missions and with several seeds: one row per policy and mission."""
+
+import logging
+import threading
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from functools import partial
+
+import numpy as np
+
+from alloc.allocators.online.contract import Policy
+from alloc.allocators.online.registry import load_policy
+from alloc.allocators.online.run import MissionRun, simulate
+from alloc.problems import MissingPackageError, Mission, MissionResult, RefusedError
+from alloc.problems.arguments import choice, event, listed, of_type, real, whole
+from alloc.problems.errors import InputError
+from alloc.problems.vocabulary import Knowledge
+
+LOG = logging.getLogger("alloc.compare")
+
+
+@dataclass(frozen=True, kw_only=True)
+class PolicyRow:
+    """The figures of one policy in one mission, over all seeds.
+
+    Attributes
+    ----------
+    mission, policy : str
+    knowledge : str
+        What agents knew; empty where there was no run.
+    agents, tasks : int
+    runs : int
+        Runs that the figures are taken over; 0 for a refusal.
+    statuses : str
+        ``done``, ``unfinished``, or both, separated by ``/``.
+    mission_time_mean, mission_time_worst : float or None
+        None if a run did not do all tasks.
+    mission_time_lower_bound : float or None
+    tasks_done_share, priority_done_share : float or None
+        Means of the share of tasks that were done, by number and by priority, among those that were not cancelled.
+    completion_hours_mean : float or None
+        From appearance to completion; None if a run did no task.
+    energy_mean, distance_mean, switches_mean, messages_mean : float or None
+    decision_ms_mean, decision_ms_worst : float or None
+        Mean over runs of the mean, and the longest of all.
+    decisions_late, orders_refused : int
+        In all runs.
+    reason : str
+        Why there are no figures: what the policy refuses, which package is not installed, or how it failed.
+    number : int
+        Number of the mission, from 1, as names may repeat.
+    results : tuple of MissionResult
+        One per seed; not in `to_dict`.
+    """
+
+    mission: str
+    policy: str
+    knowledge: str = ""
+    agents: int
+    tasks: int
+    runs: int = 0
+    statuses: str = ""
+    mission_time_mean: float | None = None
+    mission_time_worst: float | None = None
+    mission_time_lower_bound: float | None = None
+    tasks_done_share: float | None = None
+    priority_done_share: float | None = None
+    completion_hours_mean: float | None = None
+    energy_mean: float | None = None
+    distance_mean: float | None = None
+    switches_mean: float | None = None
+    messages_mean: float | None = None
+    decision_ms_mean: float | None = None
+    decision_ms_worst: float | None = None
+    decisions_late: int = 0
+    orders_refused: int = 0
+    reason: str = ""
+    number: int = 1
+    results: tuple[MissionResult, ...] = ()
+
+    def to_dict(self) -> dict[str, object]:
+        """Return the fields by name, ready for JSON.
+
+        Returns
+        -------
+        dict
+        """
+        return {name: value for name, value in asdict(self).items() if name != "results"}
+
+
+Policies = Sequence[str | Policy] | Mapping[str, str | Policy]
+"""Names of policies, and policies; where a mapping, with the name that each has in the rows."""
+
+
+def compare_policies(
+    missions: Iterable[Mission],
+    policies: Policies,
+    seeds: Sequence[int] = (0,),
+    *,
+    knowledge: Knowledge | str | None = None,
+    deadline_ms: float | None = None,
+    stop: threading.Event | None = None,
+) -> Iterator[PolicyRow]:
+    """Let every policy lead every mission with every seed; all policies meet the same events.
+
+    Parameters
+    ----------
+    missions : iterable of Mission
+    policies : sequence or dict
+        Names, each of which is loaded once, and policies with their own parameters. The keys of a dict name the
+        policies in the rows.
+    seeds : sequence of int
+    knowledge, deadline_ms
+        As in `simulate`.
+    stop : threading.Event, optional
+        Setting it ends the comparison after the run in progress.
+
+    Returns
+    -------
+    iterator of PolicyRow
+        Each as soon as all its runs are done. A policy that refuses a mission, is not installed, or fails gives a row
+        with the reason; the traceback of a failure goes to the logger ``alloc``.
+
+    Raises
+    ------
+    InputError
+        If an argument is not what it should be; its place is the parameter.
+    """
+    loaded = {label: _loaded(policy) for label, policy in _labelled(policies).items()}
+    numbers = [whole(seed, "seeds", 0, 2**63 - 1) for seed in listed(seeds, "seeds", "whole numbers")]
+    problems = missions if isinstance(missions, Iterator) else listed(missions, "missions", "missions")
+    stop = event(stop, "stop") or threading.Event()
+    known = None if knowledge is None else choice(Knowledge, knowledge, "knowledge")
+    deadline = None if deadline_ms is None else real(deadline_ms, "deadline_ms", above=True)
+    return _rows(partial(simulate, knowledge=known, deadline_ms=deadline), problems, loaded, numbers, stop)
+
+
+def _labelled(policies: Policies) -> dict[str, str | Policy]:
+    """Return the policies by the name that they have in the rows."""
+    if isinstance(policies, Mapping):
+        return {str(label): _policy(policy) for label, policy in policies.items()}
+    given = [_policy(policy) for policy in listed(policies, "policies", "policies")]
+    labelled = {policy if isinstance(policy, str) else policy.info.name: policy for policy in given}
+    if len(labelled) < len({policy if isinstance(policy, str) else id(policy) for policy in given}):
+        raise InputError("has several objects of one policy; give a dict with a name for each", "policies")
+    return labelled
+
+
+def _policy(given: object) -> str | Policy:
+    of_type(given, (str, Policy), "policies")
+    assert isinstance(given, str | Policy)
+    return given
+
+
+def _loaded(policy: str | Policy) -> Policy | MissingPackageError:
+    """Load a policy once; that a package is not installed goes into the rows."""
+    if isinstance(policy, Policy):
+        return policy
+    try:
+        return load_policy(policy)
+    except MissingPackageError as error:
+        return error
+
+
+def _rows(
+    run: Callable[..., MissionRun],
+    missions: Iterable[Mission],
+    policies: Mapping[str, Policy | MissingPackageError],
+    seeds: Sequence[int],
+    stop: threading.Event,
+) -> Iterator[PolicyRow]:
+    for number, mission in enumerate(missions, 1):
+        of_type(mission, Mission, "missions")
+        for label, policy in policies.items():
+            results: list[MissionResult] = []
+            reason = ""
+            if isinstance(policy, Policy):
+                results, reason = _run_seeds(partial(run, mission, policy), seeds, stop)
+            else:
+                reason = str(policy)
+            if reason or results:
+                yield summarise_runs(mission, label, results, reason, number)
+            if stop.is_set():
+                return
+
+
+def _run_seeds(
+    run: Callable[..., MissionRun], seeds: Sequence[int], stop: threading.Event
+) -> tuple[list[MissionResult], str]:
+    """Return the results of all seeds up to a stop, or why there are none."""
+    results: list[MissionResult] = []
+    for seed in seeds:
+        if stop.is_set():
+            break
+        try:
+            results.append(run(seed=seed).result)
+        except RefusedError as error:
+            return [], str(error)
+        except Exception as error:  # the figures of the other policies do not depend on a faulty plugin
+            LOG.warning("a run failed with seed %s", seed, exc_info=error)
+            return [], f"failed with seed {seed}: {type(error).__name__}: {error}"
+    return results, ""
+
+
+def summarise_runs(
+    mission: Mission, policy: str, results: Sequence[MissionResult], reason: str = "", number: int = 1
+) -> PolicyRow:
+    """Return the row of one policy in one mission.
+
+    Parameters
+    ----------
+    mission : Mission
+    policy : str
+    results : sequence of MissionResult
+        One per seed.
+    reason : str
+        Why there are none.
+    number : int
+        Of the mission.
+
+    Returns
+    -------
+    PolicyRow
+    """
+    size = (mission.instance.n, mission.instance.m)
+    if not results:
+        return PolicyRow(
+            mission=mission.name, policy=policy, agents=size[0], tasks=size[1], reason=reason, number=number
+        )
+    times = [result.mission_time for result in results]
+    return PolicyRow(
+        mission=mission.name,
+        policy=policy,
+        knowledge=results[0].knowledge,
+        agents=size[0],
+        tasks=size[1],
+        runs=len(results),
+        statuses="/".join(sorted({result.status for result in results})),
+        mission_time_mean=_mean(times),
+        mission_time_worst=None if None in times else max(time for time in times if time is not None),
+        mission_time_lower_bound=results[0].mission_time_lower_bound,
+        tasks_done_share=_mean([_share(result) for result in results]),
+        priority_done_share=_mean([result.priority_done_share for result in results]),
+        completion_hours_mean=_mean([result.completion_hours_mean for result in results]),
+        energy_mean=_mean([result.energy for result in results]),
+        distance_mean=_mean([result.distance for result in results]),
+        switches_mean=_mean([result.switches for result in results]),
+        messages_mean=_mean([result.messages for result in results]),
+        decision_ms_mean=_mean([result.decision_ms_mean for result in results]),
+        decision_ms_worst=max((result.decision_ms_worst or 0.0 for result in results), default=None),
+        decisions_late=sum(result.decisions_late for result in results),
+        orders_refused=sum(result.orders_refused for result in results),
+        number=number,
+        results=tuple(results),
+    )
+
+
+def _share(result: MissionResult) -> float:
+    wanted = result.tasks_done + result.tasks_missed + result.tasks_left
+    return result.tasks_done / wanted if wanted else 1.0
+
+
+def _mean(values: Sequence[float | None]) -> float | None:
+    """Return the mean; None where a value is missing, as a mean over the others alone would be too good."""
+    known = [value for value in values if value is not None]
+    return float(np.mean(known)) if len(known) == len(values) else None

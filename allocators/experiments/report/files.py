@@ -1,0 +1,95 @@
+"""A report as a file; the suffix of its name decides what it holds."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from alloc.allocators.experiments.compare import Row
+from alloc.allocators.experiments.report.runs import require_pyarrow, runs_csv, runs_parquet
+from alloc.allocators.experiments.report.tables import Table, report_tables
+from alloc.allocators.experiments.stored import Comparison, Endings
+from alloc.problems import InputError
+from alloc.problems.formats import check_writable, write_bytes_atomically
+from alloc.problems.formats.files import PathLike, is_stream, named
+
+SUFFIXES = (".md", ".tex", ".csv", ".parquet")
+
+SPECIAL = {
+    "\\": r"\textbackslash{}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    **{letter: f"\\{letter}" for letter in "&%$#_{}"},
+}
+"""Characters that LaTeX gives a meaning."""
+
+
+def check_report(path: PathLike) -> None:
+    """Raise an error if a report could not be written, for its suffix, a missing package, or its place."""
+    suffix = Path(path).suffix.lower()
+    if suffix not in SUFFIXES or is_stream(path):
+        raise InputError(f"must end in {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}", source=named(path, output=True))
+    if suffix == ".parquet":
+        require_pyarrow()
+    check_writable(path)
+
+
+def write_report(path: PathLike, comparison: Comparison, endings: Endings, rows: Sequence[Row]) -> None:
+    """Write a report, whole or not at all.
+
+    Parameters
+    ----------
+    path : str or path
+        ``.md`` and ``.tex`` (for the package booktabs) hold tables and statistics, ``.csv`` and ``.parquet`` all runs.
+    comparison : Comparison
+    endings : mapping
+        How its runs ended.
+    rows : sequence of Row
+        Those of the comparison, with the gaps that are to be told.
+
+    Raises
+    ------
+    InputError
+        If the name has another suffix, or the file cannot be written.
+    MissingPackageError
+        If pyarrow is needed and not installed.
+    """
+    check_report(path)
+    suffix = Path(path).suffix.lower()
+    if suffix == ".parquet":
+        content = runs_parquet(comparison, endings)
+    elif suffix == ".csv":
+        content = runs_csv(comparison, endings).encode()
+    else:
+        render = markdown if suffix == ".md" else latex
+        content = render(report_tables(comparison, endings, rows)).encode()
+    write_bytes_atomically(path, content)
+
+
+def markdown(tables: Sequence[Table]) -> str:
+    """Return tables in Markdown, each below its title."""
+    parts = []
+    for table in tables:
+        rule = ["---", *["--:"] * (len(table.header) - 1)]
+        lines = ["| " + " | ".join(map(_cell, row)) + " |" for row in (table.header, rule, *table.rows)]
+        parts.append("\n".join([f"## {table.title}", "", *lines, "", " ".join(table.notes)]).rstrip())
+    return "\n\n".join(parts) + "\n"
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", r"\|")
+
+
+def latex(tables: Sequence[Table]) -> str:
+    """Return tables for LaTeX with booktabs, each in a `table` with its title and notes as the caption."""
+    parts = ["% \\usepackage{booktabs}"]
+    for table in tables:
+        columns = "l" + "r" * (len(table.header) - 1)
+        head, *body = (" & ".join(map(_escaped, row)) + r" \\" for row in (table.header, *table.rows))
+        caption = _escaped(" ".join([f"{table.title}.", *table.notes]))
+        lines = [r"\begin{table}", r"\centering", rf"\caption{{{caption}}}", rf"\begin{{tabular}}{{{columns}}}"]
+        lines += [r"\toprule", head, r"\midrule", *body, r"\bottomrule", r"\end{tabular}", r"\end{table}"]
+        parts.append("\n".join(lines))
+    return "\n\n".join(parts) + "\n"
+
+
+def _escaped(text: str) -> str:
+    return "".join(SPECIAL.get(letter, letter) for letter in text)

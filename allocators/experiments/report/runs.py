@@ -1,0 +1,76 @@
+"""All runs of a comparison, a row each, for programs: as CSV, or as Parquet with the traces."""
+
+import csv
+import io
+from dataclasses import asdict, fields
+from importlib.util import find_spec
+from typing import get_type_hints
+
+from alloc.allocators.experiments.store.key import Run
+from alloc.allocators.experiments.store.outcome import Ending
+from alloc.allocators.experiments.stored import Comparison, Endings
+from alloc.problems import MissingPackageError
+
+NAMES = ("instance_name", "label")
+"""Columns before those of `Run` and `Ending`: the name of the instance, and how the method was written."""
+
+LONG = ("details", "trace")
+"""Fields that are not in the CSV."""
+
+TRACE = ("time_s", "makespan", "energy", "lower_bound")
+
+
+def require_pyarrow() -> None:
+    """Raise a `MissingPackageError` if pyarrow is not installed."""
+    if find_spec("pyarrow") is None:
+        raise MissingPackageError("Parquet needs pyarrow; install with: pip install 'alloc-mrta[parquet]'", "report")
+
+
+def run_rows(comparison: Comparison, endings: Endings) -> list[dict[str, object]]:
+    """Return a row for each run that has ended, with the fields of `Run` and `Ending`."""
+    rows = []
+    for (number, label, seed), job in comparison.jobs.items():
+        ending = endings[label][number][comparison.seeds.index(seed)]
+        if ending is not None:
+            names = {"instance_name": comparison.instances[number].name, "label": label}
+            rows.append({**names, **asdict(job.run), **asdict(ending), "outcome": str(ending.outcome)})
+    return rows
+
+
+def runs_csv(comparison: Comparison, endings: Endings) -> str:
+    """Return a header and a line per run; None is empty, and traces are left out."""
+    columns = [*NAMES, *(field.name for kind in (Run, Ending) for field in fields(kind) if field.name not in LONG)]
+    text = io.StringIO()
+    writer = csv.DictWriter(text, columns, lineterminator="\n", extrasaction="ignore")
+    writer.writeheader()
+    writer.writerows(run_rows(comparison, endings))
+    return text.getvalue()
+
+
+def runs_parquet(comparison: Comparison, endings: Endings) -> bytes:
+    """Return a Parquet file of all runs, in which a trace is a list of points.
+
+    Raises
+    ------
+    MissingPackageError
+        If pyarrow is not installed.
+    """
+    require_pyarrow()
+    import pyarrow
+    import pyarrow.parquet
+
+    point = pyarrow.struct([(name, pyarrow.float64()) for name in TRACE])
+    kinds = {int: pyarrow.int64(), float: pyarrow.float64()}
+    hints = {**dict.fromkeys(NAMES, str), **get_type_hints(Run), **get_type_hints(Ending), "trace": list}
+    columns = {
+        name: pyarrow.list_(point)
+        if hint is list
+        else next((kind for plain, kind in kinds.items() if hint in (plain, plain | None)), pyarrow.string())
+        for name, hint in hints.items()
+    }
+    rows = run_rows(comparison, endings)
+    for row in rows:
+        row["trace"] = [dict(zip(TRACE, one, strict=True)) for one in row["trace"]]  # type: ignore[attr-defined]
+    buffer = io.BytesIO()
+    pyarrow.parquet.write_table(pyarrow.Table.from_pylist(rows, schema=pyarrow.schema(columns)), buffer)
+    return buffer.getvalue()

@@ -1,0 +1,272 @@
+"""Statistics of a comparison: paired differences, performance profiles, and targets reached over time.
+
+What varies is the instance: seeds are averaged within each, so that a hundred runs on three instances are three
+observations and not a hundred. All tests and intervals are those of scipy.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from alloc.allocators.experiments.store.outcome import Ending, Outcome
+from alloc.allocators.experiments.stored import Endings
+
+CONFIDENCE = 0.95
+
+RESAMPLES = 9999
+"""Of the bootstrap; always from the same seed, so that the same runs give the same interval."""
+
+SMALL = 10
+"""Instances below which the sample is called small: an interval of so few says little, and a test hardly more."""
+
+LEAST = 3
+"""Instances below which there is no interval and no test."""
+
+EQUAL = 1e-9
+"""Relative difference up to which two scores are equal, as for the evaluator."""
+
+WITHIN = (0.0, 0.01, 0.05)
+"""Relative distances to the best known makespan of an instance that count as targets."""
+
+FACTORS = (1.0, 1.001, 1.01, 1.05, 1.1, 1.2, 1.5, 2.0)
+"""Ratios to the best method on an instance at which performance profiles are told."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Difference:
+    """A method against another, over all instances on which both have the score for every seed.
+
+    Attributes
+    ----------
+    method, against : str
+    score : str
+        ``makespan`` or ``energy``.
+    instances : int
+        How many the figures are of.
+    left_out : int
+        Instances without the score of one of the two, such as those on which a task was unserved or a run failed.
+    mean : float or None
+        Mean of the relative differences: -0.1 is 10 % less than the other.
+    low, high : float or None
+        Its BCa bootstrap interval with a confidence of 95 %; None for fewer than three instances.
+    p : float or None
+        Of Wilcoxon's signed-rank test, two-sided.
+    p_holm : float or None
+        The same, corrected for the number of methods by Holm's procedure.
+    better, equal, worse : int
+        Instances on which the method has less, as much, and more than the other.
+    """
+
+    method: str
+    against: str
+    score: str
+    instances: int
+    left_out: int
+    mean: float | None = None
+    low: float | None = None
+    high: float | None = None
+    p: float | None = None
+    p_holm: float | None = None
+    better: int = 0
+    equal: int = 0
+    worse: int = 0
+
+    @property
+    def is_small(self) -> bool:
+        """Whether there are too few instances to say much."""
+        return self.instances < SMALL
+
+
+def scores(endings: Sequence[Sequence[Ending | None]], score: str) -> NDArray[np.float64]:
+    """Return the mean of a score over the seeds of each instance; NaN where a run does not have it.
+
+    Parameters
+    ----------
+    endings : sequence of sequence of Ending or None
+        Of one method, by instance and seed.
+    score : str
+        A field of `Ending`.
+
+    Returns
+    -------
+    ndarray, shape (instances,)
+    """
+    return np.array([_mean([_score(ending, score) for ending in runs]) for runs in endings])
+
+
+def _mean(values: Sequence[float]) -> float:
+    return float(np.mean(values)) if values else float("nan")
+
+
+def _score(ending: Ending | None, score: str) -> float:
+    """Return a score, NaN where there is none; energy counts only where all tasks are served, as idling costs none."""
+    if ending is None or ending.outcome is not Outcome.SOLVED or ending.makespan is None:
+        return float("nan")
+    value = getattr(ending, score)
+    return float("nan") if value is None else float(value)
+
+
+def differences(endings: Endings, score: str = "makespan") -> list[Difference]:
+    """Return how each method differs from the first one, in the same instances.
+
+    Parameters
+    ----------
+    endings : mapping
+        How runs ended, by method, instance and seed.
+    score : str
+        ``makespan`` or ``energy``.
+
+    Returns
+    -------
+    list of Difference
+        One for each method but the first.
+    """
+    first, *others = endings
+    base = scores(endings[first], score)
+    found = [_difference(other, first, score, scores(endings[other], score), base) for other in others]
+    corrected = holm([one.p for one in found])
+    return [Difference(**{**vars(one), "p_holm": p}) for one, p in zip(found, corrected, strict=True)]
+
+
+def _difference(
+    method: str, against: str, score: str, ours: NDArray[np.float64], theirs: NDArray[np.float64]
+) -> Difference:
+    known = ~np.isnan(ours) & (theirs > 0)
+    relative = ours[known] / theirs[known] - 1
+    relative[np.abs(relative) <= EQUAL] = 0.0
+    low, high = interval(relative)
+    return Difference(
+        method=method,
+        against=against,
+        score=score,
+        instances=len(relative),
+        left_out=len(ours) - len(relative),
+        mean=float(relative.mean()) if len(relative) else None,
+        low=low,
+        high=high,
+        p=signed_rank(relative),
+        better=int((relative < 0).sum()),
+        equal=int((relative == 0).sum()),
+        worse=int((relative > 0).sum()),
+    )
+
+
+def interval(values: NDArray[np.float64]) -> tuple[float | None, float | None]:
+    """Return the BCa bootstrap interval of the mean; None for fewer than three values."""
+    from scipy import stats
+
+    if len(values) < LEAST:
+        return None, None
+    if np.ptp(values) == 0:  # all resamples are the same, and the method is not defined
+        return float(values[0]), float(values[0])
+    found = stats.bootstrap(
+        (values,),
+        np.mean,
+        n_resamples=RESAMPLES,
+        confidence_level=CONFIDENCE,
+        method="BCa",
+        rng=np.random.default_rng(0),
+    )
+    low, high = found.confidence_interval
+    return float(low), float(high)
+
+
+def signed_rank(values: NDArray[np.float64]) -> float | None:
+    """Return the p-value of Wilcoxon's signed-rank test, two-sided; None for fewer than three values.
+
+    Zeros are left out, as Wilcoxon did; where nothing else is left nothing speaks for a difference, and p is 1. With
+    ties among few values the distribution is enumerated.
+    """
+    from scipy import stats
+
+    if len(values) < LEAST:
+        return None
+    differing = values[values != 0]
+    if not len(differing):
+        return 1.0
+    has_ties = len(np.unique(np.abs(differing))) < len(differing)
+    method = stats.PermutationMethod(n_resamples=2**13) if has_ties and len(differing) <= 13 else "auto"
+    return float(stats.wilcoxon(differing, method=method).pvalue)
+
+
+def holm(p_values: Sequence[float | None]) -> list[float | None]:
+    """Return p-values corrected for their number by Holm's procedure; None stays None.
+
+    References
+    ----------
+    Holm (1979), A simple sequentially rejective multiple test procedure.
+    """
+    order = sorted((p, place) for place, p in enumerate(p_values) if p is not None)
+    corrected: list[float | None] = [None] * len(p_values)
+    largest = 0.0
+    for rank, (p, place) in enumerate(order):
+        largest = max(largest, min(1.0, (len(order) - rank) * p))
+        corrected[place] = largest
+    return corrected
+
+
+def profiles(
+    endings: Endings, factors: Sequence[float] = FACTORS, score: str = "makespan"
+) -> Mapping[str, list[float]]:
+    """Return performance profiles: on which share of the instances a method is within each factor of the best one.
+
+    An instance that no method solved counts for none; one that a method did not solve counts against it.
+
+    References
+    ----------
+    Dolan and Moré (2002), doi:10.1007/s101070100263.
+    """
+    table = np.array([scores(runs, score) for runs in endings.values()])
+    table = table[:, ~np.isnan(table).all(axis=0)]
+    best = np.nanmin(table, axis=0) if table.size else np.zeros(0)
+    shares = [[_share(row <= best * (factor + EQUAL)) for factor in factors] for row in table]
+    return dict(zip(endings, shares, strict=True))
+
+
+def targets_reached(
+    endings: Endings, times_s: Sequence[float], within: Sequence[float] = WITHIN
+) -> Mapping[str, list[float]]:
+    """Return which share of its targets a method has reached by each time, over all runs.
+
+    A target is a makespan: the best known of an instance, found in any of these runs, or so much more. A run reaches
+    it at the first improvement in its trace that is as good.
+
+    References
+    ----------
+    Hansen et al. (2021), COCO: a platform for comparing continuous optimizers, doi:10.1080/10556788.2020.1808977.
+    """
+    known = [ending for lists in endings.values() for runs in lists for ending in runs if ending is not None]
+    if not known:
+        return {label: [0.0] * len(times_s) for label in endings}
+    best = [_best([runs[number] for runs in endings.values()]) for number in range(len(next(iter(endings.values()))))]
+    found = {}
+    for label, lists in endings.items():
+        reached = np.array(
+            [
+                _reached(ending, target * (1 + more))
+                for target, runs in zip(best, lists, strict=True)
+                if target is not None
+                for ending in runs
+                for more in within
+            ]
+        )
+        found[label] = [_share(reached <= time) for time in times_s]
+    return found
+
+
+def _best(lists: Sequence[Sequence[Ending | None]]) -> float | None:
+    makespans = [ending.makespan for runs in lists for ending in runs if ending is not None]
+    return min((makespan for makespan in makespans if makespan is not None), default=None)
+
+
+def _reached(ending: Ending | None, target: float) -> float:
+    """Return when a run had a makespan of at most `target`; infinity if never."""
+    points = () if ending is None else ending.trace
+    good = (time for time, makespan, *_ in points if makespan is not None and makespan <= target * (1 + EQUAL))
+    return min(good, default=float("inf"))
+
+
+def _share(which: NDArray[np.bool_]) -> float:
+    return float(np.mean(which)) if which.size else 0.0

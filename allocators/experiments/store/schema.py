@@ -1,0 +1,63 @@
+"""The tables of a store, and how those of an older version become those of this one."""
+
+APPLICATION = 0x616C6C6F
+"""Mark of our files among those of SQLite (``PRAGMA application_id``): "allo"."""
+
+MIGRATIONS: tuple[str, ...] = (
+    """
+    CREATE TABLE runs (
+        key TEXT PRIMARY KEY,
+        instance TEXT NOT NULL,
+        method TEXT NOT NULL,
+        parameters TEXT NOT NULL,
+        seed INTEGER NOT NULL,
+        objective TEXT NOT NULL,
+        time_limit_s REAL,
+        iterations INTEGER,
+        target_gap REAL,
+        threads INTEGER NOT NULL,
+        version TEXT NOT NULL,
+        machine TEXT NOT NULL,
+        outcome TEXT NOT NULL,
+        reason TEXT NOT NULL,
+        details TEXT NOT NULL,
+        exit_code INTEGER,
+        picked TEXT NOT NULL,
+        status TEXT NOT NULL,
+        stop_reason TEXT NOT NULL,
+        makespan REAL,
+        served_makespan REAL,
+        lower_bound REAL,
+        gap REAL,
+        energy REAL,
+        energy_lower_bound REAL,
+        energy_gap REAL,
+        distance REAL,
+        battery_remaining_percent REAL,
+        reward REAL,
+        unserved INTEGER,
+        runtime_s REAL,
+        wall_s REAL NOT NULL,
+        cpu_s REAL,
+        memory_mb REAL NOT NULL,
+        memory_limit_mb REAL NOT NULL,
+        cores TEXT NOT NULL,
+        at_once INTEGER NOT NULL,
+        started_at REAL NOT NULL,
+        finished_at REAL NOT NULL,
+        trace TEXT NOT NULL
+    ) WITHOUT ROWID;
+    CREATE TABLE instances (
+        instance TEXT PRIMARY KEY,
+        name TEXT NOT NULL,
+        agents INTEGER NOT NULL,
+        tasks INTEGER NOT NULL
+    ) WITHOUT ROWID;
+    CREATE TABLE leases (
+        key TEXT PRIMARY KEY,
+        owner TEXT NOT NULL,
+        expires_at REAL NOT NULL
+    ) WITHOUT ROWID;
+    """,
+)
+"""Statements that lead from each version to the next; that of a file (``PRAGMA user_version``) is how many it had."""

@@ -1,0 +1,273 @@
+"""The store: runs as rows of one file, written as they end, and leases on what is running."""
+
+import json
+import os
+import sqlite3
+import time
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, fields
+from types import TracebackType
+from typing import Self
+
+from alloc.allocators.experiments.store.errors import BUSY_S, explained
+from alloc.allocators.experiments.store.key import Run, fingerprint
+from alloc.allocators.experiments.store.outcome import TRANSIENT, Ending, Outcome
+from alloc.allocators.experiments.store.owner import is_gone, this_process
+from alloc.allocators.experiments.store.schema import APPLICATION, MIGRATIONS
+from alloc.problems import InputError, Instance
+from alloc.problems.formats.files import PathLike, named
+
+LEASE_S = 60.0
+"""Seconds until the lease of a process of which nothing is known ends, unless it is renewed."""
+
+MOST_KEYS = 500
+"""Keys in one query: SQLite limits the parameters of a statement."""
+
+CONDITIONS = ("objective", "time_limit_s", "iterations", "target_gap", "threads", "version", "machine")
+"""Fields of a run that are the same for all that is compared, but for the versions of plugins."""
+
+RUN = tuple(field.name for field in fields(Run))
+ENDING = tuple(field.name for field in fields(Ending))
+
+
+@dataclass(frozen=True)
+class Record:
+    """A row of the store: what was run, and how it ended."""
+
+    run: Run
+    ending: Ending
+
+
+@dataclass(frozen=True)
+class Claim:
+    """What came of asking for a run.
+
+    Attributes
+    ----------
+    key : str or None
+        The run that is now ours; None where there is none left, or others work on all that are.
+    done : frozenset of str
+        Runs among those asked for that have ended, here or elsewhere.
+    """
+
+    key: str | None
+    done: frozenset[str]
+
+
+class Store:
+    """Runs in a file; a context manager. For one thread; any number of processes may have the same file open.
+
+    Each run that ends is one transaction, which is on the disk when `finish` returns. A run that somebody works on has
+    a lease, which ends with the process on the same machine, and some time after the last renewal elsewhere.
+
+    Parameters
+    ----------
+    path : str or path
+        Made where it does not exist. WAL, which lets others read while one writes, needs a file system of this
+        machine.
+    again : collection of Outcome
+        Outcomes that runs are made again for, once, if they ended so before the store was opened.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or written, is locked, damaged, of a later version, or no store; so do all methods.
+    """
+
+    def __init__(self, path: PathLike, again: Collection[Outcome] = ()) -> None:
+        self.path = named(path, output=True)
+        self.again = frozenset(again) | TRANSIENT
+        self.owner = this_process()
+        self._opened_at = time.time()
+        with explained(self.path):
+            self._connection = sqlite3.connect(os.fspath(path), timeout=BUSY_S, isolation_level=None)
+            try:
+                self._prepare()
+            except BaseException:
+                self._connection.close()
+                raise
+
+    def _prepare(self) -> None:
+        version = self._checked_version()
+        self._connection.execute("PRAGMA journal_mode = WAL")
+        self._connection.execute("PRAGMA synchronous = NORMAL")  # a lease need not survive the loss of power
+        if version == len(MIGRATIONS):
+            return
+        with self._transaction():
+            for script in MIGRATIONS[self._checked_version() :]:  # another process may have been faster
+                for statement in filter(str.strip, script.split(";")):
+                    self._connection.execute(statement)
+            self._connection.execute(f"PRAGMA application_id = {APPLICATION}")
+            self._connection.execute(f"PRAGMA user_version = {len(MIGRATIONS)}")
+
+    def _checked_version(self) -> int:
+        """Return the version of the file, 0 for an empty one; raise an error if it is not ours, or of a later one."""
+        (version,) = self._connection.execute("PRAGMA user_version").fetchone()
+        (application,) = self._connection.execute("PRAGMA application_id").fetchone()
+        (tables,) = self._connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
+        if application != APPLICATION and (version or application or tables):
+            raise InputError("is a database of another program; name another file", source=self.path)
+        if version > len(MIGRATIONS):
+            raise InputError(
+                f"is a store of version {version}, made by a later version of alloc; this one knows up to "
+                f"{len(MIGRATIONS)}: update alloc, or name another file",
+                source=self.path,
+            )
+        return int(version)
+
+    def add_instance(self, instance: Instance) -> str:
+        """Note the name and size of an instance, and return the hash of its content."""
+        known = fingerprint(instance)
+        with self._transaction():
+            self._connection.execute(
+                "INSERT OR REPLACE INTO instances VALUES (?, ?, ?, ?)", (known, instance.name, instance.n, instance.m)
+            )
+        return known
+
+    def claim(self, keys: Sequence[str]) -> Claim:
+        """Take a lease on the first of these runs that has not ended and that nobody else works on."""
+        done: set[str] = set()
+        with self._transaction():
+            for start in range(0, len(keys), MOST_KEYS):
+                part = keys[start : start + MOST_KEYS]
+                ended, leased = self._ended(part), self._leased(part)
+                done |= ended
+                free = next((key for key in part if key not in ended and key not in leased), None)
+                if free is not None:
+                    lease = (free, self.owner, time.time() + LEASE_S)
+                    self._connection.execute("INSERT OR REPLACE INTO leases VALUES (?, ?, ?)", lease)
+                    return Claim(free, frozenset(done))
+        return Claim(None, frozenset(done))
+
+    def _ended(self, keys: Sequence[str]) -> set[str]:
+        """Return the runs that have ended, without those to be made again."""
+        rows = self._connection.execute(
+            f"SELECT key, outcome, finished_at FROM runs WHERE key IN ({_marks(keys)})", keys
+        )
+        return {key for key, outcome, at in rows if outcome not in self.again or at >= self._opened_at}
+
+    def _leased(self, keys: Sequence[str]) -> set[str]:
+        """Return the runs that somebody works on."""
+        rows = self._connection.execute(
+            f"SELECT key, owner, expires_at FROM leases WHERE key IN ({_marks(keys)})", keys
+        )
+        now = time.time()
+        return {key for key, owner, expires_at in rows if expires_at > now and not is_gone(owner)}
+
+    def renew(self) -> None:
+        """Extend all leases of this process."""
+        with self._transaction():
+            self._connection.execute(
+                "UPDATE leases SET expires_at = ? WHERE owner = ?", (time.time() + LEASE_S, self.owner)
+            )
+
+    def release(self, key: str) -> None:
+        """Give a run back that did not end."""
+        with self._transaction():
+            self._connection.execute("DELETE FROM leases WHERE key = ? AND owner = ?", (key, self.owner))
+
+    def finish(self, run: Run, ending: Ending) -> bool:
+        """Write a run that has ended, in one transaction.
+
+        Returns
+        -------
+        bool
+            False, and nothing is written, if the lease had ended and another process has the run, or ended it.
+        """
+        key = run.key
+        with self._transaction(durable=True):
+            held = self._connection.execute("SELECT owner FROM leases WHERE key = ?", (key,)).fetchone()
+            if held is None or held[0] != self.owner:
+                return False
+            values = {**asdict(run), **asdict(ending), "key": key, "outcome": str(ending.outcome)}
+            values["trace"] = json.dumps(ending.trace)
+            columns = ("key", *RUN, *ENDING)
+            self._connection.execute(
+                f"INSERT OR REPLACE INTO runs ({', '.join(columns)}) VALUES ({_marks(columns)})",
+                [values[column] for column in columns],
+            )
+            self._connection.execute("DELETE FROM leases WHERE key = ?", (key,))
+        return True
+
+    def records(self, keys: Sequence[str] | None = None) -> dict[str, Record]:
+        """Return the runs that have ended by their keys: all, or those among `keys`."""
+        found: dict[str, Record] = {}
+        columns = ", ".join(("key", *RUN, *ENDING))
+        with explained(self.path):
+            if keys is None:
+                found |= map(_record, self._connection.execute(f"SELECT {columns} FROM runs"))
+            for start in range(0, len(keys or ()), MOST_KEYS):
+                part = (keys or ())[start : start + MOST_KEYS]
+                rows = self._connection.execute(f"SELECT {columns} FROM runs WHERE key IN ({_marks(part)})", part)
+                found |= map(_record, rows)
+        return found
+
+    def settings(self) -> dict[tuple[object, ...], int]:
+        """Return under which conditions the runs were made: how many with each combination of `CONDITIONS`."""
+        columns = ", ".join(CONDITIONS)
+        with explained(self.path):
+            rows = self._connection.execute(f"SELECT {columns}, count(*) FROM runs GROUP BY {columns}").fetchall()
+        return {tuple(row[:-1]): int(row[-1]) for row in rows}
+
+    def instance_names(self) -> dict[str, str]:
+        """Return the name under which each instance was last seen, by its hash."""
+        with explained(self.path):
+            return dict(self._connection.execute("SELECT instance, name FROM instances").fetchall())
+
+    def leases(self) -> dict[str, str]:
+        """Return who works on what: owners by key, also of leases that have ended."""
+        with explained(self.path):
+            return dict(self._connection.execute("SELECT key, owner FROM leases").fetchall())
+
+    @contextmanager
+    def _transaction(self, *, durable: bool = False) -> Iterator[None]:
+        """Run a block as one transaction; a durable one survives the loss of power once it has ended."""
+        with explained(self.path):
+            if durable:
+                self._connection.execute("PRAGMA synchronous = FULL")
+            self._connection.execute("BEGIN IMMEDIATE")
+            try:
+                yield
+                self._connection.execute("COMMIT")
+            except BaseException:
+                if self._connection.in_transaction:  # some errors, such as a full disk, end it themselves
+                    self._connection.execute("ROLLBACK")
+                raise
+            finally:
+                if durable:
+                    self._connection.execute("PRAGMA synchronous = NORMAL")
+
+    def close(self) -> None:
+        """Close the file, and give back what was being run."""
+        try:
+            with self._transaction():
+                self._connection.execute("DELETE FROM leases WHERE owner = ?", (self.owner,))
+        finally:
+            self._connection.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if error is None:
+            self.close()
+            return
+        try:
+            self.close()
+        except InputError:  # the error that led here says more
+            self._connection.close()
+
+
+def _marks(values: Collection[str]) -> str:
+    return ", ".join("?" * len(values))
+
+
+def _record(row: tuple[object, ...]) -> tuple[str, Record]:
+    run = Run(**dict(zip(RUN, row[1:], strict=False)))  # type: ignore[arg-type]
+    values = dict(zip(ENDING, row[1 + len(RUN) :], strict=True))
+    values["outcome"] = Outcome(str(values["outcome"]))
+    values["trace"] = tuple(map(tuple, json.loads(str(values["trace"]))))
+    return str(row[0]), Record(run, Ending(**values))  # type: ignore[arg-type]

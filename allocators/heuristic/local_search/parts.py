@@ -1,0 +1,114 @@
+"""Annealing by several threads: one plan in parts that change from round to round, or a plan each."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from alloc.allocators.contract.search import Search
+from alloc.allocators.heuristic.local_search.annealing_state import AnnealingState
+from alloc.allocators.heuristic.local_search.plan import Weights
+from alloc.allocators.parallel.pool import RunAll
+from alloc.problems.instance import FloatArray, IntArray
+
+MOST_STATES = 32
+"""Annealing states beyond which further threads are not used."""
+
+LEAST_TASKS = 8
+"""Tasks that each part has at least."""
+
+DRAWS = 1.3
+"""Exchanges that are drawn for each one that is to be made: some are with tasks of other parts."""
+
+WHOLE = 6
+"""Exchanges in each part for each one that is then made anywhere in the whole plan."""
+
+RUNS = 1
+"""Runs of each part in a round; longer rounds would settle each part for itself."""
+
+AGENTS_PER_RUN = 4_000
+"""Agents for each of which a round has one run more: dividing and joining a plan takes time by its size."""
+
+
+@dataclass(frozen=True)
+class Team:
+    """Annealing states of one instance, each with random numbers of its own, and what runs them side by side."""
+
+    states: list[AnnealingState]
+    run_all: RunAll
+
+    @classmethod
+    def of(cls, search: Search, neighbours: int, run_all: RunAll) -> "Team":
+        """Return a team for the threads of a run; its first state is the one that a single thread has."""
+        first = AnnealingState(search.instance, search.seed, neighbours)
+        twins = [first.twin([search.seed, number]) for number in range(1, min(search.threads, MOST_STATES))]
+        return cls([first, *twins], run_all)
+
+
+class Parts:
+    """Anneals the plan of a state in parts, side by side.
+
+    A part has neighbouring tasks, their agents, and some of the idle ones; exchanges are made within parts. In each
+    round, the tasks are divided along another direction.
+
+    Parameters
+    ----------
+    team : Team
+        The plan is that of its first state.
+    seed : int
+
+    Attributes
+    ----------
+    count : int
+        How many parts there are.
+    """
+
+    def __init__(self, team: Team, seed: int) -> None:
+        self.team, self.state, self.rng = team, team.states[0], np.random.default_rng(seed)
+        tasks = int(np.count_nonzero(self.state.plan.demand))
+        self.count = max(1, min(len(team.states), tasks // LEAST_TASKS))
+        first = [self.state.twin(seed)] if self.count > 1 else []
+        self._parts = [*first, *team.states[1 : self.count]]
+
+    def run(self, iterations: float, steps: int, weights: Weights) -> int:
+        """Make up to so many iterations of `steps` exchanges each; return how many were made."""
+        if self.count == 1:
+            self.state.run(steps, weights)
+            return 1
+        runs = int(min(max(RUNS, self.state.instance.n // AGENTS_PER_RUN), iterations // self.count))
+        if runs < 1:
+            self.state.run(steps, weights)
+            return 1
+        parts = self._parts
+        part_of_task, part_of_agent = self._divide()
+        for number, part in enumerate(parts):
+            part.begin_part(self.state, number, part_of_task, part_of_agent)
+
+        def work(part: AnnealingState) -> None:
+            for _ in range(runs):
+                part.run(int(steps * self.count * DRAWS), weights)  # one in `count` agents is in the part
+
+        list(self.team.run_all(work, parts))
+        self.state.join(parts, part_of_task, part_of_agent)
+        self.state.run(runs * steps // WHOLE, weights)  # shortfalls in one part may need a surplus in another
+        return runs * self.count
+
+    def _divide(self) -> tuple[IntArray, IntArray]:
+        """Return the part of each task and of each agent: slabs across a random direction, of about as many agents."""
+        plan, rng, count = self.state.plan, self.rng, self.count
+        tasks = np.flatnonzero(plan.demand[:-1] > 0)
+        order = tasks[np.argsort(_along(self.state.arrays.task_position[tasks], rng), kind="stable")]
+        agents = np.cumsum(plan.size[order])
+        cut = np.searchsorted(agents, agents[-1] * np.arange(1, count) / count)
+        number = np.arange(1, count)
+        cut = np.clip(cut, number, len(tasks) - count + number)
+        cut = np.maximum.accumulate(cut - number) + number  # no part is empty
+        part_of_task = np.full(self.state.instance.m, -1)
+        part_of_task[order] = np.searchsorted(cut, np.arange(len(tasks)), side="right")
+        of_group = np.append(part_of_task, -1)[plan.group_of_agent]
+        return part_of_task, np.where(of_group < 0, rng.integers(count, size=len(of_group)), of_group)
+
+
+def _along(position: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """Return how far each position lies in a random direction; a random number where it is unknown."""
+    key: FloatArray = position @ rng.standard_normal(position.shape[1])
+    return np.where(np.isnan(key), rng.random(len(key)), key)

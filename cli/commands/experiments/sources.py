@@ -1,0 +1,84 @@
+"""Instances as a command line names many: files, folders, patterns, tables of them, and generated families."""
+
+import csv
+import glob
+import os
+import re
+from typing import TYPE_CHECKING, Any
+
+from alloc.cli.options import BETWEEN_SETTINGS, values
+from alloc.cli.output.files import read_instances
+
+if TYPE_CHECKING:
+    from alloc.problems import Instance
+
+FAMILY = re.compile(r"(paper-[1-4]|random)(?:\[(.*)\])?:(\d{1,9})(?:-(\d{1,9}))?")
+"""A generated family with its seeds, both ends included."""
+
+MOST_GENERATED = 100_000
+
+COLUMN = "instance"
+"""That of a table of instances which names them; others are for people."""
+
+
+def gather(sources: list[str]) -> "list[Instance]":
+    """Return the instances that all sources name, in their order.
+
+    Raises
+    ------
+    InputError
+        If a source cannot be read, a pattern matches nothing, or a family is none.
+    """
+    return [instance for source in sources for instance in _instances(source)]
+
+
+def _instances(source: str) -> "list[Instance]":
+    from alloc.problems import InputError
+
+    if os.path.isfile(source) and source.endswith(".csv"):
+        return gather(_listed(source))
+    family = FAMILY.fullmatch(source)
+    if os.path.exists(source) or source == "-":
+        return read_instances(source)
+    if family is not None:
+        return _generated(source, *family.groups())
+    if glob.has_magic(source):
+        found = sorted(glob.glob(source, recursive=True))
+        if not found:
+            raise InputError("matches no file", source=source)
+        return gather(found)
+    return read_instances(source)
+
+
+def _listed(table: str) -> list[str]:
+    """Return what the rows of a table name; relative paths are from its folder."""
+    from alloc.problems import InputError
+    from alloc.problems.formats.files import read_text
+
+    rows = csv.DictReader(read_text(table).splitlines())
+    if COLUMN not in (rows.fieldnames or ()):
+        raise InputError(f"has no column {COLUMN!r} that names files or families", source=table)
+    names = [row[COLUMN].strip() for row in rows if (row[COLUMN] or "").strip()]
+    folder = os.path.dirname(table)
+    return [name if FAMILY.fullmatch(name) else os.path.join(folder, name) for name in names]
+
+
+def _generated(source: str, family: str, settings: str | None, first: str, last: str | None) -> "list[Instance]":
+    from alloc.problems import Family, InputError, paper, random_instance
+
+    seeds = range(int(first), int(last or first) + 1)
+    if not 0 < len(seeds) <= MOST_GENERATED:
+        raise InputError(f"must be from a seed to a later one, at most {MOST_GENERATED} of them", source=source)
+    try:
+        if family != "random":
+            if settings is not None:
+                raise InputError("takes no parameters; random does", family)
+            return [paper(int(family.removeprefix("paper-")), seed) for seed in seeds]
+        given: dict[str, Any] = values(BETWEEN_SETTINGS.split(settings) if settings else [])
+        unknown = sorted(given.keys() - Family.__dataclass_fields__.keys())
+        if unknown:
+            raise InputError("is no parameter of a random family", unknown[0])
+        title = source.rpartition(":")[0]
+        return [random_instance(Family(**given), seed, name=f"{title}:{seed}") for seed in seeds]
+    except InputError as error:
+        raise InputError(error.message, error.place, source) from error

@@ -1,0 +1,156 @@
+"""Missions as a PettingZoo environment: agents decide one by one, as they become free, by what each of them knows."""
+
+from __future__ import annotations
+
+from typing import TypedDict
+
+import numpy as np
+from gymnasium import spaces
+from pettingzoo import AECEnv
+
+from alloc.problems.arguments import whole
+from alloc.problems.environments.missions.decisions import Decisions, Info, Source, Weights, draw, sizes_of
+from alloc.problems.environments.missions.observation import LIMIT, Floats, Lens, Mask, length
+from alloc.problems.errors import InputError
+from alloc.problems.vocabulary import Knowledge
+
+
+class Observation(TypedDict):
+    """What an agent gets to see."""
+
+    observation: Floats
+    action_mask: Mask
+
+
+class MissionEnv(AECEnv[str, Observation, int]):  # type: ignore[misc]
+    """Each free agent chooses a task, a place to look around, or to go on as it is.
+
+    A mission goes on in continuous time; whoever is to decide is the next agent (`agent_selection`): under local
+    knowledge each free agent at every period of the radio, and when its task or flight ends, under full knowledge when
+    something has happened. Agents tell each other all that they know. Action j is task j, action m + k the place k on a
+    grid over the area, and the last action goes on with the last order: an idle agent stays idle. An action that the
+    mask bars is taken for the last one.
+
+    Observations are dictionaries as in PettingZoo's classic games: ``observation``, what the agent senses or was told
+    and nothing else, as `Lens` of `observation.py` describes, all within -10 and 10; and ``action_mask``. All agents
+    get the same reward: the share of the priority that is done, less the weighted hours that tasks wait and the energy.
+    Over a mission these add up to what was achieved. When a mission is over, all agents are terminated. Infos hold
+    hour, tasks done, energy and whether the agent's last action was ``illegal``, at the end also mission time (``inf``
+    if not all is done), priority done, switches and messages.
+
+    Parameters
+    ----------
+    missions : sequence of Mission, or callable
+        Drawn from at every reset, or called with a numpy generator; all of one size.
+    knowledge : {"full", "local"}, optional
+        As each mission says by default.
+    grid : int
+        Places on each side of the grid where an agent can look around; 0 for none.
+    switching : bool
+        Whether agents that fly or work decide as well.
+    waiting_weight, energy_weight : float
+        In the reward.
+    max_steps : int, optional
+        Decisions after which the mission is truncated; none by default, as missions end by themselves.
+
+    Raises
+    ------
+    InputError
+        If missions differ in size.
+
+    References
+    ----------
+    Terry et al. (2021), arXiv:2009.14471.
+    """
+
+    metadata = {"name": "alloc_mission_v0", "render_modes": [], "is_parallelizable": False}  # noqa: RUF012
+
+    def __init__(
+        self,
+        missions: Source,
+        *,
+        knowledge: Knowledge | str | None = None,
+        grid: int = 3,
+        switching: bool = False,
+        waiting_weight: float = 0.5,
+        energy_weight: float = 0.0,
+        max_steps: int | None = None,
+    ) -> None:
+        super().__init__()
+        self._source, self._sizes = missions, sizes_of(missions)
+        self._knowledge, self._switching, self._grid = knowledge, switching, whole(grid, "grid", 0, 100)
+        self._weights, self.max_steps = Weights(waiting_weight, energy_weight), max_steps
+        n, m = self._sizes
+        self.possible_agents = [f"agent_{number}" for number in range(n)]
+        self.agents: list[str] = []
+        self.render_mode = None
+        choices = m + self._grid**2 + 1
+        self._observes = {name: _space(length(n, m), choices) for name in self.possible_agents}
+        self._acts = {name: spaces.Discrete(choices) for name in self.possible_agents}
+        self._rng: np.random.Generator | None = None
+        self._course: Decisions
+        self._lens: Lens
+        self._steps = 0
+
+    def observation_space(self, agent: str) -> spaces.Dict:
+        """Return the space of an agent's observations."""
+        return self._observes[agent]
+
+    def action_space(self, agent: str) -> spaces.Discrete:
+        """Return the space of an agent's actions."""
+        return self._acts[agent]
+
+    def reset(self, seed: int | None = None, options: dict[str, object] | None = None) -> None:
+        """Begin a mission drawn anew; with a seed, the same missions follow."""
+        if seed is not None or self._rng is None:
+            self._rng = np.random.default_rng(seed)
+        mission = draw(self._source, self._sizes, self._rng)
+        number = int(self._rng.integers(2**63))
+        self._course = Decisions(mission, self._knowledge, number, switching=self._switching, weights=self._weights)
+        if not self._course.queue:
+            raise InputError("is over before anybody decides", mission.name)
+        self._lens, self._steps = Lens(mission, self._grid), 0
+        self.agents = list(self.possible_agents)
+        self.rewards = dict.fromkeys(self.agents, 0.0)
+        self._cumulative_rewards = dict.fromkeys(self.agents, 0.0)
+        self.terminations, self.truncations = dict.fromkeys(self.agents, False), dict.fromkeys(self.agents, False)
+        figures = self._course.figures()
+        self.infos: dict[str, Info] = {name: {**figures, "illegal": False} for name in self.agents}
+        self._skip_agent_selection = None
+        self.agent_selection = self.agents[self._course.queue[0]]
+
+    def observe(self, agent: str) -> Observation:
+        """Return what an agent knows now, and what it can choose."""
+        view = self._course.view(self.possible_agents.index(agent))
+        return {"observation": self._lens.observe(view), "action_mask": self._lens.mask(view)}
+
+    def step(self, action: int | None) -> None:
+        """Let the agent whose turn it is choose, and go on to the next decision."""
+        agent = self.agent_selection
+        if self.terminations[agent] or self.truncations[agent]:
+            self._was_dead_step(action)
+            return
+        view = self._course.view(self._course.queue[0])
+        assert action is not None
+        is_legal = bool(self._lens.mask(view)[action])
+        self._cumulative_rewards[agent] = 0.0
+        gained = self._course.decide(self._lens.order(int(action)) if is_legal else None)
+        self._steps += 1
+        self.rewards = dict.fromkeys(self.agents, gained)
+        self._accumulate_rewards()
+        over = not self._course.queue
+        cut = not over and self.max_steps is not None and self._steps >= self.max_steps
+        self.terminations, self.truncations = dict.fromkeys(self.agents, over), dict.fromkeys(self.agents, cut)
+        figures = self._course.figures()
+        illegal = {name: info["illegal"] for name, info in self.infos.items()} | {agent: not is_legal}
+        self.infos = {name: {**figures, "illegal": illegal[name]} for name in self.agents}
+        self.agent_selection = self.agents[0 if over or cut else self._course.queue[0]]
+
+
+def _space(figures: int, choices: int) -> spaces.Dict:
+    return spaces.Dict(
+        {
+            "observation": spaces.Box(-LIMIT, LIMIT, (figures,), np.float32),
+            "action_mask": spaces.Box(0, 1, (choices,), np.int8),
+        }
+    )

@@ -1,0 +1,104 @@
+"""Missions as a Gymnasium environment: one learner leads all agents, and knows all that is so now."""
+
+from __future__ import annotations
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from alloc.problems.environments.missions.decisions import Decisions, Source, Weights, draw, sizes_of
+from alloc.problems.environments.missions.observation import LIMIT, Floats, Lens, length
+from alloc.problems.errors import InputError
+from alloc.problems.vocabulary import Knowledge
+
+
+class MissionFleetEnv(gymnasium.Env[Floats, np.int64]):
+    """A planner decides for one free agent a step.
+
+    Whenever something has happened - a task appears or is done, an agent joins, fails or arrives - each free agent gets
+    an order, one after the other: action j sends it to task j, action m leaves it as it is. Observations are those of
+    `MissionEnv` for the agent whose turn it is, with full knowledge; so is the reward. The mission is over when all is
+    done, nobody is left, or its horizon is reached.
+
+    Illegal actions - a task that is not there, is over, or that the agent cannot take - leave the agent as it is and
+    bring `illegal_reward`; `action_masks` names the legal ones, as MaskablePPO of sb3-contrib asks for them. Infos hold
+    ``agent``, the number of whose turn it is, hour, tasks done, energy and ``illegal``, at the end also the measures.
+
+    Parameters
+    ----------
+    missions : sequence of Mission, or callable
+        Drawn from at every reset, or called with a numpy generator; all of one size.
+    switching : bool
+        Whether agents that fly or work get orders as well.
+    waiting_weight, energy_weight : float
+        In the reward; see `MissionEnv`.
+    max_steps : int, optional
+        Decisions after which the mission is truncated; none by default.
+    illegal_reward : float
+
+    Raises
+    ------
+    InputError
+        If missions differ in size.
+
+    References
+    ----------
+    Towers et al. (2024), arXiv:2407.17032.
+    """
+
+    metadata = {"render_modes": []}  # noqa: RUF012
+
+    def __init__(
+        self,
+        missions: Source,
+        *,
+        switching: bool = False,
+        waiting_weight: float = 0.5,
+        energy_weight: float = 0.0,
+        max_steps: int | None = None,
+        illegal_reward: float = 0.0,
+    ) -> None:
+        self._source, self._sizes = missions, sizes_of(missions)
+        self._switching, self._weights = switching, Weights(waiting_weight, energy_weight)
+        self.max_steps, self.illegal_reward = max_steps, illegal_reward
+        n, m = self._sizes
+        self.observation_space = spaces.Box(-LIMIT, LIMIT, (length(n, m),), np.float32)
+        self.action_space = spaces.Discrete(m + 1)
+        self._course: Decisions
+        self._lens: Lens
+        self._agent = self._steps = 0
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, object] | None = None
+    ) -> tuple[Floats, dict[str, object]]:
+        """Begin a mission drawn anew; with a seed, the same missions follow."""
+        super().reset(seed=seed)
+        mission = draw(self._source, self._sizes, self.np_random)
+        self._course = Decisions(mission, Knowledge.FULL, 0, switching=self._switching, weights=self._weights)
+        if not self._course.queue:
+            raise InputError("is over before anybody decides", mission.name)
+        self._lens, self._agent, self._steps = Lens(mission, 0), self._course.queue[0], 0
+        return self._observation(), self._info(illegal=False)
+
+    def step(self, action: np.int64) -> tuple[Floats, float, bool, bool, dict[str, object]]:
+        """Give an order to the agent whose turn it is, and go on to the next decision."""
+        number = int(action)
+        is_legal = bool(self.action_masks()[number])
+        gained = self._course.decide(self._lens.order(number) if is_legal else None)
+        gained += 0.0 if is_legal else self.illegal_reward
+        self._steps += 1
+        over = not self._course.queue
+        self._agent = self._agent if over else self._course.queue[0]
+        cut = not over and self.max_steps is not None and self._steps >= self.max_steps
+        return self._observation(), gained, over, cut, self._info(illegal=not is_legal)
+
+    def action_masks(self) -> NDArray[np.bool_]:
+        """Return which actions are legal now, shape (m + 1,)."""
+        return self._lens.mask(self._course.view(self._agent)).astype(np.bool_)
+
+    def _observation(self) -> Floats:
+        return self._lens.observe(self._course.view(self._agent))
+
+    def _info(self, *, illegal: bool) -> dict[str, object]:
+        return {**self._course.figures(), "agent": self._agent, "illegal": illegal}

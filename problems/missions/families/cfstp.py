@@ -1,0 +1,73 @@
+"""Coalition formation with spatial and temporal constraints (CFSTP) as missions."""
+
+import numpy as np
+
+from alloc.problems.arguments import whole
+from alloc.problems.fields import FloatArray
+from alloc.problems.instance import Instance
+from alloc.problems.missions.mission import Mission
+from alloc.problems.missions.radio import Pace
+from alloc.problems.units import Units
+
+SIDE = 50
+WORKLOAD, DEADLINE = (10, 50), (5, 600)
+
+PACE = Pace(low=1.0, high=2.0, period=1.0)
+"""A coalition does as much work a step as it has agents, times a number from 1 to 2 that is drawn anew each step."""
+
+
+def random_cfstp(agents: int = 20, tasks: int = 300, seed: int = 0, *, name: str | None = None) -> Mission:
+    """Return a random CFSTP as lcpz/cfstp draws them: all positions, workloads and deadlines are uniform.
+
+    Places are cells of a grid of 50 x 50, workloads from 10 to 50, deadlines from 5 to 600 steps.
+
+    Parameters
+    ----------
+    agents, tasks : int
+    seed : int
+        Seed of all random numbers, >= 0.
+    name : str, optional
+
+    Raises
+    ------
+    InputError
+        If a number is out of its range.
+
+    References
+    ----------
+    Ramchurn et al. (2010), coalition formation with spatial and temporal constraints, AAMAS; Capezzuto, Tarapore and
+    Ramchurn (2020), arXiv:2003.13806.
+    """
+    n, m = whole(agents, "agents", 1), whole(tasks, "tasks", 1)
+    number = whole(seed, "seed", 0, 2**63 - 1)
+    rng = np.random.default_rng(number)
+    places, starts = rng.integers(0, SIDE, (m, 2)), rng.integers(0, SIDE, (n, 2))
+    demands = np.stack([rng.integers(low, high + 1, m) for low, high in (DEADLINE, WORKLOAD)], axis=1)
+    called = f"cfstp-seed-{number}" if name is None else name
+    return cfstp_mission(called, starts.astype(float), places.astype(float), demands.astype(float), number)
+
+
+def cfstp_mission(name: str, agents: FloatArray, tasks: FloatArray, demands: FloatArray, seed: int) -> Mission:
+    """Return the mission of a CFSTP: time in steps, one cell of the grid per step, agents alike.
+
+    Parameters
+    ----------
+    name : str
+    agents, tasks : ndarray, shape (n, 2) and (m, 2)
+        Cells of the grid.
+    demands : ndarray, shape (m, 2)
+        Deadline and workload of each task.
+    seed : int
+        Of the pace.
+    """
+    instance = Instance(
+        name=name,
+        ability=np.ones(len(agents)),
+        agent_position=agents,
+        speed=np.ones(len(agents)),
+        workload=demands[:, 1],
+        task_position=tasks,
+        metric="manhattan",
+        units=Units(time="steps"),
+    )
+    return Mission(instance, deadline=demands[:, 0], pace=PACE, seed=seed)

@@ -1,0 +1,84 @@
+"""Reading a file of others as a mission, by the name of its format."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from alloc.problems.arguments import choice, of_type, whole
+from alloc.problems.errors import InputError, MissingPackageError
+from alloc.problems.formats.files import PathLike, named
+from alloc.problems.formats.messages import told
+from alloc.problems.missions.mission import Mission
+from alloc.problems.missions.readers.cfstp import read_cfstp
+from alloc.problems.missions.readers.london import read_london
+from alloc.problems.missions.readers.new_brunswick import read_new_brunswick
+from alloc.problems.missions.readers.options import RecordOptions
+from alloc.problems.missions.readers.records import Records, mission_of_records
+from alloc.problems.missions.readers.space import read_space
+from alloc.problems.vocabulary import ForeignFormat
+
+RECORDS: dict[ForeignFormat, Callable[[str, RecordOptions], Records]] = {
+    ForeignFormat.LONDON: read_london,
+    ForeignFormat.NEW_BRUNSWICK: read_new_brunswick,
+}
+DRAWN: dict[ForeignFormat, Callable[[str, str, int], Mission]] = {
+    ForeignFormat.CFSTP: read_cfstp,
+    ForeignFormat.SPACE: read_space,
+}
+
+
+def import_mission(
+    file_format: ForeignFormat | str,
+    path: PathLike,
+    options: RecordOptions | None = None,
+    *,
+    seed: int = 0,
+    name: str | None = None,
+    report: Callable[[str], None] | None = None,
+) -> Mission:
+    """Read a mission from a file of others, which the user has.
+
+    Parameters
+    ----------
+    file_format : {"cfstp", "space", "london", "new-brunswick"}
+        An instance that the tests of lcpz/cfstp print; a configuration of the SPACE simulator; calls of the London Fire
+        Brigade to animals; forest fires in New Brunswick.
+    path : str or path
+    options : RecordOptions, optional
+        Of the last two: who answers, which days, how much time is compressed.
+    seed : int
+        Of what the file leaves to chance.
+    name : str, optional
+        Of the mission; that of the file by default.
+    report : callable, optional
+        Called with a line for what was left out or filled in.
+
+    Returns
+    -------
+    Mission
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or options are given that the format does not take.
+    MissingPackageError
+        If PyYAML is needed, and not installed.
+    """
+    kind, number = choice(ForeignFormat, file_format, "file_format"), whole(seed, "seed", 0, 2**63 - 1)
+    called, source = name or Path(path).stem or str(kind), str(path)
+    if kind in DRAWN:
+        if options is not None:
+            raise InputError(f"are for records, not for {kind}", "options")
+        try:
+            return DRAWN[kind](source, called, number)
+        except MissingPackageError:
+            raise
+        except InputError as error:
+            raise told(error, named(path)) from error.__cause__
+    wanted = RecordOptions() if options is None else of_type(options, RecordOptions, "options")
+    if wanted.fleet is not None and kind is not ForeignFormat.LONDON:
+        raise InputError(f"is for {ForeignFormat.LONDON}, not for {kind}", "fleet")
+    found = RECORDS[kind](source, wanted)
+    if report is not None:
+        for note in found.notes:
+            report(note)
+    return mission_of_records(found, wanted, called, number)

@@ -1,0 +1,263 @@
+"""The store of runs: rows, leases and what can be wrong with its file."""
+
+import os
+import resource
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from dataclasses import fields, replace
+
+import pytest
+
+from alloc.allocators.experiments.store import store as store_module
+from alloc.allocators.experiments.store.key import Run, canonical, fingerprint, versions
+from alloc.allocators.experiments.store.outcome import Ending, Outcome
+from alloc.allocators.experiments.store.owner import is_gone, this_process
+from alloc.allocators.experiments.store.schema import MIGRATIONS
+from alloc.allocators.experiments.store.store import ENDING, RUN, Store
+from alloc.problems import InputError, Instance
+
+RUNS = [
+    Run(
+        instance="i",
+        method="greedy",
+        parameters="{}",
+        seed=seed,
+        objective="makespan",
+        time_limit_s=1.0,
+        iterations=None,
+        target_gap=None,
+        threads=1,
+        version="alloc 0",
+        machine="m",
+    )
+    for seed in range(4)
+]
+KEYS = [run.key for run in RUNS]
+SOLVED = Ending(outcome=Outcome.SOLVED, makespan=1.5, trace=((0.1, None, 2.0, None), (0.2, 1.5, 3.0, 1.0)))
+
+
+def finish(store, run, ending=SOLVED):
+    assert store.claim([run.key]).key == run.key
+    return store.finish(run, replace(ending, finished_at=time.time()))
+
+
+def test_a_run_comes_back_as_it_was_written(tmp_path):
+    """What ran, how it ended and the trace are the same after the file is opened again."""
+    with Store(tmp_path / "runs.db") as store:
+        assert store.claim([KEYS[0]]).key == KEYS[0]
+        store.finish(RUNS[0], SOLVED)
+    with Store(tmp_path / "runs.db") as store:
+        (record,) = store.records(KEYS).values()
+        assert (record.run, record.ending) == (RUNS[0], SOLVED)
+        assert store.records().keys() == {KEYS[0]}
+
+
+def test_the_tables_have_the_fields_of_a_run_and_its_ending(tmp_path):
+    """Every field has its column, and every column its field."""
+    Store(tmp_path / "runs.db").close()
+    rows = sqlite3.connect(tmp_path / "runs.db").execute("PRAGMA table_info(runs)").fetchall()
+    assert [row[1] for row in rows] == ["key", *RUN, *ENDING]
+
+
+def test_runs_are_claimed_once(tmp_path):
+    """Two commands on one file never get the same run, and neither gets one that has ended."""
+    with Store(tmp_path / "runs.db") as one, Store(tmp_path / "runs.db") as other:
+        assert one.claim(KEYS).key == KEYS[0]
+        assert other.claim(KEYS).key == KEYS[1]
+        one.finish(RUNS[0], SOLVED)
+        claim = one.claim(KEYS)
+        assert (claim.key, claim.done) == (KEYS[2], {KEYS[0]})
+        other.release(KEYS[1])
+        assert one.claim(KEYS).key == KEYS[1]
+
+
+def test_nothing_is_left_to_claim_while_others_work_on_it(tmp_path):
+    """Where all that is left is being run elsewhere there is no run to have, and none has ended."""
+    with Store(tmp_path / "runs.db") as one, Store(tmp_path / "runs.db") as other:
+        one.claim(KEYS[:1])
+        claim = other.claim(KEYS[:1])
+        assert (claim.key, claim.done) == (None, frozenset())
+
+
+def test_a_lease_ends_with_its_process(tmp_path):
+    """A command that is killed gives its run back at once, to whoever asks."""
+    code = "import sys, time; from alloc.allocators.experiments.store.store import Store; s = Store(sys.argv[1]);"
+    code += " print(s.claim([sys.argv[2]]).key, flush=True); time.sleep(60)"
+    child = subprocess.Popen([sys.executable, "-c", code, tmp_path / "runs.db", KEYS[0]], stdout=subprocess.PIPE)
+    try:
+        assert child.stdout.readline().decode().strip() == KEYS[0]
+        with Store(tmp_path / "runs.db") as store:
+            assert store.claim(KEYS[:1]).key is None
+            child.send_signal(signal.SIGKILL)
+            child.wait()
+            assert store.claim(KEYS[:1]).key == KEYS[0]
+    finally:
+        child.kill()
+        child.wait()
+        child.stdout.close()
+
+
+def test_a_lease_that_is_not_renewed_expires(tmp_path, monkeypatch):
+    """A process of which nothing is known, as on another machine, loses its run in the end, and its result with it."""
+    with Store(tmp_path / "runs.db") as one, Store(tmp_path / "runs.db") as other:
+        one.claim(KEYS[:2])
+        later = time.time() + store_module.LEASE_S + 1
+        with monkeypatch.context() as patch:
+            patch.setattr(store_module.time, "time", lambda: later - 30)
+            one.renew()
+            patch.setattr(store_module.time, "time", lambda: later)
+            assert other.claim(KEYS[:1]).key is None
+            patch.setattr(store_module.time, "time", lambda: later + store_module.LEASE_S)
+            assert other.claim(KEYS[:1]).key == KEYS[0]
+        assert not one.finish(RUNS[0], replace(SOLVED, makespan=9.0))
+        assert other.finish(RUNS[0], SOLVED)
+        assert other.records(KEYS)[KEYS[0]].ending.makespan == 1.5
+
+
+def test_failures_are_run_again_once_where_asked(tmp_path):
+    """What failed before is run again once where that is asked for; a package may have come meanwhile in any case."""
+    with Store(tmp_path / "runs.db") as store:
+        finish(store, RUNS[0], Ending(outcome=Outcome.FAILED))
+        finish(store, RUNS[1], Ending(outcome=Outcome.MISSING_PACKAGE))
+        finish(store, RUNS[2])
+        assert store.claim(KEYS[:3]).key is None
+    with Store(tmp_path / "runs.db") as store:
+        assert store.claim(KEYS[:3]).key == KEYS[1]
+    with Store(tmp_path / "runs.db", again=[Outcome.FAILED]) as store:
+        finish(store, RUNS[0])
+        assert store.claim(KEYS[:1]).done == {KEYS[0]}
+        assert store.records(KEYS)[KEYS[0]].ending.outcome is Outcome.SOLVED
+
+
+@pytest.mark.parametrize("field", [field.name for field in fields(Run)])
+def test_every_field_decides_a_run(field):
+    """Runs that differ in anything at all have different keys."""
+    old = getattr(RUNS[0], field)
+    other = replace(RUNS[0], **{field: 7 if old is None or isinstance(old, int | float) else old + "x"})
+    assert other.key != RUNS[0].key
+    assert replace(other, **{field: old}).key == RUNS[0].key
+
+
+def test_instances_are_known_by_content():
+    """The name of an instance does not count, any number in it does."""
+    one = Instance(name="one", ability=[1, 2], workload=[3])
+    assert fingerprint(one) == fingerprint(replace(one, name="other"))
+    assert fingerprint(one) != fingerprint(replace(one, workload=[3.0000001]))
+    assert fingerprint(one) != fingerprint(replace(one, task_ids=["x"]))
+
+
+def test_policies_count_by_content(tmp_path):
+    """A policy file of the same name with another content is another parameter; the order of parameters is none."""
+    file = tmp_path / "p.safetensors"
+    file.write_bytes(b"one")
+    before = canonical({"b": 1, "policy": str(file)})
+    assert canonical({"policy": str(file), "b": 1}) == before
+    file.write_bytes(b"two")
+    assert canonical({"b": 1, "policy": str(file)}) != before
+
+
+def test_versions_name_this_package():
+    """A built-in method has the version of this package."""
+    assert versions("greedy").startswith("alloc ")
+
+
+def test_owners_are_gone_with_their_process():
+    """This process is there; one with the same id that began at another time is not; elsewhere nothing is known."""
+    place, pid, started, token = this_process().split(" ")
+    assert not is_gone(this_process())
+    assert is_gone(" ".join([place, pid, f"{started}0", token]))
+    assert not is_gone(" ".join([f"{place}0", pid, f"{started}0", token]))
+
+
+def test_an_older_store_is_brought_up_to_date(tmp_path, monkeypatch):
+    """A file of an earlier version keeps its runs and has what is new."""
+    with Store(tmp_path / "runs.db") as store:
+        finish(store, RUNS[0])
+    monkeypatch.setattr(store_module, "MIGRATIONS", (*MIGRATIONS, "CREATE TABLE later (x TEXT)"))
+    with Store(tmp_path / "runs.db") as store:
+        assert store.records().keys() == {KEYS[0]}
+    found = sqlite3.connect(tmp_path / "runs.db")
+    assert found.execute("SELECT * FROM later").fetchall() == []
+    assert found.execute("PRAGMA user_version").fetchone() == (2,)
+
+
+def test_a_later_store_is_refused(tmp_path):
+    """A file of a later version is left alone, in one line."""
+    Store(tmp_path / "runs.db").close()
+    sqlite3.connect(tmp_path / "runs.db").execute("PRAGMA user_version = 99")
+    with pytest.raises(InputError, match=r"runs\.db: is a store of version 99.*update alloc"):
+        Store(tmp_path / "runs.db")
+
+
+def test_other_files_are_no_stores(tmp_path):
+    """A text, and a database of another program, are refused in one line and left as they were."""
+    (tmp_path / "text").write_text("instance,method\n" * 100)
+    with pytest.raises(InputError, match="is no store of runs"):
+        Store(tmp_path / "text")
+    with sqlite3.connect(tmp_path / "other.db") as other:
+        other.execute("CREATE TABLE birds (name TEXT)")
+    before = (tmp_path / "other.db").read_bytes()
+    with pytest.raises(InputError, match="is a database of another program"):
+        Store(tmp_path / "other.db")
+    assert (tmp_path / "other.db").read_bytes() == before
+    with pytest.raises(InputError, match="cannot be opened; check the path"):
+        Store(tmp_path / "absent" / "runs.db")
+
+
+def test_a_damaged_store_is_told(tmp_path):
+    """A file whose pages were overwritten is told as damaged, in one line."""
+    with Store(tmp_path / "runs.db") as store:
+        finish(store, RUNS[0])
+    data = bytearray((tmp_path / "runs.db").read_bytes())
+    data[4096:] = b"\xff" * (len(data) - 4096)
+    (tmp_path / "runs.db").write_bytes(data)
+    with pytest.raises(InputError, match=r"is damaged"), Store(tmp_path / "runs.db") as store:
+        store.claim(KEYS)
+
+
+def test_a_locked_store_is_told(tmp_path, monkeypatch):
+    """A lock of another program is waited out for a while, and then told; what the store holds is kept."""
+    monkeypatch.setattr(store_module, "BUSY_S", 0.05)
+    with Store(tmp_path / "runs.db") as store:
+        finish(store, RUNS[0])
+        other = sqlite3.connect(tmp_path / "runs.db", isolation_level=None)
+        other.execute("BEGIN IMMEDIATE")
+        with pytest.raises(InputError, match="is locked by another program"):
+            store.claim(KEYS)
+        other.close()
+        assert store.claim(KEYS).key == KEYS[1]
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root writes to anything")
+def test_a_read_only_store_is_told(tmp_path):
+    """A file that may not be written is told, in one line."""
+    Store(tmp_path / "runs.db").close()
+    (tmp_path / "runs.db").chmod(0o444)
+    with pytest.raises(InputError, match="read-only"):
+        Store(tmp_path / "runs.db")
+
+
+@pytest.fixture
+def small_files():
+    """Lets files grow to 200 kB and no further, as on a disk that is full then."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, before[1]))
+    yield
+    resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    signal.signal(signal.SIGXFSZ, handler)
+
+
+@pytest.mark.usefixtures("small_files")
+def test_a_full_disk_loses_nothing(tmp_path):
+    """Where there is no room for a row it is told in one line; the rows before are kept, and there is no half row."""
+    with Store(tmp_path / "runs.db") as store:
+        finish(store, RUNS[0])
+        with pytest.raises(InputError, match=r"disk is full|is full;"):
+            finish(store, RUNS[1], replace(SOLVED, details="x" * 400_000))
+    with Store(tmp_path / "runs.db") as store:
+        assert store.records().keys() == {KEYS[0]}
+        assert store.claim(KEYS).key == KEYS[1]

@@ -1,0 +1,97 @@
+"""Policies compared in missions: rows, and paired differences with intervals."""
+
+import threading
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from alloc.allocators import Briefing, Policy, PolicyInfo, compare_policies, paired_differences, simulate
+from alloc.problems import InputError, MissionParameters, random_mission
+
+MISSIONS = [random_mission(MissionParameters(agents=3, tasks=4), seed) for seed in (1, 2, 3)]
+
+
+class Faulty(Policy):
+    """Fails before its first order."""
+
+    info = PolicyInfo(name="faulty", summary="")
+
+    def begin(self, briefing: Briefing):
+        raise ZeroDivisionError("nine")
+
+
+def test_a_row_has_means_over_the_seeds():
+    """The figures of a row are the means, and the worst, of single runs with the same seeds."""
+    (row,) = compare_policies(MISSIONS[:1], ["random"], [0, 1, 2])
+    runs = [simulate(MISSIONS[0], "random", seed=seed).result for seed in (0, 1, 2)]
+    times = [run.mission_time for run in runs]
+    assert len(set(times)) > 1
+    assert (row.runs, row.statuses, row.tasks_done_share) == (3, "done", 1.0)
+    assert (row.mission_time_mean, row.mission_time_worst) == (pytest.approx(np.mean(times)), max(times))
+    assert row.energy_mean == pytest.approx(np.mean([run.energy for run in runs]))
+    assert row.switches_mean == pytest.approx(np.mean([run.switches for run in runs]))
+
+
+def test_undone_tasks_leave_no_mission_time():
+    """Where a run does not do all, no mean over the others flatters the policy; what is done counts as a share."""
+    (row,) = compare_policies(MISSIONS[:1], ["idle"])
+    assert (row.mission_time_mean, row.tasks_done_share, row.statuses) == (None, 0.0, "unfinished")
+
+
+def test_refusals_and_failures_are_rows():
+    """A policy that refuses a mission, or fails, has a row with the reason, and the others go on."""
+    refused, failed, fine = compare_policies(MISSIONS[:1], ["replan", Faulty(), "nearest"], [4], knowledge="local")
+    assert "needs full knowledge" in refused.reason
+    assert failed.reason == "failed with seed 4: ZeroDivisionError: nine"
+    assert (refused.runs, failed.runs, fine.runs, fine.knowledge) == (0, 0, 1, "local")
+
+
+def test_differences_are_paired_by_mission_and_seed():
+    """Over several missions, a pair is the mean over the seeds of one; over one, a seed; with Student's interval."""
+    rows = list(compare_policies(MISSIONS, ["nearest", "random"], [0, 1]))
+    (found,) = paired_differences(rows)
+    ratios = [
+        np.mean(
+            [ours.mission_time / theirs.mission_time - 1 for ours, theirs in zip(b.results, a.results, strict=True)]
+        )
+        for a, b in zip(rows[::2], rows[1::2], strict=True)
+    ]
+    assert (found.policy, found.against, found.mission_time.pairs) == ("random", "nearest", 3)
+    assert found.mission_time.mean == pytest.approx(np.mean(ratios))
+    low, high = stats.t.interval(0.95, 2, np.mean(ratios), stats.sem(ratios))
+    assert (found.mission_time.low, found.mission_time.high) == pytest.approx((low, high))
+    (alone,) = paired_differences(rows[:2])
+    assert (alone.mission_time.pairs, alone.priority_done_share.mean) == (2, 0.0)
+
+
+def test_pairs_without_a_figure_are_left_out():
+    """Where a policy did not do all tasks, there is no pair of mission times, but one of shares."""
+    (found,) = paired_differences(list(compare_policies(MISSIONS[:1], ["nearest", "idle"])))
+    assert (found.mission_time.mean, found.mission_time.pairs) == (None, 0)
+    assert (found.priority_done_share.mean, found.priority_done_share.low) == (-1.0, None)
+
+
+def test_a_stop_ends_the_comparison():
+    """Once the event is set, no further run begins, and the rows that are done have been given."""
+    stop = threading.Event()
+    rows = compare_policies(MISSIONS, ["idle", "nearest"], stop=stop)
+    assert next(rows).policy == "idle"
+    stop.set()
+    assert list(rows) == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "place"),
+    [
+        ((MISSIONS, ["gredy"]), "policy"),
+        ((MISSIONS, ["idle"], [-1]), "seeds"),
+        ((MISSIONS, "idle"), "policies"),
+        ((MISSIONS, [Faulty(), Faulty()]), "policies"),
+    ],
+)
+def test_wrong_arguments(arguments, place):
+    """What is wrong is an error before the first run, and names the parameter."""
+    with pytest.raises(InputError) as caught:
+        compare_policies(*arguments)
+    assert caught.value.place == place

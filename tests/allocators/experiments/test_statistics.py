@@ -1,0 +1,105 @@
+"""Statistics of comparisons, against numbers worked out by hand and against what they must not depend on."""
+
+import numpy as np
+import pytest
+
+from alloc.allocators.experiments import statistics
+from alloc.allocators.experiments.statistics import (
+    differences,
+    holm,
+    interval,
+    profiles,
+    scores,
+    signed_rank,
+    targets_reached,
+)
+from alloc.allocators.experiments.store.outcome import Ending, Outcome
+
+
+def solved(makespan, energy=1.0, trace=()):
+    return Ending(outcome=Outcome.SOLVED, makespan=makespan, energy=energy, trace=trace)
+
+
+def runs(*makespans):
+    """Return how runs ended, one seed an instance."""
+    return [[solved(one)] for one in makespans]
+
+
+FAILED = Ending(outcome=Outcome.FAILED)
+
+
+def test_seeds_are_averaged_within_an_instance():
+    """More seeds are no more observations: an instance has one score, the mean, and none where a run has none."""
+    found = scores([[solved(1.0), solved(3.0)], [solved(1.0), FAILED], [solved(1.0), None], [solved(None)]], "makespan")
+    np.testing.assert_array_equal(found, [2.0, np.nan, np.nan, np.nan])
+    (one,) = differences({"a": [[solved(2.0)] * 9] * 4, "b": [[solved(1.0), solved(2.0), solved(3.0)] * 3] * 4})
+    assert (one.instances, one.mean, one.equal) == (4, 0.0, 4)
+
+
+def test_differences_are_relative_and_paired():
+    """Each instance is compared with itself, so that large instances do not outweigh small ones."""
+    first, second = differences({"a": runs(1, 10, 100), "b": runs(1.1, 11, 110), "c": runs(0.5, 10, 150)})
+    assert (first.method, first.against) == ("b", "a")
+    assert first.mean == pytest.approx(0.1)
+    assert (second.better, second.equal, second.worse) == (1, 1, 1)
+    assert second.mean == pytest.approx(0)
+
+
+def test_instances_without_a_score_are_left_out_and_counted():
+    """Where one of two methods failed or left a task unserved there is no pair, which is told."""
+    base = {"a": [[solved(1.0)], [solved(None)], [FAILED], [solved(1.0)]], "b": runs(2, 2, 2, 2)}
+    (one,) = differences(base)
+    assert (one.instances, one.left_out, one.worse) == (2, 2, 2)
+    assert (one.low, one.high, one.p, one.p_holm) == (None, None, None, None)
+
+
+def test_small_samples_are_known_as_such():
+    """Nine instances are few, ten are not."""
+    assert differences({"a": runs(*[1] * 9), "b": runs(*[2] * 9)})[0].is_small
+    assert not differences({"a": runs(*[1] * 10), "b": runs(*[2] * 10)})[0].is_small
+
+
+def test_wilcoxon_has_the_exact_p_value():
+    """Of six differences of one sign p is 2 / 2^6, with ties or without; zeros are left out; of none there is no p."""
+    assert signed_rank(np.arange(1.0, 7.0)) == pytest.approx(2 / 2**6)
+    assert signed_rank(np.ones(6)) == pytest.approx(2 / 2**6)
+    assert signed_rank(np.array([0.0, 0, *range(1, 7)])) == pytest.approx(2 / 2**6)
+    assert signed_rank(np.zeros(5)) == 1.0
+    assert signed_rank(np.ones(2)) is None
+
+
+def test_holm_multiplies_by_what_is_left():
+    """The smallest p of three counts three times, the next twice, and none is below the one before it."""
+    assert holm([0.04, 0.01, None, 0.03]) == pytest.approx([0.06, 0.03, None, 0.06], nan_ok=True)
+    assert holm([0.9, 0.8]) == [1.0, 1.0]
+    assert holm([]) == []
+
+
+def test_intervals_hold_the_mean_as_often_as_they_say(monkeypatch):
+    """Of 95 % intervals of thirty skewed values about 95 % hold the true mean, which a normal one misses more often."""
+    monkeypatch.setattr(statistics, "RESAMPLES", 999)
+    rng = np.random.default_rng(7)
+    found = [interval(rng.lognormal(size=30)) for _ in range(100)]
+    share = np.mean([low <= np.exp(0.5) <= high for low, high in found])
+    assert 0.86 <= share <= 0.99
+
+
+def test_intervals_of_equal_values_are_a_point():
+    """Where all instances have the same difference the interval is that; it is the same each time it is asked for."""
+    assert interval(np.full(5, 0.25)) == (0.25, 0.25)
+    assert interval(np.array([1.0, 2.0, 4.0])) == interval(np.array([1.0, 2.0, 4.0]))
+
+
+def test_profiles_count_instances_within_a_factor_of_the_best():
+    """At factor 1 a profile is the share of wins; what a method did not solve counts against it."""
+    endings = {"a": runs(1, 2, 1, None), "b": runs(2, 1, None, None)}
+    assert profiles(endings, [1.0, 2.0]) == {"a": pytest.approx([2 / 3, 1.0]), "b": pytest.approx([1 / 3, 2 / 3])}
+    assert profiles({"a": runs(None)}, [1.0]) == {"a": [0.0]}
+
+
+def test_targets_are_reached_over_time():
+    """A run reaches a target when its trace first has it; the best known may come from another method."""
+    fast = solved(1.0, trace=((0.1, None, 0.0, None), (0.5, 1.04, 0.0, None), (2.0, 1.0, 0.0, None)))
+    slow = solved(1.2, trace=((0.1, 1.2, 0.0, None),))
+    found = targets_reached({"a": [[fast]], "b": [[slow]], "c": [[None]]}, [0.2, 1.0, 3.0], within=(0.0, 0.05))
+    assert found == {"a": [0.0, 0.5, 1.0], "b": [0.0, 0.0, 0.0], "c": [0.0, 0.0, 0.0]}

@@ -1,0 +1,71 @@
+"""The penalty on shortfalls adapts to how rare plans without any are."""
+
+import numpy as np
+import pytest
+
+from alloc.allocators.heuristic.greedy.list_schedule import greedy
+from alloc.allocators.heuristic.local_search.annealing_state import (
+    FALL,
+    LEAST_EXCHANGES,
+    LOWEST,
+    PATIENCE,
+    RISE,
+    AnnealingState,
+    PenaltyFactor,
+)
+from alloc.problems import evaluate
+from alloc.problems.generate import paper
+
+
+@pytest.fixture
+def state():
+    """A state with a plan, at its makespan, that has been saved as the best."""
+    instance = paper(1, 0)
+    plan = greedy(instance)
+    state = AnnealingState(instance, 0, 5)
+    state.begin(plan, evaluate(instance, plan).makespan)
+    state.run(100, state.weights(1.0, 0.0, 1e3, 1e3))
+    assert state.best is not None
+    return state
+
+
+def lose(state):
+    """Leave every other agent idle, so that tasks are short."""
+    best = state.best
+    group = np.where(np.arange(state.instance.n) % 2 == 0, best.task_of_agent, -1)
+    state._set_groups(np.where(group < 0, state.instance.m, group).astype(np.int32))
+    state.recompute()
+    assert state.n_short > 0
+
+
+def test_the_penalty_falls_without_shortfalls_down_to_a_limit(state):
+    """Periods that end without a shortfall lower it, and it stays above the limit."""
+    factor = PenaltyFactor(state, 10**9, 1e9)
+    factor.update(1)
+    assert factor.value == pytest.approx(FALL)
+    for _ in range(100):
+        factor.update(1)
+    assert factor.value == LOWEST
+
+
+def test_the_search_returns_to_its_best_plan(state):
+    """After periods in a row with shortfalls, which raise the penalty, the plan is the best one again, to the agent."""
+    factor, best = PenaltyFactor(state, 10**9, 1e9), state.best
+    lose(state)
+    for _ in range(PATIENCE):
+        factor.update(1)
+        assert state.n_short > 0
+    factor.update(1)
+    assert state.allocation == best
+    assert state.n_short == 0
+    assert factor.value == pytest.approx(RISE ** (PATIENCE + 1))
+    state.run(200, state.weights(1.0, 0.01, 1e3, 1e3))
+    assert evaluate(state.instance, state.best).makespan <= state.makespan * (1 + 1e-9)
+
+
+def test_a_short_budget_leaves_the_penalty_alone(state):
+    """Where the budget allows few exchanges for each agent, nothing adapts."""
+    factor = PenaltyFactor(state, 10**9, LEAST_EXCHANGES - 1)
+    for _ in range(10):
+        factor.update(1)
+    assert factor.value == 1.0

@@ -1,0 +1,215 @@
+"""``alloc compare --store``: runs that are kept, and made once."""
+
+import os
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import evil_methods
+import pytest
+from campaign_kills import kill_often
+
+from alloc.problems import paper
+from alloc.problems.formats import write_instance
+
+TINY = "random[agents=3,tasks=2]"
+QUICK = ("--iterations", "5", "--store", "runs.db", "--workers", "1")
+
+
+@pytest.fixture
+def plugin(tmp_path, monkeypatch):
+    """Installs the methods that misbehave for commands in this process and others, and returns a folder for notes."""
+    folder = tmp_path / "plugin"
+    folder.mkdir()
+    evil_methods.install(folder)
+    monkeypatch.syspath_prepend(folder)
+    monkeypatch.setenv("PYTHONPATH", f"{folder}{os.pathsep}{os.environ.get('PYTHONPATH', '')}")
+    monkeypatch.setenv("NAPS", str(tmp_path / "naps"))
+    monkeypatch.setenv("FORKED", str(tmp_path / "forked"))
+    return tmp_path
+
+
+def begun():
+    file = Path("naps")
+    return [line.split()[1:3] for line in file.read_text().splitlines() if line.startswith("begin")]
+
+
+def test_only_what_is_missing_is_run(alloc, plugin):
+    """A seed, an instance or a method more runs what they add alone; the table is of what was asked for."""
+    first = alloc("compare", f"{TINY}:1", "--methods", "nap", *QUICK, "--json")
+    assert (first.code, len(begun())) == (0, 1)
+    more = alloc("compare", f"{TINY}:0-1", "--methods", "greedy,nap", "--seeds", "2", *QUICK, "--json")
+    assert more.code == 0
+    assert sorted(begun()) == [[f"{TINY}:{instance}", seed] for instance in "01" for seed in "01"]
+    assert [(row["instance"][-1], row["method"], row["runs"]) for row in more.json["rows"]] == [
+        ("0", "greedy", 2),
+        ("0", "nap", 2),
+        ("1", "greedy", 2),
+        ("1", "nap", 2),
+    ]
+    again = alloc("compare", f"{TINY}:1", "--methods", "nap", *QUICK, "--json")
+    assert again.json == first.json
+    assert "0 runs made; runs.db has 1 of 1" in again.err
+
+
+def test_rows_are_those_of_a_comparison_without_a_store(alloc):
+    """The figures are the same as without a store, but for the seconds."""
+    words = ("compare", f"{TINY}:0-1", "--methods", "greedy,ga[population=4]", "--seeds", "2", "--iterations", "5")
+    kept = alloc(*words, "--store", "runs.db", "--json").json["rows"]
+    alloc("generate", "random", "--agents", "3", "--tasks", "2", "--count", "2", "--output", "made")
+    plain = alloc("compare", *map(str, sorted(Path("made").iterdir())), *words[2:], "--json").json["rows"]
+    for row in [*kept, *plain]:
+        for name in ("runtime_mean_s", "runtime_worst_s", "instance"):
+            row.pop(name)
+    assert kept == plain
+
+
+def test_other_budgets_are_other_runs(alloc):
+    """A run with another budget does not count, and the store says that it has some."""
+    alloc("compare", f"{TINY}:0", "--methods", "greedy", *QUICK)
+    other = alloc("compare", f"{TINY}:0", "--methods", "greedy", "--iterations", "6", "--store", "runs.db")
+    assert "1 run made" in other.err
+    assert "runs.db also holds 1 run with iterations 5, which do not count here" in other.err
+
+
+def test_differences_are_printed_and_reported(alloc):
+    """Below the table stands how methods differ from the first one; a report holds that, or all runs."""
+    words = ("compare", f"{TINY}:0-2", "--methods", "greedy,local-search", *QUICK)
+    ran = alloc(*words, "--report", "table.md", "--report", "runs.csv")
+    assert ran.code == 0
+    assert "Against greedy: T\n" in ran.err
+    assert "Small sample: 3 instances" in ran.err
+    assert "## Against greedy: T" in Path("table.md").read_text()
+    assert Path("runs.csv").read_text().count("\n") == 7
+    assert "Against" not in alloc(*words, "--json").err
+
+
+def test_failures_have_rows_and_are_tried_again_where_asked(alloc, plugin):
+    """A failure has a row with the reason; it is run again with --retry alone, which leaves good runs as they are."""
+    words = ("compare", f"{TINY}:0", "--methods", "leave,nap", *QUICK)
+    ran = alloc(*words)
+    assert ran.code == 0
+    assert "exited with seed 0: it ended its process with exit code 3" in ran.err
+    assert "0 runs made" in alloc(*words).err
+    assert "1 run made" in alloc(*words, "--retry").err
+    assert len(begun()) == 1
+
+
+def test_sources_of_instances(alloc):
+    """Instances come from a file, a folder, a pattern, a table and a family; the same content is one instance."""
+    Path("folder").mkdir()
+    for seed in (0, 1):
+        write_instance(paper(1, seed), f"folder/{seed}.json")
+    Path("list.csv").write_text("instance,from\nfolder/1.json,here\npaper-1:0-1,there\n")
+    ran = alloc("compare", "folder", "folder/*.json", "list.csv", "folder/0.json", "--methods", "greedy", *QUICK)
+    assert ran.code == 0
+    assert "2 runs made" in ran.err
+
+
+@pytest.mark.parametrize(
+    ("source", "message"),
+    [
+        ("none/*.json", "none/*.json: matches no file"),
+        ("paper-1:3-2", "paper-1:3-2: must be from a seed to a later one"),
+        ("random[agent=3]:0", "random[agent=3]:0: agent: is no parameter of a random family"),
+        ("random[agents=0]:0", "random[agents=0]:0: agents: must be"),
+        ("paper-1[agents=3]:0", "paper-1[agents=3]:0: paper-1: takes no parameters"),
+        ("list.csv", "list.csv: has no column 'instance'"),
+        ("absent.json", "absent.json: there is no such file"),
+    ],
+)
+def test_wrong_sources_are_one_line(alloc, source, message):
+    """A source that is none is told in one line, before anything runs."""
+    Path("list.csv").write_text("file\nx.json\n")
+    ran = alloc("compare", source, "--methods", "greedy", *QUICK)
+    assert ran.code == 2
+    assert ran.err.startswith(f"alloc: {message}")
+    assert ran.err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("methods", "message"),
+    [
+        ("ga[populatoin=3]", "populatoin"),
+        ("gredy", "there is no method 'gredy' (did you mean 'greedy'?)"),
+        ("ga[population=3", "must be like ga[population=200]"),
+    ],
+)
+def test_wrong_methods_are_one_line(alloc, methods, message):
+    """A method or a parameter that is none is told before anything runs."""
+    ran = alloc("compare", f"{TINY}:0", "--methods", methods, *QUICK)
+    assert ran.code == 2
+    assert message in ran.err
+    assert not Path("runs.db").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--memory", "4G"), "'--memory': goes with --store only"),
+        (("--retry",), "'--retry': goes with --store only"),
+        (("--store", "runs.db", "--memory", "4"), "'4' is not like 800M or 4G"),
+        (("--store", "runs.db", "--memory", "4M"), "must be at least 100M"),
+        (("--store", "runs.db", "--kill-after", "0"), "must be more than 0 seconds"),
+        (("--store", "runs.db", "--time-limit", "1", "--workers", "999"), "--workers: 999 timed runs"),
+        (("--store", "absent/runs.db"), "absent/runs.db: cannot be opened"),
+        (("--store", "runs.db", "--report", "runs.txt"), "runs.txt: must end in .md, .tex, .csv or .parquet"),
+        (("--store", "runs.db", "--csv", "runs.db"), "is --store and --csv at once"),
+        (("--store", "text"), "text: is no store of runs"),
+    ],
+)
+def test_wrong_options_are_one_line(alloc, words, message):
+    """What makes no sense is told in one line, before anything runs."""
+    Path("text").write_text("no database\n" * 100)
+    ran = alloc("compare", f"{TINY}:0", "--methods", "greedy", *words)
+    assert ran.code == 2
+    assert message in ran.err
+    assert ran.err.count("\n") == 1
+
+
+def test_ctrl_c_keeps_what_has_ended(plugin):
+    """Ctrl-C prints the rows of what has ended, with exit code 1; nothing is left running, and nothing leased."""
+    command = [sys.executable, "-m", "alloc.cli", "compare", f"{TINY}:0", "--methods", "nap", "--seeds", "500", *QUICK]
+    process = subprocess.Popen(command, cwd=plugin, stderr=subprocess.PIPE, text=True)
+    naps, limit = plugin / "naps", time.monotonic() + 60
+    while not (naps.exists() and naps.read_text().count("begin") > 1) and time.monotonic() < limit:
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert "interrupted; the same command goes on from here" in errors
+    store = sqlite3.connect(plugin / "runs.db")
+    assert store.execute("SELECT count(*) FROM leases").fetchone() == (0,)
+    assert 1 <= store.execute("SELECT count(*) FROM runs").fetchone()[0] < 500
+
+
+def test_runs_end_with_a_command_that_is_killed(plugin):
+    """Where a command is killed, its run ends with it, and so do processes that the run has started."""
+    command = [sys.executable, "-m", "alloc.cli", "compare", f"{TINY}:0", "--methods", "fork", "--seeds", "99", *QUICK]
+    process = subprocess.Popen(command, cwd=plugin, stderr=subprocess.DEVNULL)
+    noted, limit = plugin / "forked", time.monotonic() + 60
+    while not (noted.exists() and noted.read_text().count("\n") >= 2) and time.monotonic() < limit:
+        time.sleep(0.01)
+    process.kill()
+    process.wait()
+    while any(map(_is_there, noted.read_text().split())) and time.monotonic() < limit:
+        time.sleep(0.01)
+    assert not any(map(_is_there, noted.read_text().split()))
+
+
+def _is_there(pid):
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def test_two_commands_that_are_killed_lose_no_run_and_make_none_twice(tmp_path):
+    """Of two commands on one store, killed now and then, every run is in the store once, and no lease is left."""
+    found = kill_often(tmp_path, seeds=3, kills=3, nap_s=0.4, workers=1, gap_s=(1.0, 2.0))
+    assert found.kills >= 1
+    assert (found.rows, found.solved, found.lost) == (12, 12, 0)
+    assert (found.overlapping, found.again, found.leases) == (0, 0, 0)
