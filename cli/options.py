@@ -29,7 +29,19 @@ BUILT_IN_METHODS = (
 )
 """For completion, which must not load numpy; a test compares them with the registry."""
 
-BUILT_IN_POLICIES = ("idle", "random", "nearest", "greedy", "hedonic", "auction", "gappo", "ppo", "replan")
+BUILT_IN_POLICIES = (
+    "idle",
+    "random",
+    "nearest",
+    "greedy",
+    "hedonic",
+    "auction",
+    "gappo",
+    "ppo",
+    "replan",
+    "routes",
+    "clairvoyant",
+)
 """For completion, likewise."""
 
 READABLE = "a .json or .npz file, a folder with agents.csv and tasks.csv, or - for JSON on standard input"

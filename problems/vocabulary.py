@@ -102,6 +102,7 @@ class MissionFamily(StrEnum):
     GROWTH = "growth"
     DEADLINES = "deadlines"
     SILENCE = "silence"
+    CFSTP = "cfstp"
     PAPER_1 = "paper-1"
     PAPER_2 = "paper-2"
     PAPER_3 = "paper-3"

@@ -11,7 +11,7 @@ import numpy as np
 from alloc.allocators.contract.parameters import Parameterised
 from alloc.problems.errors import AllocError
 from alloc.problems.missions.mission import Mission
-from alloc.problems.missions.radio import Radio
+from alloc.problems.missions.radio import Pace, Radio
 from alloc.problems.missions.simulation.reports import Message, View
 from alloc.problems.missions.simulation.state import Order
 from alloc.problems.vocabulary import Knowledge
@@ -33,6 +33,8 @@ class PolicyInfo:
         One line.
     central : bool
         Whether it decides for all agents at once, which needs full knowledge; else each agent decides for itself.
+    clairvoyant : bool
+        Whether it is told all that is to come: no policy for use, but what others are measured against.
     requires : tuple of str
         Modules that must be installed.
     options : tuple of str
@@ -44,6 +46,7 @@ class PolicyInfo:
     name: str
     summary: str
     central: bool = False
+    clairvoyant: bool = False
     requires: tuple[str, ...] = ()
     options: tuple[str, ...] = ()
     citation: str = ""
@@ -74,6 +77,10 @@ class Briefing:
     radio : Radio
     area : tuple of two positions
         Least and largest coordinates of all places in the mission.
+    pace : Pace or None
+        Between what the work of groups is drawn; not what is drawn.
+    mission : Mission or None
+        All that will happen, for a policy that is `clairvoyant`; None for all others.
     """
 
     agent: str | None
@@ -84,12 +91,21 @@ class Briefing:
     sensing: float
     radio: Radio
     area: tuple[tuple[float, ...], tuple[float, ...]]
+    pace: Pace | None = None
+    mission: Mission | None = None
 
     @classmethod
     def of(
-        cls, mission: Mission, knowledge: Knowledge, seed: int, deadline_s: float | None, agent: str | None
+        cls,
+        mission: Mission,
+        knowledge: Knowledge,
+        seed: int,
+        deadline_s: float | None,
+        agent: str | None,
+        *,
+        clairvoyant: bool = False,
     ) -> "Briefing":
-        """Return what an agent, or who leads all, is told of a mission."""
+        """Return what an agent, or who leads all, is told of a mission; all of it, if the policy is clairvoyant."""
         number = 0 if agent is None else mission.instance.agent_index[agent] + 1
         return cls(
             agent=agent,
@@ -100,6 +116,8 @@ class Briefing:
             sensing=mission.sensing,
             radio=mission.radio,
             area=mission.area,
+            pace=mission.pace,
+            mission=mission if clairvoyant else None,
         )
 
     def generator(self) -> np.random.Generator:

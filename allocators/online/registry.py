@@ -21,6 +21,8 @@ POLICIES = {
     "gappo": "alloc.allocators.online.policies.gappo:NetworkPolicy",
     "ppo": "alloc.allocators.online.policies.gappo:PpoPolicy",
     "replan": "alloc.allocators.online.policies.replan:Replan",
+    "routes": "alloc.allocators.online.policies.routes:Routes",
+    "clairvoyant": "alloc.allocators.online.policies.clairvoyant:Clairvoyant",
 }
 
 

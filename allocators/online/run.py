@@ -119,7 +119,8 @@ class _Control:
         self._fleet: FleetDecider | None = None
         self._agents: dict[str, AgentDecider] = {}
         if policy.info.central:
-            fleet = policy.begin(Briefing.of(mission, known, seed, deadline_s, None))
+            told = policy.info.clairvoyant
+            fleet = policy.begin(Briefing.of(mission, known, seed, deadline_s, None, clairvoyant=told))
             if not isinstance(fleet, FleetDecider):
                 raise PolicyError(f"policy {self._name!r} is central, but began with a {type(fleet).__name__}")
             self._fleet = fleet

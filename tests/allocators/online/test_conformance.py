@@ -12,6 +12,9 @@ from alloc.cli.options import BUILT_IN_POLICIES
 from alloc.problems.missions.simulation.simulation import Simulation
 from alloc.problems.missions.simulation.state import Order, TaskStatus
 
+COMPILED = [pytest.mark.slow, pytest.mark.timeout(300)]
+"""Marks of policies that are compiled first: half a minute, more under load."""
+
 
 class TestIdle(PolicyConformance):
     name = "idle"
@@ -48,6 +51,18 @@ class TestPpo(PolicyConformance):
 class TestReplan(PolicyConformance):
     name = "replan"
     settings = {"method": "greedy", "iterations": 1}  # noqa: RUF012
+
+
+class TestRoutes(PolicyConformance):
+    pytestmark = COMPILED
+    name = "routes"
+    settings = {"iterations": 50, "first_iterations": 50}  # noqa: RUF012
+
+
+class TestClairvoyant(PolicyConformance):
+    pytestmark = COMPILED
+    name = "clairvoyant"
+    settings = {"iterations": 50, "first_iterations": 50}  # noqa: RUF012
 
 
 class Defective(Policy):

@@ -1,0 +1,125 @@
+"""The policy `routes`: looks ahead over sequences of tasks, and improves its plan at every event."""
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from alloc.allocators.contract.parameters import CheckedParameters, bounded
+from alloc.allocators.online.contract import Briefing, FleetDecider, Policy, PolicyInfo
+from alloc.allocators.online.routes.describe import Described, Describer, Foresight
+from alloc.allocators.online.routes.plan import first_tasks, improved, warm_up
+from alloc.allocators.online.routes.situation import Ints
+from alloc.problems.missions.simulation.reports import View
+from alloc.problems.missions.simulation.state import ACTIVE, STAY, Order, TaskStatus
+
+DEADLINE_SHARE = 0.6
+"""Part of the time for a decision that the search gets: the rest is for what is around it."""
+
+
+@dataclass(frozen=True)
+class RoutesParameters(CheckedParameters):
+    """Parameters of plans of routes.
+
+    Attributes
+    ----------
+    iterations : int
+        Changes of the plan that are tried at each event, unless the deadline comes before.
+    first_iterations : int
+        Those of the first plan.
+    switch_price : float
+        What each agent counts that leaves its task for another, in units of the hours that all work would take if
+        flights took no time, >= 0.
+    """
+
+    iterations: int = bounded(1000, low=0)
+    first_iterations: int = bounded(3000, low=0)
+    switch_price: float = bounded(0.2, low=0)
+
+
+class Routes(Policy):
+    """Each agent has a sequence of tasks, coalitions meet at tasks, and the plan is improved at every event.
+
+    Raises
+    ------
+    InputError
+        If a setting is out of range.
+
+    References
+    ----------
+    Christiaens and Vanden Berghe (2020), doi:10.1287/trsc.2019.0914: visits taken out near each other, put back with
+    blinks.
+    """
+
+    info = PolicyInfo(name="routes", summary="sequences of tasks, improved at every event", central=True)
+    parameters_type: ClassVar[type] = RoutesParameters
+
+    def __init__(self, parameters: RoutesParameters | None = None, **settings: object) -> None:
+        super().__init__(parameters, **settings)
+        warm_up()
+
+    def begin(self, briefing: Briefing) -> FleetDecider:
+        """Return who plans routes."""
+        return RoutePlanner(self.parameters, briefing)
+
+
+class RoutePlanner(FleetDecider):
+    """Leads all agents by routes.
+
+    Parameters
+    ----------
+    parameters : RoutesParameters
+    briefing : Briefing
+    """
+
+    def __init__(self, parameters: RoutesParameters, briefing: Briefing) -> None:
+        pace = 1.0 if briefing.pace is None else (briefing.pace.low + briefing.pace.high) / 2
+        self._parameters, self._seed = parameters, briefing.seed[0]
+        self._describer = Describer(briefing.end, max(pace, 1e-9), parameters.switch_price)
+        limit = briefing.deadline_s
+        self._time_limit_s = None if limit is None else DEADLINE_SHARE * limit
+        self._routes: dict[str, list[str]] = {}
+        self._given_up: set[str] = set()
+        self._count = 0
+
+    def foresight(self, view: View) -> Foresight:
+        """Return what is known to come: nothing."""
+        return Foresight()
+
+    def decide(self, view: View) -> Mapping[str, Order]:
+        """Return the first task of each route, after it was improved."""
+        began = time.perf_counter()
+        described = self._describer.describe(view, self.foresight(view))
+        if described is None:
+            return {}
+        parameters = self._parameters
+        iterations = parameters.iterations if self._count else parameters.first_iterations
+        self._count += 1
+        until = None if self._time_limit_s is None else began + self._time_limit_s
+        seed = (self._seed * 1_000_003 + self._count) % 2**31
+        routes, lengths = improved(described, self._routes, iterations, seed, until, self._given_up)
+        names = [task.facts.id for task in described.tasks]
+        self._routes = {
+            agent.facts.id: [names[j] for j in routes[i, : lengths[i]].tolist()]
+            for i, agent in enumerate(described.agents)
+        }
+        self._given_up = set(names).difference(*self._routes.values())
+        return dict(self._orders(view, described, first_tasks(described.situation, routes, lengths)))
+
+    def _orders(self, view: View, described: Described, first: Ints) -> list[tuple[str, Order]]:
+        orders = []
+        for agent, j in zip(described.agents, first.tolist(), strict=True):
+            if agent.status not in ACTIVE:
+                continue
+            order = STAY
+            if j >= 0:
+                task = described.tasks[j]
+                order = Order(task.facts.id)
+                if task.status is TaskStatus.TO_COME:
+                    site = task.facts.place
+                    is_there = view.distance_to_place(agent, site) == 0
+                    order = (
+                        STAY if site.position is None or view.has_table or is_there else Order(position=site.position)
+                    )
+            orders.append((agent.facts.id, order))
+        return orders

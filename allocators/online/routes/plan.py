@@ -1,0 +1,110 @@
+"""Plans of routes from plans in force: set up, improved until the time is up, read."""
+
+import time
+from collections.abc import Mapping, Sequence, Set
+
+import numpy as np
+
+from alloc.allocators.online.routes.describe import Described
+from alloc.allocators.online.routes.evaluation import play
+from alloc.allocators.online.routes.record import Schedule, new_schedule
+from alloc.allocators.online.routes.search import improve
+from alloc.allocators.online.routes.situation import AGENT, EUCLIDEAN, EVENT, TASK, Ints, Situation, records
+
+PORTION, PORTION_S = 8, 0.001
+"""Changes before the first look at the clock, and seconds between two looks that are aimed at."""
+
+TOLERATED = 0.05
+"""By what share a plan may be worse than the best one at first; it shrinks to none."""
+
+
+def improved(
+    described: Described,
+    before: Mapping[str, Sequence[str]],
+    iterations: int,
+    seed: int,
+    until: float | None,
+    given_up: Set[str] = frozenset(),
+) -> tuple[Ints, Ints]:
+    """Return routes that begin with those in force.
+
+    Parameters
+    ----------
+    described : Described
+    before : mapping of str to sequence of str
+        Tasks of each agent in the plan in force, by their ids.
+    iterations : int
+        Changes to be tried.
+    seed : int
+    until : float or None
+        Second of `time.perf_counter` at which to stop; None for no limit.
+    given_up : set of str
+        Tasks that were tried before and have no place; they are tried again only as the search comes to them.
+
+    Returns
+    -------
+    tuple of ndarray
+        Tasks of each agent, shape (n, c), and how many there are, shape (n,).
+    """
+    situation = described.situation
+    n, m = situation.start_distance.shape
+    column = {task.facts.id: j for j, task in enumerate(described.tasks)}
+    routes = np.zeros((n, min(m, 4 * (m // n) + 16)), np.int64)
+    lengths = np.zeros(n, np.int64)
+    for i, agent in enumerate(described.agents):
+        kept = [column[name] for name in before.get(agent.facts.id, ()) if name in column][: routes.shape[1]]
+        routes[i, : len(kept)] = kept
+        lengths[i] = len(kept)
+    pair = _new_schedules(situation, routes)
+    fresh = np.array([task.facts.id not in given_up for task in described.tasks])
+    fresh[[j for i in range(n) for j in routes[i, : lengths[i]].tolist()]] = False
+    done, began = 0, time.perf_counter()
+    portion, hour = iterations if until is None else PORTION, began
+    while fresh.any() or done < iterations:
+        share = 0.0 if until is None else min(1.0, (hour - began) / max(1e-9, until - began))
+        tolerated = TOLERATED * (1 - share), 0.0 if until is None else TOLERATED * (1 - share)
+        portion = min(portion, iterations - done)
+        improve(
+            situation,
+            pair,
+            described.nearest,
+            (routes, lengths),
+            portion,
+            (seed + 7919 * done) % 2**31,
+            fresh,
+            tolerated,
+        )
+        fresh[:] = False
+        done, last, hour = done + portion, hour, time.perf_counter()
+        if until is not None and hour >= until:
+            break
+        portion *= 2 if hour - last < PORTION_S else 1
+    return routes, lengths
+
+
+def first_tasks(situation: Situation, routes: Ints, lengths: Ints) -> Ints:
+    """Return the task to which each agent goes first, -1 for none."""
+    schedule, _ = _new_schedules(situation, routes)
+    play(situation, schedule, routes, lengths)
+    return schedule.agents["first"]
+
+
+def warm_up() -> None:
+    """Compile the loops, or read them from their cache."""
+    table, site = np.zeros((1, 1)), np.zeros((1, 3))
+    agents = records(AGENT, 1, ability=1, speed=1, reach=1, battery=1, active=1, at=-1, aim=-1)
+    tasks = records(TASK, 1, left=1, weight=1, deadline=9, is_open=1)
+    allowed, events = np.ones((1, 1), np.bool_), records(EVENT, 0)
+    situation = Situation(
+        0.0, 9.0, agents, tasks, events, allowed, table, table, table, site, site, EUCLIDEAN, 1.0, False, 0.0, 1.0
+    )
+    plan = np.zeros((1, 1), np.int64), np.zeros(1, np.int64)
+    pair = _new_schedules(situation, plan[0])
+    improve(situation, pair, np.zeros((1, 1), np.int64), plan, 1, 0, np.ones(1, np.bool_), (0.0, 0.0))
+    first_tasks(situation, *plan)
+
+
+def _new_schedules(situation: Situation, routes: Ints) -> tuple[Schedule, Schedule]:
+    n, m = situation.start_distance.shape
+    size = n, m, routes.shape[1], len(situation.events)
+    return new_schedule(*size), new_schedule(*size)

@@ -1,0 +1,54 @@
+"""A compiled queue of what comes next: a heap of hours and items."""
+
+import numpy as np
+
+from alloc.allocators.online.routes.situation import Records
+from alloc.allocators.runtime.compiled import compiled, inlined
+
+ENTRY = np.dtype([("hour", np.float64), ("item", np.int64), ("version", np.int64)])
+
+
+@inlined
+def _is_before(queue: Records, index: int, hour: float, item: int) -> bool:
+    return bool(queue[index].hour < hour or (queue[index].hour == hour and queue[index].item <= item))
+
+
+@inlined
+def _copy(queue: Records, to: int, source: int) -> None:
+    queue[to].hour, queue[to].item = queue[source].hour, queue[source].item
+    queue[to].version = queue[source].version
+
+
+@compiled
+def push(queue: Records, size: int, hour: float, item: int, version: int) -> int:
+    """Put an item into the queue; return its new size. At one hour smaller items come first."""
+    child = size
+    while child > 0:
+        parent = (child - 1) >> 1
+        if _is_before(queue, parent, hour, item):
+            break
+        _copy(queue, child, parent)
+        child = parent
+    queue[child].hour, queue[child].item, queue[child].version = hour, item, version
+    return size + 1
+
+
+@compiled
+def drop_first(queue: Records, size: int) -> int:
+    """Take the first item out of the queue; return its new size."""
+    size -= 1
+    hour, item = queue[size].hour, queue[size].item
+    parent = 0
+    while True:
+        child = 2 * parent + 1
+        if child >= size:
+            break
+        other = child + 1
+        if other < size and _is_before(queue, other, queue[child].hour, queue[child].item):
+            child = other
+        if not _is_before(queue, child, hour, item):
+            break
+        _copy(queue, parent, child)
+        parent = child
+    _copy(queue, parent, size)
+    return size

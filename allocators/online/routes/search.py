@@ -1,0 +1,227 @@
+"""Local search over routes: small changes, and tasks taken out near each other and put back where they fit best."""
+
+# ruff: noqa: NPY002 - compiled code seeds numba's own generator
+
+import numpy as np
+
+from alloc.allocators.online.routes.cheapest import insert_cheapest
+from alloc.allocators.online.routes.evaluation import copy_touched, play, replay
+from alloc.allocators.online.routes.insertion import find_slack, insert_best, insert_coalition, tidy
+from alloc.allocators.online.routes.moves import change
+from alloc.allocators.online.routes.record import Schedule
+from alloc.allocators.online.routes.situation import Bools, Floats, Ints, Situation
+from alloc.allocators.runtime.compiled import compiled
+
+UNDONE = 1e4
+"""What all tasks left undone would count, beside the mission time in units of the situation's scale."""
+
+HOURS, FLIGHT, MISSED_HOURS, MISSED_BUSY = 0.02, 0.02, 0.02, 0.5
+"""What hours to completion and of flight count where all is done, and hours to completion and of flight and work where
+something is missed: who is done with its tasks earlier has time for more."""
+
+RUIN, BLINK = 0.5, 0.02
+"""Share of the changes that rebuild, and share of the places passed over."""
+
+Plan = tuple[Ints, Ints]
+"""Routes and their lengths."""
+
+MOST_OUT, MOST_NEAR, MOST_WAITING, MOST_MEETINGS, BY_TIME = 7, 10, 4, 2, 0.6
+"""Most tasks of a stretch, unplanned tasks near it and elsewhere that are tried with them, tasks for which a coalition
+is sought, and share of the stretches in time."""
+
+
+@compiled
+def value(s: Situation, r: Schedule) -> float:
+    """Return the value of a schedule, less being better: undone weight, then time, then flights and switches."""
+    n, undone = len(s.agents), max(0.0, r.totals[0])
+    switches = 0
+    for i in range(n):
+        if s.agents[i].active and s.agents[i].aim >= 0 and r.agents[i].first != s.agents[i].aim:
+            switches += 1
+    cost = UNDONE * undone + s.price * switches + 1e-9 * r.totals[3]
+    if undone < 1e-12 and not s.has_missed:
+        time = max(0.0, r.totals[1] - s.hour) + HOURS * r.totals[2] + FLIGHT * r.totals[4] / n
+    else:
+        time = MISSED_HOURS * r.totals[2] + MISSED_BUSY * (r.totals[4] + r.totals[5]) / n
+    return float(cost + time / s.scale)
+
+
+@compiled
+def _take_out(r: Schedule, nearest: Ints, routes: Ints, lengths: Ints, near: Ints) -> None:
+    """Take out a stretch of a route and what others do at that time, or tasks near each other in space.
+
+    `near` is set to 1 for tasks that are taken out or lie near one of those, for all others it is left as it is.
+    """
+    i = np.random.randint(len(lengths))
+    if lengths[i] == 0:
+        return
+    p = np.random.randint(lengths[i])
+    seed, most = routes[i, p], 1 + np.random.randint(MOST_OUT)
+    by_time = np.random.random() < BY_TIME
+    begin, end = r.arrive[i, p], r.arrive[i, min(p + most, lengths[i]) - 1]
+    share = 1.0 if np.random.random() < 0.5 else 0.3
+    for k in range(nearest.shape[1]):
+        near[nearest[seed, k]] = 2 if not by_time and k < most else 1
+    for k in range(len(lengths)):
+        is_in = k == i or np.random.random() < share * 2 / len(lengths)
+        kept = 0
+        for q in range(lengths[k]):
+            j = routes[k, q]
+            hour = r.arrive[k, q]
+            if (by_time and is_in and begin <= hour <= end) or (not by_time and (near[j] == 2 or j == seed)):
+                near[j] = 2
+                for other in range(min(6, nearest.shape[1])):
+                    near[nearest[j, other]] = max(1, near[nearest[j, other]])
+            else:
+                routes[k, kept] = j
+                kept += 1
+        lengths[k] = kept
+
+
+@compiled
+def rebuild(
+    s: Situation, r: Schedule, nearest: Ints, plan: Plan, before: Plan, slack: Floats, fresh: Bools, is_partial: bool
+) -> None:
+    """Take some tasks out of all routes, and put them and unplanned tasks where they fit best.
+
+    Parameters
+    ----------
+    s : Situation
+    r : Schedule
+        Of the plan before.
+    nearest : ndarray of int, shape (m, k)
+        Tasks near each task, nearest first.
+    plan, before : tuple of ndarray
+        Routes and their lengths, to be changed, and as they were.
+    slack : ndarray, shape (n, c)
+        Room.
+    fresh : ndarray of bool, shape (m,)
+        Tasks that are put in where `is_partial` is false.
+    is_partial : bool
+        Whether tasks are taken out, and put back together with some of those that lie near them.
+    """
+    routes, lengths = plan
+    m = len(s.tasks)
+    near = np.where(fresh, 1, 0)
+    if is_partial:
+        near[:] = 0
+        _take_out(r, nearest, routes, lengths, near)
+        replay(s, r, routes, lengths, *before)
+        tidy(r, routes, lengths)
+    for i in range(len(lengths)):
+        find_slack(s, r, routes, lengths, slack, i)
+    has_deadline = False
+    for j in range(m):
+        has_deadline = has_deadline or s.tasks[j].deadline < np.inf
+    waiting = _waiting(
+        s, routes, lengths, near, has_deadline, MOST_WAITING if is_partial else 0, MOST_NEAR if is_partial else m
+    )
+    balance = 0.02 if has_deadline else 1.0
+    alone = has_deadline and (not is_partial or np.random.random() < 0.5)
+    if alone:
+        insert_cheapest(s, r, routes, lengths, slack, waiting, balance)
+    meetings = MOST_MEETINGS if is_partial else len(waiting)
+    for j in waiting:
+        if j < 0 or (not alone and insert_best(s, r, routes, lengths, slack, j, balance, BLINK)):
+            continue
+        if meetings > 0 and s.tasks[j].deadline < np.inf:
+            meetings -= 1
+            insert_coalition(s, r, routes, lengths, slack, j)
+
+
+@compiled
+def _waiting(
+    s: Situation, routes: Ints, lengths: Ints, near: Ints, has_deadline: bool, others: int, most_near: int
+) -> Ints:
+    """Return the tasks without a place that are near, and some others, in a random order or one that suits them."""
+    m = len(s.tasks)
+    planned = np.zeros(m, np.bool_)
+    for i in range(len(lengths)):
+        for p in range(lengths[i]):
+            planned[routes[i, p]] = True
+    beside = 0
+    for j in range(m):
+        beside += not planned[j] and near[j] == 1
+    unplanned = m - planned.sum()
+    waiting, key = np.empty(m, np.int64), np.empty(m)
+    count, order = 0, np.random.randint(4)
+    chances = others / max(1, unplanned), most_near / max(1, beside), 1.0
+    for j in range(m):
+        if planned[j] or np.random.random() >= chances[near[j]]:
+            continue
+        waiting[count] = j
+        draw = np.random.random()
+        if order == 0:
+            key[count] = draw
+        elif order == 1:
+            key[count] = s.tasks[j].deadline if has_deadline else -s.tasks[j].left
+        else:
+            key[count] = s.tasks[j].left / s.tasks[j].weight * (0.7 + 0.6 * draw)
+            if not has_deadline:
+                key[count] = -key[count]
+        count += 1
+    return waiting[:count][np.argsort(key[:count])]
+
+
+@compiled
+def improve(
+    s: Situation,
+    pair: tuple[Schedule, Schedule],
+    nearest: Ints,
+    plan: Plan,
+    iterations: int,
+    seed: int,
+    fresh: Bools,
+    tolerated: tuple[float, float],
+) -> float:
+    """Improve routes in place; return their value.
+
+    Parameters
+    ----------
+    s : Situation
+    pair : tuple of Schedule
+        Two with room for the routes.
+    nearest : ndarray of int, shape (m, k)
+        Tasks near each task, nearest first.
+    plan : tuple of ndarray
+        Routes, shape (n, c), and their lengths, shape (n,).
+    iterations : int
+        Changes that are tried.
+    seed : int
+    fresh : ndarray of bool, shape (m,)
+        Tasks that are to be put into the routes first.
+    tolerated : tuple of float
+        By what share a plan may be worse than the best one, at first and at last.
+    """
+    np.random.seed(seed)
+    r, trial_r = pair
+    routes, lengths = plan
+    slack = np.zeros(routes.shape)
+    now, now_lengths = routes.copy(), lengths.copy()
+    trial, trial_lengths = routes.copy(), lengths.copy()
+    play(s, r, routes, lengths)
+    play(s, trial_r, routes, lengths)
+    copy_touched(trial_r, r, now, now_lengths, trial_r, trial, trial_lengths)
+    best, undone = value(s, r), max(0.0, r.totals[0])
+    for step in range(-1 if fresh.any() else 0, iterations):
+        if step < 0 or np.random.random() < RUIN:
+            rebuild(s, trial_r, nearest, (trial, trial_lengths), (now, now_lengths), slack, fresh, step >= 0)
+        elif not change(s, r, nearest, trial, trial_lengths):
+            continue
+        replay(s, trial_r, trial, trial_lengths, now, now_lengths)
+        share = tolerated[0] + (tolerated[1] - tolerated[0]) * max(0, step) / max(1, iterations)
+        limit = best + share * (best - UNDONE * undone)
+        reached = value(s, trial_r)
+        while reached < limit and tidy(trial_r, trial, trial_lengths):
+            replay(s, trial_r, trial, trial_lengths, now, now_lengths)
+            reached = value(s, trial_r)
+        if reached < limit:
+            copy_touched(trial_r, trial_r, trial, trial_lengths, r, now, now_lengths)
+            if reached < best:
+                best, undone = reached, max(0.0, trial_r.totals[0])
+                lengths[:] = now_lengths
+                for i in range(len(lengths)):
+                    routes[i, : lengths[i]] = now[i, : lengths[i]]
+        else:
+            copy_touched(trial_r, r, now, now_lengths, trial_r, trial, trial_lengths)
+    return best
