@@ -102,7 +102,6 @@ class MissionFamily(StrEnum):
     GROWTH = "growth"
     DEADLINES = "deadlines"
     SILENCE = "silence"
-    CFSTP = "cfstp"
     PAPER_1 = "paper-1"
     PAPER_2 = "paper-2"
     PAPER_3 = "paper-3"

@@ -15,7 +15,7 @@ import numpy as np
 from scipy import stats
 
 from alloc.allocators import load_policy, simulate
-from alloc.problems import MissionParameters, MissionResult, random_mission
+from alloc.problems import Mission, MissionParameters, MissionResult, random_cfstp, random_mission
 
 FIRST_SEED = 1000
 FIGURES = ("mission_time", "tasks_done_share", "switches", "distance", "decision_ms_mean", "decision_ms_p99")
@@ -30,12 +30,11 @@ def main() -> None:
     parser.add_argument("--missions", type=int, default=100)
     parser.add_argument("--deadline-ms", type=float)
     options = parser.parse_args()
-    parameters = MissionParameters(family=options.family, agents=options.agents, tasks=options.tasks, knowledge="full")
     names = options.policies.split()
     table = {name: [] for name in names}
     policies = {name: named(name) for name in names}
     for seed in range(FIRST_SEED, FIRST_SEED + options.missions):
-        mission = random_mission(parameters, seed)
+        mission = drawn(options.family, options.agents, options.tasks, seed)
         for name, policy in policies.items():
             table[name].append(figures(simulate(mission, policy, deadline_ms=options.deadline_ms).result))
     print(f"| {options.family}, {options.missions} missions | " + " | ".join(FIGURES) + " |")
@@ -45,6 +44,12 @@ def main() -> None:
         rows = np.array(table[name])
         cells = [cell(rows[:, k], None if name == names[0] else first[:, k]) for k in range(len(FIGURES))]
         print(f"| `{name}` | " + " | ".join(cells) + " |")
+
+
+def drawn(family: str, agents: int | None, tasks: int | None, seed: int) -> Mission:
+    if family == "cfstp":
+        return random_cfstp(agents or 20, tasks or 300, seed)
+    return random_mission(MissionParameters(family=family, agents=agents, tasks=tasks, knowledge="full"), seed)
 
 
 def named(text: str) -> object:

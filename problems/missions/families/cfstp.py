@@ -41,8 +41,9 @@ def random_cfstp(agents: int = 20, tasks: int = 300, seed: int = 0, *, name: str
     n, m = whole(agents, "agents", 1), whole(tasks, "tasks", 1)
     number = whole(seed, "seed", 0, 2**63 - 1)
     rng = np.random.default_rng(number)
-    places, starts = rng.integers(0, SIDE, (m, 2)), rng.integers(0, SIDE, (n, 2))
-    demands = np.stack([rng.integers(low, high + 1, m) for low, high in (DEADLINE, WORKLOAD)], axis=1)
+    workload = rng.integers(*WORKLOAD, m, endpoint=True)
+    starts, places = rng.integers(0, SIDE, (n, 2)), rng.integers(0, SIDE, (m, 2))
+    demands = np.stack([rng.integers(*DEADLINE, m, endpoint=True), workload], axis=1)
     called = f"cfstp-seed-{number}" if name is None else name
     return cfstp_mission(called, starts.astype(float), places.astype(float), demands.astype(float), number)
 

@@ -13,8 +13,8 @@ from alloc.problems.instance import FloatArray, Instance
 from alloc.problems.missions.events import Event, EventKind
 from alloc.problems.missions.families.parameters import MissionParameters
 from alloc.problems.missions.mission import Mission
-from alloc.problems.missions.radio import Pace, Radio
-from alloc.problems.vocabulary import MANHATTAN, MissionFamily
+from alloc.problems.missions.radio import Radio
+from alloc.problems.vocabulary import MissionFamily
 
 AGENTS, TASKS = 20, 40
 SPEED = 0.5
@@ -24,7 +24,6 @@ WAVES = (0.3, 0.7, 1.1)
 """Hours at which waves come, over the ideal mission time."""
 SPOTS, SPREAD = 3, 0.06
 """Hot spots, and how far tasks lie from them, in units of distance."""
-GRID, CFSTP_TASKS, CFSTP_END = 50, 300, 600
 PAPER = {MissionFamily.PAPER_1: 1, MissionFamily.PAPER_2: 2, MissionFamily.PAPER_3: 3, MissionFamily.PAPER_4: 4}
 
 
@@ -70,9 +69,7 @@ def random_mission(parameters: MissionParameters, seed: int, *, name: str | None
     family = MissionFamily(parameters.family)
     called = name if name is not None else f"mission-{family}-seed-{number}"
     radio = Radio(radius=parameters.radius, loss=parameters.loss)
-    if family is MissionFamily.CFSTP:
-        mission = _cfstp(parameters, called, rng)
-    elif family in PAPER:
+    if family in PAPER:
         mission = _paper(parameters, PAPER[family], number, called, rng)
     else:
         mission = _drawn(parameters, family, called, rng)
@@ -82,7 +79,6 @@ def random_mission(parameters: MissionParameters, seed: int, *, name: str | None
         knowledge=parameters.knowledge,
         sensing=parameters.sensing,
         radio=radio,
-        pace=mission.pace,
         seed=number,
     )
 
@@ -118,21 +114,6 @@ def _drawn(parameters: MissionParameters, family: MissionFamily, name: str, rng:
     )
     fields = {field: getattr(draft, field) for field in ("joins", "appears", "deadline", "growth", "events")}
     return Mission(instance, **fields, horizon=float(np.ceil(6 * ideal + 6)))
-
-
-def _cfstp(parameters: MissionParameters, name: str, rng: np.random.Generator) -> Mission:
-    """Return a mission of the coalition formation problem with spatial and temporal constraints; an hour is a step."""
-    n, m = parameters.agents or AGENTS, parameters.tasks or CFSTP_TASKS
-    instance = Instance(
-        name=name,
-        ability=np.ones(n),
-        workload=rng.integers(10, 51, m),
-        agent_position=rng.integers(0, GRID, (n, 2)),
-        task_position=rng.integers(0, GRID, (m, 2)),
-        speed=np.ones(n),
-        metric=MANHATTAN,
-    )
-    return Mission(instance, deadline=rng.integers(5, CFSTP_END + 1, m), horizon=CFSTP_END, pace=Pace(1, 2, 1))
 
 
 def _steady(draft: _Draft, later: BoolArray, rng: np.random.Generator) -> None:

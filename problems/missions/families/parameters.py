@@ -21,9 +21,8 @@ class MissionParameters:
         places, one after the other. ``failures``: a fifth of the agents fail. ``recharging``: a fifth of the agents
         join late, a fifth are recalled for a while, and small batteries are recharged. ``growth``: tasks grow until
         somebody works there. ``deadlines``: most tasks have one. ``silence``: the radio of some agents and of a region
-        is silent for a while. ``cfstp``: deadlines on a grid, where agents are equal and all is there from the start
-        (Ramchurn et al. 2010, https://github.com/lcpz/cfstp), 300 tasks by default. ``paper-1`` to ``paper-4``: a
-        scenario of the paper, in which 30 % of the tasks emerge and 20 % of the agents fail.
+        is silent for a while. ``paper-1`` to ``paper-4``: a scenario of the paper, in which 30 % of the tasks emerge
+        and 20 % of the agents fail.
     agents, tasks : int or None
         None for 20 and 40, or those of the paper's scenario, which cannot be changed.
     knowledge : Knowledge or str
