@@ -16,6 +16,7 @@ from alloc.allocators.contract.base import Allocator, Proposal
 from alloc.allocators.contract.budget import Budget, StopReason
 from alloc.allocators.contract.improvement import Improvement
 from alloc.allocators.contract.search import Search
+from alloc.allocators.contract.tolerance import EXACT
 from alloc.allocators.decomposition import Decomposition
 from alloc.allocators.heuristic.greedy.list_schedule import load_compiled
 from alloc.allocators.refusal import refuse
@@ -45,6 +46,9 @@ MATCHED_PAIRS = 1_000_000
 
 REPAIR_SHARE = 0.05
 """Part of the time limit for the repair of a plan in force, after the method's own time is up."""
+
+SLACK_AGENTS, SLACK_LIMIT_S = 20_000, 0.5
+"""Most agents and least time limit for a look at what slack would save, which must take little of a run."""
 
 
 def solve(
@@ -172,10 +176,10 @@ def _prepared(
         given = ", ".join(settings) or "parameters"
         raise InputError(f"is an allocator with its own parameters; set {given} where it is made", "method")
     allocator = load(method, parameters, **settings) if isinstance(method, str) else method
-    if _is_repaired(request.instance):
+    if _is_repaired(request.instance) or _slack_may_save(allocator, request):
         from alloc.allocators.heuristic.local_search.annealing_state import compile_loops
 
-        compile_loops()  # for the repair; loading is not part of the run
+        compile_loops()  # for what local search does in the end; loading is not part of the run
     begin = time.monotonic()
     refuse(allocator, request.instance, request.objective, request.budget, request.tolerance)
     is_matched = _is_matched(request.instance)
@@ -192,6 +196,15 @@ def _is_repaired(instance: Instance) -> bool:
     """Whether moves have a price, so that the plan is repaired in the end: pins alone leave nothing to repair."""
     move = instance.reach.move
     return move is not None and bool(move.price.any())
+
+
+def _slack_may_save(allocator: Allocator, run: Request | Search) -> bool:
+    """Whether the least makespan may take much energy, as sums of abilities can be any numbers."""
+    if run.objective is not Objective.MAKESPAN_ENERGY or run.tolerance != EXACT or run.instance.reach.move is not None:
+        return False
+    limit, method = run.budget.time_limit_s, allocator.method
+    is_quick = run.instance.n <= SLACK_AGENTS and (limit is None or limit >= SLACK_LIMIT_S)
+    return is_quick and method.anytime and method.makespan_slack and bool((run.instance.ability % 1).any())
 
 
 def _is_matched(instance: Instance) -> bool:
@@ -250,4 +263,9 @@ def _propose(allocator: Allocator, search: Search) -> tuple[Proposal, StopReason
 
         limit = search.budget.time_limit_s
         repair(search, seconds=math.inf if limit is None else max(REPAIR_S, REPAIR_SHARE * limit))
+    if _slack_may_save(allocator, search):
+        from alloc.allocators.heuristic.slack import note_saving
+
+        with search.improving("looking for what slack saves"):
+            note_saving(search)
     return proposal, stop_reason
