@@ -133,7 +133,7 @@ def folder(tmp_path, monkeypatch):
 TEXTS = {path: path.read_text(encoding="utf-8") for path in DOCUMENTS}
 RUN = [path for path, text in TEXTS.items() if any(map(runs, blocks(text)))]
 SHOWN = [(path, line) for path, text in TEXTS.items() for line in shown(text)]
-WITHOUT_CODE = {"architecture.md", "exact.md", "glossary.md", "learned_methods.md", "paper.md", "reference.md"}
+WITHOUT_CODE = {"architecture.md", "glossary.md", "learned_methods.md", "paper.md", "reference.md"}
 """Documents that show neither code nor commands: nothing of them is tested here but their links."""
 
 

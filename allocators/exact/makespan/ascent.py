@@ -133,9 +133,9 @@ class ConfigurationAscent:
 def _in_steps(model: Model, time: float) -> tuple[WholeArray, WholeArray]:
     """Return weights, shape (t, k), and needs, shape (t,), such that what is impossible so is impossible indeed."""
     weight, need = model.uncapped(time)
-    step = need / GRID
-    whole = np.ceil(weight / step).T.astype(np.int64)
-    return np.ascontiguousarray(np.minimum(whole, GRID)), np.full(len(need), GRID, dtype=np.int64)
+    with np.errstate(over="ignore"):  # an agent may bring far more than a task needs
+        steps = np.minimum(np.ceil(weight / (need / GRID)), GRID)
+    return np.ascontiguousarray(steps.T.astype(np.int64)), np.full(len(need), GRID, dtype=np.int64)
 
 
 @compiled

@@ -12,7 +12,7 @@ RNG = np.random.default_rng(1)
 PLACES = {"agent_position": RNG.random((60, 2)), "task_position": RNG.random((12, 2))}
 REAL = Instance(ability=RNG.uniform(1, 10, 60), workload=RNG.uniform(10, 80, 12), **PLACES)
 WHOLE = Instance(ability=RNG.integers(1, 10, 60), workload=RNG.integers(10, 80, 12), **PLACES)
-SETTINGS = {"method": "local-search", "iterations": 200, "time_limit_s": None}
+SETTINGS = {"method": "local-search", "iterations": 60, "time_limit_s": None}
 
 
 def notes_on_slack(result):

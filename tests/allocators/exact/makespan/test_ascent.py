@@ -3,6 +3,7 @@ import pytest
 from oracle import brute_force
 from tiny_instances import tiny_instance
 
+from alloc.allocators import solve
 from alloc.allocators.exact.makespan.ascent import ConfigurationAscent
 from alloc.allocators.exact.makespan.relaxation import relaxed_lower_bound
 from alloc.allocators.exact.model import Model
@@ -47,3 +48,9 @@ def test_whole_agents_are_seen():
         ascent.round(low)
     assert low == pytest.approx(3.0, rel=1e-4)
     assert 3.97 < ascent.proven < 4.0
+
+
+def test_tasks_that_are_nothing_to_an_agent():
+    """What an agent brings may be any multiple of what a task needs: it is cut off before it is counted in steps."""
+    instance = Instance(ability=[2.8, 3.4, 10.0], workload=[1e-60, 0.0, 1e-9], speed=[np.inf, np.inf, 3.0])
+    assert solve(instance, "cpsat", iterations=2, time_limit_s=None).makespan > 0

@@ -207,6 +207,7 @@ def _is_there(pid):
         return False
 
 
+@pytest.mark.slow
 def test_two_commands_that_are_killed_lose_no_run_and_make_none_twice(tmp_path):
     """Of two commands on one store, killed now and then, every run is in the store once, and no lease is left."""
     found = kill_often(tmp_path, seeds=3, kills=3, nap_s=0.4, workers=1, gap_s=(1.0, 2.0))
