@@ -19,6 +19,9 @@ FAMILIES = tuple(str(family) for family in MissionFamily if not str(family).star
 VALIDATION_SEED = 1_000_000_000
 """Seeds from here on are those of validation missions."""
 
+VALIDATION_SIZES = ((20, 40), (40, 80), (10, 40), (60, 40))
+"""Agents and tasks of validation missions, in turn."""
+
 
 class PackedMission(NamedTuple):
     """A mission that is ready for compiled runs.
@@ -61,8 +64,8 @@ class MissionCurriculum:
     """
 
     families: tuple[str, ...] = FAMILIES
-    agents: tuple[int, int] = (10, 30)
-    tasks: tuple[int, int] = (20, 50)
+    agents: tuple[int, int] = (10, 60)
+    tasks: tuple[int, int] = (20, 80)
     radii: tuple[float, ...] = (0.3, 0.3, 0.2, 0.15)
     losses: tuple[float, ...] = (0.2, 0.0, 0.8)
     periods: tuple[int, ...] = (1, 10)
@@ -109,8 +112,10 @@ class MissionCurriculum:
             if self.missions:
                 mission = packed(self.missions[k % kinds])
             else:
-                mission = _generated(MissionParameters(self.families[k % kinds]), seed)
-            chosen.append((mission._replace(periods=self.periods[k // kinds % len(self.periods)]), seed))
+                n, m = VALIDATION_SIZES[k // kinds % len(VALIDATION_SIZES)]
+                mission = _generated(MissionParameters(self.families[k % kinds], n, m), seed)
+            turn = k // kinds + k // (kinds * len(VALIDATION_SIZES))  # each size with each of them
+            chosen.append((mission._replace(periods=self.periods[turn % len(self.periods)]), seed))
         return chosen
 
 

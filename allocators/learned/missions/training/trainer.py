@@ -71,7 +71,7 @@ class MissionTrainingParameters:
     decisions: int = 60_000
     missions: int = 12
     groups: int = 4
-    validations: int = 24
+    validations: int = 64
     evolved: int = 100
     candidates: int = 16
     learner: PpoParameters = DEFAULT_PPO
