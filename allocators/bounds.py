@@ -12,6 +12,9 @@ from alloc.allocators.contract.tolerance import PROVEN
 from alloc.allocators.runtime.interrupts import run_native
 from alloc.problems import Objective, agent_classes, count_classes, energy_lower_bound, lp_makespan_lower_bound
 from alloc.problems.bounds import LP_PAIRS_PER_SECOND, LP_SIZE_LIMIT
+from alloc.problems.distances.neighbours import estimated_pairs
+from alloc.problems.distances.reach import Reach
+from alloc.problems.matching.clock import GATHERED_PER_SECOND
 
 UNLIMITED_S = 30.0
 """Time limit of the linear programme before a run without one; so long that the clock does not decide."""
@@ -45,18 +48,26 @@ def _bound_below_plan(search: Search, seconds: float) -> float | None:
     low, stopped = min(search.lower_bound, makespan), lambda: search.interrupted
     pairs = count_classes(instance, by_place=False) * instance.m
     if pairs > min(LP_SIZE_LIMIT, LP_PAIRS_PER_SECOND * seconds):
-        reach = instance.reach
-        if reach.has_table or reach.is_complete or reach.neighbours is None:
+        end = time.monotonic() + seconds
+        if not _are_neighbours_at_hand(instance.reach, seconds):
             return None
         from alloc.allocators.exact.makespan.task_prices import bound_by_task_prices  # loads numba
 
-        return bound_by_task_prices(instance, low, makespan, time.monotonic() + seconds, stopped)
+        return bound_by_task_prices(instance, low, makespan, end, stopped)
     from alloc.allocators.exact.makespan.relaxation import relaxed_lower_bound  # loads scipy
     from alloc.allocators.exact.model import Model
 
     classes = agent_classes(instance, by_place=False)
     model = Model.build(instance, classes, int(np.count_nonzero(instance.workload)))
     return relaxed_lower_bound(model, low, makespan, seconds, stopped)[0]
+
+
+def _are_neighbours_at_hand(reach: Reach, seconds: float) -> bool:
+    """Whether reach is short, and the pairs within it have been gathered or can be in time."""
+    if reach.has_table or reach.is_complete:
+        return False
+    is_quick = "neighbours" in vars(reach) or estimated_pairs(reach) <= GATHERED_PER_SECOND * seconds
+    return is_quick and reach.neighbours is not None
 
 
 def bounds_after(search: Search, proposal: Proposal) -> float | None:
