@@ -3,7 +3,8 @@
     python tests/benchmarks/missions.py --family cfstp --agents 10 --policies routes --missions 100 --deadline-ms 10
     python tests/benchmarks/missions.py --family failures --policies 'replan[method=cpsat] routes' --missions 100
 
-Missions have seeds from 1000 on, on which nothing was tuned. What is compared is the mission time of missions that both
+Missions have seeds from 2000 on by default, on which nothing was tuned; the price on switches of `routes` was chosen on
+seeds 1000 to 1015. What is compared is the mission time of missions that both
 policies finish, the share of tasks done, switches and distance; of each figure the policy's mean, and in brackets the
 mean difference from the first policy and the half width of its interval.
 """
@@ -17,7 +18,7 @@ from scipy import stats
 from alloc.allocators import load_policy, simulate
 from alloc.problems import Mission, MissionParameters, MissionResult, random_cfstp, random_mission
 
-FIRST_SEED = 1000
+FIRST_SEED = 2000
 FIGURES = ("mission_time", "tasks_done_share", "switches", "distance", "decision_ms_mean", "decision_ms_p99")
 
 
@@ -28,12 +29,13 @@ def main() -> None:
     parser.add_argument("--tasks", type=int)
     parser.add_argument("--policies", default="replan[method=cpsat] routes clairvoyant")
     parser.add_argument("--missions", type=int, default=100)
+    parser.add_argument("--first-seed", type=int, default=FIRST_SEED)
     parser.add_argument("--deadline-ms", type=float)
     options = parser.parse_args()
     names = options.policies.split()
     table = {name: [] for name in names}
     policies = {name: named(name) for name in names}
-    for seed in range(FIRST_SEED, FIRST_SEED + options.missions):
+    for seed in range(options.first_seed, options.first_seed + options.missions):
         mission = drawn(options.family, options.agents, options.tasks, seed)
         for name, policy in policies.items():
             table[name].append(figures(simulate(mission, policy, deadline_ms=options.deadline_ms).result))
