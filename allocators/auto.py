@@ -29,7 +29,7 @@ def choose(instance: Instance, objective: Objective, budget: Budget) -> tuple[st
     pairs = count_classes(instance, by_place=energy) * tasks
     seconds = min(UNHURRIED_S, UNHURRIED_S if budget.time_limit_s is None else budget.time_limit_s)
     searchable = max(15_000, int(MAKESPAN_PAIRS_PER_SECOND * seconds))
-    is_easy = instance.reach.is_complete and not instance.has_travel_time and _are_whole(instance)
+    is_easy = instance.reach.is_complete and not instance.has_travel_time and has_whole_abilities(instance)
     limit = max(1_000, int(ENERGY_PAIRS_PER_SECOND * seconds)) if energy and is_easy else searchable
     size = f"{pairs} pairs of agent class and task"
     time = "without a time limit" if budget.time_limit_s is None else f"in {budget.time_limit_s:g} s"
@@ -46,6 +46,6 @@ def choose(instance: Instance, objective: Objective, budget: Budget) -> tuple[st
     return "local-search", f"{size} are too many for a proof {time} (more than {limit})"
 
 
-def _are_whole(instance: Instance) -> bool:
+def has_whole_abilities(instance: Instance) -> bool:
     """Whether abilities are whole numbers."""
     return bool((instance.ability == np.round(instance.ability)).all())

@@ -9,7 +9,7 @@ from contextlib import nullcontext
 
 import numpy as np
 
-from alloc.allocators.auto import choose
+from alloc.allocators.auto import choose, has_whole_abilities
 from alloc.allocators.bounds import raise_bound_before
 from alloc.allocators.conclusion import conclude
 from alloc.allocators.contract.base import Allocator, Proposal
@@ -204,7 +204,7 @@ def _slack_may_save(allocator: Allocator, run: Request | Search) -> bool:
         return False
     limit, method = run.budget.time_limit_s, allocator.method
     is_quick = run.instance.n <= SLACK_AGENTS and (limit is None or limit >= SLACK_LIMIT_S)
-    return is_quick and method.anytime and method.makespan_slack and bool((run.instance.ability % 1).any())
+    return is_quick and method.anytime and method.makespan_slack and not has_whole_abilities(run.instance)
 
 
 def _is_matched(instance: Instance) -> bool:

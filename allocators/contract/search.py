@@ -125,21 +125,27 @@ class Search:
         return math.inf if self.fastest is None else self.tolerance.hours(self.fastest.evaluation.served_makespan)
 
     def part(
-        self, objective: Objective, tolerance: MakespanTolerance, on_improvement: Callable[[Improvement], None]
+        self,
+        objective: Objective,
+        tolerance: MakespanTolerance,
+        on_improvement: Callable[[Improvement], None] | None = None,
+        budget: Budget | None = None,
     ) -> "Search":
-        """Return a run of its own on the same instance, with the same clock, time limit, stop event and best plans.
+        """Return a run of its own on the same instance, with the same clock, stop event and best plans.
 
-        For another method within this run, possibly in another thread. It has no limit on iterations.
+        For another method within this run, possibly in another thread.
 
         Parameters
         ----------
         objective, tolerance, on_improvement
             As those of a search; improvements are not submitted to this one.
+        budget : Budget, optional
+            Its time limit is on the clock of this run; by default the time limit of this run, and no other limit.
         """
         part = Search(
             self.instance,
             objective,
-            Budget(self.budget.time_limit_s),
+            budget or Budget(self.budget.time_limit_s),
             seed=self.seed,
             tolerance=tolerance,
             stop=self._stop,

@@ -46,17 +46,9 @@ def note_saving(search: Search) -> None:
 
 def _within(search: Search, makespan: float) -> Evaluation:
     """Return the scores of a plan with little energy that takes no longer than so many hours."""
-    assert search.best is not None
     limit = search.budget.time_limit_s
-    part = Search(
-        search.instance,
-        search.objective,
-        Budget(None, ITERATIONS) if limit is None else Budget(min(MOST_S, TIME_SHARE * limit)),
-        seed=search.seed,
-        start=search.best.allocation,
-        threads=search.threads,
-        tolerance=MakespanTolerance(limit=makespan),
-    )
+    budget = Budget(None, ITERATIONS) if limit is None else Budget(search.elapsed_s + min(MOST_S, TIME_SHARE * limit))
+    part = search.part(search.objective, MakespanTolerance(limit=makespan), budget=budget)
     improve(part)
     assert part.best is not None
     return part.best.evaluation

@@ -103,11 +103,11 @@ def test_nothing_is_compiled_within_a_mission():
 
     policy = load_policy("gappo")
     loops = (play.consider, play.notice, play.centre, play.is_due, talking.is_to_send)
-    before = [list(loop.signatures) for loop in loops if hasattr(loop, "signatures")]
+    before = [list(loop.signatures) for loop in loops]
     result = simulate(random_mission(MissionParameters(agents=3, tasks=4), seed=1), policy).result
     assert result.decisions > 0
     assert all(before)
-    assert [list(loop.signatures) for loop in loops if hasattr(loop, "signatures")] == before
+    assert [list(loop.signatures) for loop in loops] == before
 
 
 def test_central_policies_need_full_knowledge():
