@@ -5,10 +5,11 @@ from dataclasses import dataclass, replace
 
 from alloc.allocators.contract.budget import Budget
 from alloc.allocators.experiments.campaign import Job
-from alloc.allocators.experiments.compare import Row, mean_and_worst
+from alloc.allocators.experiments.compare import Row
 from alloc.allocators.experiments.store.key import Run, canonical, this_machine, versions
 from alloc.allocators.experiments.store.outcome import Ending, Outcome
 from alloc.allocators.experiments.store.store import Store
+from alloc.allocators.experiments.sweep import mean_and_worst
 from alloc.allocators.request import checked_objective, checked_seed, checked_threads
 from alloc.problems import Instance, Objective
 from alloc.problems.text import counted, percent
