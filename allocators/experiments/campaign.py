@@ -18,7 +18,7 @@ from alloc.allocators.experiments.store.outcome import Ending
 from alloc.allocators.experiments.store.store import LEASE_S, Store
 from alloc.allocators.parallel.engine import POLL_S
 from alloc.allocators.parallel.processors import available_threads
-from alloc.problems import InputError, Instance
+from alloc.problems import InputError, Instance, Mission
 
 OTHERS_S = 0.3
 """Seconds between two looks at what other commands have left to do."""
@@ -39,7 +39,7 @@ class Job:
 
     run: Run
     settings: dict[str, object]
-    instance: Instance = field(repr=False)
+    instance: Instance | Mission = field(repr=False)
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ class Campaign:
         self._pending = list(self._jobs)
         first = jobs[0].run if jobs else None
         self._threads = 1 if first is None else first.threads
-        self._is_pinned = CAN_PIN and first is not None and first.time_limit_s is not None
+        self._is_pinned = CAN_PIN and first is not None and first.is_timed
         limit = None if first is None else first.time_limit_s
         self._size = _checked_workers(means.workers, self._threads, pinned=self._is_pinned)
         usual = math.inf if limit is None else OVERRUN * limit + OVERRUN_S

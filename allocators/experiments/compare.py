@@ -121,7 +121,7 @@ def compare(
     InputError
         If an argument is not what it should be; its place is the parameter.
     """
-    given = by_label(methods, Allocator, lambda method: method.method.name, "methods")
+    given = by_label(methods, Allocator, lambda method: method.method.name, "methods")  # type: ignore[type-abstract]
     numbers = [checked_seed(seed, "seeds") for seed in listed(seeds, "seeds", "whole numbers")]
     problems = instances if isinstance(instances, Iterator) else listed(instances, "instances", "instances")
     Budget(time_limit_s, iterations, target_gap)

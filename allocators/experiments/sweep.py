@@ -69,9 +69,14 @@ def by_label(
     InputError
         If an entry is something else, or two objects of a sequence have one name.
     """
+
+    def checked(one: str | M) -> str | M:
+        of_type(one, (str, kind), place)
+        return one
+
     if isinstance(given, Mapping):
-        return {str(label): of_type(one, (str, kind), place) for label, one in given.items()}
-    entries: list[str | M] = [of_type(one, (str, kind), place) for one in listed(given, place, place)]
+        return {str(label): checked(one) for label, one in given.items()}
+    entries = [checked(one) for one in listed(given, place, place)]
     found = {one if isinstance(one, str) else name(one): one for one in entries}
     if len(found) < len({one if isinstance(one, str) else id(one) for one in entries}):
         raise InputError("has several objects of one name; give a dict with a name for each", place)

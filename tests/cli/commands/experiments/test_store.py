@@ -1,5 +1,6 @@
 """``alloc compare --store``: runs that are kept, and made once."""
 
+import csv
 import os
 import signal
 import sqlite3
@@ -214,3 +215,30 @@ def test_two_commands_that_are_killed_lose_no_run_and_make_none_twice(tmp_path):
     assert found.kills >= 1
     assert (found.rows, found.solved, found.lost) == (12, 12, 0)
     assert (found.overlapping, found.again, found.leases) == (0, 0, 0)
+
+
+def test_policies_in_missions_are_kept(alloc, plugin):
+    """Runs of policies are made once, in a process each; rows are those without a store, reports hold all measures."""
+    alloc("generate", "mission", "--agents", "2", "--tasks", "2", "--seed", "1", "--output", "m.json")
+    words = ("compare", "m.json", "--policies", "nearest,replan", "--seeds", "2")
+    kept = alloc(*words, "--store", "runs.db", "--report", "table.md", "--report", "runs.csv", "--json")
+    assert "4 runs made; runs.db has 4 of 4" in kept.err
+    plain = alloc(*words, "--json")
+    rows, others = kept.json["rows"], plain.json["rows"]
+    for row in [*rows, *others]:
+        for name in ("decision_ms_mean", "decision_ms_worst"):
+            row.pop(name)
+    assert (kept.code, rows, kept.json["differences"]) == (plain.code, others, plain.json["differences"])
+    assert "0 runs made" in alloc(*words, "--store", "runs.db").err
+    more = alloc(*words, "--knowledge", "full", "--store", "runs.db")
+    assert "4 runs made; runs.db has 4 of 4" in more.err
+    assert "runs.db also holds 4 runs with knowledge local" in more.err
+    assert "## Against nearest, in the same missions" in Path("table.md").read_text()
+    (mean,) = (
+        sqlite3.connect("runs.db")
+        .execute("SELECT avg(measures ->> 'mission_time') FROM runs WHERE method = 'nearest' AND knowledge = 'local'")
+        .fetchone()
+    )
+    assert mean == pytest.approx(rows[0]["mission_time_mean"])
+    rows = list(csv.DictReader(Path("runs.csv").read_text().splitlines()))
+    assert [row["tasks_done"] for row in rows] == ["2", "", "2", ""]
