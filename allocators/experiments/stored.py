@@ -102,6 +102,7 @@ def planned(
     objective: Objective | str = Objective.MAKESPAN,
     budget: Budget,
     threads: int | None = None,
+    machine: str | None = None,
 ) -> Comparison:
     """Return all runs of a comparison of methods, and note the instances in the store.
 
@@ -117,6 +118,8 @@ def planned(
         Of each run.
     threads : int, optional
         Of each run; one by default, whatever the machine has.
+    machine : str, optional
+        Where the runs are made; this one by default.
 
     Raises
     ------
@@ -129,6 +132,7 @@ def planned(
         iterations=budget.iterations,
         target_gap=None if budget.target_gap is None else float(budget.target_gap),
         threads=checked_threads(threads) or 1,
+        machine=machine or this_machine(),
     )
     packages = {name: versions(name) for name, _ in methods.values()}
     numbers = [checked_seed(seed, "seeds") for seed in seeds]
@@ -161,8 +165,8 @@ def plan(
     for number, ((problem, common), hashed) in enumerate(zip(problems, hashes, strict=True)):
         for seed in seeds:
             for label, (name, parameters, version) in known.items():
-                own = replace(common, instance=hashed, method=name, parameters=parameters, seed=seed)
-                run = replace(own, version=version, machine=this_machine())
+                own = replace(common, instance=hashed, method=name, parameters=parameters)
+                run = replace(own, version=version, seed=seed)
                 jobs[number, label, seed] = Job(run, dict(compared[label][1]), problem)
     return Comparison([problem for problem, _ in problems], seeds, jobs)
 

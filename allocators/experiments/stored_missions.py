@@ -2,10 +2,10 @@
 
 import json
 from collections.abc import Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 
 from alloc.allocators.experiments.policies import PolicyRow, summarise_runs
-from alloc.allocators.experiments.store.key import MISSION, Run, versions
+from alloc.allocators.experiments.store.key import MISSION, Run, this_machine, versions
 from alloc.allocators.experiments.store.outcome import Ending
 from alloc.allocators.experiments.store.store import Store
 from alloc.allocators.experiments.stored import Comparison, Endings, Variants, plan, unsolved
@@ -23,6 +23,7 @@ def planned_missions(
     *,
     knowledge: Knowledge | str | None = None,
     deadline_ms: float | None = None,
+    machine: str | None = None,
 ) -> Comparison:
     """Return all runs of a comparison of policies, and note the missions in the store.
 
@@ -35,6 +36,8 @@ def planned_missions(
     seeds : sequence of int
     knowledge, deadline_ms
         As in `simulate`.
+    machine
+        As in `planned`.
 
     Raises
     ------
@@ -43,10 +46,8 @@ def planned_missions(
     """
     known = None if knowledge is None else choice(Knowledge, knowledge, "knowledge")
     deadline = None if deadline_ms is None else float(real(deadline_ms, "deadline_ms", above=True))
-    problems = [
-        (mission, Run(objective=MISSION, knowledge=str(known or mission.knowledge), deadline_ms=deadline))
-        for mission in missions
-    ]
+    common = Run(objective=MISSION, deadline_ms=deadline, machine=machine or this_machine())
+    problems = [(mission, replace(common, knowledge=str(known or mission.knowledge))) for mission in missions]
     packages = {name: versions(name, ENTRY_POINT_GROUP, POLICIES) for name, _ in policies.values()}
     numbers = [whole(seed, "seeds", 0, 2**63 - 1) for seed in seeds]
     return plan(store, problems, policies, numbers, packages)

@@ -95,12 +95,14 @@ def compare_command(
     kill_after: kept.KillAfterOption = None,
     retry: kept.RetryOption = False,
     report: kept.ReportOption = None,
+    engine: kept.EngineOption = None,
+    address: kept.AddressOption = None,
 ) -> None:
     """Run several methods on instances, or policies in missions, with several seeds, and print a table."""
     from alloc.allocators import Budget
     from alloc.problems.formats import is_standard_output
 
-    keeping = kept.checked(store, workers, memory, kill_after, report, retry=retry)
+    keeping = kept.checked(store, workers, memory, kill_after, report, engine, address, retry=retry)
     written = [("--csv", csv), *(("--report", file) for file in report or ())]
     check_outputs(*written, read=[("--store", store), *(("INSTANCE", instance) for instance in instances)])
     if json and csv is not None and is_standard_output(csv):

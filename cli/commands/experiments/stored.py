@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from alloc.cli.commands.experiments.options import Keeping
+from alloc.cli.commands.experiments.options import Engine, Keeping
 from alloc.cli.commands.experiments.sources import gather
 from alloc.cli.output.console import is_terminal, note, say, table
 from alloc.problems.text import counted, number
@@ -14,6 +14,7 @@ from alloc.problems.text import counted, number
 if TYPE_CHECKING:
     from alloc.allocators import Budget
     from alloc.allocators.experiments.compare import Row
+    from alloc.allocators.experiments.isolation.places import Place
     from alloc.allocators.experiments.store.key import Run
     from alloc.allocators.experiments.store.outcome import Ending
     from alloc.allocators.experiments.store.store import Store
@@ -41,8 +42,15 @@ class Kept:
     notes: list[str]
 
 
-def make_missing(keeping: Keeping, plan: Callable[["Store"], "Comparison"]) -> Kept:
-    """Make the runs that a store has not yet, until all are there or a signal comes, and return how all ended."""
+def make_missing(keeping: Keeping, plan: Callable[["Store", str], "Comparison"]) -> Kept:
+    """Make the runs that a store has not yet, until all are there or a signal comes, and return how all ended.
+
+    Parameters
+    ----------
+    keeping : Keeping
+    plan : callable
+        Returns all runs, by the store and the machine that makes them.
+    """
     from alloc.allocators.experiments.campaign import Campaign, Means
     from alloc.allocators.experiments.report.files import check_report
     from alloc.allocators.experiments.store.outcome import UNSOLVED
@@ -53,13 +61,14 @@ def make_missing(keeping: Keeping, plan: Callable[["Store"], "Comparison"]) -> K
     for file in keeping.reports:
         check_report(file)
     stop = threading.Event()
-    with Store(keeping.store, again=UNSOLVED if keeping.retry else ()) as store:
-        planned = plan(store)
+    again = UNSOLVED if keeping.retry else ()
+    with _place(keeping) as place, Store(keeping.store, again=again) as store:
+        planned = plan(store, place.machine)
         names = {job.run.key: f"{job.instance.name}, {label}" for (_, label, _), job in planned.jobs.items()}
         progress = _Progress(names)
         means = Means(keeping.workers, keeping.memory_mb, keeping.kill_after_s)
         with signals_set(stop):
-            done = Campaign(store, list(planned.jobs.values()), means, progress.tell, _say_waiting).run(stop)
+            done = Campaign(store, list(planned.jobs.values()), means, progress.tell, _say_waiting, place).run(stop)
         endings = planned.endings(store)
         notes = [f"{counted(progress.made, 'run')} made; {keeping.store} has {_count(endings)} of {len(planned.jobs)}"]
         notes += [f"{keeping.store} also holds {other}, which do not count here" for other in planned.others(store)]
@@ -67,6 +76,17 @@ def make_missing(keeping: Keeping, plan: Callable[["Store"], "Comparison"]) -> K
     if not done:
         notes.insert(0, "interrupted; the same command goes on from here")
     return Kept(planned, endings, done, notes)
+
+
+def _place(keeping: Keeping) -> "Place":
+    """Return where runs are made."""
+    if keeping.engine is Engine.RAY:
+        from alloc.allocators.experiments.isolation.cluster import Cluster
+
+        return Cluster(keeping.address)
+    from alloc.allocators.experiments.isolation.places import Here
+
+    return Here()
 
 
 def compare_in_store(
@@ -86,8 +106,17 @@ def compare_in_store(
         _check_method(name, settings)
     instances = gather(list(sources))
 
-    def plan(store: "Store") -> "Comparison":
-        return planned(store, instances, methods, seeds, objective=objective, budget=budget, threads=threads)
+    def plan(store: "Store", machine: str) -> "Comparison":
+        return planned(
+            store,
+            instances,
+            methods,
+            seeds,
+            objective=objective,
+            budget=budget,
+            threads=threads,
+            machine=machine,
+        )
 
     kept = make_missing(keeping, plan)
     return kept, share_bounds(rows_of(kept.comparison, kept.endings))

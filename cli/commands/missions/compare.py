@@ -113,8 +113,10 @@ def _in_store(
             load_policy(name, **settings)  # what is wrong with them is told before anything runs
     variants = {label: (name, settings or {}) for label, (name, settings) in policies.items()}
 
-    def plan(store: "Store") -> "Comparison":
-        return planned_missions(store, missions, variants, seeds, knowledge=knowledge, deadline_ms=deadline_ms)
+    def plan(store: "Store", machine: str) -> "Comparison":
+        return planned_missions(
+            store, missions, variants, seeds, knowledge=knowledge, deadline_ms=deadline_ms, machine=machine
+        )
 
     kept = make_missing(keeping, plan)
     rows = policy_rows(kept.comparison, kept.endings)
