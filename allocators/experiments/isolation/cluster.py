@@ -50,9 +50,9 @@ class Cluster(Place):
         """Return what each machine is."""
         from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
-        ask = self._ray.remote(num_cpus=0)(_kind)
+        kind_of = self._ray.remote(num_cpus=0)(_kind)
         places = [NodeAffinitySchedulingStrategy(node, soft=True) for node, _ in self._with_processors()]
-        kinds: list[str] = self._ray.get([ask.options(scheduling_strategy=place).remote() for place in places])
+        kinds: list[str] = self._ray.get([kind_of.options(scheduling_strategy=place).remote() for place in places])
         return kinds
 
     def _with_processors(self) -> list[tuple[str, int]]:

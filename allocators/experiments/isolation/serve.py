@@ -66,14 +66,14 @@ def serve(channel: int) -> None:
         problem = None
         try:
             if make is None:
-                make = _maker(order)
+                make = maker(order)
                 gc.freeze()  # what is loaded is never searched for garbage again
             connection.send_bytes(LOADED)
             problem, begin = pickle.loads(order.instance), time.process_time()
             figures = make(order.run, problem)
             figures["cpu_s"] = time.process_time() - begin
         except BaseException as error:  # whatever a method raises is how its run ended, also SystemExit
-            figures = _failure(error)
+            figures = failure(error)
         figures["reusable"] = not left_behind()
         connection.send_bytes(json.dumps(figures).encode())
         del order, problem
@@ -89,7 +89,7 @@ def _warming() -> Instance:
     return random_instance(Family(agents=12, tasks=3), 0)
 
 
-def _maker(order: Order) -> Callable[[Run, Any], Figures]:
+def maker(order: Order) -> Callable[[Run, Any], Figures]:
     """Load what the order names, and return what makes its runs."""
     name = order.run.method
     if order.run.objective == MISSION:
@@ -163,7 +163,8 @@ OUTCOMES: tuple[tuple[type[BaseException], Outcome], ...] = (
 )
 
 
-def _failure(error: BaseException) -> Figures:
+def failure(error: BaseException) -> Figures:
+    """Return how a run ended that raised an error."""
     outcome = next(outcome for kind, outcome in OUTCOMES if isinstance(error, kind))
     if outcome in (Outcome.REFUSED, Outcome.MISSING_PACKAGE):
         return {"outcome": outcome, "reason": str(error)}

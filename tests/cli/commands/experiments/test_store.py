@@ -12,7 +12,9 @@ from pathlib import Path
 import evil_methods
 import pytest
 from campaign_kills import kill_often
+from in_process import InProcess
 
+from alloc.cli.commands.experiments import stored
 from alloc.problems import paper
 from alloc.problems.formats import write_instance
 
@@ -33,11 +35,18 @@ def plugin(tmp_path, monkeypatch):
     return tmp_path
 
 
+@pytest.fixture
+def in_process(monkeypatch):
+    """Makes runs in this process."""
+    monkeypatch.setattr(stored, "_place", lambda keeping: InProcess())
+
+
 def begun():
     file = Path("naps")
     return [line.split()[1:3] for line in file.read_text().splitlines() if line.startswith("begin")]
 
 
+@pytest.mark.usefixtures("in_process")
 def test_only_what_is_missing_is_run(alloc, plugin):
     """A seed, an instance or a method more runs what they add alone; the table is of what was asked for."""
     first = alloc("compare", f"{TINY}:1", "--methods", "nap", *QUICK, "--json")
@@ -56,6 +65,7 @@ def test_only_what_is_missing_is_run(alloc, plugin):
     assert "0 runs made; runs.db has 1 of 1" in again.err
 
 
+@pytest.mark.usefixtures("in_process")
 def test_rows_are_those_of_a_comparison_without_a_store(alloc):
     """The figures are the same as without a store, but for the seconds."""
     words = ("compare", f"{TINY}:0-1", "--methods", "greedy,ga[population=4]", "--seeds", "2", "--iterations", "5")
@@ -68,6 +78,7 @@ def test_rows_are_those_of_a_comparison_without_a_store(alloc):
     assert kept == plain
 
 
+@pytest.mark.usefixtures("in_process")
 def test_other_budgets_are_other_runs(alloc):
     """A run with another budget does not count, and the store says that it has some."""
     alloc("compare", f"{TINY}:0", "--methods", "greedy", *QUICK)
@@ -76,6 +87,7 @@ def test_other_budgets_are_other_runs(alloc):
     assert "runs.db also holds 1 run with iterations 5, which do not count here" in other.err
 
 
+@pytest.mark.usefixtures("in_process")
 def test_differences_are_printed_and_reported(alloc):
     """Below the table stands how methods differ from the first one; a report holds that, or all runs."""
     words = ("compare", f"{TINY}:0-2", "--methods", "greedy,local-search", *QUICK)
@@ -99,6 +111,7 @@ def test_failures_have_rows_and_are_tried_again_where_asked(alloc, plugin):
     assert len(begun()) == 1
 
 
+@pytest.mark.usefixtures("in_process")
 def test_sources_of_instances(alloc):
     """Instances come from a file, a folder, a pattern, a table and a family; the same content is one instance."""
     Path("folder").mkdir()
@@ -219,6 +232,7 @@ def test_two_commands_that_are_killed_lose_no_run_and_make_none_twice(tmp_path):
     assert (found.overlapping, found.again, found.leases) == (0, 0, 0)
 
 
+@pytest.mark.usefixtures("in_process")
 def test_policies_in_missions_are_kept(alloc, plugin):
     """Runs of policies are made once, in a process each; rows are those without a store, reports hold all measures."""
     alloc("generate", "mission", "--agents", "2", "--tasks", "2", "--seed", "1", "--output", "m.json")
