@@ -91,8 +91,10 @@ class Store:
                 raise
 
     def _prepare(self) -> None:
+        self._connection.execute("BEGIN")  # all that is read is of one moment, also while another process begins it
         version = self._checked_version()
-        self._connection.execute("PRAGMA journal_mode = WAL")
+        self._connection.execute("COMMIT")
+        self._use_wal()
         self._connection.execute("PRAGMA synchronous = NORMAL")  # a lease need not survive the loss of power
         if version == len(MIGRATIONS):
             return
@@ -102,6 +104,18 @@ class Store:
                     self._connection.execute(statement)
             self._connection.execute(f"PRAGMA application_id = {APPLICATION}")
             self._connection.execute(f"PRAGMA user_version = {len(MIGRATIONS)}")
+
+    def _use_wal(self) -> None:
+        """Let others read while one writes; SQLite does not wait where several processes begin with it at once."""
+        limit = time.monotonic() + BUSY_S
+        while True:
+            try:
+                self._connection.execute("PRAGMA journal_mode = WAL")
+                return
+            except sqlite3.OperationalError as error:
+                if error.sqlite_errorcode != sqlite3.SQLITE_BUSY or time.monotonic() > limit:
+                    raise
+            time.sleep(0.01)
 
     def _checked_version(self) -> int:
         """Return the version of the file, 0 for an empty one; raise an error if it is not ours, or of a later one."""

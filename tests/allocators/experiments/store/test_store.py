@@ -1,5 +1,6 @@
 """The store of runs: rows, leases and what can be wrong with its file."""
 
+import contextlib
 import os
 import resource
 import signal
@@ -211,6 +212,29 @@ def test_an_older_store_is_brought_up_to_date(tmp_path, monkeypatch):
     found = sqlite3.connect(tmp_path / "runs.db")
     assert found.execute("SELECT * FROM later").fetchall() == []
     assert found.execute("PRAGMA user_version").fetchone() == (len(MIGRATIONS) + 1,)
+
+
+def test_two_commands_begin_a_store_at_once(tmp_path, monkeypatch):
+    """A file that another command makes a store of while this one looks at it is taken for what it becomes."""
+    monkeypatch.setattr(store_module, "BUSY_S", 0.05)
+    connect, others = sqlite3.connect, []
+
+    def watched(*arguments, **settings):
+        connection = connect(*arguments, **settings)
+        monkeypatch.setattr(store_module.sqlite3, "connect", connect)
+        connection.set_trace_callback(begin_another)
+        return connection
+
+    def begin_another(statement):
+        if "sqlite_master" in statement and not others:
+            others.append(statement)
+            with contextlib.suppress(InputError):  # it may have to wait until this one has looked
+                Store(tmp_path / "runs.db").close()
+
+    monkeypatch.setattr(store_module.sqlite3, "connect", watched)
+    with Store(tmp_path / "runs.db") as store:
+        assert store.claim(KEYS[:1]).key == KEYS[0]
+    assert others
 
 
 def test_a_later_store_is_refused(tmp_path):
