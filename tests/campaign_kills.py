@@ -57,7 +57,7 @@ class Killed:
 def kill_often(folder, *, seeds, kills, nap_s, workers=2, gap_s=(0.0, 3.0), signals=SIGNALS, seed=0):
     """Compare with two commands until all is done, after so many of them were killed, and check what is left."""
     for number, handler in ((signal.SIGINT, signal.default_int_handler), (signal.SIGHUP, signal.SIG_DFL)):
-        if signal.getsignal(number) is signal.SIG_IGN:  # in the background of a shell, or by nohup: in all commands, too
+        if signal.getsignal(number) is signal.SIG_IGN:  # in the background of a shell, or by nohup
             signal.signal(number, handler)
     plugin = folder / "plugin"
     plugin.mkdir()

@@ -68,6 +68,16 @@ def fork_and_leave(search):
     os._exit(0)
 
 
+def freeze(search):
+    os.kill(os.getpid(), signal.SIGSTOP)
+
+
+def shut(search):
+    """Close all that the process has open, the way by which it would answer too."""
+    os.closerange(0, 256)
+    return answer(search)
+
+
 def killed(search):
     os.kill(os.getpid(), signal.SIGKILL)
 
@@ -104,8 +114,8 @@ def pid(search):
 
 
 BEHAVIOURS = (
-    answer, crash, fail, leave, leave_softly, hang, eat, eat_at_once, garbage, fork, fork_and_leave, killed, refuse,
-    missing, nap, busy, pid,
+    answer, crash, fail, leave, leave_softly, hang, eat, eat_at_once, garbage, fork, fork_and_leave, freeze, shut,
+    killed, refuse, missing, nap, busy, pid,
 )  # fmt: skip
 
 

@@ -1,6 +1,7 @@
 """A place for runs in the process of the test: for tests of what is planned, kept and told, at no cost of processes."""
 
 import json
+import os
 import pickle
 
 from alloc.allocators.experiments.isolation.places import Here
@@ -14,7 +15,11 @@ class InProcess(Here):
 
 
 class _Direct:
-    is_alive, is_reusable, handles = True, True, ()
+    is_alive, is_reusable = True, True
+
+    def __init__(self):
+        self._ready = open(os.devnull, "rb")  # noqa: SIM115 -- always readable: nobody waits
+        self.handles = [self._ready]
 
     def send(self, order, limits):
         try:
@@ -28,4 +33,4 @@ class _Direct:
         return self._figures
 
     def end(self):
-        pass
+        self._ready.close()

@@ -2,6 +2,7 @@
 
 import csv
 import os
+import resource
 import signal
 import sqlite3
 import subprocess
@@ -160,6 +161,25 @@ def test_wrong_methods_are_one_line(alloc, methods, message):
     assert not Path("runs.db").exists()
 
 
+@pytest.mark.usefixtures("in_process")
+def test_a_full_disk_is_one_line_and_loses_nothing(alloc, plugin):
+    """Where the disk is full half-way, what was written stays; with room the same command goes on from there."""
+    words = ("compare", f"{TINY}:0-1", "--methods", "greedy,answer", "--seeds", "10", *QUICK)
+    before, handler = resource.getrlimit(resource.RLIMIT_FSIZE), signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, before[1]))
+    try:
+        ran = alloc(*words)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        signal.signal(signal.SIGXFSZ, handler)
+    assert (ran.code, ran.err.count("\n")) == (2, 1)
+    assert "runs.db: cannot be" in ran.err
+    assert "full" in ran.err
+    kept = sqlite3.connect("runs.db").execute("SELECT count(*) FROM runs").fetchone()[0]
+    assert 0 < kept < 40
+    assert f"{40 - kept} runs made; runs.db has 40 of 40" in alloc(*words).err
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
@@ -175,6 +195,7 @@ def test_wrong_methods_are_one_line(alloc, methods, message):
         (("--store", "runs.db", "--report", "runs.txt"), "runs.txt: must end in .md, .tex, .csv or .parquet"),
         (("--store", "runs.db", "--csv", "runs.db"), "is --store and --csv at once"),
         (("--store", "text"), "text: is no store of runs"),
+        (("--store", "."), ".: cannot be opened"),
     ],
 )
 def test_wrong_options_are_one_line(alloc, words, message):
