@@ -1,4 +1,4 @@
-"""Draws the pictures of docs/gallery.md, and the map beside them: ``python docs/make_gallery.py``."""
+"""Draws the pictures of docs/data/gallery.md, and the map beside them: ``python docs/make_gallery.py``."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -7,7 +7,7 @@ from alloc.allocators import Result, pareto, plot, plot_convergence, solve, writ
 from alloc.allocators.plotting import plot_front
 from alloc.problems import Family, Instance, Units, paper, random_instance, read_instance
 
-FOLDER = Path(__file__).with_name("gallery")
+FOLDER = Path(__file__).parent / "data" / "gallery"
 ALASKA = Path(__file__).parents[1] / "examples" / "earthquakes" / "alaska.json"
 
 BASES = {

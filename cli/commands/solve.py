@@ -194,7 +194,7 @@ def _tell(result: "Result", *, summary: bool) -> None:
     for line in result.notes:
         note(line)
     _doubt(result)
-    if result.evaluation is not None and result.evaluation.reward_saturated:
+    if not summary and result.evaluation is not None and result.evaluation.reward_saturated:
         note("the reward (3) is too large for a float and stands at its most negative value")
 
 

@@ -1,6 +1,6 @@
 """Learning from scratch: `gappo` against its four rivals and against itself without each of its parts.
 
-    python tests/benchmarks/from_scratch.py --runs docs/from_scratch.csv --seeds 10 --publish
+    python tests/benchmarks/from_scratch.py --runs docs/benchmarks/from_scratch.csv --seeds 10 --publish
 
 Every run begins with random weights, makes the same number of decisions of agents, all members of a population
 together, and is judged ten times on the way by greedy games on instances of the paper's scenario 1, which is never
@@ -263,7 +263,7 @@ def main() -> None:
     parser.add_argument(
         "--publish",
         action="store_true",
-        help="put tables and plot into docs/from_scratch.md, of the seeds that all variants have",
+        help="put tables and plot into docs/benchmarks/from_scratch.md, of the seeds that all variants have",
     )
     options = parser.parse_args()
     torch.set_num_threads(1)

@@ -1,4 +1,4 @@
-"""The table and the drawing of `from_scratch.py`, for docs/from_scratch.md."""
+"""The table and the drawing of `from_scratch.py`, for docs/benchmarks/from_scratch.md."""
 
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from from_scratch import Row
     from matplotlib.axes import Axes
 
-DOCS = Path(__file__).parents[2] / "docs"
+DOCS = Path(__file__).parents[2] / "docs" / "benchmarks"
 BEGIN, END = "<!-- made by tests/benchmarks/from_scratch.py -->", "<!-- end of from_scratch.py -->"
 
 METHODS = ("gappo", "ppo", "a2c", "dqn", "ddpg")
@@ -196,7 +196,7 @@ def _frame(panels: Any) -> None:
 
 
 def publish(rows: list["Row"], budget: int) -> None:
-    """Put the table between its marks in docs/from_scratch.md, and the drawing beside the page.
+    """Put the table between its marks in docs/benchmarks/from_scratch.md, and the drawing beside the page.
 
     Raises
     ------

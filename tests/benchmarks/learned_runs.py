@@ -27,7 +27,7 @@ from alloc.allocators import RefusedError, load, names, solve
 from alloc.allocators.contract.base import Allocator
 from alloc.problems import Family, random_instance
 
-PAGE = Path(__file__).parents[2] / "docs" / "learned_methods.md"
+PAGE = Path(__file__).parents[2] / "docs" / "benchmarks" / "learned_methods.md"
 EQUAL = 1e-9
 """Relative difference up to which two makespans or energies are equal, as for the evaluator."""
 
@@ -231,7 +231,7 @@ def add_options(parser: argparse.ArgumentParser, *, methods: str, seeds: int, th
     parser.add_argument("--jobs", type=int, default=1, help="runs at a time; with --threads 1 figures are of one core")
     parser.add_argument("--runs", type=Path, metavar="CSV", help="keep all runs there, and do not make them anew")
     parser.add_argument("--again", default="", metavar="METHODS", help="make the runs of these anew all the same")
-    parser.add_argument("--publish", action="store_true", help=f"put the tables into docs/{PAGE.name}")
+    parser.add_argument("--publish", action="store_true", help=f"put the tables into docs/benchmarks/{PAGE.name}")
 
 
 def table(head: str, lines: Iterable[Iterable[str]]) -> str:

@@ -8,7 +8,8 @@ figures for; the others are of the kinds in the literature: `small` with n = 2m,
 classes of agents, as it would be stated without further thought. A gap is (T - bound) / T of the method's own bound;
 T / bound is against the best bound of all methods in the same run. Exits with 1 if a target family misses its figure.
 
-    python tests/benchmarks/machine_covering.py --families target,large --seeds 10 --publish docs/machine-covering.csv
+    python tests/benchmarks/machine_covering.py --families target,large --seeds 10 \
+        --publish docs/benchmarks/machine-covering.csv
 
 writes plans and proven bounds of `cpsat` instead, one row for each instance, beside those that the file has already.
 """

@@ -1,6 +1,7 @@
 """Families of machine covering that still separate methods: real-valued abilities, and agents bound to a few tasks.
 
-    python tests/benchmarks/machine_covering_open.py --seeds 2 --time-limit 10 --publish docs/machine-covering-open.csv
+    python tests/benchmarks/machine_covering_open.py --seeds 2 --time-limit 10 \
+        --publish docs/benchmarks/machine-covering-open.csv
 
 `real` are the instances of `alloc.problems.machine_covering` with ``whole=False``. `restricted` ones have the abilities
 and workloads of `machine_covering`, whole or not; agent i may take task i modulo m and two others, drawn by

@@ -1,4 +1,4 @@
-"""Our methods beside naive models and published programs, on the same instances, as one table in docs/peers.md.
+"""Our methods beside naive models and published programs, on the same instances: docs/benchmarks/peers.md.
 
     python tests/benchmarks/peers.py                                  # a look: small families, 2 seconds a run
     python tests/benchmarks/peers.py --families all --methods all --seeds 5 --time-limit 30 --pygrape DIR --write
@@ -37,7 +37,7 @@ from alloc.problems import (
 from alloc.problems import Family as Spread
 
 RUN = Path(__file__).with_name("peers_run.py")
-PAGE = Path(__file__).parents[2] / "docs" / "peers.md"
+PAGE = Path(__file__).parents[2] / "docs" / "benchmarks" / "peers.md"
 BEGIN, END = "<!-- table of tests/benchmarks/peers.py -->", "<!-- end of table -->"
 LOADING_S = 60.0
 """What a process may take beyond its time limit, for imports and for what does not keep to limits."""

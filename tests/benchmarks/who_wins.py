@@ -1,7 +1,7 @@
 """Who wins where: all kinds of methods at equal time, for both objectives, as a table and a drawing.
 
-    python tests/benchmarks/who_wins.py --seeds 10 --jobs 2 --runs docs/who_wins.csv --publish
-    python tests/benchmarks/who_wins.py --again gappo,gappo-ls --jobs 2 --runs docs/who_wins.csv --publish
+    python tests/benchmarks/who_wins.py --seeds 10 --jobs 2 --runs docs/benchmarks/who_wins.csv --publish
+    python tests/benchmarks/who_wins.py --again gappo,gappo-ls --jobs 2 --runs docs/benchmarks/who_wins.csv --publish
 
 The second makes the runs of two methods anew and takes those of the others from the file. `exact` is `cpsat` for the
 makespan and `milp` with energy. Energy ratios are to the least energy met at the least T on that instance (or 0.01 %
