@@ -86,11 +86,11 @@ def main() -> None:
     for name, draw in PICTURES.items():
         path = FOLDER / f"{name}.png"
         draw(str(path))
-        _reduce_colours(path)
+        reduce_colours(path)
     write_result(answer(north(), "milp"), FOLDER / "north.html")
 
 
-def _reduce_colours(path: Path) -> None:
+def reduce_colours(path: Path) -> None:
     """Write a picture again with 256 colours, at a third of the size."""
     from PIL import Image
 
