@@ -19,7 +19,7 @@ PAGES_OUTSIDE = ("CONTRIBUTING.md", "CHANGELOG.md", "LICENSE", "CITATION.cff")
 EXAMPLES = (".csv", ".ipynb", ".json", ".md", ".py", ".toml", ".txt", ".yaml")
 """Suffixes of the files in examples/ that pages may link to."""
 
-LINK = re.compile(r"(\]\()([^)\s#:]+)(#[^)\s]*)?(\))")
+LINK = re.compile(r"\[([^\[\]]*)\]\(([^)\s#:]+)(#[^)\s]*)?\)")
 EXTERNAL = re.compile(
     r"<(?:script|img|iframe|source)\b[^>]*?\bsrc=[\"']?https?:|<link\b(?![^>]*\bcanonical)[^>]*?\bhref=[\"']?https?:"
 )
@@ -41,12 +41,14 @@ def is_kept(path: Path) -> bool:
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Lead links where their targets stand in the site; in the repository docs/ is a folder among others."""
-    return site_links(markdown, page.file.src_uri)
+    """Lead links where their targets stand in the site, and colour commands, which have no prompt, as a shell's."""
+    if page.is_homepage:
+        page.meta["hide"] = ["navigation"]  # it would have a single entry
+    return site_links(markdown, page.file.src_uri).replace("```console\n", "```bash\n")
 
 
 def site_links(markdown: str, source: str) -> str:
-    """Return the text of a page with links between docs/ and the rest of the repository as they are in the site.
+    """Return the text of a page with links as they are in the site, where a page is called by its title.
 
     Parameters
     ----------
@@ -58,15 +60,21 @@ def site_links(markdown: str, source: str) -> str:
     place = source if (ROOT / source).is_file() else f"docs/{source}"
 
     def lead(match: re.Match[str]) -> str:
-        target = posixpath.normpath(posixpath.join(posixpath.dirname(place), match[2]))
-        if place.startswith("docs/") and target.startswith("docs/"):
-            return match[0]
+        label, target = match[1], posixpath.normpath(posixpath.join(posixpath.dirname(place), match[2]))
+        if label == posixpath.basename(target):
+            label = title(ROOT / target)
         if (ROOT / target).is_dir():
             target = f"{target}/README.md" if (ROOT / target / "README.md").is_file() else "examples/README.md"
         found = posixpath.relpath(target.removeprefix("docs/"), posixpath.dirname(source) or ".")
-        return f"{match[1]}{found}{match[3] or ''}{match[4]}"
+        return f"[{label}]({found}{match[3] or ''})"
 
     return LINK.sub(lead, markdown)
+
+
+def title(path: Path) -> str:
+    """Return the heading of a page, or the name of another file."""
+    heading = re.match(r"# (.+)", path.read_text(encoding="utf-8")) if path.suffix == ".md" else None
+    return heading[1] if heading else path.name
 
 
 def on_post_build(config: MkDocsConfig) -> None:

@@ -1,5 +1,6 @@
 """Makes the page of all commands and options from the parser of the command line; `hooks.py` puts it into the site."""
 
+import html
 import re
 
 import typer
@@ -29,7 +30,7 @@ def chapter(name: str, command: "typer.core.TyperCommand") -> str:
     lines += ["```text", f"alloc {name} {usage}", "```", ""]
     rows = [record for one in command.params if (record := one.get_help_record(context))]
     if rows:
-        lines += ["| option | meaning |", "|---|---|", *(f"| `{cell(option)}` | {cell(meaning)} |" for option, meaning in rows), ""]
+        lines += ["| option | meaning |", "|---|---|", *(f"| <code>{cell(option)}</code> | {cell(meaning)} |" for option, meaning in rows), ""]
     examples = re.findall(r"^\s*(alloc .*)$", command.epilog or "", re.MULTILINE)
     if examples:
         lines += ["```console", *examples, "```", ""]
@@ -37,8 +38,8 @@ def chapter(name: str, command: "typer.core.TyperCommand") -> str:
 
 
 def cell(words: str) -> str:
-    """Return words as they may stand in a cell of a table."""
-    return " ".join(words.split()).replace("|", "\\|")
+    """Return words as they may stand in a cell of a table, and as they are: no tags, no columns."""
+    return html.escape(" ".join(words.split()), quote=False).replace("|", "&#124;")
 
 
 def text(words: str) -> str:
