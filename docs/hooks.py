@@ -1,4 +1,4 @@
-"""What `mkdocs` calls while it builds the site: pages from elsewhere, links to them, and a check that it needs no network."""
+"""What `mkdocs` calls while it builds the site: pages from elsewhere, links, and a check that nothing is loaded."""
 
 import posixpath
 import re

@@ -30,7 +30,12 @@ def chapter(name: str, command: "typer.core.TyperCommand") -> str:
     lines += ["```text", f"alloc {name} {usage}", "```", ""]
     rows = [record for one in command.params if (record := one.get_help_record(context))]
     if rows:
-        lines += ["| option | meaning |", "|---|---|", *(f"| <code>{cell(option)}</code> | {cell(meaning)} |" for option, meaning in rows), ""]
+        lines += [
+            "| option | meaning |",
+            "|---|---|",
+            *(f"| <code>{cell(option)}</code> | {cell(meaning)} |" for option, meaning in rows),
+            "",
+        ]
     examples = re.findall(r"^\s*(alloc .*)$", command.epilog or "", re.MULTILINE)
     if examples:
         lines += ["```console", *examples, "```", ""]

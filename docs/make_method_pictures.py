@@ -1,4 +1,4 @@
-"""Draws one picture for each method, on one instance: ``python docs/make_method_pictures.py`` fills docs/methods/pictures/."""
+"""Draws docs/methods/pictures/, one for each method, on one instance: ``python docs/make_method_pictures.py``."""
 
 from pathlib import Path
 
