@@ -45,12 +45,12 @@ def living(cluster: Any) -> int:
     return sum(node["Alive"] for node in cluster.global_state.node_table())
 
 
-def at_work(machine: Any) -> bool:
+def at_work(machine: Any, task: str = "_run_item") -> bool:
     """Whether an item is under work there."""
-    return any("ray::_run_item" in line for line in _each(machine, lambda process: " ".join(process.cmdline())))
+    return any(f"ray::{task}" in line for line in _each(machine, lambda process: " ".join(process.cmdline())))
 
 
-def kill_at_work(cluster: Any, goes_on: Callable[[], bool]) -> Any:
+def kill_at_work(cluster: Any, goes_on: Callable[[], bool], task: str = "_run_item") -> Any:
     """Kill a machine with an item under work, and return it; None if all went on to its end without such a moment.
 
     Its processes are stopped before the look whether they work, so that no item can end between look and kill.
@@ -58,7 +58,7 @@ def kill_at_work(cluster: Any, goes_on: Callable[[], bool]) -> Any:
     while goes_on():
         for machine in cluster.worker_nodes:
             _each(machine, lambda process: process.suspend())
-            if at_work(machine):
+            if at_work(machine, task):
                 _each(machine, lambda process: process.kill())
                 return machine
             _each(machine, lambda process: process.resume())

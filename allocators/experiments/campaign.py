@@ -9,25 +9,21 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from multiprocessing import connection
 
-from alloc.allocators.experiments.isolation.cores import CAN_PIN, Cores, take
+from alloc.allocators.experiments.isolation.cores import CAN_PIN, Cores
+from alloc.allocators.experiments.isolation.places import Handle, Here, Place
 from alloc.allocators.experiments.isolation.serve import Figures, Order
-from alloc.allocators.experiments.isolation.tree import memory_mb
-from alloc.allocators.experiments.isolation.worker import Limits, Worker
+from alloc.allocators.experiments.isolation.worker import Limits
 from alloc.allocators.experiments.store.key import Run
 from alloc.allocators.experiments.store.outcome import Ending
 from alloc.allocators.experiments.store.store import LEASE_S, Store
 from alloc.allocators.parallel.engine import POLL_S
-from alloc.allocators.parallel.processors import available_threads
-from alloc.problems import InputError, Instance
+from alloc.problems import InputError, Instance, Mission
 
 OTHERS_S = 0.3
 """Seconds between two looks at what other commands have left to do."""
 
 MOST_WARM = 12
 """Processes that wait for another run of their method; beyond, the one that has waited longest is ended."""
-
-MEMORY_SHARE = 0.8
-"""Part of the memory of the machine that all runs together may take by default."""
 
 OVERRUN, OVERRUN_S = 1.2, 10.0
 """A run is ended, by default, when it takes longer than this factor times its time limit and so many seconds more."""
@@ -39,7 +35,7 @@ class Job:
 
     run: Run
     settings: dict[str, object]
-    instance: Instance = field(repr=False)
+    instance: Instance | Mission = field(repr=False)
 
 
 @dataclass(frozen=True)
@@ -67,8 +63,8 @@ class _Slot:
     """A place for one run at a time: its processors, the run, and the idle processes by method."""
 
     cores: Cores
-    idle: dict[str, Worker] = field(default_factory=dict)
-    worker: Worker | None = None
+    idle: dict[str, Handle] = field(default_factory=dict)
+    worker: Handle | None = None
     job: Job | None = None
     started_at: float = 0.0
     begin: float = 0.0
@@ -88,6 +84,8 @@ class Campaign:
         Called with each run that this command has made, and how it ended.
     on_wait : callable
         Called once if other commands have all processors.
+    place : Place, optional
+        Where runs are made; this machine by default.
 
     Raises
     ------
@@ -102,19 +100,22 @@ class Campaign:
         means: Means,
         on_end: Callable[[Run, Ending], None] = lambda run, ending: None,
         on_wait: Callable[[], None] = lambda: None,
+        place: Place | None = None,
     ) -> None:
+        self._place = Here() if place is None else place
         self._store, self._on_end, self._on_wait = store, on_end, on_wait
         self._jobs = {job.run.key: job for job in jobs}
         self._pending = list(self._jobs)
         first = jobs[0].run if jobs else None
         self._threads = 1 if first is None else first.threads
-        self._is_pinned = CAN_PIN and first is not None and first.time_limit_s is not None
+        self._is_pinned = CAN_PIN and first is not None and first.is_timed
         limit = None if first is None else first.time_limit_s
-        self._size = _checked_workers(means.workers, self._threads, pinned=self._is_pinned)
+        self._workers, room = means.workers, self._place.room(self._threads)
+        _check_workers(means.workers, self._threads, room, pinned=self._is_pinned)
         usual = math.inf if limit is None else OVERRUN * limit + OVERRUN_S
         self._limits = Limits(
             usual if means.kill_after_s is None else means.kill_after_s,
-            MEMORY_SHARE * memory_mb() / self._size if means.memory_mb is None else means.memory_mb,
+            self._place.memory_mb(means.workers or max(1, room)) if means.memory_mb is None else means.memory_mb,
         )
         self._slots: list[_Slot] = []
         self._renewed_at = self._asked_at = self._opened_at = -math.inf
@@ -142,14 +143,13 @@ class Campaign:
 
     def _open_slots(self) -> None:
         """Take processors as long as there are too few slots; other commands may free some later."""
-        wanted = min(self._size, len(self._slots) + len(self._pending))
-        if len(self._slots) >= wanted:
-            return
         if time.monotonic() - self._opened_at < OTHERS_S:
             return
         self._opened_at = time.monotonic()
+        room = self._workers or max(1, self._place.room(self._threads))
+        wanted = min(room, len(self._slots) + len(self._pending))
         while len(self._slots) < wanted:
-            cores = take(self._threads) if self._is_pinned else Cores()
+            cores = self._place.take(self._threads) if self._is_pinned else Cores()
             if cores is None:
                 break
             self._slots.append(_Slot(cores))
@@ -176,9 +176,11 @@ class Campaign:
         if worker is not None and not worker.is_alive:
             worker.end()
             worker = None
-        slot.worker, slot.job = worker or Worker(slot.cores, self._threads), job
+        if worker is None:
+            worker = self._place.handle(slot.cores, self._threads, is_timed=self._is_pinned)
+        slot.worker, slot.job = worker, job
         slot.started_at, slot.begin = time.time(), time.monotonic()
-        slot.worker.send(Order(job.run, job.settings, self._pickled(job)), self._limits)
+        worker.send(Order(job.run, job.settings, self._pickled(job)), self._limits)
         busy = [one for one in self._slots if one.worker is not None]
         slot.at_once = 1
         for one in busy:
@@ -209,16 +211,16 @@ class Campaign:
 
     def _ending(self, slot: _Slot, figures: Figures) -> Ending:
         points: list[list[float]] = figures.pop("trace", [])  # type: ignore[assignment]
-        return Ending(
-            **figures,  # type: ignore[arg-type]
-            trace=tuple(map(tuple, points)),  # type: ignore[arg-type]
-            wall_s=time.monotonic() - slot.begin,
-            memory_limit_mb=self._limits.memory_mb,
-            cores=",".join(map(str, slot.cores.numbers)),
-            at_once=slot.at_once,
-            started_at=slot.started_at,
-            finished_at=time.time(),
-        )
+        known: Figures = {
+            "trace": tuple(map(tuple, points)),
+            "wall_s": time.monotonic() - slot.begin,
+            "memory_limit_mb": self._limits.memory_mb,
+            "cores": ",".join(map(str, slot.cores.numbers)),
+            "at_once": slot.at_once,
+            "started_at": slot.started_at,
+            "finished_at": time.time(),
+        }
+        return Ending(**known | figures)  # type: ignore[arg-type]
 
     def _renew(self) -> None:
         if time.monotonic() - self._renewed_at > LEASE_S / 6:
@@ -236,13 +238,11 @@ class Campaign:
             slot.cores.free()
 
 
-def _checked_workers(workers: int | None, threads: int, *, pinned: bool) -> int:
-    """Return how many runs are made at a time; timed ones never share a processor."""
-    most = available_threads() // threads
-    if pinned and (workers or 1) > most:
+def _check_workers(workers: int | None, threads: int, room: int, *, pinned: bool) -> None:
+    """Raise an error for more timed runs at a time than there are processors, as they never share one."""
+    if pinned and (workers or 1) > room:
         raise InputError(
             f"{workers or 1} timed runs of {threads} threads at a time need {(workers or 1) * threads} processors, and "
-            f"there are {available_threads()}; take fewer workers or threads, or limit iterations instead of time",
+            f"there is room for {room}; take fewer workers or threads, or limit iterations instead of time",
             "workers",
         )
-    return workers or max(1, most)

@@ -1,24 +1,20 @@
 """Several methods on several instances and seeds: one row per method and instance."""
 
-import logging
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 
-import numpy as np
-
 from alloc.allocators.contract.base import Allocator
 from alloc.allocators.contract.budget import Budget, StopReason
 from alloc.allocators.contract.tolerance import relative_gap
+from alloc.allocators.experiments.sweep import LOG, by_label, mean_and_worst, sweep
 from alloc.allocators.registry import load
 from alloc.allocators.request import checked_objective, checked_seed, checked_threads
 from alloc.allocators.result import Result
 from alloc.allocators.solve import solve
-from alloc.problems import InputError, Instance, Objective, RefusedError
+from alloc.problems import InputError, Instance, Objective
 from alloc.problems.arguments import event, listed, of_type
-
-LOG = logging.getLogger("alloc.compare")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,7 +121,7 @@ def compare(
     InputError
         If an argument is not what it should be; its place is the parameter.
     """
-    loaded = _labelled(methods)
+    given = by_label(methods, Allocator, lambda method: method.method.name, "methods")  # type: ignore[type-abstract]
     numbers = [checked_seed(seed, "seeds") for seed in listed(seeds, "seeds", "whole numbers")]
     problems = instances if isinstance(instances, Iterator) else listed(instances, "instances", "instances")
     Budget(time_limit_s, iterations, target_gap)
@@ -140,64 +136,18 @@ def compare(
         stop=stop,
         handle_signals=False,
     )
-    return _rows(run, problems, loaded, numbers, stop)
+    loaded = {label: _load(method) if isinstance(method, str) else method for label, method in given.items()}
+    checked = (of_type(instance, Instance, "instances") for instance in problems)
+    return (
+        replace(summarise(one.problem, one.label, one.results, one.reason), number=one.number)
+        for one in sweep(partial(_run, run), checked, loaded, numbers, stop)
+    )
 
 
-def _labelled(methods: Methods) -> dict[str, str | Allocator]:
-    """Return the methods by the name that they have in the rows."""
-    if isinstance(methods, Mapping):
-        return {str(label): _method(method) for label, method in methods.items()}
-    given = [_method(method) for method in listed(methods, "methods", "methods")]
-    labelled = {method if isinstance(method, str) else method.method.name: method for method in given}
-    if len(labelled) < len({method if isinstance(method, str) else id(method) for method in given}):
-        raise InputError("has several allocators of one method; give a dict with a name for each", "methods")
-    return labelled
-
-
-def _method(given: object) -> str | Allocator:
-    of_type(given, (str, Allocator), "methods")
-    assert isinstance(given, str | Allocator)
-    return given
-
-
-def _rows(
-    run: Callable[..., Result],
-    instances: Iterable[Instance],
-    methods: Mapping[str, str | Allocator],
-    seeds: Sequence[int],
-    stop: threading.Event,
-) -> Iterator[Row]:
-    loaded = {label: _load(method) if isinstance(method, str) else method for label, method in methods.items()}
-    for number, instance in enumerate(instances, 1):
-        of_type(instance, Instance, "instances")
-        for label, method in loaded.items():
-            results: list[Result] = []
-            reason = ""
-            if isinstance(method, Exception):
-                reason = str(method)
-            else:
-                results, reason = _run_seeds(partial(run, instance, method), seeds)
-            if reason or results:
-                yield replace(summarise(instance, label, results, reason), number=number)
-            if stop.is_set():
-                return
-
-
-def _run_seeds(run: Callable[..., Result], seeds: Sequence[int]) -> tuple[list[Result], str]:
-    """Return the results of all seeds, or why there are none; a run that was interrupted is dropped."""
-    results: list[Result] = []
-    for seed in seeds:
-        try:
-            result = run(seed=seed)
-        except RefusedError as error:
-            return [], str(error)
-        except Exception as error:  # the figures of the other methods do not depend on a faulty plugin
-            LOG.warning("a run failed with seed %s", seed, exc_info=error)
-            return [], f"failed with seed {seed}: {type(error).__name__}: {error}"
-        if result.stop_reason is StopReason.INTERRUPTED:
-            break
-        results.append(result)
-    return results, ""
+def _run(run: Callable[..., Result], instance: Instance, method: str | Allocator, seed: int) -> Result | None:
+    """Return the result of a run, None if it was interrupted."""
+    result = run(instance, method, seed=seed)
+    return None if result.stop_reason is StopReason.INTERRUPTED else result
 
 
 def summarise(instance: Instance, method: str, results: Sequence[Result], reason: str = "") -> Row:
@@ -273,9 +223,3 @@ def _load(name: str) -> str | Allocator | Exception:
     except Exception as error:  # as above
         LOG.warning("method %r cannot be loaded", name, exc_info=error)
         return ImportError(f"cannot be loaded: {type(error).__name__}: {error}")
-
-
-def mean_and_worst(values: Sequence[float | None]) -> tuple[float | None, float | None]:
-    """Return mean and maximum; None where a value is missing, as a mean over the others alone would be too good."""
-    known = [value for value in values if value is not None]
-    return (float(np.mean(known)), max(known)) if len(known) == len(values) else (None, None)

@@ -1,22 +1,16 @@
 """Several policies in several missions and with several seeds: one row per policy and mission."""
 
-import logging
 import threading
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from functools import partial
 
-import numpy as np
-
+from alloc.allocators.experiments.sweep import by_label, mean, mean_and_worst, sweep
 from alloc.allocators.online.contract import Policy
 from alloc.allocators.online.registry import load_policy
-from alloc.allocators.online.run import MissionRun, simulate
-from alloc.problems import MissingPackageError, Mission, MissionResult, RefusedError
+from alloc.allocators.online.run import simulate
+from alloc.problems import MissingPackageError, Mission, MissionResult
 from alloc.problems.arguments import choice, event, listed, of_type, real, whole
-from alloc.problems.errors import InputError
 from alloc.problems.vocabulary import Knowledge
-
-LOG = logging.getLogger("alloc.compare")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -126,30 +120,23 @@ def compare_policies(
     InputError
         If an argument is not what it should be; its place is the parameter.
     """
-    loaded = {label: _loaded(policy) for label, policy in _labelled(policies).items()}
+    given = by_label(policies, Policy, lambda policy: policy.info.name, "policies")  # type: ignore[type-abstract]
+    loaded = {label: _loaded(policy) for label, policy in given.items()}
     numbers = [whole(seed, "seeds", 0, 2**63 - 1) for seed in listed(seeds, "seeds", "whole numbers")]
     problems = missions if isinstance(missions, Iterator) else listed(missions, "missions", "missions")
     stop = event(stop, "stop") or threading.Event()
     known = None if knowledge is None else choice(Knowledge, knowledge, "knowledge")
     deadline = None if deadline_ms is None else real(deadline_ms, "deadline_ms", above=True)
-    return _rows(partial(simulate, knowledge=known, deadline_ms=deadline), problems, loaded, numbers, stop)
 
+    checked = (of_type(mission, Mission, "missions") for mission in problems)
 
-def _labelled(policies: Policies) -> dict[str, str | Policy]:
-    """Return the policies by the name that they have in the rows."""
-    if isinstance(policies, Mapping):
-        return {str(label): _policy(policy) for label, policy in policies.items()}
-    given = [_policy(policy) for policy in listed(policies, "policies", "policies")]
-    labelled = {policy if isinstance(policy, str) else policy.info.name: policy for policy in given}
-    if len(labelled) < len({policy if isinstance(policy, str) else id(policy) for policy in given}):
-        raise InputError("has several objects of one policy; give a dict with a name for each", "policies")
-    return labelled
+    def run(mission: Mission, policy: Policy, seed: int) -> MissionResult:
+        return simulate(mission, policy, seed=seed, knowledge=known, deadline_ms=deadline).result
 
-
-def _policy(given: object) -> str | Policy:
-    of_type(given, (str, Policy), "policies")
-    assert isinstance(given, str | Policy)
-    return given
+    return (
+        summarise_runs(one.problem, one.label, one.results, one.reason, one.number)
+        for one in sweep(run, checked, loaded, numbers, stop)
+    )
 
 
 def _loaded(policy: str | Policy) -> Policy | MissingPackageError:
@@ -160,46 +147,6 @@ def _loaded(policy: str | Policy) -> Policy | MissingPackageError:
         return load_policy(policy)
     except MissingPackageError as error:
         return error
-
-
-def _rows(
-    run: Callable[..., MissionRun],
-    missions: Iterable[Mission],
-    policies: Mapping[str, Policy | MissingPackageError],
-    seeds: Sequence[int],
-    stop: threading.Event,
-) -> Iterator[PolicyRow]:
-    for number, mission in enumerate(missions, 1):
-        of_type(mission, Mission, "missions")
-        for label, policy in policies.items():
-            results: list[MissionResult] = []
-            reason = ""
-            if isinstance(policy, Policy):
-                results, reason = _run_seeds(partial(run, mission, policy), seeds, stop)
-            else:
-                reason = str(policy)
-            if reason or results:
-                yield summarise_runs(mission, label, results, reason, number)
-            if stop.is_set():
-                return
-
-
-def _run_seeds(
-    run: Callable[..., MissionRun], seeds: Sequence[int], stop: threading.Event
-) -> tuple[list[MissionResult], str]:
-    """Return the results of all seeds up to a stop, or why there are none."""
-    results: list[MissionResult] = []
-    for seed in seeds:
-        if stop.is_set():
-            break
-        try:
-            results.append(run(seed=seed).result)
-        except RefusedError as error:
-            return [], str(error)
-        except Exception as error:  # the figures of the other policies do not depend on a faulty plugin
-            LOG.warning("a run failed with seed %s", seed, exc_info=error)
-            return [], f"failed with seed {seed}: {type(error).__name__}: {error}"
-    return results, ""
 
 
 def summarise_runs(
@@ -227,7 +174,7 @@ def summarise_runs(
         return PolicyRow(
             mission=mission.name, policy=policy, agents=size[0], tasks=size[1], reason=reason, number=number
         )
-    times = [result.mission_time for result in results]
+    time_mean, time_worst = mean_and_worst([result.mission_time for result in results])
     return PolicyRow(
         mission=mission.name,
         policy=policy,
@@ -236,17 +183,17 @@ def summarise_runs(
         tasks=size[1],
         runs=len(results),
         statuses="/".join(sorted({result.status for result in results})),
-        mission_time_mean=_mean(times),
-        mission_time_worst=None if None in times else max(time for time in times if time is not None),
+        mission_time_mean=time_mean,
+        mission_time_worst=time_worst,
         mission_time_lower_bound=results[0].mission_time_lower_bound,
-        tasks_done_share=_mean([_share(result) for result in results]),
-        priority_done_share=_mean([result.priority_done_share for result in results]),
-        completion_hours_mean=_mean([result.completion_hours_mean for result in results]),
-        energy_mean=_mean([result.energy for result in results]),
-        distance_mean=_mean([result.distance for result in results]),
-        switches_mean=_mean([result.switches for result in results]),
-        messages_mean=_mean([result.messages for result in results]),
-        decision_ms_mean=_mean([result.decision_ms_mean for result in results]),
+        tasks_done_share=mean([_share(result) for result in results]),
+        priority_done_share=mean([result.priority_done_share for result in results]),
+        completion_hours_mean=mean([result.completion_hours_mean for result in results]),
+        energy_mean=mean([result.energy for result in results]),
+        distance_mean=mean([result.distance for result in results]),
+        switches_mean=mean([result.switches for result in results]),
+        messages_mean=mean([result.messages for result in results]),
+        decision_ms_mean=mean([result.decision_ms_mean for result in results]),
         decision_ms_worst=max((result.decision_ms_worst or 0.0 for result in results), default=None),
         decisions_late=sum(result.decisions_late for result in results),
         orders_refused=sum(result.orders_refused for result in results),
@@ -258,9 +205,3 @@ def summarise_runs(
 def _share(result: MissionResult) -> float:
     wanted = result.tasks_done + result.tasks_missed + result.tasks_left
     return result.tasks_done / wanted if wanted else 1.0
-
-
-def _mean(values: Sequence[float | None]) -> float | None:
-    """Return the mean; None where a value is missing, as a mean over the others alone would be too good."""
-    known = [value for value in values if value is not None]
-    return float(np.mean(known)) if len(known) == len(values) else None

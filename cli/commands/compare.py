@@ -28,7 +28,7 @@ EXAMPLES = examples(
     "alloc compare demo.json --methods 'ga[population=40],ga[population=400]' --time-limit 1",
     "alloc compare demo.json --methods milp,gappo --objective makespan-energy --seeds 7,8,9 --json",
     "alloc compare paper-1:0-99 --methods greedy,gappo --seeds 3 --time-limit 5 --store runs.db --report table.tex",
-    "alloc compare missions/*.json --policies nearest,greedy,gappo --seeds 3",
+    "alloc compare missions/*.json --policies nearest,greedy,gappo --seeds 3 --store runs.db",
     closing="A method or policy that refuses has a row with the reason. Ctrl-C prints the finished rows, with exit "
     "code 1.",
 )
@@ -95,12 +95,14 @@ def compare_command(
     kill_after: kept.KillAfterOption = None,
     retry: kept.RetryOption = False,
     report: kept.ReportOption = None,
+    engine: kept.EngineOption = None,
+    address: kept.AddressOption = None,
 ) -> None:
     """Run several methods on instances, or policies in missions, with several seeds, and print a table."""
     from alloc.allocators import Budget
     from alloc.problems.formats import is_standard_output
 
-    keeping = kept.checked(store, workers, memory, kill_after, report, retry=retry)
+    keeping = kept.checked(store, workers, memory, kill_after, report, engine, address, retry=retry)
     written = [("--csv", csv), *(("--report", file) for file in report or ())]
     check_outputs(*written, read=[("--store", store), *(("INSTANCE", instance) for instance in instances)])
     if json and csv is not None and is_standard_output(csv):
@@ -110,14 +112,14 @@ def compare_command(
         "--iterations": iterations,
         "--target-gap": target_gap,
         "--threads": threads,
-        "--store": store,
         "--objective": None if objective is options.PlainObjective.MAKESPAN else objective,
     }
     _check_kind(methods, policies, of_methods, {"--knowledge": knowledge, "--deadline-ms": deadline_ms})
     numbers = _seeds(seeds)
     if policies is not None:
         listed = _listed(policies, "--policies")
-        raise typer.Exit(compare_missions(instances, listed, numbers, knowledge, deadline_ms, csv, json=json))
+        asked_of = (instances, listed, numbers, knowledge, deadline_ms or None, csv)
+        raise typer.Exit(compare_missions(keeping, *asked_of, json=json))
     assert methods is not None
     budget = Budget(options.time_limit(time_limit, iterations), iterations, target_gap)
     if keeping is not None:
@@ -152,14 +154,16 @@ def _compare_in_store(
     json: bool,
 ) -> int:
     """Make the runs that the store has not yet, print the rows of all, and return the exit code."""
-    from alloc.cli.commands.experiments.stored import compare_in_store
+    from alloc.cli.commands.experiments.stored import compare_in_store, conclude
+    from alloc.problems import Instance
     from alloc.problems.formats import is_standard_output
     from alloc.problems.units import common_units
 
     variants = {label: (name, settings or {}) for label, (name, settings) in _listed(methods, "--methods").items()}
-    found = compare_in_store(keeping, files, variants, seeds, objective.value, budget, threads)
-    _write(found.rows, csv, common_units([one.units for one in found.comparison.instances]), json=json)
-    return found.conclude(keeping.reports, quiet=json or (csv is not None and is_standard_output(csv)))
+    found, rows = compare_in_store(keeping, files, variants, seeds, objective.value, budget, threads)
+    units = common_units([one.units for one in found.comparison.instances if isinstance(one, Instance)])
+    _write(rows, csv, units, json=json)
+    return conclude(keeping, found, rows, quiet=json or (csv is not None and is_standard_output(csv)))
 
 
 def _compare(

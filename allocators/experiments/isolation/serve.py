@@ -1,22 +1,29 @@
-"""What a worker does: it makes one run after the other, of one method, and says how each ended."""
+"""What a worker does: it makes one run after the other, of one method or policy, and says how each ended."""
 
+import contextlib
 import gc
 import json
 import os
 import pickle
 import time
 import traceback
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from multiprocessing.connection import Connection
+from typing import Any
 
 from alloc.allocators.contract.base import Allocator
-from alloc.allocators.experiments.store.key import Run
+from alloc.allocators.experiments.store.key import MISSION, Run
 from alloc.allocators.experiments.store.outcome import Outcome
+from alloc.allocators.online.contract import Policy
+from alloc.allocators.online.registry import load_policy
+from alloc.allocators.online.run import simulate
 from alloc.allocators.registry import load
 from alloc.allocators.result import Result
 from alloc.allocators.runtime.interrupts import left_behind
 from alloc.allocators.solve import solve
-from alloc.problems import Family, MissingPackageError, Objective, RefusedError, random_instance
+from alloc.problems import Family, Instance, MissingPackageError, Mission, Objective, RefusedError, random_instance
 
 LONGEST_DETAILS = 20_000
 """Characters of a traceback that are kept, from its end."""
@@ -36,9 +43,10 @@ class Order:
     ----------
     run : Run
     settings : dict
-        Parameters of the method, as `load` takes them.
+        Parameters of the method or policy, as `load` and `load_policy` take them.
     instance : bytes
-        Pickled, so that every run has an instance of its own: what one remembers would favour whoever comes second.
+        An instance or a mission, pickled, so that every run has one of its own: what one remembers would favour
+        whoever comes second.
     """
 
     run: Run
@@ -48,38 +56,52 @@ class Order:
 
 def serve(channel: int) -> None:
     """Make runs until the other end of the channel is closed."""
-    connection, allocator = Connection(channel), None
+    connection, make = Connection(channel), None
     _warm_up()
     while True:
         try:
             order = pickle.loads(connection.recv_bytes())
         except (EOFError, OSError):
             os._exit(0)
+        problem = None
         try:
-            if allocator is None:
-                name = order.run.method
-                allocator = name if name == "auto" else load(name, **order.settings)
+            if make is None:
+                make = maker(order)
                 gc.freeze()  # what is loaded is never searched for garbage again
             connection.send_bytes(LOADED)
-            figures = make(order, allocator)
+            problem, begin = pickle.loads(order.instance), time.process_time()
+            figures = make(order.run, problem)
+            figures["cpu_s"] = time.process_time() - begin
         except BaseException as error:  # whatever a method raises is how its run ended, also SystemExit
-            figures = _failure(error)
+            figures = failure(error)
         figures["reusable"] = not left_behind()
         connection.send_bytes(json.dumps(figures).encode())
-        del order
+        del order, problem
         gc.collect()
 
 
 def _warm_up() -> None:
     """Load what every run uses at its beginning and its end, which would count for the first one."""
-    instance = random_instance(Family(agents=12, tasks=3), 0)
-    solve(instance, "greedy", objective=Objective.MAKESPAN_ENERGY, iterations=1, threads=1, handle_signals=False)
+    solve(_warming(), "greedy", objective=Objective.MAKESPAN_ENERGY, iterations=1, threads=1, handle_signals=False)
 
 
-def make(order: Order, allocator: str | Allocator) -> Figures:
+def _warming() -> Instance:
+    return random_instance(Family(agents=12, tasks=3), 0)
+
+
+def maker(order: Order) -> Callable[[Run, Any], Figures]:
+    """Load what the order names, and return what makes its runs."""
+    name = order.run.method
+    if order.run.objective == MISSION:
+        policy = load_policy(name, **order.settings)
+        with contextlib.suppress(Exception):  # its runs will tell
+            simulate(Mission.from_instance(_warming()), policy, knowledge=order.run.knowledge)
+        return partial(_lead, policy)
+    return partial(_solve, name if name == "auto" else load(name, **order.settings))
+
+
+def _solve(allocator: str | Allocator, run: Run, instance: Instance) -> Figures:
     """Make one run, and return what is to be kept of its result."""
-    run, instance = order.run, pickle.loads(order.instance)
-    begin = time.process_time()
     result = solve(
         instance,
         allocator,
@@ -91,7 +113,23 @@ def make(order: Order, allocator: str | Allocator) -> Figures:
         threads=run.threads,
         handle_signals=False,
     )
-    return {**_figures(result), "cpu_s": time.process_time() - begin}
+    return _figures(result)
+
+
+def _lead(policy: Policy, run: Run, mission: Mission) -> Figures:
+    """Make one run of a policy, likewise."""
+    result = simulate(mission, policy, knowledge=run.knowledge, seed=run.seed, deadline_ms=run.deadline_ms).result
+    return {
+        "outcome": Outcome.SOLVED,
+        "picked": result.policy,
+        "status": result.status,
+        "energy": result.energy,
+        "distance": result.distance,
+        "battery_remaining_percent": result.battery_remaining_percent,
+        "unserved": result.tasks_missed + result.tasks_left,
+        "runtime_s": result.runtime_s,
+        "measures": json.dumps(result.to_dict()),
+    }
 
 
 def _figures(result: Result) -> Figures:
@@ -125,7 +163,8 @@ OUTCOMES: tuple[tuple[type[BaseException], Outcome], ...] = (
 )
 
 
-def _failure(error: BaseException) -> Figures:
+def failure(error: BaseException) -> Figures:
+    """Return how a run ended that raised an error."""
     outcome = next(outcome for kind, outcome in OUTCOMES if isinstance(error, kind))
     if outcome in (Outcome.REFUSED, Outcome.MISSING_PACKAGE):
         return {"outcome": outcome, "reason": str(error)}

@@ -2,14 +2,15 @@
 
 import csv
 import io
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from importlib.util import find_spec
 from typing import get_type_hints
 
-from alloc.allocators.experiments.store.key import Run
+from alloc.allocators.experiments.store.key import MISSION, Run
 from alloc.allocators.experiments.store.outcome import Ending
 from alloc.allocators.experiments.stored import Comparison, Endings
-from alloc.problems import MissingPackageError
+from alloc.allocators.experiments.stored_missions import result_of
+from alloc.problems import MissingPackageError, MissionResult
 
 NAMES = ("instance_name", "label")
 """Columns before those of `Run` and `Ending`: the name of the instance, and how the method was written."""
@@ -33,13 +34,23 @@ def run_rows(comparison: Comparison, endings: Endings) -> list[dict[str, object]
         ending = endings[label][number][comparison.seeds.index(seed)]
         if ending is not None:
             names = {"instance_name": comparison.instances[number].name, "label": label}
-            rows.append({**names, **asdict(job.run), **asdict(ending), "outcome": str(ending.outcome)})
+            measures = asdict(result_of(ending)) if ending.measures else {}
+            row = {**names, **asdict(job.run), **asdict(ending), "outcome": str(ending.outcome)}
+            rows.append(measures | row)
     return rows
+
+
+def _columns(comparison: Comparison) -> dict[str, object]:
+    """Return the columns by their names, with their types: those of `Run`, `Ending` and, of missions, the measures."""
+    is_of_missions = any(job.run.objective == MISSION for job in comparison.jobs.values())
+    measures = get_type_hints(MissionResult) if is_of_missions else {}
+    hints = {**dict.fromkeys(NAMES, str), **get_type_hints(Run), **get_type_hints(Ending), **measures}
+    return {name: hint for name, hint in hints.items() if name != "measures"}
 
 
 def runs_csv(comparison: Comparison, endings: Endings) -> str:
     """Return a header and a line per run; None is empty, and traces are left out."""
-    columns = [*NAMES, *(field.name for kind in (Run, Ending) for field in fields(kind) if field.name not in LONG)]
+    columns = [name for name in _columns(comparison) if name not in LONG]
     text = io.StringIO()
     writer = csv.DictWriter(text, columns, lineterminator="\n", extrasaction="ignore")
     writer.writeheader()
@@ -61,7 +72,7 @@ def runs_parquet(comparison: Comparison, endings: Endings) -> bytes:
 
     point = pyarrow.struct([(name, pyarrow.float64()) for name in TRACE])
     kinds = {int: pyarrow.int64(), float: pyarrow.float64()}
-    hints = {**dict.fromkeys(NAMES, str), **get_type_hints(Run), **get_type_hints(Ending), "trace": list}
+    hints = {**_columns(comparison), "trace": list}
     columns = {
         name: pyarrow.list_(point)
         if hint is list

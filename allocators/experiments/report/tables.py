@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from alloc.allocators.experiments.compare import Row, mean_and_worst
+from alloc.allocators.experiments.compare import Row
 from alloc.allocators.experiments.statistics import (
     CONFIDENCE,
     FACTORS,
@@ -20,6 +20,7 @@ from alloc.allocators.experiments.statistics import (
 )
 from alloc.allocators.experiments.store.outcome import Outcome
 from alloc.allocators.experiments.stored import Comparison, Endings, doubts
+from alloc.allocators.experiments.sweep import mean_and_worst
 from alloc.problems import Objective
 from alloc.problems.text import counted, number, percent
 

@@ -4,18 +4,28 @@ import hashlib
 import json
 import os
 import platform
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass
 from functools import cache
-from importlib.metadata import entry_points, version
+from importlib.metadata import version
 from pathlib import Path
 
 from alloc.allocators.contract.built_in import BUILT_IN
+from alloc.allocators.contract.plugins import plugins
 from alloc.allocators.parallel.processors import available_threads
+from alloc.allocators.registry import ENTRY_POINT_GROUP
 from alloc.problems import Instance
 from alloc.problems.formats.files import read_bytes
 from alloc.problems.formats.npz import to_npz
 from alloc.problems.formats.npz_archive import load
+from alloc.problems.missions.files.document import mission_to_document
+from alloc.problems.missions.mission import Mission
+
+MISSION = "mission"
+"""Objective of a run that a policy makes in a mission."""
+
+LATER_FIELDS = {"knowledge": "", "deadline_ms": None}
+"""Fields that were added later, and their defaults, which do not count: older runs keep their hashes."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,13 +35,14 @@ class Run:
     Attributes
     ----------
     instance : str
-        Hash of the content of the instance, which is not its name; see `fingerprint`.
+        Hash of the content of the instance or mission, which is not its name; see `fingerprint`.
     method : str
-        Name of the method.
+        Name of the method, or of the policy.
     parameters : str
         Those that were given, as JSON; see `canonical`.
     seed : int
     objective : str
+        `MISSION` for a policy.
     time_limit_s : float or None
     iterations : int or None
     target_gap : float or None
@@ -40,34 +51,54 @@ class Run:
         Of this package and, for a plugin, of its own; see `versions`.
     machine : str
         See `this_machine`.
+    knowledge : str
+        What agents in a mission know; empty for a method.
+    deadline_ms : float or None
+        For each decision of a policy.
     """
 
-    instance: str
-    method: str
-    parameters: str
-    seed: int
-    objective: str
-    time_limit_s: float | None
-    iterations: int | None
-    target_gap: float | None
-    threads: int
-    version: str
-    machine: str
+    instance: str = ""
+    method: str = ""
+    parameters: str = "{}"
+    seed: int = 0
+    objective: str = ""
+    time_limit_s: float | None = None
+    iterations: int | None = None
+    target_gap: float | None = None
+    threads: int = 1
+    version: str = ""
+    machine: str = ""
+    knowledge: str = ""
+    deadline_ms: float | None = None
 
     @property
     def key(self) -> str:
         """A hash of all fields: two runs with the same key are the same run."""
-        return hashlib.sha256(json.dumps(asdict(self), sort_keys=True).encode()).hexdigest()
+        values = asdict(self)
+        counted = {name: value for name, value in values.items() if LATER_FIELDS.get(name, ...) != value}
+        return hashlib.sha256(json.dumps(counted, sort_keys=True).encode()).hexdigest()
+
+    @property
+    def is_timed(self) -> bool:
+        """Whether the speed of the machine decides its outcome."""
+        return self.time_limit_s is not None or self.deadline_ms is not None
 
 
-def fingerprint(instance: Instance) -> str:
-    """Return a hash of all that an instance holds but for its name.
+def fingerprint(problem: Instance | Mission) -> str:
+    """Return a hash of all that an instance or a mission holds but for its name.
 
     Raises
     ------
     InputError
-        If it cannot be written as .npz.
+        If it cannot be written to a file.
     """
+    if isinstance(problem, Mission):
+        document = {**mission_to_document(problem), "name": ""}
+        return hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()
+    return _fingerprint(problem)
+
+
+def _fingerprint(instance: Instance) -> str:
     digest = hashlib.sha256()
     for name, array in sorted(load(to_npz(instance)).items()):
         if name != "name":
@@ -77,7 +108,7 @@ def fingerprint(instance: Instance) -> str:
 
 
 def canonical(settings: Mapping[str, object]) -> str:
-    """Return the parameters of a method as JSON; a file, such as a policy, counts by its content.
+    """Return the parameters of a method or policy as JSON; a file, such as a policy, counts by its content.
 
     Raises
     ------
@@ -91,13 +122,20 @@ def canonical(settings: Mapping[str, object]) -> str:
     return json.dumps(known, sort_keys=True, default=str)
 
 
-def versions(method: str) -> str:
-    """Return the version of this package and, behind a plus sign, of the package that a plugin comes from."""
-    own = f"alloc {version('alloc-mrta')}"
-    if method in BUILT_IN or method == "auto":
-        return own
-    found = [entry.dist for entry in entry_points(group="alloc.allocators") if entry.name == method]
-    return own if not found or found[0] is None else f"{own} + {found[0].name} {found[0].version}"
+def versions(name: str, group: str = ENTRY_POINT_GROUP, built_in: Collection[str] = (*BUILT_IN, "auto")) -> str:
+    """Return the version of this package and, behind a plus sign, of the package that a plugin comes from.
+
+    Parameters
+    ----------
+    name : str
+        Of a method, or of a policy.
+    group : str
+        Entry points of plugins of its kind.
+    built_in : collection of str
+        Names of this package's own.
+    """
+    own, entry = f"alloc {version('alloc-mrta')}", plugins(group, built_in).get(name)
+    return own if entry is None or entry.dist is None else f"{own} + {entry.dist.name} {entry.dist.version}"
 
 
 @cache

@@ -8,7 +8,7 @@ class Outcome(StrEnum):
     """What became of a run."""
 
     SOLVED = "solved"
-    """`solve` returned a result; its status says how good it is."""
+    """There is a result; its status says how good it is."""
 
     REFUSED = "refused"
     """The method cannot handle the instance within the budget, and said so."""
@@ -58,12 +58,12 @@ class Ending:
     picked : str
         The method that ran, which differs from the one asked for where that is ``auto``.
     status, stop_reason : str
-        Of the result.
+        Of the result; a mission has no reason to stop but its end.
     makespan, served_makespan, lower_bound, gap : float or None
         In hours, and the relative gap; None as in `Result`.
     energy, energy_lower_bound, energy_gap, distance, battery_remaining_percent, reward : float or None
     unserved : int or None
-        Number of unserved tasks.
+        Number of unserved tasks; in a mission, of those that were missed or are left.
     runtime_s : float or None
         Seconds of the run by its own clock.
     wall_s : float
@@ -82,6 +82,10 @@ class Ending:
         Seconds since 1970.
     trace : tuple
         See `TracePoints`.
+    measures : str or None
+        Of a mission: a `MissionResult` as JSON.
+    host : str
+        The machine of a cluster that made the run; empty for this one.
     """
 
     outcome: Outcome
@@ -112,3 +116,5 @@ class Ending:
     started_at: float = 0.0
     finished_at: float = 0.0
     trace: TracePoints = ()
+    measures: str | None = None
+    host: str = ""

@@ -59,5 +59,11 @@ MIGRATIONS: tuple[str, ...] = (
         expires_at REAL NOT NULL
     ) WITHOUT ROWID;
     """,
+    """
+    ALTER TABLE runs ADD COLUMN knowledge TEXT NOT NULL DEFAULT '';
+    ALTER TABLE runs ADD COLUMN deadline_ms REAL;
+    ALTER TABLE runs ADD COLUMN measures TEXT;
+    ALTER TABLE runs ADD COLUMN host TEXT NOT NULL DEFAULT '';
+    """,
 )
 """Statements that lead from each version to the next; that of a file (``PRAGMA user_version``) is how many it had."""

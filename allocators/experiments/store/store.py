@@ -15,7 +15,7 @@ from alloc.allocators.experiments.store.key import Run, fingerprint
 from alloc.allocators.experiments.store.outcome import TRANSIENT, Ending, Outcome
 from alloc.allocators.experiments.store.owner import is_gone, this_process
 from alloc.allocators.experiments.store.schema import APPLICATION, MIGRATIONS
-from alloc.problems import InputError, Instance
+from alloc.problems import InputError, Instance, Mission
 from alloc.problems.formats.files import PathLike, named
 
 LEASE_S = 60.0
@@ -24,7 +24,9 @@ LEASE_S = 60.0
 MOST_KEYS = 500
 """Keys in one query: SQLite limits the parameters of a statement."""
 
-CONDITIONS = ("objective", "time_limit_s", "iterations", "target_gap", "threads", "version", "machine")
+LIMITS = ("time_limit_s", "iterations", "target_gap", "deadline_ms")
+
+CONDITIONS = ("objective", *LIMITS, "threads", "version", "machine", "knowledge")
 """Fields of a run that are the same for all that is compared, but for the versions of plugins."""
 
 RUN = tuple(field.name for field in fields(Run))
@@ -116,13 +118,13 @@ class Store:
             )
         return int(version)
 
-    def add_instance(self, instance: Instance) -> str:
-        """Note the name and size of an instance, and return the hash of its content."""
-        known = fingerprint(instance)
+    def add(self, problem: Instance | Mission) -> str:
+        """Note the name and size of an instance or a mission, and return the hash of its content."""
+        known = fingerprint(problem)
+        sized = problem.instance if isinstance(problem, Mission) else problem
+        row = (known, problem.name, sized.n, sized.m)
         with self._transaction():
-            self._connection.execute(
-                "INSERT OR REPLACE INTO instances VALUES (?, ?, ?, ?)", (known, instance.name, instance.n, instance.m)
-            )
+            self._connection.execute("INSERT OR REPLACE INTO instances VALUES (?, ?, ?, ?)", row)
         return known
 
     def claim(self, keys: Sequence[str]) -> Claim:

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Annotated
 
 import typer
@@ -11,6 +12,14 @@ SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*([MG])i?B?", re.IGNORECASE)
 
 LEAST_MB = 100.0
 """Memory below which no run starts."""
+
+
+class Engine(StrEnum):
+    """Where the runs of a comparison are made."""
+
+    PROCESSES = "processes"
+    RAY = "ray"
+
 
 StoreOption = Annotated[
     str | None,
@@ -55,6 +64,18 @@ ReportOption = Annotated[
 ]
 
 
+EngineOption = Annotated[
+    Engine | None,
+    typer.Option(help="Where runs are made, with --store.", show_default="processes of this machine"),
+]
+AddressOption = Annotated[
+    str | None,
+    typer.Option(
+        help="For --engine ray: head of the cluster.", show_default="RAY_ADDRESS, else the cluster on this machine"
+    ),
+]
+
+
 @dataclass(frozen=True)
 class Keeping:
     """The store of a comparison, and what goes with it."""
@@ -65,6 +86,8 @@ class Keeping:
     kill_after_s: float | None
     reports: tuple[str, ...]
     retry: bool
+    engine: Engine
+    address: str | None
 
 
 def checked(
@@ -73,19 +96,25 @@ def checked(
     memory: str | None,
     kill_after: float | None,
     reports: list[str] | None,
+    engine: Engine | None,
+    address: str | None,
     *,
     retry: bool,
 ) -> Keeping | None:
     """Return the options of a store, None where there is none; raise an error for those that need one."""
     if store is None:
         given = {"workers": workers, "memory": memory, "kill-after": kill_after, "report": reports, "retry": retry}
+        given |= {"engine": engine, "address": address}
         for name, value in given.items():
             if value not in (None, False):
                 raise typer.BadParameter("goes with --store only", param_hint=f"'--{name}'")
         return None
     if kill_after is not None and not kill_after > 0:
         raise typer.BadParameter("must be more than 0 seconds", param_hint="'--kill-after'")
-    return Keeping(store, workers, _megabytes(memory), kill_after, tuple(reports or ()), retry)
+    if address is not None and engine is not Engine.RAY:
+        raise typer.BadParameter("goes with --engine ray only", param_hint="'--address'")
+    means = (workers, _megabytes(memory), kill_after)
+    return Keeping(store, *means, tuple(reports or ()), retry, engine or Engine.PROCESSES, address)
 
 
 def _megabytes(text: str | None) -> float | None:

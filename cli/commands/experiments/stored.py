@@ -2,11 +2,11 @@
 
 import sys
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from alloc.cli.commands.experiments.options import Keeping
+from alloc.cli.commands.experiments.options import Engine, Keeping
 from alloc.cli.commands.experiments.sources import gather
 from alloc.cli.output.console import is_terminal, note, say, table
 from alloc.problems.text import counted, number
@@ -14,13 +14,15 @@ from alloc.problems.text import counted, number
 if TYPE_CHECKING:
     from alloc.allocators import Budget
     from alloc.allocators.experiments.compare import Row
+    from alloc.allocators.experiments.isolation.places import Place
     from alloc.allocators.experiments.store.key import Run
     from alloc.allocators.experiments.store.outcome import Ending
+    from alloc.allocators.experiments.store.store import Store
     from alloc.allocators.experiments.stored import Comparison, Endings
 
 
 @dataclass(frozen=True)
-class Found:
+class Kept:
     """What a comparison came to.
 
     Attributes
@@ -28,8 +30,6 @@ class Found:
     comparison : Comparison
     endings : mapping
         How its runs ended.
-    rows : list of Row
-        From the store, of exactly what was asked for, with the gaps against the best bound of any method.
     is_complete : bool
         Whether all runs have ended.
     notes : list of str
@@ -38,30 +38,55 @@ class Found:
 
     comparison: "Comparison"
     endings: "Endings"
-    rows: "list[Row]"
     is_complete: bool
     notes: list[str]
 
-    def conclude(self, reports: Sequence[str], *, quiet: bool) -> int:
-        """Print how methods differ, unless `quiet`, and the notes, write the reports, and return the exit code."""
-        from alloc.allocators.experiments.report.files import write_report
 
-        if not quiet and len(self.endings) > 1:
-            self._tell_differences()
-        for one in self.notes:
-            note(one)
-        for file in reports:
-            write_report(file, self.comparison, self.endings, self.rows)
-        is_served = any(row.runs for row in self.rows) and not any(row.unserved for row in self.rows)
-        return 0 if self.is_complete and is_served else 1
+def make_missing(keeping: Keeping, plan: Callable[["Store", str], "Comparison"]) -> Kept:
+    """Make the runs that a store has not yet, until all are there or a signal comes, and return how all ended.
 
-    def _tell_differences(self) -> None:
-        from alloc.allocators.experiments.report.tables import difference_tables
+    Parameters
+    ----------
+    keeping : Keeping
+    plan : callable
+        Returns all runs, by the store and the machine that makes them.
+    """
+    from alloc.allocators.experiments.campaign import Campaign, Means
+    from alloc.allocators.experiments.report.files import check_report
+    from alloc.allocators.experiments.store.outcome import UNSOLVED
+    from alloc.allocators.experiments.store.store import Store
+    from alloc.allocators.experiments.stored import doubts
+    from alloc.allocators.runtime.interrupts import signals_set
 
-        for found in difference_tables(self.comparison, self.endings):
-            say(f"\n{found.title}\n{table(found.header, found.rows)}")
-            for one in found.notes:
-                note(one)
+    for file in keeping.reports:
+        check_report(file)
+    stop = threading.Event()
+    again = UNSOLVED if keeping.retry else ()
+    with _place(keeping) as place, Store(keeping.store, again=again) as store:
+        planned = plan(store, place.machine)
+        names = {job.run.key: f"{job.instance.name}, {label}" for (_, label, _), job in planned.jobs.items()}
+        progress = _Progress(names)
+        means = Means(keeping.workers, keeping.memory_mb, keeping.kill_after_s)
+        with signals_set(stop):
+            done = Campaign(store, list(planned.jobs.values()), means, progress.tell, _say_waiting, place).run(stop)
+        endings = planned.endings(store)
+        notes = [f"{counted(progress.made, 'run')} made; {keeping.store} has {_count(endings)} of {len(planned.jobs)}"]
+        notes += [f"{keeping.store} also holds {other}, which do not count here" for other in planned.others(store)]
+        notes += doubts(endings)
+    if not done:
+        notes.insert(0, "interrupted; the same command goes on from here")
+    return Kept(planned, endings, done, notes)
+
+
+def _place(keeping: Keeping) -> "Place":
+    """Return where runs are made."""
+    if keeping.engine is Engine.RAY:
+        from alloc.allocators.experiments.isolation.cluster import Cluster
+
+        return Cluster(keeping.address)
+    from alloc.allocators.experiments.isolation.places import Here
+
+    return Here()
 
 
 def compare_in_store(
@@ -72,36 +97,52 @@ def compare_in_store(
     objective: str,
     budget: "Budget",
     threads: int | None,
-) -> Found:
-    """Make the runs that are missing, until all are there or a signal comes, and return what the store says of all."""
-    from alloc.allocators.experiments.campaign import Campaign, Means
+) -> "tuple[Kept, list[Row]]":
+    """Compare methods, and return the rows of what was asked for, with gaps against the best bound of any method."""
     from alloc.allocators.experiments.compare import share_bounds
-    from alloc.allocators.experiments.report.files import check_report
-    from alloc.allocators.experiments.store.outcome import UNSOLVED
-    from alloc.allocators.experiments.store.store import Store
-    from alloc.allocators.experiments.stored import doubts, planned, rows_of
-    from alloc.allocators.runtime.interrupts import signals_set
+    from alloc.allocators.experiments.stored import planned, rows_of
 
-    for file in keeping.reports:
-        check_report(file)
     for name, settings in methods.values():
         _check_method(name, settings)
     instances = gather(list(sources))
-    stop = threading.Event()
-    with Store(keeping.store, again=UNSOLVED if keeping.retry else ()) as store:
-        plan = planned(store, instances, methods, seeds, objective=objective, budget=budget, threads=threads)
-        names = {job.run.key: f"{job.instance.name}, {label}" for (_, label, _), job in plan.jobs.items()}
-        progress = _Progress(names)
-        means = Means(keeping.workers, keeping.memory_mb, keeping.kill_after_s)
-        with signals_set(stop):
-            done = Campaign(store, list(plan.jobs.values()), means, progress.tell, _say_waiting).run(stop)
-        endings = plan.endings(store)
-        notes = [f"{counted(progress.made, 'run')} made; {keeping.store} has {_count(endings)} of {len(plan.jobs)}"]
-        notes += [f"{keeping.store} also holds {other}, which do not count here" for other in plan.others(store)]
-        notes += doubts(endings)
-    if not done:
-        notes.insert(0, "interrupted; the same command goes on from here")
-    return Found(plan, endings, share_bounds(rows_of(plan, endings)), done, notes)
+
+    def plan(store: "Store", machine: str) -> "Comparison":
+        return planned(
+            store,
+            instances,
+            methods,
+            seeds,
+            objective=objective,
+            budget=budget,
+            threads=threads,
+            machine=machine,
+        )
+
+    kept = make_missing(keeping, plan)
+    return kept, share_bounds(rows_of(kept.comparison, kept.endings))
+
+
+def conclude(keeping: Keeping, kept: Kept, rows: "list[Row]", *, quiet: bool) -> int:
+    """Print how methods differ, unless `quiet`, and the notes, write the reports, and return the exit code."""
+    from alloc.allocators.experiments.report.files import write_report
+
+    if not quiet and len(kept.endings) > 1:
+        _tell_differences(kept)
+    for one in kept.notes:
+        note(one)
+    for file in keeping.reports:
+        write_report(file, kept.comparison, kept.endings, rows)
+    is_served = any(row.runs for row in rows) and not any(row.unserved for row in rows)
+    return 0 if kept.is_complete and is_served else 1
+
+
+def _tell_differences(kept: Kept) -> None:
+    from alloc.allocators.experiments.report.tables import difference_tables
+
+    for found in difference_tables(kept.comparison, kept.endings):
+        say(f"\n{found.title}\n{table(found.header, found.rows)}")
+        for one in found.notes:
+            note(one)
 
 
 def _check_method(name: str, settings: Mapping[str, object]) -> None:
@@ -132,5 +173,6 @@ class _Progress:
         """Count a run, and print how it ended."""
         self.made += 1
         if self._shows:
-            outcome = f"T {number(ending.makespan)}" if not ending.reason else f"{ending.outcome}: {ending.reason}"
+            solved = ending.status if ending.measures else f"T {number(ending.makespan)}"
+            outcome = f"{ending.outcome}: {ending.reason}" if ending.reason else solved
             say(f"[{self.made}] {self._names[run.key]}, seed {run.seed}: {outcome}")

@@ -2,23 +2,29 @@
 
 import threading
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from alloc.cli.commands.experiments.options import Keeping
+from alloc.cli.commands.experiments.stored import make_missing
 from alloc.cli.output.console import note, say, table
 from alloc.cli.output.rows import show_done, write_rows
 from alloc.problems.text import heading, labelled, number, percent
 from alloc.problems.vocabulary import Knowledge
 
 if TYPE_CHECKING:
-    from alloc.allocators.experiments.differences import Interval, PolicyDifference
+    from alloc.allocators.experiments.differences import PolicyDifference
     from alloc.allocators.experiments.policies import PolicyRow
-    from alloc.problems import Units
+    from alloc.allocators.experiments.store.store import Store
+    from alloc.allocators.experiments.stored import Comparison
+    from alloc.problems import Mission, Units
 
 Listed = Mapping[str, tuple[str, dict[str, object] | None]]
 """Name and parameters of each policy, by how it is written."""
 
 
 def compare_missions(
+    keeping: Keeping | None,
     files: Sequence[str],
     policies: Listed,
     seeds: list[int],
@@ -29,38 +35,94 @@ def compare_missions(
     json: bool,
 ) -> int:
     """Let the policies lead all missions, print the rows, and return the exit code."""
-    from alloc.allocators import describe_policy, load_policy
+    from alloc.allocators import describe_policy
     from alloc.allocators.experiments.differences import paired_differences
-    from alloc.allocators.experiments.policies import compare_policies
-    from alloc.allocators.runtime.interrupts import signals_set
     from alloc.problems import read_mission
     from alloc.problems.units import common_units
 
     for name, _ in policies.values():
         describe_policy(name)
+    missions = [read_mission(file) for file in files]
+    units = common_units([mission.instance.units for mission in missions])
+    asked = (missions, policies, seeds, knowledge, deadline_ms)
+    found = _in_store(keeping, *asked) if keeping is not None else _at_once(*asked, units)
+    differences = paired_differences(found.rows)
+    document: dict[str, object] = {
+        "format": "alloc-mission-comparison/1",
+        "rows": [row.to_dict() for row in found.rows],
+        "differences": [one.to_dict() for one in differences],
+    }
+    write_rows(document, _columns(), csv, lambda: _tell(found.rows, differences, units), json=json)
+    for one in found.notes:
+        note(one)
+    complete = found.is_complete and all(row.reason or row.runs == len(seeds) for row in found.rows)
+    done = any(row.runs for row in found.rows) and all(row.statuses in ("done", "") for row in found.rows)
+    return 0 if complete and done else 1
+
+
+@dataclass(frozen=True)
+class _Found:
+    """What a comparison came to: its rows, whether they are all, and notes for the user."""
+
+    rows: "list[PolicyRow]"
+    is_complete: bool
+    notes: list[str]
+
+
+def _at_once(
+    missions: "list[Mission]",
+    policies: Listed,
+    seeds: list[int],
+    knowledge: Knowledge | None,
+    deadline_ms: float | None,
+    units: "Units",
+) -> _Found:
+    """Make all runs in this process."""
+    from alloc.allocators import load_policy
+    from alloc.allocators.experiments.policies import compare_policies
+    from alloc.allocators.runtime.interrupts import signals_set
+
     leaders = {
         label: name if settings is None else load_policy(name, **settings)
         for label, (name, settings) in policies.items()
     }
-    missions, deadline = [read_mission(file) for file in files], deadline_ms or None
-    units = common_units([mission.instance.units for mission in missions])
     stop, rows, total = threading.Event(), list["PolicyRow"](), len(missions) * len(leaders)
     with signals_set(stop):
-        for row in compare_policies(missions, leaders, seeds, knowledge=knowledge, deadline_ms=deadline, stop=stop):
+        for row in compare_policies(missions, leaders, seeds, knowledge=knowledge, deadline_ms=deadline_ms, stop=stop):
             rows.append(row)
             show_done(f"{row.mission}, {row.policy}: {_outcome(row, units)}", len(rows), total)
-    differences = paired_differences(rows)
-    document: dict[str, object] = {
-        "format": "alloc-mission-comparison/1",
-        "rows": [row.to_dict() for row in rows],
-        "differences": [one.to_dict() for one in differences],
-    }
-    write_rows(document, _columns(), csv, lambda: _tell(rows, differences, units), json=json)
-    if stop.is_set():
-        note(f"interrupted after {len(rows)} of {total} rows")
-    complete = len(rows) == total and all(row.reason or row.runs == len(seeds) for row in rows)
-    done = any(row.runs for row in rows) and all(row.statuses in ("done", "") for row in rows)
-    return 0 if complete and done else 1
+    notes = [f"interrupted after {len(rows)} of {total} rows"] if stop.is_set() else []
+    return _Found(rows, len(rows) == total, notes)
+
+
+def _in_store(
+    keeping: Keeping,
+    missions: "list[Mission]",
+    policies: Listed,
+    seeds: list[int],
+    knowledge: Knowledge | None,
+    deadline_ms: float | None,
+) -> _Found:
+    """Make the runs that the store has not yet, write the reports, and return the rows of all."""
+    from alloc.allocators import load_policy
+    from alloc.allocators.experiments.report.missions import write_mission_report
+    from alloc.allocators.experiments.stored_missions import planned_missions, policy_rows
+
+    for name, settings in policies.values():
+        if settings:
+            load_policy(name, **settings)  # what is wrong with them is told before anything runs
+    variants = {label: (name, settings or {}) for label, (name, settings) in policies.items()}
+
+    def plan(store: "Store", machine: str) -> "Comparison":
+        return planned_missions(
+            store, missions, variants, seeds, knowledge=knowledge, deadline_ms=deadline_ms, machine=machine
+        )
+
+    kept = make_missing(keeping, plan)
+    rows = policy_rows(kept.comparison, kept.endings)
+    for file in keeping.reports:
+        write_mission_report(file, kept.comparison, kept.endings, rows)
+    return _Found(rows, kept.is_complete, kept.notes)
 
 
 def _outcome(row: "PolicyRow", units: "Units") -> str:
@@ -69,6 +131,8 @@ def _outcome(row: "PolicyRow", units: "Units") -> str:
 
 
 def _tell(rows: "list[PolicyRow]", differences: "list[PolicyDifference]", units: "Units") -> None:
+    from alloc.allocators.experiments.report.missions import difference_tables
+
     header = ["mission", "policy", heading("time", units.time), "worst", "done", "priority done"]
     header += [heading("energy", units.energy), "switches", "messages", "ms/decision", "worst", "runs", "status"]
     say(table(header, [_cells(row) for row in rows], left=2))
@@ -78,10 +142,8 @@ def _tell(rows: "list[PolicyRow]", differences: "list[PolicyDifference]", units:
     late = sum(row.decisions_late for row in rows)
     if late:
         note(f"{late} decisions came after the deadline and were not followed; see --deadline-ms")
-    if differences:
-        say(f"\nAgainst {differences[0].against}, in the same missions with the same seeds (95 % interval):")
-        header = ["policy", "time", "interval", "pairs", "energy", "interval", "priority done", "interval", "pairs"]
-        say(table(header, [_difference(one) for one in differences]))
+    for found in difference_tables(differences):
+        say(f"\n{found.title}:\n{table(found.header, found.rows)}")
 
 
 def _cells(row: "PolicyRow") -> list[str]:
@@ -100,31 +162,6 @@ def _cells(row: "PolicyRow") -> list[str]:
         str(row.runs),
         "no figures, see below" if row.reason else row.statuses,
     ]
-
-
-def _difference(one: "PolicyDifference") -> list[str]:
-    return [
-        one.policy,
-        *_interval(one.mission_time),
-        str(one.mission_time.pairs),
-        *_interval(one.energy),
-        *_interval(one.priority_done_share),
-        str(one.priority_done_share.pairs),
-    ]
-
-
-def _interval(interval: "Interval") -> list[str]:
-    """Return the mean and the two ends in per cent, dashes for what is not known."""
-    if interval.mean is None:
-        return ["-", "-"]
-    mean = f"{_percent(interval.mean)} %"
-    if interval.low is None or interval.high is None:
-        return [mean, "-"]
-    return [mean, f"{_percent(interval.low)} to {_percent(interval.high)} %"]
-
-
-def _percent(share: float) -> str:
-    return "0" if abs(share) < 5e-7 else f"{100 * share:+.3g}"
 
 
 def _columns() -> list[str]:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import evil_methods
 import pytest
+from in_process import InProcess
 
 from alloc.allocators.experiments.campaign import Campaign, Job, Means
 from alloc.allocators.experiments.isolation import cores
@@ -46,10 +47,10 @@ def job(method, seed=0, *, time_limit_s=None, instance=INSTANCE):
     return Job(run, {}, instance)
 
 
-def run(folder, jobs, **means):
+def run(folder, jobs, place=None, **means):
     """Make runs, and return how each ended, by method."""
     with Store(folder / "runs.db") as store:
-        assert Campaign(store, jobs, Means(**means)).run(threading.Event())
+        assert Campaign(store, jobs, Means(**means), place=place).run(threading.Event())
         assert store.leases() == {}
         return {record.run.method: record.ending for record in store.records().values()}
 
@@ -105,8 +106,8 @@ def test_every_way_to_end_is_recorded_and_stops_nobody_else(plugin):
 
 def test_what_is_there_is_not_run_again(plugin):
     """A second campaign runs what is missing alone: another seed."""
-    run(plugin, [job("nap", 0), job("nap", 1)])
-    run(plugin, [job("nap", seed) for seed in (2, 1, 0)])
+    run(plugin, [job("nap", 0), job("nap", 1)], InProcess())
+    run(plugin, [job("nap", seed) for seed in (2, 1, 0)], InProcess())
     ended = [line.split()[2] for line in (plugin / "naps").read_text().splitlines() if line.startswith("end")]
     assert sorted(ended) == ["0", "1", "2"]
 
@@ -158,7 +159,7 @@ def test_a_campaign_that_is_stopped_gives_its_runs_back(plugin, monkeypatch):
         assert not Campaign(store, jobs, Means(workers=1), on_end=lambda run, ending: stop.set()).run(stop)
         assert len(store.records()) == 1
         assert store.leases() == {}
-        assert Campaign(store, jobs[:2], Means(workers=1)).run(threading.Event())
+        assert Campaign(store, jobs[:2], Means(workers=1), place=InProcess()).run(threading.Event())
         assert len(store.records()) == 2
 
 

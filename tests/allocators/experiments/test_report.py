@@ -104,7 +104,11 @@ def test_csv_has_a_row_for_each_run(compared, tmp_path):
     write_report(tmp_path / "runs.csv", *compared)
     rows = list(csv.DictReader(io.StringIO((tmp_path / "runs.csv").read_text())))
     names = [field.name for kind in (Run, Ending) for field in fields(kind)]
-    assert list(rows[0]) == ["instance_name", "label", *(name for name in names if name not in ("details", "trace"))]
+    assert list(rows[0]) == [
+        "instance_name",
+        "label",
+        *(name for name in names if name not in ("details", "trace", "measures")),
+    ]
     assert len(rows) == 16
     assert (rows[1]["label"], rows[1]["method"], rows[1]["parameters"]) == ("b", "ga", '{"population": 4}')
     assert [row["reason"] for row in rows if row["outcome"] == "failed"] == ["ValueError: no"]

@@ -7,7 +7,8 @@ import sqlite3
 import subprocess
 import sys
 import time
-from dataclasses import fields, replace
+from dataclasses import asdict, fields, replace
+from inspect import signature
 
 import pytest
 
@@ -15,9 +16,9 @@ from alloc.allocators.experiments.store import store as store_module
 from alloc.allocators.experiments.store.key import Run, canonical, fingerprint, versions
 from alloc.allocators.experiments.store.outcome import Ending, Outcome
 from alloc.allocators.experiments.store.owner import is_gone, this_process
-from alloc.allocators.experiments.store.schema import MIGRATIONS
+from alloc.allocators.experiments.store.schema import APPLICATION, MIGRATIONS
 from alloc.allocators.experiments.store.store import ENDING, RUN, Store
-from alloc.problems import InputError, Instance
+from alloc.problems import InputError, Instance, Mission, MissionParameters, random_mission
 
 RUNS = [
     Run(
@@ -36,6 +37,8 @@ RUNS = [
     for seed in range(4)
 ]
 KEYS = [run.key for run in RUNS]
+OLD_KEY = "fd1753bf557b9f078a379b63a2567abaffa8357409529c06426d019410b7978b"
+"""That of the first run by the first version."""
 SOLVED = Ending(outcome=Outcome.SOLVED, makespan=1.5, trace=((0.1, None, 2.0, None), (0.2, 1.5, 3.0, 1.0)))
 
 
@@ -59,7 +62,7 @@ def test_the_tables_have_the_fields_of_a_run_and_its_ending(tmp_path):
     """Every field has its column, and every column its field."""
     Store(tmp_path / "runs.db").close()
     rows = sqlite3.connect(tmp_path / "runs.db").execute("PRAGMA table_info(runs)").fetchall()
-    assert [row[1] for row in rows] == ["key", *RUN, *ENDING]
+    assert sorted(row[1] for row in rows) == sorted(["key", *RUN, *ENDING])
 
 
 def test_runs_are_claimed_once(tmp_path):
@@ -149,6 +152,32 @@ def test_instances_are_known_by_content():
     assert fingerprint(one) != fingerprint(replace(one, task_ids=["x"]))
 
 
+def test_a_store_of_the_first_version_keeps_its_runs(tmp_path):
+    """Runs that were written before there were missions are found under the same keys."""
+    with sqlite3.connect(tmp_path / "runs.db") as old:
+        old.executescript(MIGRATIONS[0] + f"; PRAGMA application_id = {APPLICATION}; PRAGMA user_version = 1;")
+        values = {**asdict(RUNS[0]), **asdict(SOLVED), "trace": "[]", "key": OLD_KEY}
+        columns = [row[1] for row in old.execute("PRAGMA table_info(runs)")]
+        marks = ", ".join("?" * len(columns))
+        old.execute(f"INSERT INTO runs VALUES ({marks})", [values[column] for column in columns])
+    old.close()
+    with Store(tmp_path / "runs.db") as store:
+        assert store.claim(KEYS[:1]).done == {KEYS[0]}
+        assert store.records(KEYS)[KEYS[0]].ending == replace(SOLVED, trace=())
+
+
+def test_missions_are_known_by_content():
+    """The name of a mission does not count, what happens in it does."""
+    one = random_mission(MissionParameters(agents=3, tasks=4), 1)
+    renamed = Mission(replace(one.instance, name="other"), **_rest(one))
+    assert fingerprint(renamed) == fingerprint(one)
+    assert fingerprint(Mission(one.instance, **_rest(one) | {"horizon": 7.5})) != fingerprint(one)
+
+
+def _rest(mission):
+    return {name: getattr(mission, name) for name in signature(Mission).parameters if name != "instance"}
+
+
 def test_policies_count_by_content(tmp_path):
     """A policy file of the same name with another content is another parameter; the order of parameters is none."""
     file = tmp_path / "p.safetensors"
@@ -181,7 +210,7 @@ def test_an_older_store_is_brought_up_to_date(tmp_path, monkeypatch):
         assert store.records().keys() == {KEYS[0]}
     found = sqlite3.connect(tmp_path / "runs.db")
     assert found.execute("SELECT * FROM later").fetchall() == []
-    assert found.execute("PRAGMA user_version").fetchone() == (2,)
+    assert found.execute("PRAGMA user_version").fetchone() == (len(MIGRATIONS) + 1,)
 
 
 def test_a_later_store_is_refused(tmp_path):

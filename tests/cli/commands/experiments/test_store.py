@@ -1,5 +1,6 @@
 """``alloc compare --store``: runs that are kept, and made once."""
 
+import csv
 import os
 import signal
 import sqlite3
@@ -11,7 +12,9 @@ from pathlib import Path
 import evil_methods
 import pytest
 from campaign_kills import kill_often
+from in_process import InProcess
 
+from alloc.cli.commands.experiments import stored
 from alloc.problems import paper
 from alloc.problems.formats import write_instance
 
@@ -32,11 +35,18 @@ def plugin(tmp_path, monkeypatch):
     return tmp_path
 
 
+@pytest.fixture
+def in_process(monkeypatch):
+    """Makes runs in this process."""
+    monkeypatch.setattr(stored, "_place", lambda keeping: InProcess())
+
+
 def begun():
     file = Path("naps")
     return [line.split()[1:3] for line in file.read_text().splitlines() if line.startswith("begin")]
 
 
+@pytest.mark.usefixtures("in_process")
 def test_only_what_is_missing_is_run(alloc, plugin):
     """A seed, an instance or a method more runs what they add alone; the table is of what was asked for."""
     first = alloc("compare", f"{TINY}:1", "--methods", "nap", *QUICK, "--json")
@@ -55,6 +65,7 @@ def test_only_what_is_missing_is_run(alloc, plugin):
     assert "0 runs made; runs.db has 1 of 1" in again.err
 
 
+@pytest.mark.usefixtures("in_process")
 def test_rows_are_those_of_a_comparison_without_a_store(alloc):
     """The figures are the same as without a store, but for the seconds."""
     words = ("compare", f"{TINY}:0-1", "--methods", "greedy,ga[population=4]", "--seeds", "2", "--iterations", "5")
@@ -67,6 +78,7 @@ def test_rows_are_those_of_a_comparison_without_a_store(alloc):
     assert kept == plain
 
 
+@pytest.mark.usefixtures("in_process")
 def test_other_budgets_are_other_runs(alloc):
     """A run with another budget does not count, and the store says that it has some."""
     alloc("compare", f"{TINY}:0", "--methods", "greedy", *QUICK)
@@ -75,6 +87,7 @@ def test_other_budgets_are_other_runs(alloc):
     assert "runs.db also holds 1 run with iterations 5, which do not count here" in other.err
 
 
+@pytest.mark.usefixtures("in_process")
 def test_differences_are_printed_and_reported(alloc):
     """Below the table stands how methods differ from the first one; a report holds that, or all runs."""
     words = ("compare", f"{TINY}:0-2", "--methods", "greedy,local-search", *QUICK)
@@ -98,6 +111,7 @@ def test_failures_have_rows_and_are_tried_again_where_asked(alloc, plugin):
     assert len(begun()) == 1
 
 
+@pytest.mark.usefixtures("in_process")
 def test_sources_of_instances(alloc):
     """Instances come from a file, a folder, a pattern, a table and a family; the same content is one instance."""
     Path("folder").mkdir()
@@ -151,6 +165,8 @@ def test_wrong_methods_are_one_line(alloc, methods, message):
     [
         (("--memory", "4G"), "'--memory': goes with --store only"),
         (("--retry",), "'--retry': goes with --store only"),
+        (("--engine", "ray"), "'--engine': goes with --store only"),
+        (("--store", "runs.db", "--address", "here:1"), "'--address': goes with --engine ray only"),
         (("--store", "runs.db", "--memory", "4"), "'4' is not like 800M or 4G"),
         (("--store", "runs.db", "--memory", "4M"), "must be at least 100M"),
         (("--store", "runs.db", "--kill-after", "0"), "must be more than 0 seconds"),
@@ -214,3 +230,31 @@ def test_two_commands_that_are_killed_lose_no_run_and_make_none_twice(tmp_path):
     assert found.kills >= 1
     assert (found.rows, found.solved, found.lost) == (12, 12, 0)
     assert (found.overlapping, found.again, found.leases) == (0, 0, 0)
+
+
+@pytest.mark.usefixtures("in_process")
+def test_policies_in_missions_are_kept(alloc, plugin):
+    """Runs of policies are made once, in a process each; rows are those without a store, reports hold all measures."""
+    alloc("generate", "mission", "--agents", "2", "--tasks", "2", "--seed", "1", "--output", "m.json")
+    words = ("compare", "m.json", "--policies", "nearest,replan", "--seeds", "2")
+    kept = alloc(*words, "--store", "runs.db", "--report", "table.md", "--report", "runs.csv", "--json")
+    assert "4 runs made; runs.db has 4 of 4" in kept.err
+    plain = alloc(*words, "--json")
+    rows, others = kept.json["rows"], plain.json["rows"]
+    for row in [*rows, *others]:
+        for name in ("decision_ms_mean", "decision_ms_worst"):
+            row.pop(name)
+    assert (kept.code, rows, kept.json["differences"]) == (plain.code, others, plain.json["differences"])
+    assert "0 runs made" in alloc(*words, "--store", "runs.db").err
+    more = alloc(*words, "--knowledge", "full", "--store", "runs.db")
+    assert "4 runs made; runs.db has 4 of 4" in more.err
+    assert "runs.db also holds 4 runs with knowledge local" in more.err
+    assert "## Against nearest, in the same missions" in Path("table.md").read_text()
+    (mean,) = (
+        sqlite3.connect("runs.db")
+        .execute("SELECT avg(measures ->> 'mission_time') FROM runs WHERE method = 'nearest' AND knowledge = 'local'")
+        .fetchone()
+    )
+    assert mean == pytest.approx(rows[0]["mission_time_mean"])
+    rows = list(csv.DictReader(Path("runs.csv").read_text().splitlines()))
+    assert [row["tasks_done"] for row in rows] == ["2", "", "2", ""]

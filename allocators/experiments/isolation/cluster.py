@@ -1,0 +1,158 @@
+"""The machines of a Ray cluster as a place for runs; a run whose machine dies is made again on another."""
+
+import contextlib
+import math
+import pickle
+import socket
+import time
+from dataclasses import replace
+from multiprocessing import connection
+from types import ModuleType
+
+from alloc.allocators.experiments.isolation.cores import CAN_PIN, Cores, take
+from alloc.allocators.experiments.isolation.places import Handle, Here, Place
+from alloc.allocators.experiments.isolation.serve import Figures, Order
+from alloc.allocators.experiments.isolation.worker import Limits, Worker
+from alloc.allocators.experiments.store.key import this_machine
+from alloc.allocators.experiments.store.outcome import Outcome
+from alloc.allocators.parallel.engine import POLL_S
+from alloc.allocators.parallel.ray import MAX_ATTEMPTS, RayEngine
+
+OTHERS_S = 0.3
+"""Seconds between two looks whether other commands have freed processors."""
+
+
+class Cluster(Place):
+    """A Ray cluster, on whose machines this package and all plugins must be installed in the same versions.
+
+    The store stays with the command alone: machines get runs and answer how they ended. `machine` tells all kinds of
+    machines that there are at the beginning.
+
+    Parameters
+    ----------
+    address : str, optional
+        Head of the cluster; see `RayEngine`.
+
+    Raises
+    ------
+    InputError
+        If Ray is not installed, or there is no cluster at `address`.
+    """
+
+    def __init__(self, address: str | None = None) -> None:
+        self._engine = RayEngine(address)
+        import ray
+
+        self._ray = ray
+        self.machine = " and ".join(sorted(set(self._kinds())))
+
+    def _kinds(self) -> list[str]:
+        """Return what each machine is."""
+        from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
+
+        kind_of = self._ray.remote(num_cpus=0)(_kind)
+        places = [NodeAffinitySchedulingStrategy(node, soft=True) for node, _ in self._with_processors()]
+        kinds: list[str] = self._ray.get([kind_of.options(scheduling_strategy=place).remote() for place in places])
+        return kinds
+
+    def _with_processors(self) -> list[tuple[str, int]]:
+        """Return the id and the number of processors of each machine that makes runs."""
+        found = [(node["NodeID"], int(node["Resources"].get("CPU", 0))) for node in self._ray.nodes() if node["Alive"]]
+        return [(node, processors) for node, processors in found if processors]
+
+    def room(self, threads: int) -> int:
+        """See `Place.room`."""
+        return sum(processors // threads for _, processors in self._with_processors())
+
+    def take(self, threads: int) -> Cores | None:
+        """Return no processors: each run takes them where it is made."""
+        return Cores()
+
+    def memory_mb(self, runs: int) -> float:
+        """Return infinity: each run finds out where it is made."""
+        return math.inf
+
+    def handle(self, cores: Cores, threads: int, *, is_timed: bool) -> Handle:
+        """See `Place.handle`."""
+        return _Remote(self._ray, threads, is_timed=is_timed)
+
+    def close(self) -> None:
+        """See `Place.close`."""
+        self._engine.close()
+
+
+class _Remote(Handle):
+    """Makes runs as tasks of a cluster, which Ray begins again if their machine dies."""
+
+    def __init__(self, ray: ModuleType, threads: int, *, is_timed: bool) -> None:
+        self._ray, self._threads, self._is_timed = ray, threads, is_timed
+        self._function = ray.remote(num_cpus=threads, max_retries=MAX_ATTEMPTS - 1)(make_run)
+        self._task: object = None
+        self.is_reusable = True
+
+    @property
+    def handles(self) -> "list[connection.Connection[bytes, bytes] | socket.socket | int]":
+        """See `Handle.handles`."""
+        return []
+
+    @property
+    def is_alive(self) -> bool:
+        """See `Handle.is_alive`."""
+        return True
+
+    def send(self, order: Order, limits: Limits) -> None:
+        """See `Handle.send`."""
+        self._task = self._function.remote(pickle.dumps(order), limits, self._threads, is_timed=self._is_timed)
+
+    def figures(self) -> Figures | None:
+        """See `Handle.figures`."""
+        try:
+            if not self._ray.wait([self._task], timeout=0)[0]:
+                return None
+            figures: Figures = self._ray.get(self._task)
+        except (self._ray.exceptions.RayError, OSError) as error:
+            figures = {"outcome": Outcome.KILLED, "reason": f"Ray gave it up: {' '.join(str(error).split())[:300]}"}
+        self._task = None
+        return figures
+
+    def end(self) -> None:
+        """See `Handle.end`."""
+        if self._task is not None:
+            with contextlib.suppress(Exception):  # the connection may be what has failed
+                self._ray.cancel(self._task, force=True)
+
+
+def _kind() -> str:
+    return this_machine()
+
+
+def make_run(order: bytes, limits: Limits, threads: int, *, is_timed: bool) -> Figures:
+    """Make one run on this machine, in a process of its own.
+
+    Parameters
+    ----------
+    order : bytes
+        A pickled `Order`.
+    limits : Limits
+        With infinite memory: the part of this machine's that each of its runs has.
+    threads : int
+    is_timed : bool
+        Whether it has processors to itself, for which it waits.
+    """
+    if math.isinf(limits.memory_mb):
+        here = Here()
+        limits = replace(limits, memory_mb=here.memory_mb(max(1, here.room(threads))))
+    cores = Cores()
+    while is_timed and CAN_PIN and not cores.numbers:
+        cores = take(threads) or cores
+        time.sleep(0.0 if cores.numbers else OTHERS_S)
+    began, worker = time.monotonic(), Worker(cores, threads)
+    try:
+        worker.send(pickle.loads(order), limits)
+        while (figures := worker.figures()) is None:
+            connection.wait(worker.handles, POLL_S)
+    finally:
+        worker.end()
+        cores.free()
+    own = {"wall_s": time.monotonic() - began, "memory_limit_mb": limits.memory_mb, "host": socket.gethostname()}
+    return {**figures, **own, "cores": ",".join(map(str, cores.numbers))}

@@ -1,0 +1,100 @@
+"""A report on policies in missions: tables for people, all runs with their measures for programs."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from alloc.allocators.experiments.differences import Interval, PolicyDifference, paired_differences
+from alloc.allocators.experiments.policies import PolicyRow
+from alloc.allocators.experiments.report.files import check_report, latex, markdown
+from alloc.allocators.experiments.report.runs import runs_csv, runs_parquet
+from alloc.allocators.experiments.report.tables import Table
+from alloc.allocators.experiments.stored import Comparison, Endings, doubts
+from alloc.allocators.experiments.sweep import mean
+from alloc.problems.formats import write_bytes_atomically
+from alloc.problems.formats.files import PathLike
+from alloc.problems.text import counted, number, percent
+
+
+def write_mission_report(path: PathLike, comparison: Comparison, endings: Endings, rows: Sequence[PolicyRow]) -> None:
+    """Write a report, whole or not at all; see `write_report`.
+
+    Parameters
+    ----------
+    path : str or path
+    comparison : Comparison
+        Of policies.
+    endings : mapping
+        How its runs ended.
+    rows : sequence of PolicyRow
+        Those of the comparison.
+
+    Raises
+    ------
+    InputError
+        If the name has no known suffix, or the file cannot be written.
+    MissingPackageError
+        If pyarrow is needed and not installed.
+    """
+    check_report(path)
+    suffix = Path(path).suffix.lower()
+    if suffix == ".parquet":
+        content = runs_parquet(comparison, endings)
+    elif suffix == ".csv":
+        content = runs_csv(comparison, endings).encode()
+    else:
+        tables = [_policies(comparison, endings, rows), *difference_tables(paired_differences(rows))]
+        content = (markdown if suffix == ".md" else latex)(tables).encode()
+    write_bytes_atomically(path, content)
+
+
+def _policies(comparison: Comparison, endings: Endings, rows: Sequence[PolicyRow]) -> Table:
+    """Return the means over all missions; of a figure that a mission lacks there is none."""
+    cells = []
+    for policy in comparison.methods:
+        own = [row for row in rows if row.policy == policy and not row.reason]
+        time, done, energy, late = (
+            mean([getattr(row, name) for row in own]) if own else None
+            for name in ("mission_time_mean", "priority_done_share", "energy_mean", "decision_ms_mean")
+        )
+        cells.append([policy, str(len(own)), number(time, 5), percent(done), number(energy, 4), number(late, 3)])
+    run = next(iter(comparison.jobs.values())).run
+    limit = "no deadline" if run.deadline_ms is None else f"{run.deadline_ms:g} ms for each decision"
+    size = f"{counted(len(comparison.instances), 'mission')}, {counted(len(comparison.seeds), 'seed')}"
+    notes = [f"{size}; knowledge {run.knowledge}; {limit}; {run.version}; {run.machine}."]
+    notes += [f"{row.mission}, {row.policy}: {row.reason}" for row in rows if row.reason]
+    header = ["policy", "missions", "time", "priority done", "energy", "ms/decision"]
+    return Table("Policies", header, cells, [*notes, *doubts(endings)])
+
+
+def difference_tables(differences: Sequence[PolicyDifference]) -> list[Table]:
+    """Return how policies differ from the first one, as one table; none where there is only one."""
+    if not differences:
+        return []
+    title = f"Against {differences[0].against}, in the same missions with the same seeds (95 % interval)"
+    header = ["policy", "time", "interval", "pairs", "energy", "interval", "priority done", "interval", "pairs"]
+    return [Table(title, header, [_difference(one) for one in differences], [])]
+
+
+def _difference(one: PolicyDifference) -> list[str]:
+    return [
+        one.policy,
+        *_interval(one.mission_time),
+        str(one.mission_time.pairs),
+        *_interval(one.energy),
+        *_interval(one.priority_done_share),
+        str(one.priority_done_share.pairs),
+    ]
+
+
+def _interval(interval: Interval) -> list[str]:
+    """Return the mean and the two ends in per cent, dashes for what is not known."""
+    if interval.mean is None:
+        return ["-", "-"]
+    mean = f"{_percent(interval.mean)} %"
+    if interval.low is None or interval.high is None:
+        return [mean, "-"]
+    return [mean, f"{_percent(interval.low)} to {_percent(interval.high)} %"]
+
+
+def _percent(share: float) -> str:
+    return "0" if abs(share) < 5e-7 else f"{100 * share:+.3g}"

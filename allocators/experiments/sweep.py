@@ -1,0 +1,147 @@
+"""What comparisons of methods and of policies have in common: every one of them, on every problem, with every seed."""
+
+import logging
+import threading
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Generic, TypeVar
+
+import numpy as np
+
+from alloc.problems import InputError, RefusedError
+from alloc.problems.arguments import listed, of_type
+
+LOG = logging.getLogger("alloc.compare")
+
+P = TypeVar("P")
+"""A problem: an instance, or a mission."""
+
+M = TypeVar("M")
+"""What is compared: methods, or policies."""
+
+R = TypeVar("R")
+"""The result of a run."""
+
+
+@dataclass(frozen=True)
+class Runs(Generic[P, R]):
+    """The runs of one method or policy on one problem.
+
+    Attributes
+    ----------
+    number : int
+        Of the problem, from 1, as names may repeat.
+    problem : Instance or Mission
+    label : str
+        Name of the method or policy in the rows.
+    results : list
+        One per seed, up to a stop.
+    reason : str
+        Why there are none.
+    """
+
+    number: int
+    problem: P
+    label: str
+    results: list[R]
+    reason: str
+
+
+def by_label(
+    given: Sequence[str | M] | Mapping[str, str | M], kind: type[M], name: Callable[[M], str], place: str
+) -> dict[str, str | M]:
+    """Return what is compared by the name that it has in the rows.
+
+    Parameters
+    ----------
+    given : sequence or mapping
+        Names and objects; where a mapping, with the names in the rows.
+    kind : type
+        Of the objects.
+    name : callable
+        Returns the name of an object.
+    place : str
+        The parameter.
+
+    Raises
+    ------
+    InputError
+        If an entry is something else, or two objects of a sequence have one name.
+    """
+
+    def checked(one: str | M) -> str | M:
+        of_type(one, (str, kind), place)
+        return one
+
+    if isinstance(given, Mapping):
+        return {str(label): checked(one) for label, one in given.items()}
+    entries = [checked(one) for one in listed(given, place, place)]
+    found = {one if isinstance(one, str) else name(one): one for one in entries}
+    if len(found) < len({one if isinstance(one, str) else id(one) for one in entries}):
+        raise InputError("has several objects of one name; give a dict with a name for each", place)
+    return found
+
+
+def sweep(
+    run: Callable[[P, M, int], R | None],
+    problems: Iterable[P],
+    compared: Mapping[str, M | Exception],
+    seeds: Sequence[int],
+    stop: threading.Event,
+) -> Iterator[Runs[P, R]]:
+    """Make all runs, and yield those of one label on one problem as soon as they are done.
+
+    Parameters
+    ----------
+    run : callable
+        Makes one run with a seed; None if it was interrupted.
+    problems : iterable
+    compared : mapping
+        By their names in the rows; an exception where one could not be loaded.
+    seeds : sequence of int
+    stop : threading.Event
+        Setting it ends the comparison; what has no result yet is left out.
+    """
+    for number, problem in enumerate(problems, 1):
+        for label, one in compared.items():
+            results: list[R] = []
+            reason = ""
+            if isinstance(one, Exception):
+                reason = str(one)
+            else:
+                results, reason = _with_seeds(partial(run, problem, one), seeds, stop)
+            if reason or results:
+                yield Runs(number, problem, label, results, reason)
+            if stop.is_set():
+                return
+
+
+def _with_seeds(run: Callable[[int], R | None], seeds: Sequence[int], stop: threading.Event) -> tuple[list[R], str]:
+    """Return the results of all seeds up to a stop, or why there are none."""
+    results: list[R] = []
+    for seed in seeds:
+        if stop.is_set():
+            break
+        try:
+            result = run(seed)
+        except RefusedError as error:
+            return [], str(error)
+        except Exception as error:  # the figures of the others do not depend on a faulty plugin
+            LOG.warning("a run failed with seed %s", seed, exc_info=error)
+            return [], f"failed with seed {seed}: {type(error).__name__}: {error}"
+        if result is None:
+            break
+        results.append(result)
+    return results, ""
+
+
+def mean_and_worst(values: Sequence[float | None]) -> tuple[float | None, float | None]:
+    """Return mean and maximum; None where a value is missing, as a mean over the others alone would be too good."""
+    known = [value for value in values if value is not None]
+    return (float(np.mean(known)), max(known)) if len(known) == len(values) else (None, None)
+
+
+def mean(values: Sequence[float | None]) -> float | None:
+    """Return the mean, likewise."""
+    return mean_and_worst(values)[0]

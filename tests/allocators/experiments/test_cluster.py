@@ -1,0 +1,62 @@
+"""Comparisons over a Ray cluster: one command keeps the store, and a machine that dies loses no run."""
+
+import os
+import sqlite3
+import subprocess
+import sys
+import time
+from collections import Counter
+from pathlib import Path
+
+import evil_methods
+import pytest
+from ray_cluster import kill_at_work, ray_cluster
+
+# Ray leaves the processes that it starts, and their logs, to the garbage collector
+pytestmark = [
+    pytest.mark.filterwarnings("ignore:unclosed file .*/ray/session_:ResourceWarning"),
+    pytest.mark.filterwarnings("ignore:subprocess .* is still running:ResourceWarning"),
+    pytest.mark.needs("ray"),
+    pytest.mark.slow,
+    pytest.mark.timeout(300),
+]
+
+SEEDS = 8
+
+
+def test_a_machine_dies_half_way_and_every_run_is_there_once(tmp_path, monkeypatch):
+    """One of two machines is killed with a run under work, which another makes again; each run has one row."""
+    evil_methods.install(tmp_path)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
+    monkeypatch.setenv("NAPS", str(tmp_path / "naps"))
+    monkeypatch.setenv("NAP_S", "1.0")
+    with ray_cluster(machines=2) as cluster:
+        command = [sys.executable, "-m", "alloc.cli", "compare", "random[agents=3,tasks=2]:0", "--iterations", "1"]
+        command += ["--methods", "nap,leave", "--seeds", str(SEEDS), "--store", str(tmp_path / "runs.db")]
+        command += ["--engine", "ray", "--address", cluster.address]
+        with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
+            assert process.stderr is not None
+            while process.poll() is None and ended(tmp_path / "runs.db") < SEEDS:
+                time.sleep(0.1)
+            killed = kill_at_work(cluster, lambda: process.poll() is None, "make_run")
+            told = process.stderr.read()
+        again = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (process.returncode, killed is None) == (0, False), told
+    assert f"{2 * SEEDS} runs made; {tmp_path / 'runs.db'} has {2 * SEEDS} of {2 * SEEDS}" in told
+    assert "0 runs made" in again.stderr
+    store = sqlite3.connect(tmp_path / "runs.db")
+    outcomes = Counter(store.execute("SELECT method, outcome FROM runs").fetchall())
+    assert outcomes == {("nap", "solved"): SEEDS, ("leave", "exited"): SEEDS}
+    assert store.execute("SELECT count(*) FROM leases").fetchone() == (0,)
+    assert "" not in {host for (host,) in store.execute("SELECT host FROM runs")}
+    begun = [line.split()[2] for line in Path(tmp_path / "naps").read_text().splitlines() if line.startswith("begin")]
+    assert SEEDS <= len(begun) <= SEEDS + 1
+
+
+def ended(path):
+    """Count the rows of a store that another process writes."""
+    try:
+        with sqlite3.connect(f"file:{path}?mode=ro", uri=True) as store:
+            return store.execute("SELECT count(*) FROM runs").fetchone()[0]
+    except sqlite3.OperationalError:  # not there yet
+        return 0
