@@ -15,7 +15,7 @@ from deap import base, cma
 
 from alloc.allocators import simulate
 from alloc.allocators.learned.missions import situation as known
-from alloc.allocators.learned.missions.options import done_with, expect, in_turn
+from alloc.allocators.learned.missions.options import done_with, expect
 from alloc.allocators.learned.missions.play import Room, room_for
 from alloc.allocators.learned.missions.situation import fill
 from alloc.allocators.learned.missions.training.curriculum import MissionCurriculum, PackedMission
@@ -64,8 +64,8 @@ def best_task(state: MissionArrays, number: int, room: Room, parameters: FloatAr
     fill(state, number, situation)
     for i in range(len(situation.counts)):
         situation.counts[i] &= hour - state.agent_hour[row, i] <= memory
-    expect(situation, room.rank, room.others, room.rate, room.without)
-    first, following = in_turn(room.rank, situation.target, len(room.without))
+    expect(situation)
+    others, without = situation.coming.others, situation.coming.without
     own, task, best, highest = situation.own, situation.task, -1, 0.0
     for j in range(len(situation.can)):
         if not situation.can[j]:
@@ -74,14 +74,14 @@ def best_task(state: MissionArrays, number: int, room: Room, parameters: FloatAr
         is_there = is_order and own[known.IS_WORKING] > 0
         arrival = hour + (0.0 if is_there else task[known.DISTANCE, j] / own[known.SPEED])
         left, since = task[known.LEFT, j], task[known.KNOWN_AT, j]
-        if room.others[j] == 0 and not is_there:
+        if others[j] == 0 and not is_there:
             left += task[known.GROWTH, j] * (arrival - since)
-        with_me = done_with(situation, first[j], following, arrival, left, since)
-        if with_me >= room.without[j]:
+        with_me = done_with(situation, j, arrival, left)
+        if with_me >= without[j]:
             continue
         hours = with_me - hour
         value = (1.0 if hours <= 0 else (with_me - arrival) / hours) * (task[known.PRIORITY, j] + 1e-6)
-        value = value / (1 + crowding * room.others[j]) * math.exp(-flight * (arrival - hour))
+        value = value / (1 + crowding * others[j]) * math.exp(-flight * (arrival - hour))
         value *= missed if with_me > task[known.DEADLINE, j] else 1.0
         value *= stay if is_order else 1.0
         if value > highest:
