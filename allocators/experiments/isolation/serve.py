@@ -6,12 +6,14 @@ import os
 import pickle
 import time
 import traceback
+from base64 import b64encode
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 
 from alloc.allocators.contract.base import Allocator
 from alloc.allocators.experiments.store.key import Run
 from alloc.allocators.experiments.store.outcome import Outcome
+from alloc.allocators.experiments.store.plan import packed
 from alloc.allocators.registry import load
 from alloc.allocators.result import Result
 from alloc.allocators.runtime.interrupts import left_behind
@@ -91,7 +93,8 @@ def make(order: Order, allocator: str | Allocator) -> Figures:
         threads=run.threads,
         handle_signals=False,
     )
-    return {**_figures(result), "cpu_s": time.process_time() - begin}
+    spent = time.process_time() - begin
+    return {**_figures(result), "cpu_s": spent}
 
 
 def _figures(result: Result) -> Figures:
@@ -113,6 +116,7 @@ def _figures(result: Result) -> Figures:
         "reward": None if score is None else score.reward,
         "unserved": result.instance.m if score is None else result.unserved_count,
         "runtime_s": result.runtime_s,
+        "plan": None if result.allocation is None else b64encode(packed(result.allocation)).decode("ascii"),
         "trace": [(point.time_s, point.makespan, point.energy, point.lower_bound) for point in result.trace],
     }
 

@@ -68,8 +68,13 @@ def fingerprint(instance: Instance) -> str:
     InputError
         If it cannot be written as .npz.
     """
+    return fingerprint_of(to_npz(instance))
+
+
+def fingerprint_of(content: bytes) -> str:
+    """Return the `fingerprint` of the instance in the bytes of an .npz file."""
     digest = hashlib.sha256()
-    for name, array in sorted(load(to_npz(instance)).items()):
+    for name, array in sorted(load(content).items()):
         if name != "name":
             digest.update(f"{name} {array.dtype.str} {array.shape}\n".encode())
             digest.update(array.tobytes())

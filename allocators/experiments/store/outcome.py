@@ -82,6 +82,8 @@ class Ending:
         Seconds since 1970.
     trace : tuple
         See `TracePoints`.
+    revision : str
+        Commit of alloc, where it ran from a checkout or was installed from one; see `revision`.
     """
 
     outcome: Outcome
@@ -112,3 +114,4 @@ class Ending:
     started_at: float = 0.0
     finished_at: float = 0.0
     trace: TracePoints = ()
+    revision: str = ""

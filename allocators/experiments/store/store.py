@@ -11,12 +11,13 @@ from types import TracebackType
 from typing import Self
 
 from alloc.allocators.experiments.store.errors import BUSY_S, explained
-from alloc.allocators.experiments.store.key import Run, fingerprint
+from alloc.allocators.experiments.store.key import Run, fingerprint_of
 from alloc.allocators.experiments.store.outcome import TRANSIENT, Ending, Outcome
 from alloc.allocators.experiments.store.owner import is_gone, this_process
-from alloc.allocators.experiments.store.schema import APPLICATION, MIGRATIONS
+from alloc.allocators.experiments.store.schema import APPLICATION, MIGRATIONS, checked_version
 from alloc.problems import InputError, Instance
 from alloc.problems.formats.files import PathLike, named
+from alloc.problems.formats.npz import to_npz
 
 LEASE_S = 60.0
 """Seconds until the lease of a process of which nothing is known ends, unless it is renewed."""
@@ -89,40 +90,29 @@ class Store:
                 raise
 
     def _prepare(self) -> None:
-        version = self._checked_version()
+        version = checked_version(self._connection, self.path)
         self._connection.execute("PRAGMA journal_mode = WAL")
         self._connection.execute("PRAGMA synchronous = NORMAL")  # a lease need not survive the loss of power
         if version == len(MIGRATIONS):
             return
         with self._transaction():
-            for script in MIGRATIONS[self._checked_version() :]:  # another process may have been faster
+            for script in MIGRATIONS[
+                checked_version(self._connection, self.path) :
+            ]:  # another process may have been faster
                 for statement in filter(str.strip, script.split(";")):
                     self._connection.execute(statement)
             self._connection.execute(f"PRAGMA application_id = {APPLICATION}")
             self._connection.execute(f"PRAGMA user_version = {len(MIGRATIONS)}")
 
-    def _checked_version(self) -> int:
-        """Return the version of the file, 0 for an empty one; raise an error if it is not ours, or of a later one."""
-        (version,) = self._connection.execute("PRAGMA user_version").fetchone()
-        (application,) = self._connection.execute("PRAGMA application_id").fetchone()
-        (tables,) = self._connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
-        if application != APPLICATION and (version or application or tables):
-            raise InputError("is a database of another program; name another file", source=self.path)
-        if version > len(MIGRATIONS):
-            raise InputError(
-                f"is a store of version {version}, made by a later version of alloc; this one knows up to "
-                f"{len(MIGRATIONS)}: update alloc, or name another file",
-                source=self.path,
-            )
-        return int(version)
-
     def add_instance(self, instance: Instance) -> str:
-        """Note the name and size of an instance, and return the hash of its content."""
-        known = fingerprint(instance)
+        """Note the name, size and content of an instance, and return the hash of its content."""
+        content = to_npz(instance)
+        known = fingerprint_of(content)
         with self._transaction():
             self._connection.execute(
                 "INSERT OR REPLACE INTO instances VALUES (?, ?, ?, ?)", (known, instance.name, instance.n, instance.m)
             )
+            self._connection.execute("INSERT OR IGNORE INTO contents VALUES (?, ?)", (known, content))
         return known
 
     def claim(self, keys: Sequence[str]) -> Claim:
@@ -167,8 +157,15 @@ class Store:
         with self._transaction():
             self._connection.execute("DELETE FROM leases WHERE key = ? AND owner = ?", (key, self.owner))
 
-    def finish(self, run: Run, ending: Ending) -> bool:
+    def finish(self, run: Run, ending: Ending, plan: bytes | None = None) -> bool:
         """Write a run that has ended, in one transaction.
+
+        Parameters
+        ----------
+        run : Run
+        ending : Ending
+        plan : bytes, optional
+            Its allocation; see `packed`.
 
         Returns
         -------
@@ -187,6 +184,9 @@ class Store:
                 f"INSERT OR REPLACE INTO runs ({', '.join(columns)}) VALUES ({_marks(columns)})",
                 [values[column] for column in columns],
             )
+            self._connection.execute("DELETE FROM plans WHERE key = ?", (key,))
+            if plan is not None:
+                self._connection.execute("INSERT INTO plans VALUES (?, ?)", (key, plan))
             self._connection.execute("DELETE FROM leases WHERE key = ?", (key,))
         return True
 
