@@ -20,6 +20,7 @@ from alloc.cli.commands import (
     methods,
     pareto,
     plot,
+    report,
     schema,
     solve,
     validate,
@@ -53,6 +54,7 @@ app = typer.Typer(
 COMMANDS = (
     solve,
     compare,
+    report,
     pareto,
     whatif,
     evaluate,

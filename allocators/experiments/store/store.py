@@ -196,11 +196,11 @@ class Store:
         columns = ", ".join(("key", *RUN, *ENDING))
         with explained(self.path):
             if keys is None:
-                found |= map(_record, self._connection.execute(f"SELECT {columns} FROM runs"))
+                found |= map(record_of, self._connection.execute(f"SELECT {columns} FROM runs"))
             for start in range(0, len(keys or ()), MOST_KEYS):
                 part = (keys or ())[start : start + MOST_KEYS]
                 rows = self._connection.execute(f"SELECT {columns} FROM runs WHERE key IN ({_marks(part)})", part)
-                found |= map(_record, rows)
+                found |= map(record_of, rows)
         return found
 
     def settings(self) -> dict[tuple[object, ...], int]:
@@ -265,7 +265,8 @@ def _marks(values: Collection[str]) -> str:
     return ", ".join("?" * len(values))
 
 
-def _record(row: tuple[object, ...]) -> tuple[str, Record]:
+def record_of(row: tuple[object, ...]) -> tuple[str, Record]:
+    """Return the key and the run in a row of the columns ``key``, `RUN` and `ENDING`."""
     run = Run(**dict(zip(RUN, row[1:], strict=False)))  # type: ignore[arg-type]
     values = dict(zip(ENDING, row[1 + len(RUN) :], strict=True))
     values["outcome"] = Outcome(str(values["outcome"]))
