@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from alloc.allocators.exact.milp import Milp
     from alloc.allocators.experiments.differences import Interval, PolicyDifference, paired_differences
     from alloc.allocators.experiments.policies import PolicyRow, compare_policies
+    from alloc.allocators.experiments.report.page.page import report_html
     from alloc.allocators.heuristic.decentralised.auction import Auction
     from alloc.allocators.heuristic.decentralised.hedonic import Hedonic
     from alloc.allocators.heuristic.genetic.algorithm import GeneticAlgorithm
@@ -116,6 +117,7 @@ __all__ = [
     "policy_names",
     "read_result",
     "reasons_of_moves",
+    "report_html",
     "simulate",
     "solve",
     "train",
@@ -150,6 +152,7 @@ _LAZY = {
     "describe_policy": "alloc.allocators.online.registry",
     "load_policy": "alloc.allocators.online.registry",
     "policy_names": "alloc.allocators.online.registry",
+    "report_html": "alloc.allocators.experiments.report.page.page",
     "simulate": "alloc.allocators.online.run",
 }
 """Module of each public name that is imported on first use."""

@@ -11,20 +11,18 @@ from typing import NoReturn
 import typer
 
 from alloc.cli.commands import (
-    compare,
     convert,
     evaluate,
     export,
     generate,
     import_,
     methods,
-    pareto,
     plot,
     schema,
     solve,
     validate,
-    whatif,
 )
+from alloc.cli.commands.experiments import compare, pareto, report, whatif
 from alloc.cli.commands.missions import import_mission, plan, replay, simulate
 from alloc.cli.commands.training import train, tune
 from alloc.cli.options import Parameter, examples, option_of
@@ -53,6 +51,7 @@ app = typer.Typer(
 COMMANDS = (
     solve,
     compare,
+    report,
     pareto,
     whatif,
     evaluate,

@@ -64,7 +64,9 @@ def test_wrong_options_are_one_line(alloc, small, arguments, message):
 
 def test_ctrl_c_saves_the_fleets_so_far(alloc, small, monkeypatch):
     """After Ctrl-C the fleets so far are saved, and it says that they are not all."""
-    monkeypatch.setattr("alloc.cli.commands.whatif._show_fleet", lambda fleet: signal.raise_signal(signal.SIGINT))
+    monkeypatch.setattr(
+        "alloc.cli.commands.experiments.whatif._show_fleet", lambda fleet: signal.raise_signal(signal.SIGINT)
+    )
     ran = alloc("whatif", "small.json", "--add", "like a1", "--up-to", "4", "--method", "milp", "--output", "f.json")
     assert ran.code == 0
     found = json.loads(Path("f.json").read_text())

@@ -76,7 +76,9 @@ def test_broken_fronts_are_told(alloc, small, text, words):
 
 def test_ctrl_c_saves_the_front_so_far(alloc, small, monkeypatch):
     """After Ctrl-C the front so far is saved, and says that it is not complete."""
-    monkeypatch.setattr("alloc.cli.commands.pareto._show_point", lambda result: signal.raise_signal(signal.SIGINT))
+    monkeypatch.setattr(
+        "alloc.cli.commands.experiments.pareto._show_point", lambda result: signal.raise_signal(signal.SIGINT)
+    )
     ran = alloc("pareto", "small.json", "--method", "milp", "--output", "front.json")
     assert ran.code == 0
     front = json.loads(Path("front.json").read_text())
