@@ -25,6 +25,7 @@ from alloc.cli.commands import (
     validate,
     whatif,
 )
+from alloc.cli.commands.experiments import reproduce
 from alloc.cli.commands.missions import import_mission, plan, replay, simulate
 from alloc.cli.commands.training import train, tune
 from alloc.cli.options import Parameter, examples, option_of
@@ -70,6 +71,7 @@ COMMANDS = (
     methods,
     train,
     tune,
+    reproduce,
 )
 for module in COMMANDS:
     module.register(app)
