@@ -26,6 +26,9 @@ from alloc.allocators.experiments.reproduction.summary import (
 from alloc.allocators.experiments.statistics import holm, interval
 from alloc.problems.text import counted
 
+GAIN = 0.01
+"""p-value, corrected by Holm's procedure, below which the population is said to bring something."""
+
 
 def page(learned: Sequence[Learned], solved: Sequence[Solved], environments: Sequence[dict[str, str]]) -> str:
     """Return the page in Markdown."""
@@ -42,6 +45,7 @@ def page(learned: Sequence[Learned], solved: Sequence[Solved], environments: Seq
         "![Battery left](reproduction/figure-6.png)",
         "## Equal decisions",
         _tests(rows),
+        _population(rows),
         "## The four scenarios",
         _scenarios(rows),
         "Battery is that of the episode, where every hop is flown; a mean over the runs, as are hops per agent.",
@@ -144,6 +148,28 @@ def _tests(rows: Sequence[Learned]) -> str:
         )
     header = ["method", "runs", "final T", "less `ppo`'s", "best of 8 drawn", "less `ppo`'s"]
     return _table([*header, "iterations to T = 1.05", "unserved", "decisions"], lines)
+
+
+def _population(rows: Sequence[Learned]) -> str:
+    """Say whether the population of GAPPO brings anything: in the final T, and in the best of several drawn games."""
+    own = of_scenario(rows, TESTS)
+    pairs = {
+        "final T against one member": effect(own, "gappo", "gappo-single", final("makespan")),
+        "against `ppo`": effect(own, "gappo", "ppo", final("makespan")),
+        "best of 8 drawn games against one member": effect(own, "gappo", "gappo-single", final("drawn")),
+        "against `ppo`, best of 8": effect(own, "gappo", "ppo", final("drawn")),
+    }
+    known = {name: one for name, one in pairs.items() if one is not None}
+    corrected = holm([one.p for one in known.values()])
+    gains = [
+        name
+        for (name, one), p in zip(known.items(), corrected, strict=True)
+        if one.mean < 0 and p is not None and p < GAIN
+    ]
+    figures = "; ".join(f"{name} {told(one, '+.4f')}" for name, one in known.items())
+    if gains:
+        return f"**The population brings something** ({', '.join(gains)}; p < {GAIN} after Holm): {figures}."
+    return f"**Nothing is shown to come of the population** (no p < {GAIN} after Holm): {figures or 'no runs'}."
 
 
 def _scenarios(rows: Sequence[Learned]) -> str:
