@@ -124,7 +124,7 @@ def read(path: Path, kind: type[Row]) -> list[Row]:
         raise InputError(f"must have the columns {', '.join(names)}", source=str(path))
     kinds = [field.type for field in fields(kind)]
     return [
-        kind(*(form(cell) for form, cell in zip(kinds, line, strict=True)))  # type: ignore[operator, misc]
+        kind(*(form(cell) for form, cell in zip(kinds, line, strict=True)))  # type: ignore[operator]
         for line in lines
         if len(line) == len(names)
     ]

@@ -21,7 +21,7 @@ from torch import Tensor
 from alloc.allocators.learned.algorithms.gappo import fitness, offspring
 from alloc.allocators.learned.algorithms.hyperparameters import BreedingParameters, GappoParameters, PpoParameters
 from alloc.allocators.learned.algorithms.ppo import Ppo, Update
-from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize
+from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize, uninitialised
 from alloc.allocators.learned.network.state_dict import StateDict
 from alloc.problems.game import Board, Rules
 
@@ -97,7 +97,7 @@ class GeneticPpo(Ppo):
         copies = []
         for member in range(self.population.genes):
             self.genes.express(member)
-            one = ActorCritic(self.network.size)
+            one = uninitialised(self.network.size)
             one.load_state_dict(self.network.state_dict())
             copies.append(one)
         self.genes.express(0)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from alloc.cli.options import examples
-from alloc.cli.output.console import INTERRUPTED, is_terminal, note, say
+from alloc.cli.output.console import is_terminal, note, say
 from alloc.problems.text import counted
 
 if TYPE_CHECKING:
@@ -68,11 +68,12 @@ def reproduce_command(
         length = iterations or (QUICK_ITERATIONS if quick else 300)
         wanted = planned(runs or (QUICK_RUNS if quick else 100), _methods(methods), length, time_limit)
         finished = _made(place, wanted, workers)
-    place.publish()
-    say(f"{place.page}: {counted(len({(row.run, row.method) for row in place.learned}), 'training')}")
+    if finished or place.learned:
+        place.publish()
+        say(f"{place.page}: {counted(len({(row.run, row.method) for row in place.learned}), 'training')}")
     if not finished:
         note("interrupted; the same command goes on from here")
-        raise typer.Exit(INTERRUPTED)
+        raise typer.Exit(1)
 
 
 def _methods(names: str | None) -> tuple[str, ...]:
