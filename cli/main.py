@@ -22,7 +22,7 @@ from alloc.cli.commands import (
     solve,
     validate,
 )
-from alloc.cli.commands.experiments import compare, pareto, report, whatif
+from alloc.cli.commands.experiments import compare, pareto, report, reproduce, whatif
 from alloc.cli.commands.missions import import_mission, plan, replay, simulate
 from alloc.cli.commands.training import train, tune
 from alloc.cli.options import Parameter, examples, option_of
@@ -69,6 +69,7 @@ COMMANDS = (
     methods,
     train,
     tune,
+    reproduce,
 )
 for module in COMMANDS:
     module.register(app)
