@@ -6,6 +6,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext
+from dataclasses import replace
 
 import numpy as np
 
@@ -107,7 +108,7 @@ def solve(
     handle_signals : bool
         Whether SIGINT and SIGTERM end the run as the time limit does, when called from the main thread.
     parameters : object, optional
-        Parameters of a method that is given by name, as its class describes them.
+        Parameters of a method that is given by name: those that its class describes, or a mapping by name.
     **settings
         Single parameters of a method that is given by name, such as ``population`` of ``ga`` or ``policy`` of
         ``gappo``; see `method_parameters`.
@@ -148,7 +149,7 @@ def solve(
     allocator, notes, spent_s = _prepared(method, request, parameters, settings)
     with ended_with_process(request.stop.set), signals_set(request.stop) if handle_signals else nullcontext():
         result = _run(allocator, request, [*notes, *carried_notes], spent_s)
-    return concluded(result, plan_in_force)
+    return concluded(replace(result, parameters=allocator.changed_parameters()), plan_in_force)
 
 
 def _prepared(

@@ -10,6 +10,7 @@ import numpy as np
 
 from alloc.allocators.contract.base import Allocator
 from alloc.allocators.contract.budget import Budget, StopReason
+from alloc.allocators.contract.parameters import labelled_method
 from alloc.allocators.contract.tolerance import relative_gap
 from alloc.allocators.registry import load
 from alloc.allocators.request import checked_objective, checked_seed, checked_threads
@@ -106,8 +107,9 @@ def compare(
     ----------
     instances : iterable of Instance
     methods : sequence or dict
-        Names, each of which is loaded once, and allocators with their own parameters. The keys of a dict name the
-        methods in the rows: ``{"small": GeneticAlgorithm(population=20), "large": GeneticAlgorithm(population=200)}``.
+        Names, each of which is loaded once, and allocators with their own parameters, which the rows call such as
+        ``ga[population=20]``. The keys of a dict are names of one's own for the rows:
+        ``{"small": GeneticAlgorithm(population=20), "large": GeneticAlgorithm(population=200)}``.
     seeds : sequence of int
     objective, time_limit_s, iterations, target_gap, threads
         As in `solve`; the budget is that of each single run.
@@ -148,10 +150,17 @@ def _labelled(methods: Methods) -> dict[str, str | Allocator]:
     if isinstance(methods, Mapping):
         return {str(label): _method(method) for label, method in methods.items()}
     given = [_method(method) for method in listed(methods, "methods", "methods")]
-    labelled = {method if isinstance(method, str) else method.method.name: method for method in given}
+    labelled = {method if isinstance(method, str) else _label(method): method for method in given}
     if len(labelled) < len({method if isinstance(method, str) else id(method) for method in given}):
-        raise InputError("has several allocators of one method; give a dict with a name for each", "methods")
+        raise InputError(
+            "has several allocators of one method with the same parameters; give a dict with a name for each", "methods"
+        )
     return labelled
+
+
+def _label(method: Allocator) -> str:
+    """Return what an allocator is called in the rows, such as ``ga[population=20]``."""
+    return labelled_method(method.method.name, method.changed_parameters())
 
 
 def _method(given: object) -> str | Allocator:
