@@ -22,6 +22,7 @@ from alloc.allocators.registry import TARGETS, describe, describe_parameters, lo
 from alloc.allocators.replanning.moves import Moves
 from alloc.allocators.replanning.reasons import reasons_of_moves
 from alloc.allocators.result import Result, read_result
+from alloc.allocators.serving.asynchronous import solve_async
 from alloc.allocators.solve import solve
 from alloc.problems import AllocError, InputError, MissingPackageError, RefusedError, TrainingError
 
@@ -121,6 +122,7 @@ __all__ = [
     "reasons_of_moves",
     "simulate",
     "solve",
+    "solve_async",
     "train",
     "whatif",
     "write_result",

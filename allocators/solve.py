@@ -34,7 +34,7 @@ from alloc.allocators.request import (
     default_threads,
 )
 from alloc.allocators.result import Result
-from alloc.allocators.runtime.interrupts import ended_with_process, signals_set
+from alloc.allocators.runtime.interrupts import ended_with_process, require_wanted, signals_set
 from alloc.problems import InputError, Instance, Objective, find_shortage, serve_all
 from alloc.problems.allocation import CarriedOver
 from alloc.problems.arguments import choice, event, flag, function, of_type, real
@@ -239,19 +239,21 @@ def _run(allocator: Allocator, request: Request, notes: list[str], spent_s: floa
         stop=request.stop,
         spent_s=spent_s + time.monotonic() - begin,
     )
+    require_wanted(request.stop)
     decomposition = None if shortage is None else Decomposition(search, shortage, request)
     part = search if decomposition is None else decomposition.rest
-    proposal, stop_reason = (Proposal(), None) if part is None else _propose(allocator, part)
+    proposal, stop_reason = (Proposal(), None) if part is None else _propose(allocator, part, request.stop)
     if decomposition is not None:
         decomposition.conclude()
     return conclude(search, decomposition, allocator.method.name, proposal, stop_reason, notes, pinned=request.pinned)
 
 
-def _propose(allocator: Allocator, search: Search) -> tuple[Proposal, StopReason | None]:
+def _propose(allocator: Allocator, search: Search, stop: threading.Event) -> tuple[Proposal, StopReason | None]:
     """Let the method run, submit its answer, and serve what it left unserved; return also why it stopped."""
     if search.budget.target_gap is not None and not allocator.method.proves:
         raise_bound_before(search)
     proposal = allocator.allocate(search)
+    require_wanted(stop)
     stop_reason = search.stop_reason()
     if proposal.allocation is not None:
         search.submit(proposal.allocation)
@@ -269,4 +271,5 @@ def _propose(allocator: Allocator, search: Search) -> tuple[Proposal, StopReason
 
         with search.improving("looking for what slack saves"):
             note_saving(search)
+    require_wanted(stop)
     return proposal, stop_reason

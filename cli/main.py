@@ -26,6 +26,7 @@ from alloc.cli.commands import (
     whatif,
 )
 from alloc.cli.commands.missions import import_mission, plan, replay, simulate
+from alloc.cli.commands.serving import serve
 from alloc.cli.commands.training import train, tune
 from alloc.cli.options import Parameter, examples, option_of
 from alloc.cli.output.console import INTERRUPTED, complain, flush, interrupted, write_out
@@ -66,6 +67,7 @@ COMMANDS = (
     simulate,
     replay,
     plan,
+    serve,
     schema,
     methods,
     train,
