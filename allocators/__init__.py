@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from alloc.allocators.contract.base import Allocator, Proposal
 from alloc.allocators.contract.budget import Budget, StopReason
+from alloc.allocators.contract.described import Parameter
 from alloc.allocators.contract.improvement import Improvement, TracePoint
 from alloc.allocators.contract.method import Kind, Method
 from alloc.allocators.contract.search import Search
@@ -17,10 +18,11 @@ from alloc.allocators.experiments.compare import Row, compare
 from alloc.allocators.experiments.whatif import Fleet, WhatIf, whatif
 from alloc.allocators.explain import Bottleneck, explain
 from alloc.allocators.pareto import Front, pareto
-from alloc.allocators.registry import TARGETS, describe, load, method_parameters, names
+from alloc.allocators.registry import TARGETS, describe, describe_parameters, load, method_parameters, names
 from alloc.allocators.replanning.moves import Moves
 from alloc.allocators.replanning.reasons import reasons_of_moves
 from alloc.allocators.result import Result, read_result
+from alloc.allocators.serving.asynchronous import solve_async
 from alloc.allocators.solve import solve
 from alloc.problems import AllocError, InputError, MissingPackageError, RefusedError, TrainingError
 
@@ -81,6 +83,7 @@ __all__ = [
     "MissionRun",
     "Moves",
     "OrderChange",
+    "Parameter",
     "Plan",
     "Policy",
     "PolicyDifference",
@@ -103,6 +106,7 @@ __all__ = [
     "compare",
     "compare_policies",
     "describe",
+    "describe_parameters",
     "describe_policy",
     "explain",
     "load",
@@ -120,6 +124,7 @@ __all__ = [
     "report_html",
     "simulate",
     "solve",
+    "solve_async",
     "train",
     "whatif",
     "write_result",

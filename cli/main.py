@@ -24,6 +24,7 @@ from alloc.cli.commands import (
 )
 from alloc.cli.commands.experiments import compare, pareto, report, reproduce, whatif
 from alloc.cli.commands.missions import import_mission, plan, replay, simulate
+from alloc.cli.commands.serving import serve
 from alloc.cli.commands.training import train, tune
 from alloc.cli.options import Parameter, examples, option_of
 from alloc.cli.output.console import INTERRUPTED, complain, flush, interrupted, write_out
@@ -65,6 +66,7 @@ COMMANDS = (
     simulate,
     replay,
     plan,
+    serve,
     schema,
     methods,
     train,

@@ -2,8 +2,8 @@
 
 HEAD = """# The paper's experiments, made anew
 
-Section 4 of the paper ([what we made of it](paper/paper.md)) has five learning methods in four scenarios, convergence in
-figures 2 to 5, and the battery left in figure 6. This page repeats it: every method learns from nothing, with the
+Section 4 of the paper ([what we made of it](paper/paper.md)) has five learning methods in four scenarios, convergence
+in figures 2 to 5, and the battery left in figure 6. This page repeats it: every method learns from nothing, with the
 same network, first weights, games, number of decisions and number of tuning trials. It is about learning with small
 budgets; how good the trained methods that ship are is in [gappo.md](methods/gappo.md). All of it is made by one command
 from rows that lie beside the page.

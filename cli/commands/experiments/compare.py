@@ -1,6 +1,5 @@
 """``alloc compare``."""
 
-import re
 import threading
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated
@@ -9,8 +8,8 @@ import typer
 
 from alloc.cli import options
 from alloc.cli.commands.experiments import options as kept
-from alloc.cli.commands.missions.compare import compare_missions
-from alloc.cli.options import BETWEEN_SETTINGS, examples
+from alloc.cli.commands.experiments.missions import compare_missions
+from alloc.cli.options import examples
 from alloc.cli.output.console import note, say, table
 from alloc.cli.output.files import check_outputs
 from alloc.cli.output.rows import show_done, write_rows
@@ -32,9 +31,6 @@ EXAMPLES = examples(
     closing="A method or policy that refuses has a row with the reason. Ctrl-C prints the finished rows, with exit "
     "code 1.",
 )
-
-BETWEEN_METHODS = re.compile(r",(?![^\[]*\])")
-"""A comma outside of brackets."""
 
 MethodsOption = Annotated[
     str | None,
@@ -117,7 +113,7 @@ def compare_command(
     _check_kind(methods, policies, of_methods, {"--knowledge": knowledge, "--deadline-ms": deadline_ms})
     numbers = _seeds(seeds)
     if policies is not None:
-        listed = _listed(policies, "--policies")
+        listed = options.listed(policies, "--policies")
         asked_of = (instances, listed, numbers, knowledge, deadline_ms or None, csv)
         raise typer.Exit(compare_missions(keeping, *asked_of, json=json))
     assert methods is not None
@@ -159,7 +155,9 @@ def _compare_in_store(
     from alloc.problems.formats import is_standard_output
     from alloc.problems.units import common_units
 
-    variants = {label: (name, settings or {}) for label, (name, settings) in _listed(methods, "--methods").items()}
+    variants = {
+        label: (name, settings or {}) for label, (name, settings) in options.listed(methods, "--methods").items()
+    }
     found, rows = compare_in_store(keeping, files, variants, seeds, objective.value, budget, threads)
     units = common_units([one.units for one in found.comparison.instances if isinstance(one, Instance)])
     _write(rows, csv, units, json=json)
@@ -209,28 +207,12 @@ def _compare(
     return 0 if complete and served else 1
 
 
-def _listed(text: str, option: str) -> dict[str, tuple[str, dict[str, object] | None]]:
-    """Return names and, where there are brackets, parameters of methods or policies, by how they are written."""
-    found: dict[str, tuple[str, dict[str, object] | None]] = {}
-    for label in dict.fromkeys(part.strip() for part in BETWEEN_METHODS.split(text) if part.strip()):
-        name, bracket, settings = label.partition("[")
-        if bracket and not settings.endswith("]"):
-            raise typer.BadParameter(f"{label!r} must be like ga[population=200]", param_hint=f"'{option}'")
-        found[label] = (name, options.values(BETWEEN_SETTINGS.split(settings[:-1])) if bracket else None)
-    if not found:
-        see = "see `alloc methods`" if option == "--methods" else f"such as {', '.join(options.BUILT_IN_POLICIES)}"
-        raise typer.BadParameter(
-            f"names no {'method' if option == '--methods' else 'policy'}; {see}", param_hint=f"'{option}'"
-        )
-    return found
-
-
 def _methods(text: str) -> "dict[str, str | Allocator]":
     """Return the methods by how they are written; those with parameters in brackets are loaded with them."""
     from alloc.allocators import describe, load
 
     found: dict[str, str | Allocator] = {}
-    for label, (name, settings) in _listed(text, "--methods").items():
+    for label, (name, settings) in options.listed(text, "--methods").items():
         if name != "auto":
             describe(name)
         found[label] = name if settings is None else load(name, **settings)
