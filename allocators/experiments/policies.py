@@ -10,7 +10,8 @@ import numpy as np
 
 from alloc.allocators.online.contract import Policy
 from alloc.allocators.online.registry import load_policy
-from alloc.allocators.online.run import MissionRun, simulate
+from alloc.allocators.online.run import MissionRun, simulate_until
+from alloc.allocators.runtime.interrupts import run_native
 from alloc.problems import MissingPackageError, Mission, MissionResult, RefusedError
 from alloc.problems.arguments import choice, event, listed, of_type, real, whole
 from alloc.problems.errors import InputError
@@ -113,7 +114,7 @@ def compare_policies(
     knowledge, deadline_ms
         As in `simulate`.
     stop : threading.Event, optional
-        Setting it ends the comparison after the run in progress.
+        Setting it ends the comparison; of the run in progress there is no row.
 
     Returns
     -------
@@ -132,7 +133,8 @@ def compare_policies(
     stop = event(stop, "stop") or threading.Event()
     known = None if knowledge is None else choice(Knowledge, knowledge, "knowledge")
     deadline = None if deadline_ms is None else real(deadline_ms, "deadline_ms", above=True)
-    return _rows(partial(simulate, knowledge=known, deadline_ms=deadline), problems, loaded, numbers, stop)
+    run = partial(_run, stop, knowledge=known, deadline_ms=deadline)
+    return _rows(run, problems, loaded, numbers, stop)
 
 
 def _labelled(policies: Policies) -> dict[str, str | Policy]:
@@ -162,8 +164,23 @@ def _loaded(policy: str | Policy) -> Policy | MissingPackageError:
         return error
 
 
+def _run(
+    stop: threading.Event,
+    mission: Mission,
+    policy: Policy,
+    *,
+    knowledge: Knowledge | None,
+    deadline_ms: float | None,
+    seed: int,
+) -> MissionRun | None:
+    """Simulate a mission, on another thread as a decision cannot be stopped; return None if there was a stop."""
+    ended = threading.Event()
+    run = partial(simulate_until, ended.is_set, mission, policy, knowledge, seed, deadline_ms)
+    return run_native(run, stop.is_set, ended.set)
+
+
 def _rows(
-    run: Callable[..., MissionRun],
+    run: Callable[..., MissionRun | None],
     missions: Iterable[Mission],
     policies: Mapping[str, Policy | MissingPackageError],
     seeds: Sequence[int],
@@ -185,7 +202,7 @@ def _rows(
 
 
 def _run_seeds(
-    run: Callable[..., MissionRun], seeds: Sequence[int], stop: threading.Event
+    run: Callable[..., MissionRun | None], seeds: Sequence[int], stop: threading.Event
 ) -> tuple[list[MissionResult], str]:
     """Return the results of all seeds up to a stop, or why there are none."""
     results: list[MissionResult] = []
@@ -193,12 +210,15 @@ def _run_seeds(
         if stop.is_set():
             break
         try:
-            results.append(run(seed=seed).result)
+            found = run(seed=seed)
         except RefusedError as error:
             return [], str(error)
         except Exception as error:  # the figures of the other policies do not depend on a faulty plugin
             LOG.warning("a run failed with seed %s", seed, exc_info=error)
             return [], f"failed with seed {seed}: {type(error).__name__}: {error}"
+        if found is None:
+            break
+        results.append(found.result)
     return results, ""
 
 
