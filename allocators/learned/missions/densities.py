@@ -8,15 +8,15 @@ from alloc.allocators.learned.missions import feature_names as names
 from alloc.allocators.learned.missions import situation as known
 from alloc.allocators.learned.missions.network_arrays import Singles
 from alloc.allocators.learned.missions.situation import Situation
-from alloc.allocators.runtime.compiled import compiled
+from alloc.allocators.runtime.compiled import compiled_in_place
 from alloc.problems.fields import IntArray
 
 NOT_AS_FAR = 1 - 1e-9
 """Factor on a squared distance below which another is nearer: agents at one place are equally far, however rounded."""
 
 
-@compiled
-def fill_densities(situation: Situation, choice: IntArray, tasks: int, others: IntArray, options: Singles) -> None:
+@compiled_in_place
+def fill_densities(situation: Situation, choice: IntArray, tasks: int, options: Singles) -> None:
     """Fill in what comes after each task, who is nearer, how far it is beside others, and the products.
 
     Parameters
@@ -25,8 +25,6 @@ def fill_densities(situation: Situation, choice: IntArray, tasks: int, others: I
     choice : ndarray of int
         Task of each option; the first `tasks` are tasks.
     tasks : int
-    others : ndarray of int, shape (m,)
-        Others at each task or on their way.
     options : ndarray, shape (options, FEATURES)
         With all other features filled in.
     """
@@ -35,28 +33,22 @@ def fill_densities(situation: Situation, choice: IntArray, tasks: int, others: I
         mean += options[row, names.TRAVEL] / np.float32(tasks)
     for row in range(tasks):
         option = options[row]
-        option[names.APART] = apart(situation, choice, tasks, others, row)
+        option[names.APART] = apart(situation, choice, tasks, row)
         option[names.NEARER] = nearer(situation, choice[row])
         travel = option[names.TRAVEL]
         option[names.FARNESS] = travel / (travel + mean) if travel > 0 else 0.0
     for row in range(len(options)):
         option = options[row]
-        ahead, per_agent = option[names.WORK_AHEAD], option[names.TASKS_PER_AGENT]
-        option[names.TRAVEL_AHEAD] = option[names.TRAVEL] * ahead
-        option[names.WITH_ME_AHEAD] = option[names.WITH_ME] * ahead
-        option[names.SHARE_AHEAD] = option[names.SHARE] * ahead
-        option[names.GAIN_AHEAD] = option[names.GAIN] * ahead
-        option[names.WORK_SHARE_AHEAD] = option[names.WORK] * ahead
-        option[names.ORDER_AHEAD] = option[names.IS_ORDER] * ahead
-        option[names.OTHERS_PER_AGENT] = option[names.OTHERS] * per_agent
-        option[names.RIVALS_PER_AGENT] = option[names.RIVALS] * per_agent
-        option[names.EXPLORES_PER_AGENT] = option[names.EXPLORES] * per_agent
+        option[names.SHARE_AHEAD] = option[names.SHARE] * option[names.WORK_AHEAD]
+        option[names.GAIN_AHEAD] = option[names.GAIN] * option[names.WORK_AHEAD]
+        option[names.OTHERS_PER_AGENT] = option[names.OTHERS] * option[names.TASKS_PER_AGENT]
 
 
-@compiled
-def apart(situation: Situation, choice: IntArray, tasks: int, others: IntArray, row: int) -> float:
+@compiled_in_place
+def apart(situation: Situation, choice: IntArray, tasks: int, row: int) -> float:
     """Return how far the next task is that nobody does, in spans; 1 where there is none."""
-    task, span, least = situation.task, situation.own[known.SPAN], np.inf
+    task, others = situation.task, situation.coming.others
+    span, least = situation.own[known.SPAN], np.inf
     j = choice[row]
     x, y, z = task[known.TASK_X, j], task[known.TASK_Y, j], task[known.TASK_Z, j]
     for place in range(tasks):
@@ -67,7 +59,7 @@ def apart(situation: Situation, choice: IntArray, tasks: int, others: IntArray, 
     return min(1.0, math.sqrt(least) / span) if least < np.inf and span > 0 else 1.0
 
 
-@compiled
+@compiled_in_place
 def nearer(situation: Situation, j: int) -> float:
     """Return the share of others that are nearer to a task than the agent, as far as it knows."""
     task, other, distance = situation.task, situation.other, situation.task[known.DISTANCE, j]

@@ -1,13 +1,13 @@
 """When an agent sends: every radio period, or seldom, and then sooner where it has news; compiled."""
 
-from alloc.allocators.runtime.compiled import compiled
+from alloc.allocators.runtime.compiled import compiled_in_place
 from alloc.problems.fields import IntArray
 
 MOST_SAVED = 3
 """Messages for which an agent saves up periods at the most."""
 
 
-@compiled
+@compiled_in_place
 def is_to_send(periods: int, saved: IntArray, counted: IntArray, news: IntArray, row: int, tick: int) -> bool:
     """Whether an agent sends now; what is remembered of that is brought up to date.
 

@@ -9,11 +9,11 @@ from alloc.allocators.learned.missions.play import Room
 from alloc.allocators.learned.missions.situation import fill_own, fill_tasks
 from alloc.allocators.missions.layout import IDLE, NOBODY, WORKING, MissionArrays
 from alloc.allocators.online.compiled.notes import AMOUNT, HOUR, Notes, take_newer
-from alloc.allocators.runtime.compiled import compiled
+from alloc.allocators.runtime.compiled import compiled_in_place
 from alloc.problems.fields import FloatArray, IntArray
 
 
-@compiled
+@compiled_in_place
 def bid(state: MissionArrays, number: int, room: Room, parameters: FloatArray, notes: Notes, rank: IntArray) -> int:
     """Return the task for which an agent bids, -1 for none.
 
@@ -56,7 +56,7 @@ def bid(state: MissionArrays, number: int, room: Room, parameters: FloatArray, n
     return best
 
 
-@compiled
+@compiled_in_place
 def count_seats(state: MissionArrays, number: int, bids: FloatArray, factor: float) -> int:
     """Return the seats of a task; bids of those who were seen to go elsewhere since are forgotten."""
     row, agents, tasks, n = state.agents[number].known, 0, 0, len(state.agents)
@@ -71,7 +71,7 @@ def count_seats(state: MissionArrays, number: int, bids: FloatArray, factor: flo
     return max(1, int(np.ceil(factor * agents / max(1, tasks))))
 
 
-@compiled
+@compiled_in_place
 def is_outbid(
     bids: FloatArray, number: int, task: int, amount: float, hour: float, memory: float, seats: int, rank: IntArray
 ) -> bool:

@@ -5,14 +5,14 @@ import numpy as np
 from alloc.allocators.learned.missions.play import Room
 from alloc.allocators.missions.chance import first_key, fraction, keyed
 from alloc.allocators.missions.layout import NOBODY, MissionArrays
-from alloc.allocators.online.compiled.notes import Notes, precedes
+from alloc.allocators.online.compiled.notes import Notes, copy, precedes
 from alloc.allocators.online.compiled.utility import best_task, fill_with
 from alloc.allocators.online.policies.hedonic import STAMP
-from alloc.allocators.runtime.compiled import compiled
+from alloc.allocators.runtime.compiled import compiled_in_place
 from alloc.problems.fields import FloatArray, IntArray
 
 
-@compiled
+@compiled_in_place
 def join(
     state: MissionArrays, number: int, room: Room, parameters: FloatArray, notes: Notes, seed: int, moves: IntArray
 ) -> int:
@@ -20,7 +20,7 @@ def join(
     partition, heard, n = notes.own[number], notes.heard[number], len(notes.own)
     row = state.agents[number].known
     if precedes(heard, partition):
-        partition[:] = heard
+        copy(heard, partition)
     heard[n:] = -np.inf
     for i in range(n):
         task = int(partition[i])

@@ -17,7 +17,7 @@ from alloc.allocators.online.compiled.hedonic import join
 from alloc.allocators.online.compiled.looking import look_around
 from alloc.allocators.online.compiled.notes import BIDS, PARTITION, Notes, hear, notes_for, send
 from alloc.allocators.online.compiled.utility import best_task, fill_with
-from alloc.allocators.runtime.compiled import compiled
+from alloc.allocators.runtime.compiled import compiled_in_place
 from alloc.problems.fields import FloatArray, IntArray
 from alloc.problems.missions.chance import EXPLORING
 
@@ -29,15 +29,16 @@ NOTES = (0, 0, PARTITION, BIDS)
 
 
 class Memory(NamedTuple):
-    """What agents remember: notes, how many chances and changes there were, and the order of their ids."""
+    """What agents remember: notes, how many chances and changes there were, and the order of their ids; and nothing."""
 
     notes: Notes
     drawn: IntArray
     moves: IntArray
     rank: IntArray
+    none: FloatArray
 
 
-@compiled
+@compiled_in_place
 def nearest(state: MissionArrays, number: int, room: Room) -> int:
     """Return the nearest task, -1 for none."""
     fill_own(state, number, room.situation.own)
@@ -49,13 +50,13 @@ def nearest(state: MissionArrays, number: int, room: Room) -> int:
     return best
 
 
-@compiled
+@compiled_in_place
 def choose(
     state: MissionArrays, number: int, room: Room, leader: int, parameters: FloatArray, memory: Memory, seed: int
 ) -> int:
     """Return the task that an agent is to go to, -1 for none."""
     if leader == GREEDY:
-        fill_with(state, number, room.situation, parameters[1], np.zeros(0))
+        fill_with(state, number, room.situation, parameters[1], memory.none)
         return best_task(room, int(room.situation.own[known.TARGET]), parameters)
     if leader == HEDONIC:
         return join(state, number, room, parameters, memory.notes, seed, memory.moves)
@@ -64,7 +65,7 @@ def choose(
     return nearest(state, number, room)
 
 
-@compiled
+@compiled_in_place
 def lead(
     state: MissionArrays, room: Room, leader: int, kind: int, parameters: FloatArray, memory: Memory, seed: int
 ) -> None:
@@ -110,6 +111,6 @@ def led(arrays: MissionArrays, policy: str, parameters: FloatArray, seed: int, r
     state, leader = begun(arrays, seed), NAMES.index(policy)
     n, m, slots = len(state.agents), len(state.tasks), len(state.heard)
     none = np.zeros(n, np.intp)
-    memory = Memory(notes_for(NOTES[leader], n, slots), none, none.copy(), rank)
+    memory = Memory(notes_for(NOTES[leader], n, slots), none, none.copy(), rank, np.zeros(0))
     lead(state, room_for(n, m), leader, NOTES[leader], parameters, memory, seed)
     return state

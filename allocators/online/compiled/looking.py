@@ -7,11 +7,19 @@ from alloc.allocators.missions.layout import NOBODY, STAY, TO_PLACE, TO_TASK, Mi
 from alloc.allocators.missions.motion import battery_of, can_fly, distance_between, place_of
 from alloc.allocators.missions.orders import order
 from alloc.allocators.online.policies.exploring import BATTERY_SHARE, TRIES
-from alloc.allocators.runtime.compiled import compiled
-from alloc.problems.fields import IntArray
+from alloc.allocators.runtime.compiled import compiled_in_place
+from alloc.problems.fields import FloatArray, IntArray
 
 
-@compiled
+@compiled_in_place
+def draw(area: FloatArray, axis: int, number: int, key: int, drawn: IntArray) -> float:
+    """Return a coordinate at random."""
+    drawn[number] += 1
+    chance = fraction(keyed(keyed(key, number + 1), drawn[number]))
+    return area[0, axis] + (area[1, axis] - area[0, axis]) * chance
+
+
+@compiled_in_place
 def look_around(state: MissionArrays, number: int, key: int, drawn: IntArray) -> None:
     """Send an agent that knows of nothing to do to a random place, as `Explorer` does.
 
@@ -33,13 +41,12 @@ def look_around(state: MissionArrays, number: int, key: int, drawn: IntArray) ->
     if agent.flight != 0 and agent.order != TO_TASK:
         return
     here, battery = place_of(agent, head.hour), battery_of(agent, head.hour)
-    at = np.zeros(3)
     for _ in range(TRIES):
-        for axis in range(3):
-            drawn[number] += 1
-            chance = fraction(keyed(keyed(key, number + 1), drawn[number]))
-            at[axis] = state.area[0, axis] + (state.area[1, axis] - state.area[0, axis]) * chance
-        place = (at[0], at[1], at[2])
+        place = (
+            draw(state.area, 0, number, key, drawn),
+            draw(state.area, 1, number, key, drawn),
+            draw(state.area, 2, number, key, drawn),
+        )
         energy = agent.energy_per_distance * distance_between(head.is_manhattan, here, place)
         is_cheap = battery == np.inf or energy <= BATTERY_SHARE * battery
         if is_cheap and can_fly(head.is_manhattan, agent, here, battery, place):

@@ -10,7 +10,7 @@ import numpy as np
 
 from alloc.allocators.missions.channel import is_silent
 from alloc.allocators.missions.layout import IDLE, NOBODY, WORKING, MissionArrays
-from alloc.allocators.runtime.compiled import compiled
+from alloc.allocators.runtime.compiled import compiled_in_place
 from alloc.problems.fields import FloatArray
 from alloc.problems.missions.simulation.reports import BYTES_OF_VALUE
 
@@ -51,13 +51,20 @@ def notes_for(kind: int, n: int, slots: int) -> Notes:
     )
 
 
-@compiled
+@compiled_in_place
+def copy(source: FloatArray, target: FloatArray) -> None:
+    """Copy a row of notes."""
+    for place in range(len(source)):
+        target[place] = source[place]
+
+
+@compiled_in_place
 def precedes(one: FloatArray, other: FloatArray) -> bool:
     """Whether a partition takes precedence over another: more changes, then a higher stamp."""
     return bool(one[-2] > other[-2] or (one[-2] == other[-2] and one[-1] > other[-1]))
 
 
-@compiled
+@compiled_in_place
 def take_newer(bids: FloatArray, told: FloatArray) -> None:
     """Replace bids by those that are newer."""
     n = len(bids) // BIDS
@@ -68,7 +75,7 @@ def take_newer(bids: FloatArray, told: FloatArray) -> None:
                 bids[part * n + i] = told[part * n + i]
 
 
-@compiled
+@compiled_in_place
 def hear(state: MissionArrays, notes: Notes, kind: int) -> None:
     """Let agents hear the notes that have arrived by now."""
     head = state.head[0]
@@ -84,18 +91,20 @@ def hear(state: MissionArrays, notes: Notes, kind: int) -> None:
                 if kind == BIDS:
                     take_newer(notes.heard[number], told)
                 elif precedes(told, notes.heard[number]):
-                    notes.heard[number] = told
+                    copy(told, notes.heard[number])
 
 
-@compiled
+@compiled_in_place
 def send(state: MissionArrays, notes: Notes, kind: int) -> None:
     """Send the notes of all agents with the messages that are sent now."""
     head, n = state.head[0], len(notes.own)
     slot = head.tick % len(notes.hour)
     notes.hour[slot] = head.hour
-    notes.sent[slot] = notes.own
     for number in range(n):
+        copy(notes.own[number], notes.sent[slot, number])
         agent = state.agents[number]
         if IDLE <= agent.status <= WORKING and not (head.silences and is_silent(state, number)):
-            some = (notes.own[number, :n] != NOBODY).sum()
+            some = 0
+            for i in range(n):
+                some += notes.own[number, i] != NOBODY
             agent.bytes += BYTES_OF_VALUE * (4 * some if kind == BIDS else 2 + 2 * some)

@@ -67,7 +67,13 @@ class Tuned:
     missions: int
 
 
-def tune(policy: str, generations: int, seed: int = 0, state: Path | None = None) -> Iterator[Tuned]:
+def tune(
+    policy: str,
+    generations: int,
+    seed: int = 0,
+    state: Path | None = None,
+    setting: MissionTrainingParameters | None = None,
+) -> Iterator[Tuned]:
     """Tune the parameters of a policy, and tell each generation; the one of lowest cost is best.
 
     Parameters
@@ -79,10 +85,12 @@ def tune(policy: str, generations: int, seed: int = 0, state: Path | None = None
         Of all random numbers.
     state : Path, optional
         File from which an interrupted tuning goes on.
+    setting : MissionTrainingParameters, optional
+        Candidates, missions and validations, those of `gappo` by default.
     """
     if policy not in FIRST:
         raise InputError(f"{policy!r} is not to be tuned; {', '.join(FIRST)} are", "policy")
-    setting = MissionTrainingParameters()
+    setting = setting or MissionTrainingParameters()
     fields = dataclasses.fields(load_policy(policy).parameters)
     names, lows = [field.name for field in fields], np.array([field.metadata["low"] for field in fields])
     first = np.log([FIRST[policy][name] for name in names])

@@ -5,16 +5,16 @@ import math
 import numpy as np
 
 from alloc.allocators.learned.missions import situation as known
-from alloc.allocators.learned.missions.options import done_with, expect, in_turn
+from alloc.allocators.learned.missions.options import done_with, expect
 from alloc.allocators.learned.missions.play import Room
 from alloc.allocators.learned.missions.situation import Situation, fill_own, fill_tasks
 from alloc.allocators.missions.layout import NOBODY, WORKING, MissionArrays
 from alloc.allocators.missions.motion import distance_between
-from alloc.allocators.runtime.compiled import compiled
+from alloc.allocators.runtime.compiled import compiled_in_place
 from alloc.problems.fields import FloatArray
 
 
-@compiled
+@compiled_in_place
 def fill_with(state: MissionArrays, number: int, situation: Situation, memory: float, goals: FloatArray) -> None:
     """Fill in what an agent knows, and of others what it heard at most `memory` hours ago.
 
@@ -49,7 +49,7 @@ def fill_with(state: MissionArrays, number: int, situation: Situation, memory: f
             other[known.ARRIVES, i] = -np.inf if is_there else hour + way / agent.speed
 
 
-@compiled
+@compiled_in_place
 def best_task(room: Room, home: int, parameters: FloatArray) -> int:
     """Return the task of highest utility in the situation that is filled in, -1 for none.
 
@@ -63,8 +63,8 @@ def best_task(room: Room, home: int, parameters: FloatArray) -> int:
     """
     stay, _, missed, crowding, flight, age = parameters
     situation = room.situation
-    expect(situation, room.rank, room.others, room.rate, room.without)
-    first, following = in_turn(room.rank, situation.target, len(room.without))
+    expect(situation)
+    others, without = situation.coming.others, situation.coming.without
     own, task, best, highest = situation.own, situation.task, NOBODY, 0.0
     hour = own[known.HOUR]
     for j in range(len(situation.can)):
@@ -73,14 +73,14 @@ def best_task(room: Room, home: int, parameters: FloatArray) -> int:
         is_there = own[known.TARGET] == j and own[known.IS_WORKING] > 0
         arrival = hour + (0.0 if is_there else task[known.DISTANCE, j] / own[known.SPEED])
         left, since = task[known.LEFT, j], task[known.KNOWN_AT, j]
-        if room.others[j] == 0 and not is_there:
+        if others[j] == 0 and not is_there:
             left += task[known.GROWTH, j] * (arrival - since)
-        with_me = done_with(situation, first[j], following, arrival, left, since)
-        if with_me >= room.without[j]:
+        with_me = done_with(situation, j, arrival, left)
+        if with_me >= without[j]:
             continue
         hours = with_me - hour
         value = (1.0 if hours <= 0 else (with_me - arrival) / hours) * (task[known.PRIORITY, j] + 1e-6)
-        value = value / (1 + crowding * room.others[j]) * math.exp(-flight * (arrival - hour) - age * (hour - since))
+        value = value / (1 + crowding * others[j]) * math.exp(-flight * (arrival - hour) - age * (hour - since))
         value *= missed if with_me > task[known.DEADLINE, j] else 1.0
         value *= stay if home == j else 1.0
         if value > highest:

@@ -1,10 +1,12 @@
 """Policies that are no networks in compiled loops, against the reference, and their tuning."""
 
 import math
+from pathlib import Path
 
 import pytest
 
 from alloc.allocators import load_policy, simulate
+from alloc.allocators.learned.missions.training.trainer import MissionTrainingParameters
 from alloc.allocators.online.compiled.run import run_compiled
 from alloc.allocators.online.compiled.tuning import tune
 from alloc.problems import InputError, MissionParameters, random_mission
@@ -55,12 +57,11 @@ def test_policies_without_loops_are_refused() -> None:
         run_compiled(missions()[0], load_policy("idle"))
 
 
-def test_a_tuning_goes_on_where_it_was_interrupted(tmp_path, monkeypatch) -> None:
+def test_a_tuning_goes_on_where_it_was_interrupted(tmp_path: Path) -> None:
     """Two generations in two goes are those of one go."""
-    monkeypatch.setattr("alloc.allocators.learned.missions.training.trainer.MissionTrainingParameters.missions", 1)
-    monkeypatch.setattr("alloc.allocators.learned.missions.training.trainer.MissionTrainingParameters.validations", 1)
-    whole = list(tune("auction", 2, 3))
+    small = MissionTrainingParameters(missions=1, candidates=4, validations=1)
+    whole = list(tune("auction", 2, 3, setting=small))
     state = tmp_path / "state.npz"
-    first = next(tune("auction", 2, 3, state))
-    assert [first, *tune("auction", 2, 3, state)] == whole
-    assert whole[1].missions == 32
+    first = next(tune("auction", 2, 3, state, small))
+    assert [first, *tune("auction", 2, 3, state, small)] == whole
+    assert whole[1].missions == 8

@@ -9,7 +9,6 @@ import torch
 from alloc.allocators.learned.missions.feature_names import FEATURES
 from alloc.allocators.learned.missions.forward import score
 from alloc.allocators.learned.missions.network import compiled_weights, first_network
-from alloc.allocators.learned.missions.network_arrays import HIDDEN
 from alloc.allocators.learned.missions.play import play, room_for
 from alloc.allocators.learned.missions.policy_file import load_network, save_network
 from alloc.allocators.learned.missions.talking import is_to_send
@@ -25,9 +24,10 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]  # loops are compiled 
 
 def scored(options: np.ndarray, seed: int) -> np.ndarray:
     """Return the scores that the compiled network gives."""
-    token, scores = np.zeros((len(options), HIDDEN), np.float32), np.zeros(len(options), np.float32)
-    score(options, len(options), compiled_weights(first_network(seed)), token, scores)
-    return scores
+    room = room_for(0, len(options))
+    room.options[: len(options), :FEATURES] = options
+    score(room.options, len(options), compiled_weights(first_network(seed)), room.token, room.pooled, room.scores)
+    return room.scores[: len(options)]
 
 
 def test_compiled_scores_are_those_of_torch() -> None:
