@@ -34,6 +34,10 @@ FIRST = {
 """Where the parameters of each policy begin."""
 
 
+VALIDATED_EVERY = 5
+"""Generations from one validation to the next."""
+
+
 class _Fitness(base.Fitness):  # type: ignore[misc]
     weights = (-1.0,)
 
@@ -63,7 +67,7 @@ class Tuned:
 
     generation: int
     parameters: dict[str, float]
-    cost: float
+    cost: float | None
     missions: int
 
 
@@ -106,9 +110,10 @@ def tune(
         costs = [_cost(policy, np.maximum(np.exp(row), lows), missions) for row in rows]
         strategy.update([_Candidate(row, cost) for row, cost in zip(rows, costs, strict=True)])
         mean = np.maximum(np.exp(strategy.centroid), lows)
-        found = _cost(policy, mean, validation)
         if state is not None:
             np.savez(state, **state_of(strategy))
+        is_due = (generation + 1) % VALIDATED_EVERY == 0 or generation + 1 == generations
+        found = _cost(policy, mean, validation) if is_due else None
         parameters = dict(zip(names, mean.tolist(), strict=True))
         yield Tuned(generation + 1, parameters, found, (generation + 1) * setting.candidates * setting.missions)
 

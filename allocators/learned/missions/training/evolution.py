@@ -19,8 +19,8 @@ from alloc.allocators.learned.training.member import Weights
 from alloc.allocators.parallel.engine import Engine
 from alloc.problems.fields import FloatArray
 
-STEP = 1.0
-"""Initial standard deviation of a weight."""
+STEP, FINE_STEP = 1.0, 0.3
+"""Initial standard deviation of a weight; the smaller one where a training goes on from a policy."""
 
 EVOLVED = ("skip.weight", "out.weight")
 """What is evolved: the weights of features, and those of the last layer, whose inputs stay as they were drawn."""
@@ -77,12 +77,14 @@ class Evolution:
         Candidates in a generation.
     missions : int
         On which all candidates of a generation are compared.
+    step : float
+        Initial standard deviation of a weight.
     """
 
-    def __init__(self, network: Weights, population: int, missions: int) -> None:
+    def __init__(self, network: Weights, population: int, missions: int, step: float = STEP) -> None:
         self._network, self._population, self._missions = network, population, missions
         first = torch.cat([network[name][0] for name in EVOLVED]).double().numpy()
-        self._strategy = cma.Strategy(centroid=first, sigma=STEP, lambda_=population)
+        self._strategy = cma.Strategy(centroid=first, sigma=step, lambda_=population)
 
     def advance(
         self, curriculum: MissionCurriculum, seed: int, progress: float, engine: Engine, should_stop: Callable[[], bool]
