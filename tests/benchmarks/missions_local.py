@@ -52,8 +52,10 @@ def drawn(
     family = ("steady", "failures")[seed % 2]
     parameters = MissionParameters(family, agents, tasks, radius=radius, sensing=radius, loss=loss)
     mission = random_mission(parameters, seed)
-    return mission if radio is None else Mission(
-        mission.instance, **{name: getattr(mission, name) for name in KEPT}, radio=radio
+    return (
+        mission
+        if radio is None
+        else Mission(mission.instance, **{name: getattr(mission, name) for name in KEPT}, radio=radio)
     )
 
 
@@ -77,7 +79,7 @@ def column(lines: list[dict[str, str]], policy: str, measure: str) -> np.ndarray
 
 
 def against(lines: list[dict[str, str]], rival: str, measure: str) -> str:
-    """Return the mean difference of `gappo` from a rival in per cent, with its interval; and pairs that are left out."""
+    """Return the mean difference of `gappo` from a rival in per cent, its interval, and pairs left out."""
     ratios = column(lines, "gappo", measure) / column(lines, rival, measure)
     kept = 100 * (ratios[~np.isnan(ratios)] - 1)
     half = stats.t.ppf(0.975, len(kept) - 1) * kept.std(ddof=1) / np.sqrt(len(kept))

@@ -71,4 +71,3 @@ def nearer(situation: Situation, j: int) -> float:
             counted += 1
             found += dx * dx + dy * dy + dz * dz < distance * distance * NOT_AS_FAR
     return found / counted if counted else 0.0
-

@@ -39,9 +39,9 @@ others there or coming, none; the agent's ability and its hours for the work; wh
 of what is known; share of the time that would be work; other work near by; hours gained; priority; hours before the
 deadline, which it misses; growth; energy; agents without a task that are nearer; whether the option is to look around,
 or to stay; how long a place was not seen; of the whole situation: known tasks per agent, agents, work of all. Then what
-does not change with the density of tasks and agents: how far the next task is that nobody does, share of agents that are
-nearer, travel beside the mean of all tasks; and products: share and gain with the work ahead, as what is good while there
-is much to do is not what is good at the end, and others with the tasks per agent."""
+does not change with the density of tasks and agents: how far the next task is that nobody does, share of agents that
+are nearer, travel beside the mean of all tasks; and products: share and gain with the work ahead, as what is good
+while there is much to do is not what is good at the end, and others with the tasks per agent."""
 
 FEATURES = 32
 FEATURE_SET = "missions/2"

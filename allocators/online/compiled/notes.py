@@ -1,7 +1,7 @@
 """What policies add to messages, compiled: sent with the message of a slot, and heard with it.
 
-Notes of an agent are a row of numbers: a partition, which is the task of each agent, the number of changes and a stamp; or
-the bids of all agents, which are a task, an amount and an hour for each.
+Notes of an agent are a row of numbers: a partition, which is the task of each agent, the number of changes and a stamp;
+or the bids of all agents, which are a task, an amount and an hour for each.
 """
 
 from typing import NamedTuple
@@ -46,9 +46,7 @@ def notes_for(kind: int, n: int, slots: int) -> Notes:
     row[: n * (kind > 0)] = NOBODY
     heard = row.copy()
     heard[n:] = -np.inf
-    return Notes(
-        np.tile(row, (n, 1)), np.tile(heard, (n, 1)), np.zeros((slots, n, len(row))), np.full(slots, np.inf)
-    )
+    return Notes(np.tile(row, (n, 1)), np.tile(heard, (n, 1)), np.zeros((slots, n, len(row))), np.full(slots, np.inf))
 
 
 @compiled_in_place

@@ -17,17 +17,18 @@ STAMP = 13
 
 @dataclass(frozen=True)
 class HedonicPolicyParameters(UtilityParameters):
-    """Parameters of the game, those of the utility of a coalition.
+    """Parameters of the game, those of the utility of a coalition; the defaults are tuned.
 
     A stable partition exists where each member takes away from the utility (`crowding`). `stay` is for the coalition
     that an agent is in, and `memory` for others that were not heard of.
     """
 
-    stay: float = bounded(1.5, low=1)
-    memory: float = bounded(5.0, low=0)
-    missed: float = bounded(1.0, low=0)
-    crowding: float = bounded(0.5, low=0)
-    flight: float = bounded(0.0, low=0)
+    stay: float = bounded(7.5, low=1)
+    memory: float = bounded(4.9, low=0)
+    missed: float = bounded(0.61, low=0)
+    crowding: float = bounded(0.086, low=0)
+    flight: float = bounded(0.0125, low=0)
+    age: float = bounded(0.066, low=0)
 
 
 class HedonicCoalitions(Policy):

@@ -11,7 +11,7 @@ from alloc.problems.missions.simulation.state import ACTIVE, AgentStatus
 
 @dataclass(frozen=True)
 class UtilityParameters(CheckedParameters):
-    """Parameters of the utility of a task; the defaults are those of `greedy`.
+    """Parameters of the utility of a task; the defaults are those of `greedy`, tuned.
 
     Attributes
     ----------
@@ -29,12 +29,12 @@ class UtilityParameters(CheckedParameters):
         How fast utility falls with the age, in hours, of what is known of the task.
     """
 
-    stay: float = bounded(2.3, low=0)
-    memory: float = bounded(1.8, low=0)
-    missed: float = bounded(0.025, low=0)
-    crowding: float = bounded(0.05, low=0)
-    flight: float = bounded(0.07, low=0)
-    age: float = bounded(0.0, low=0)
+    stay: float = bounded(4.8, low=0)
+    memory: float = bounded(5.0, low=0)
+    missed: float = bounded(0.016, low=0)
+    crowding: float = bounded(0.14, low=0)
+    flight: float = bounded(0.19, low=0)
+    age: float = bounded(0.02, low=0)
 
 
 Group = list[tuple[float, float]]

@@ -21,9 +21,9 @@ DISTANCE_WEIGHT = 0.02
 def validate(network: MissionNetwork, missions: list[tuple[PackedMission, int]]) -> Validation:
     """Return how well a network leads missions.
 
-    The cost of a mission is the hour at which the last task is done, over the ideal mission time, with what is missed or
-    left, and a little for distance; that of all is the geometric mean, as what counts is per cents of each, large or
-    small. ``unserved`` counts tasks that are not done, and ``reward`` is minus the cost.
+    The cost of a mission is the hour at which the last task is done, over the ideal mission time, with what is missed
+    or left, and a little for distance; that of all is the geometric mean, as what counts is per cents of each, large
+    or small. ``unserved`` counts tasks that are not done, and ``reward`` is minus the cost.
 
     Parameters
     ----------
