@@ -4,6 +4,7 @@ import numpy as np
 
 from alloc.allocators.learned.missions import feature_names as names
 from alloc.allocators.learned.missions import situation as known
+from alloc.allocators.learned.missions.densities import NOT_AS_FAR, fill_densities
 from alloc.allocators.learned.missions.network_arrays import Singles
 from alloc.allocators.learned.missions.situation import Situation
 from alloc.allocators.missions.layout import NOBODY
@@ -146,6 +147,7 @@ def fill_options(situation: Situation, look: FloatArray, options: Singles, choic
         else:
             option[names.STAYS] = 1
     fill_whole(situation, choice, tasks, options[:count])
+    fill_densities(situation, choice, tasks, options[:count])
     return count
 
 
@@ -191,7 +193,7 @@ def rivals(situation: Situation, j: int, distance: float, idle: int) -> float:
     for place in range(idle):
         i = situation.coming.idle[place]
         dx, dy, dz = other[known.OTHER_X, i] - x, other[known.OTHER_Y, i] - y, other[known.OTHER_Z, i] - z
-        found += dx * dx + dy * dy + dz * dz < distance * distance
+        found += dx * dx + dy * dy + dz * dz < distance * distance * NOT_AS_FAR
     return found
 
 

@@ -9,7 +9,7 @@ from alloc.allocators.learned.missions.forward import score
 from alloc.allocators.learned.missions.network_arrays import HIDDEN, WIDTH, MissionWeights, Singles
 from alloc.allocators.learned.missions.options import WAIT, fill_options
 from alloc.allocators.learned.missions.situation import IS_FLYING, TARGET, Situation, empty, fill
-from alloc.allocators.learned.missions.talking import is_to_send
+from alloc.allocators.learned.missions.talking import MOST_SAVED, is_to_send
 from alloc.allocators.missions.advance import advance
 from alloc.allocators.missions.channel import is_silent
 from alloc.allocators.missions.layout import (
@@ -92,7 +92,7 @@ def room_for(n: int, m: int, periods: int = 1) -> Room:
         decided=np.full(n, -np.inf),
         tasks=np.zeros(n, np.intp),
         periods=periods,
-        saved=np.zeros(n, np.intp),
+        saved=np.full(n, MOST_SAVED * periods, np.intp),
         counted=np.zeros(n, np.intp),
         news=np.zeros(n, np.intp),
     )

@@ -14,10 +14,11 @@ def is_to_send(periods: int, saved: IntArray, counted: IntArray, news: IntArray,
     Parameters
     ----------
     periods : int
-        Radio periods that an agent saves up for each message, which it begins without; 1 to send every period. One
-        message is kept back for when it has news.
+        Radio periods that an agent saves up for each message; 1 to send every period. One message is kept back for when
+        it has news.
     saved, counted, news : ndarray of int, shape (agents,)
-        Periods saved up to the tick that was counted last; whether its order has changed since its last message.
+        Periods saved up to the tick that was counted last, at first those of as many messages as it can save up for;
+        whether its order has changed since its last message.
     row : int
         Of the agent in these.
     tick : int
