@@ -10,7 +10,7 @@ PARALLEL := -n logical --maxprocesses 8 --dist worksteal
 CODE := pyproject.toml $(shell find problems allocators cli -name '*.py' -o -name '*.safetensors')
 EXAMPLE := examples/earthquakes/alaska.json
 
-.PHONY: solve test check format wheel policies clean
+.PHONY: solve test check format wheel docs policies clean
 
 solve: $(VENV)/.installed  ## allocate the agents of a real instance with GAPPO, and draw the plan
 	@mkdir -p out
@@ -28,6 +28,10 @@ check: $(VENV)/.checked  ## lint, format, imports and types
 format: $(VENV)/.checked  ## put the code into shape
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+
+docs: $(VENV)/.documented  ## build the documentation as a site in build/site, with warnings as errors
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict
+	@echo "open build/site/index.html"
 
 wheel: $(VENV)/.checked  ## build dist/*.whl
 	rm -rf dist
@@ -71,6 +75,11 @@ $(VENV)/.tested: $(VENV)/bin/python $(CODE)
 	$(COMPILE)
 	$(BIN)/alloc methods --prepare
 	@touch $(VENV)/.installed $@
+
+$(VENV)/.documented: $(VENV)/.installed
+	$(INSTALL) --editable '.[docs]'
+	$(COMPILE)
+	@touch $@
 
 $(VENV)/.checked: $(VENV)/.tested
 	$(INSTALL) --editable '.[dev]'

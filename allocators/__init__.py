@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from alloc.allocators.contract.base import Allocator, Proposal
 from alloc.allocators.contract.budget import Budget, StopReason
+from alloc.allocators.contract.described import Parameter
 from alloc.allocators.contract.improvement import Improvement, TracePoint
 from alloc.allocators.contract.method import Kind, Method
 from alloc.allocators.contract.search import Search
@@ -17,10 +18,11 @@ from alloc.allocators.experiments.compare import Row, compare
 from alloc.allocators.experiments.whatif import Fleet, WhatIf, whatif
 from alloc.allocators.explain import Bottleneck, explain
 from alloc.allocators.pareto import Front, pareto
-from alloc.allocators.registry import TARGETS, describe, load, method_parameters, names
+from alloc.allocators.registry import TARGETS, describe, describe_parameters, load, method_parameters, names
 from alloc.allocators.replanning.moves import Moves
 from alloc.allocators.replanning.reasons import reasons_of_moves
 from alloc.allocators.result import Result, read_result
+from alloc.allocators.serving.asynchronous import solve_async
 from alloc.allocators.solve import solve
 from alloc.problems import AllocError, InputError, MissingPackageError, RefusedError, TrainingError
 
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
     from alloc.allocators.exact.milp import Milp
     from alloc.allocators.experiments.differences import Interval, PolicyDifference, paired_differences
     from alloc.allocators.experiments.policies import PolicyRow, compare_policies
+    from alloc.allocators.experiments.report.page.page import report_html
     from alloc.allocators.heuristic.decentralised.auction import Auction
     from alloc.allocators.heuristic.decentralised.hedonic import Hedonic
     from alloc.allocators.heuristic.genetic.algorithm import GeneticAlgorithm
@@ -80,6 +83,7 @@ __all__ = [
     "MissionRun",
     "Moves",
     "OrderChange",
+    "Parameter",
     "Plan",
     "Policy",
     "PolicyDifference",
@@ -102,6 +106,7 @@ __all__ = [
     "compare",
     "compare_policies",
     "describe",
+    "describe_parameters",
     "describe_policy",
     "explain",
     "load",
@@ -116,8 +121,10 @@ __all__ = [
     "policy_names",
     "read_result",
     "reasons_of_moves",
+    "report_html",
     "simulate",
     "solve",
+    "solve_async",
     "train",
     "whatif",
     "write_result",
@@ -150,6 +157,7 @@ _LAZY = {
     "describe_policy": "alloc.allocators.online.registry",
     "load_policy": "alloc.allocators.online.registry",
     "policy_names": "alloc.allocators.online.registry",
+    "report_html": "alloc.allocators.experiments.report.page.page",
     "simulate": "alloc.allocators.online.run",
 }
 """Module of each public name that is imported on first use."""

@@ -1,19 +1,29 @@
 """Methods by name, imported on first use; third parties add theirs by entry point."""
 
+from collections.abc import Mapping
 from importlib.metadata import EntryPoint
-from inspect import signature
 from typing import cast
 
 from alloc.allocators.contract.base import Allocator
 from alloc.allocators.contract.built_in import BUILT_IN
+from alloc.allocators.contract.described import Parameter, described
 from alloc.allocators.contract.method import Method
 from alloc.allocators.contract.plugins import imported, plugin_class, plugins, require_installed
 from alloc.allocators.runtime.interrupts import ended_with_process
 from alloc.problems import InputError
 from alloc.problems.arguments import text
-from alloc.problems.errors import nearest
+from alloc.problems.errors import nearest, of_these
 
-__all__ = ["BUILT_IN", "ENTRY_POINT_GROUP", "TARGETS", "describe", "load", "method_parameters", "names"]
+__all__ = [
+    "BUILT_IN",
+    "ENTRY_POINT_GROUP",
+    "TARGETS",
+    "describe",
+    "describe_parameters",
+    "load",
+    "method_parameters",
+    "names",
+]
 
 ENTRY_POINT_GROUP = "alloc.allocators"
 
@@ -75,7 +85,7 @@ def load(name: str, parameters: object = None, **settings: object) -> Allocator:
     name : str
         One of `names`.
     parameters : object, optional
-        All parameters of the method, of its `Allocator.parameters_type`.
+        All parameters of the method, of its `Allocator.parameters_type`, or a mapping of some by name.
     **settings
         Single ones by name, such as ``population`` of ``ga`` or ``policy`` of ``gappo``; None stands for the default.
 
@@ -91,6 +101,8 @@ def load(name: str, parameters: object = None, **settings: object) -> Allocator:
         If what it requires is not installed.
     """
     method = describe(name)
+    if isinstance(parameters, Mapping):
+        settings, parameters = {**_named(parameters), **settings}, None
     given = {key: value for key, value in settings.items() if value is not None}
     require_installed(method.missing, f"method {name!r}", "method")
     if "policy" in given and "policy" in method.options:
@@ -129,12 +141,35 @@ def method_parameters(name: str) -> dict[str, object]:
     MissingPackageError
         If what it requires is not installed.
     """
-    method = describe(name)
-    require_installed(method.missing, f"method {name!r}", "method")
-    kind = _class(name)
-    arguments = signature(kind).parameters
-    options = {key: arguments[key].default for key in method.options if key in arguments}
-    return {**options, **kind.default_parameters()}
+    return {parameter.name: parameter.default for parameter in describe_parameters(name)}
+
+
+def describe_parameters(name: str) -> tuple[Parameter, ...]:
+    """Return what can be set of a method, with types, ranges, defaults and meanings; its class is imported for it.
+
+    Parameters
+    ----------
+    name : str
+        One of `names`.
+
+    Returns
+    -------
+    tuple of Parameter
+
+    Raises
+    ------
+    InputError
+        If there is no such method.
+    MissingPackageError
+        If what it requires is not installed.
+    """
+    require_installed(describe(name).missing, f"method {name!r}", "method")
+    return described(_class(name))
+
+
+def _named(parameters: Mapping[str, object]) -> dict[str, object]:
+    """Return parameters that were given as a mapping."""
+    return {text(key, "parameters"): value for key, value in parameters.items()}
 
 
 def _class(name: str) -> type[Allocator]:
@@ -145,12 +180,11 @@ def _class(name: str) -> type[Allocator]:
 
 
 def _hint(key: str, method: Method, kind: type[Allocator]) -> str:
-    """Return which of our methods take this option, or which one may be meant."""
+    """Return which of our methods take this option, or which one may be meant and all that there are."""
     takers = [other.name for other in BUILT_IN.values() if key in other.options]
     if takers:
         return f"; {', '.join(takers)} {'do' if len(takers) > 1 else 'does'}"
-    known = [*method.options, *kind.default_parameters()]
-    return nearest(key, known) if known else ""
+    return of_these(key, list(dict.fromkeys([*method.options, *kind.default_parameters()])))
 
 
 def _plugins() -> dict[str, EntryPoint]:

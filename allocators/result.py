@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from alloc.allocators.contract.budget import StopReason
 from alloc.allocators.contract.improvement import TracePoint
+from alloc.allocators.contract.parameters import labelled_method, plain_values
 from alloc.allocators.contract.status import Status
 from alloc.allocators.contract.tolerance import EXACT, PROVEN, MakespanTolerance, relative_gap
 from alloc.allocators.plan.table import AgentRow, agent_rows
@@ -59,6 +60,8 @@ class Result:
         Task id of each agent id that had to do one task, None for idle; what is proven holds for them alone.
     tolerance : MakespanTolerance
         The slack and the limit that were given for the makespan.
+    parameters : mapping
+        Parameters of the method that differ from their defaults, by name.
     """
 
     instance: Instance
@@ -77,6 +80,12 @@ class Result:
     tolerance: MakespanTolerance = EXACT
     moves: Moves | None = None
     pins: Mapping[str, str | None] = field(default_factory=dict)
+    parameters: Mapping[str, object] = field(default_factory=dict)
+
+    @property
+    def label(self) -> str:
+        """The method with the parameters that were set, such as ``ga[population=200]``."""
+        return labelled_method(self.method, self.parameters)
 
     @property
     def makespan(self) -> float | None:
@@ -159,6 +168,7 @@ class Result:
         return {
             "format": RESULT_FORMAT,
             "method": self.method,
+            **({"parameters": plain_values(self.parameters)} if self.parameters else {}),
             "objective": str(self.objective),
             "instance": ids.name,
             "seed": self.seed,

@@ -36,6 +36,7 @@ class ResultFields(TypedDict):
     tolerance: MakespanTolerance
     moves: Moves | None
     pins: dict[str, str | None]
+    parameters: dict[str, object]
 
 
 def result_fields(document: Mapping[str, object], instance: Instance) -> ResultFields:
@@ -81,6 +82,7 @@ def result_fields(document: Mapping[str, object], instance: Instance) -> ResultF
         "tolerance": MakespanTolerance(limit=limit) if limit and status is Status.OPTIMAL else EXACT,
         "pins": _pins(of_type(fields.get("pins", {}), dict, "pins"), instance),
         "moves": None if fields.get("moves") is None else _moves(of_type(fields["moves"], dict, "moves"), instance),
+        "parameters": dict(of_type(fields.get("parameters", {}), dict, "parameters")),
     }
 
 

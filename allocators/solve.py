@@ -6,6 +6,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext
+from dataclasses import replace
 
 import numpy as np
 
@@ -33,7 +34,7 @@ from alloc.allocators.request import (
     default_threads,
 )
 from alloc.allocators.result import Result
-from alloc.allocators.runtime.interrupts import ended_with_process, signals_set
+from alloc.allocators.runtime.interrupts import ended_with_process, require_wanted, signals_set
 from alloc.problems import InputError, Instance, Objective, find_shortage, serve_all
 from alloc.problems.allocation import CarriedOver
 from alloc.problems.arguments import choice, event, flag, function, of_type, real
@@ -107,7 +108,7 @@ def solve(
     handle_signals : bool
         Whether SIGINT and SIGTERM end the run as the time limit does, when called from the main thread.
     parameters : object, optional
-        Parameters of a method that is given by name, as its class describes them.
+        Parameters of a method that is given by name: those that its class describes, or a mapping by name.
     **settings
         Single parameters of a method that is given by name, such as ``population`` of ``ga`` or ``policy`` of
         ``gappo``; see `method_parameters`.
@@ -148,7 +149,7 @@ def solve(
     allocator, notes, spent_s = _prepared(method, request, parameters, settings)
     with ended_with_process(request.stop.set), signals_set(request.stop) if handle_signals else nullcontext():
         result = _run(allocator, request, [*notes, *carried_notes], spent_s)
-    return concluded(result, plan_in_force)
+    return concluded(replace(result, parameters=allocator.changed_parameters()), plan_in_force)
 
 
 def _prepared(
@@ -238,19 +239,21 @@ def _run(allocator: Allocator, request: Request, notes: list[str], spent_s: floa
         stop=request.stop,
         spent_s=spent_s + time.monotonic() - begin,
     )
+    require_wanted(request.stop)
     decomposition = None if shortage is None else Decomposition(search, shortage, request)
     part = search if decomposition is None else decomposition.rest
-    proposal, stop_reason = (Proposal(), None) if part is None else _propose(allocator, part)
+    proposal, stop_reason = (Proposal(), None) if part is None else _propose(allocator, part, request.stop)
     if decomposition is not None:
         decomposition.conclude()
     return conclude(search, decomposition, allocator.method.name, proposal, stop_reason, notes, pinned=request.pinned)
 
 
-def _propose(allocator: Allocator, search: Search) -> tuple[Proposal, StopReason | None]:
+def _propose(allocator: Allocator, search: Search, stop: threading.Event) -> tuple[Proposal, StopReason | None]:
     """Let the method run, submit its answer, and serve what it left unserved; return also why it stopped."""
     if search.budget.target_gap is not None and not allocator.method.proves:
         raise_bound_before(search)
     proposal = allocator.allocate(search)
+    require_wanted(stop)
     stop_reason = search.stop_reason()
     if proposal.allocation is not None:
         search.submit(proposal.allocation)
@@ -268,4 +271,5 @@ def _propose(allocator: Allocator, search: Search) -> tuple[Proposal, StopReason
 
         with search.improving("looking for what slack saves"):
             note_saving(search)
+    require_wanted(stop)
     return proposal, stop_reason

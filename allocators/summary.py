@@ -63,7 +63,7 @@ def summary(result: "Result") -> str:
 def _headline(result: "Result") -> str:
     size = f"{counted(result.instance.n, 'agent')}, {counted(result.instance.m, 'task')}"
     pinned = f" with {counted(len(result.pins), 'agent')} pinned" if result.pins else ""
-    return f"{result.instance.name} ({size}), {result.method}{pinned}: {_status(result)}"
+    return f"{result.instance.name} ({size}), {result.label}{pinned}: {_status(result)}"
 
 
 def _status(result: "Result") -> str:

@@ -11,21 +11,20 @@ from typing import NoReturn
 import typer
 
 from alloc.cli.commands import (
-    compare,
     convert,
     evaluate,
     export,
     generate,
     import_,
     methods,
-    pareto,
     plot,
     schema,
     solve,
     validate,
-    whatif,
 )
+from alloc.cli.commands.experiments import compare, pareto, report, reproduce, whatif
 from alloc.cli.commands.missions import import_mission, plan, replay, simulate
+from alloc.cli.commands.serving import serve
 from alloc.cli.commands.training import train, tune
 from alloc.cli.options import Parameter, examples, option_of
 from alloc.cli.output.console import INTERRUPTED, complain, flush, interrupted, write_out
@@ -53,6 +52,7 @@ app = typer.Typer(
 COMMANDS = (
     solve,
     compare,
+    report,
     pareto,
     whatif,
     evaluate,
@@ -66,10 +66,12 @@ COMMANDS = (
     simulate,
     replay,
     plan,
+    serve,
     schema,
     methods,
     train,
     tune,
+    reproduce,
 )
 for module in COMMANDS:
     module.register(app)

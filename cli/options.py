@@ -49,6 +49,9 @@ READABLE = "a .json or .npz file, a folder with agents.csv and tasks.csv, or - f
 BETWEEN_SETTINGS = re.compile(r",(?=\s*\w+=)")
 """A comma before the name of the next parameter; others are part of a value."""
 
+BETWEEN_METHODS = re.compile(r",(?![^\[]*\])")
+"""A comma outside of brackets."""
+
 PLAN = "A result of `alloc solve`, an allocation, a table of it, or a solver's solution of what `alloc export` wrote"
 """What every command that takes a plan reads."""
 
@@ -189,3 +192,19 @@ def _number(text: str) -> int | float | None:
         except ValueError:
             continue
     return None
+
+
+def listed(text: str, option: str) -> dict[str, tuple[str, dict[str, object] | None]]:
+    """Return names and, where there are brackets, parameters of methods or policies, by how they are written."""
+    found: dict[str, tuple[str, dict[str, object] | None]] = {}
+    for label in dict.fromkeys(part.strip() for part in BETWEEN_METHODS.split(text) if part.strip()):
+        name, bracket, settings = label.partition("[")
+        if bracket and not settings.endswith("]"):
+            raise typer.BadParameter(f"{label!r} must be like ga[population=200]", param_hint=f"'{option}'")
+        found[label] = (name, values(BETWEEN_SETTINGS.split(settings[:-1])) if bracket else None)
+    if not found:
+        see = "see `alloc methods`" if option == "--methods" else f"such as {', '.join(BUILT_IN_POLICIES)}"
+        raise typer.BadParameter(
+            f"names no {'method' if option == '--methods' else 'policy'}; {see}", param_hint=f"'{option}'"
+        )
+    return found

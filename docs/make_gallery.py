@@ -1,4 +1,4 @@
-"""Draws the pictures of docs/gallery.md, and the map beside them: ``python docs/make_gallery.py``."""
+"""Draws the pictures of docs/data/gallery.md, and the map beside them: ``python docs/make_gallery.py``."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -7,7 +7,7 @@ from alloc.allocators import Result, pareto, plot, plot_convergence, solve, writ
 from alloc.allocators.plotting import plot_front
 from alloc.problems import Family, Instance, Units, paper, random_instance, read_instance
 
-FOLDER = Path(__file__).with_name("gallery")
+FOLDER = Path(__file__).parent / "data" / "gallery"
 ALASKA = Path(__file__).parents[1] / "examples" / "earthquakes" / "alaska.json"
 
 BASES = {
@@ -86,11 +86,11 @@ def main() -> None:
     for name, draw in PICTURES.items():
         path = FOLDER / f"{name}.png"
         draw(str(path))
-        _reduce_colours(path)
+        reduce_colours(path)
     write_result(answer(north(), "milp"), FOLDER / "north.html")
 
 
-def _reduce_colours(path: Path) -> None:
+def reduce_colours(path: Path) -> None:
     """Write a picture again with 256 colours, at a third of the size."""
     from PIL import Image
 

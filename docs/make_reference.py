@@ -18,7 +18,7 @@ SECTION = re.compile(r"^(\w[\w ]*)\n-{3,}\n", re.MULTILINE)
 HEAD = """# Reference
 
 The public names of `alloc.problems` and `alloc.allocators`, made from their docstrings by `docs/make_reference.py`.
-[glossary.md](glossary.md) explains the terms, [embedding.md](embedding.md) shows the names at work. All else is
+[glossary.md](glossary.md) explains the terms, [embedding.md](use/embedding.md) shows the names at work. All else is
 reachable by its module, and may change.
 """
 

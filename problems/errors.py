@@ -45,16 +45,29 @@ class TrainingError(AllocError, RuntimeError):
     """A training cannot go on, through no fault of its input."""
 
 
-def nearest(name: str, known: Sequence[str]) -> str:
-    """Return a hint such as `` (did you mean 'speed'?)``, or of the known names if none is near."""
+def closest(name: str, known: Sequence[str]) -> str | None:
+    """Return the known name that may be meant; None if none is near."""
     options = [option for option in islice(known, MOST_COMPARED) if len(option) <= LONGEST_COMPARED]
     close = difflib.get_close_matches(name[:LONGEST_COMPARED], options, n=1)
     if not close:  # capital letters alone make no other name
         folded = {option.casefold(): option for option in reversed(options)}
         close = [folded[key] for key in difflib.get_close_matches(name[:LONGEST_COMPARED].casefold(), folded, n=1)]
-    if close:
-        return f" (did you mean {close[0]!r}?)"
+    return close[0] if close else None
+
+
+def nearest(name: str, known: Sequence[str]) -> str:
+    """Return a hint such as `` (did you mean 'speed'?)``, or of the known names if none is near."""
+    close = closest(name, known)
+    if close is not None:
+        return f" (did you mean {close!r}?)"
     if not known:
         return ""
     more = f" and {len(known) - MOST_NAMES} more" if len(known) > MOST_NAMES else ""
     return f" (known: {', '.join(known[:MOST_NAMES])}{more})"
+
+
+def of_these(name: str, known: Sequence[str]) -> str:
+    """Return the end of a message on an unknown name: which one may be meant, and all that there are."""
+    close = closest(name, known)
+    hint = "" if close is None else f" (did you mean {close!r}?)"
+    return f"{hint}; there are {', '.join(known)}" if known else ""

@@ -10,7 +10,7 @@ import alloc.problems
 
 ROOT = Path(__file__).parents[1]
 CODE = Path(alloc.problems.__file__).parents[1]  # where it is installed: beside the documents, or not
-PAGES = ("paper.md", "gappo.md")
+PAGES = ("paper/paper.md", "methods/gappo.md")
 
 
 def text_of(page: str) -> str:
@@ -56,7 +56,7 @@ def test_names_that_are_not_there_are_told() -> None:
 
 def test_every_part_of_the_paper_has_its_word() -> None:
     """Equations 1 to 19, all 39 lines of Algorithm 1, Table 1 and figures 1 to 6 are gone through."""
-    text = text_of("paper.md")
+    text = text_of("paper/paper.md")
     assert [int(number) for number in re.findall(r"\*\*\((\d+)\)\*\*", text)] == list(range(1, 20))
     rows = re.findall(r"^\| (\d+)(?:-(\d+))? \|", text, re.MULTILINE)
     lines = [line for first, last in rows for line in range(int(first), int(last or first) + 1)]

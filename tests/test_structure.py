@@ -18,7 +18,8 @@ TREES = {name: ast.parse(source) for name, source in SOURCES.items()}
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = {
-    path.name: path.read_text(encoding="utf-8") for path in [*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")]
+    path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8")
+    for path in [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")]
 }
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef

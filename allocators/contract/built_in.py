@@ -31,6 +31,7 @@ BUILT_IN = {
             proves=True,
             warm_start=True,
             anytime=True,
+            options=("plain",),
             citation="Huangfu and Hall (2018), doi:10.1007/s12532-017-0130-5",
         ),
         Method(
@@ -43,6 +44,7 @@ BUILT_IN = {
             proves=True,
             warm_start=True,
             anytime=True,
+            options=("plain",),
             citation="Perron, Didier and Gay (2023), doi:10.4230/LIPIcs.CP.2023.3",
         ),
         Method(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, get_args, get_origin, 
 
 from alloc.problems import InputError
 from alloc.problems.arguments import flag, listed, of_type, real, shown, text, whole
-from alloc.problems.errors import nearest
+from alloc.problems.errors import of_these
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -41,7 +41,7 @@ def with_settings(parameters_type: type[P], parameters: P | None, settings: Mapp
     names = [field.name for field in dataclasses.fields(parameters_type)]
     for name in settings:
         if name not in names:
-            raise InputError(f"is not a parameter of this method{nearest(name, names)}", name)
+            raise InputError(f"is not a parameter of this method{of_these(name, names)}", name)
     if not issubclass(parameters_type, CheckedParameters):  # which check themselves, and know their ranges
         settings = {name: _converted(value, hints[name], name, infinite=True) for name, value in settings.items()}
     return dataclasses.replace(start, **settings)
@@ -78,6 +78,32 @@ class CheckedParameters:
             object.__setattr__(self, field.name, value)
 
 
+def plain_values(parameters: Mapping[str, object]) -> dict[str, object]:
+    """Return parameters as JSON has them: tuples as lists, paths and infinity as text."""
+    return {name: _plain(value) for name, value in parameters.items()}
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, tuple | list):
+        return [_plain(entry) for entry in value]
+    if value is None or isinstance(value, bool | int | str) or (isinstance(value, float) and math.isfinite(value)):
+        return value
+    return str(value)
+
+
+def labelled_method(name: str, parameters: Mapping[str, object]) -> str:
+    """Return a method with parameters as ``alloc compare`` takes it, such as ``ga[population=200]``."""
+    settings = ",".join(f"{key}={written(value)}" for key, value in parameters.items())
+    return f"{name}[{settings}]" if settings else name
+
+
+def written(value: object) -> str:
+    """Return the value of a parameter as ``--set`` takes it."""
+    if isinstance(value, tuple | list):
+        return ",".join(map(written, value)) + ("," if len(value) == 1 else "")
+    return str(value).lower() if value is None or isinstance(value, bool) else str(value)
+
+
 class Parameterised(ABC):
     """A class whose parameters are a frozen dataclass, or none; see `Allocator` and `Policy`."""
 
@@ -93,6 +119,15 @@ class Parameterised(ABC):
     def default_parameters(cls) -> dict[str, object]:
         """Return the default of each parameter, by name; nothing where there are none."""
         return {} if cls.parameters_type is None else dict(vars(cls.parameters_type()))
+
+    def changed_parameters(self) -> dict[str, object]:
+        """Return the parameters that differ from their defaults, by name."""
+        defaults = self.default_parameters()
+        return {
+            name: getattr(self.parameters, name)
+            for name, value in defaults.items()
+            if getattr(self.parameters, name) != value
+        }
 
     @classmethod
     @abstractmethod

@@ -11,6 +11,7 @@ from ortools.sat.python import cp_model
 from alloc.allocators.contract.built_in import BUILT_IN
 from alloc.allocators.exact.demand import Demand
 from alloc.allocators.exact.monitor import SolverMonitor
+from alloc.allocators.exact.plain.cpsat import PlainCpSat
 from alloc.allocators.exact.solver_model import Answer, SolverModel, Verdict
 from alloc.allocators.exact.stages import ExactAllocator
 from alloc.problems.instance import IntArray
@@ -65,6 +66,7 @@ class CpSat(ExactAllocator):
 
     method = BUILT_IN["cpsat"]
     solver = CpSatSolver()
+    plain_solver = PlainCpSat
 
 
 class _Reporter(cp_model.CpSolverSolutionCallback):

@@ -14,6 +14,7 @@ from scipy.sparse import csc_array, csr_array, diags_array
 from alloc.allocators.contract.built_in import BUILT_IN
 from alloc.allocators.exact.demand import Demand
 from alloc.allocators.exact.monitor import SolverMonitor
+from alloc.allocators.exact.plain.highs import PlainHighs
 from alloc.allocators.exact.solver_model import Answer, SolverModel, Verdict
 from alloc.allocators.exact.stages import ExactAllocator
 from alloc.problems.bounds import scale_to_one
@@ -94,6 +95,7 @@ class Milp(ExactAllocator):
 
     method = BUILT_IN["milp"]
     solver = HighsSolver()
+    plain_solver = PlainHighs
 
 
 def formulate(model: SolverModel) -> tuple[cp.Problem, cp.Variable]:

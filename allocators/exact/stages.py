@@ -1,5 +1,6 @@
 """The recipe of the exact methods: a start, the least makespan, then the least energy at it."""
 
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -8,6 +9,7 @@ import scipy.sparse.csgraph  # noqa: F401 - both are loaded with the method, so 
 
 from alloc.allocators.contract.base import Allocator, Proposal
 from alloc.allocators.contract.budget import Budget
+from alloc.allocators.contract.parameters import CheckedParameters, with_settings
 from alloc.allocators.contract.search import Search
 from alloc.allocators.exact.energy import primal_dual
 from alloc.allocators.exact.energy.least_energy import least_energy
@@ -15,6 +17,7 @@ from alloc.allocators.exact.makespan import ascent, enumeration
 from alloc.allocators.exact.makespan.bisection import least_makespan
 from alloc.allocators.exact.makespan.repartition import search as repartition_search
 from alloc.allocators.exact.monitor import is_over
+from alloc.allocators.exact.plain.stages import PlainSolver, allocate_plain, refusal_of_plain
 from alloc.allocators.exact.solver_model import Solver
 from alloc.allocators.heuristic.greedy.list_schedule import greedy
 from alloc.allocators.heuristic.local_search import annealing_state
@@ -24,19 +27,44 @@ MAKESPAN_SHARE = 0.6
 """Part of the time limit after which the makespan stage gives way to the energy stage, proven or not."""
 
 
+@dataclass(frozen=True)
+class ExactParameters(CheckedParameters):
+    """Parameters of the exact methods.
+
+    Attributes
+    ----------
+    descent : bool
+        Whether plans are looked for before the solver runs.
+    plain : bool
+        Whether the solver gets the model with a variable for each agent and task, as ``alloc export --model plain``
+        writes it, and nothing else is done: no start, no searches, no bounds of our own.
+    """
+
+    descent: bool = True
+    plain: bool = False
+
+
 class ExactAllocator(Allocator):
     """Proves optima with a solver for integer programmes; subclasses name the solver.
 
     Parameters
     ----------
-    descent : bool
-        Whether plans are looked for before the solver runs.
+    parameters : ExactParameters, optional
+    **settings
+        Fields of `ExactParameters`, such as ``plain``, in place of those of `parameters`.
+
+    Raises
+    ------
+    InputError
+        If a setting is unknown, or of the wrong type.
     """
 
     solver: ClassVar[Solver]
+    plain_solver: ClassVar[type[PlainSolver]]
+    parameters_type: ClassVar[type] = ExactParameters
 
-    def __init__(self, *, descent: bool = True) -> None:
-        self._descent = descent
+    def __init__(self, parameters: ExactParameters | None = None, **settings: object) -> None:
+        self.parameters = with_settings(ExactParameters, parameters, settings)
         ascent.compile_loops()
         enumeration.compile_loops()
         repartition_search.compile_loops()
@@ -45,6 +73,8 @@ class ExactAllocator(Allocator):
 
     def refusal(self, instance: Instance, objective: Objective, budget: Budget) -> str | None:
         """Refuse models that would take most of the time only to be built."""
+        if self.parameters.plain:
+            return refusal_of_plain(instance, self.solver.max_pairs)
         limit, per_second, seconds = self.solver.max_pairs, self.solver.pairs_per_second, budget.time_limit_s
         if seconds is not None:
             limit = min(limit, max(per_second // 4, int(per_second * seconds / 2)))
@@ -56,6 +86,8 @@ class ExactAllocator(Allocator):
 
     def allocate(self, search: Search) -> Proposal:
         """Return bounds; every plan on the way is submitted."""
+        if self.parameters.plain:
+            return allocate_plain(search, self.plain_solver)
         instance = search.instance
         search.submit(serve_all(instance, greedy(instance, search)))
         min_served = int((instance.workload > 0).sum()) - fewest_unserved(instance)
@@ -83,7 +115,7 @@ class ExactAllocator(Allocator):
         until_s = np.inf
         if search.budget.time_limit_s is not None:
             until_s = search.elapsed_s + share * search.remaining_s
-        least_makespan(search, self.solver, min_served, until_s, descent=self._descent)
+        least_makespan(search, self.solver, min_served, until_s, descent=self.parameters.descent)
         return search.elapsed_s < until_s
 
 

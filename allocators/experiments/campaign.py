@@ -5,6 +5,7 @@ import math
 import pickle
 import threading
 import time
+from base64 import b64decode
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from multiprocessing import connection
@@ -15,6 +16,7 @@ from alloc.allocators.experiments.isolation.serve import Figures, Order
 from alloc.allocators.experiments.isolation.worker import Limits
 from alloc.allocators.experiments.store.key import Run
 from alloc.allocators.experiments.store.outcome import Ending
+from alloc.allocators.experiments.store.revision import revision
 from alloc.allocators.experiments.store.store import LEASE_S, Store
 from alloc.allocators.parallel.engine import POLL_S
 from alloc.problems import InputError, Instance, Mission
@@ -118,6 +120,7 @@ class Campaign:
             self._place.memory_mb(means.workers or max(1, room)) if means.memory_mb is None else means.memory_mb,
         )
         self._slots: list[_Slot] = []
+        self._revision = revision()
         self._renewed_at = self._asked_at = self._opened_at = -math.inf
         self._instances: dict[str, bytes] = {}
 
@@ -198,8 +201,9 @@ class Campaign:
         figures = slot.worker.figures()
         if figures is None:
             return
+        plan = figures.pop("plan", None)
         run, worker, ending = slot.job.run, slot.worker, self._ending(slot, figures)
-        if self._store.finish(run, ending):
+        if self._store.finish(run, ending, None if plan is None else b64decode(str(plan))):
             self._on_end(run, ending)
         slot.worker = None
         if not worker.is_reusable:
@@ -219,6 +223,7 @@ class Campaign:
             "at_once": slot.at_once,
             "started_at": slot.started_at,
             "finished_at": time.time(),
+            "revision": self._revision,
         }
         return Ending(**known | figures)  # type: ignore[arg-type]
 

@@ -7,6 +7,7 @@ from functools import partial
 
 from alloc.allocators.contract.base import Allocator
 from alloc.allocators.contract.budget import Budget, StopReason
+from alloc.allocators.contract.parameters import labelled_method
 from alloc.allocators.contract.tolerance import relative_gap
 from alloc.allocators.experiments.sweep import LOG, by_label, mean_and_worst, sweep
 from alloc.allocators.registry import load
@@ -102,8 +103,9 @@ def compare(
     ----------
     instances : iterable of Instance
     methods : sequence or dict
-        Names, each of which is loaded once, and allocators with their own parameters. The keys of a dict name the
-        methods in the rows: ``{"small": GeneticAlgorithm(population=20), "large": GeneticAlgorithm(population=200)}``.
+        Names, each of which is loaded once, and allocators with their own parameters, which the rows call such as
+        ``ga[population=20]``. The keys of a dict are names of one's own for the rows:
+        ``{"small": GeneticAlgorithm(population=20), "large": GeneticAlgorithm(population=200)}``.
     seeds : sequence of int
     objective, time_limit_s, iterations, target_gap, threads
         As in `solve`; the budget is that of each single run.
@@ -121,7 +123,7 @@ def compare(
     InputError
         If an argument is not what it should be; its place is the parameter.
     """
-    given = by_label(methods, Allocator, lambda method: method.method.name, "methods")  # type: ignore[type-abstract]
+    given = by_label(methods, Allocator, _label, "methods")  # type: ignore[type-abstract]
     numbers = [checked_seed(seed, "seeds") for seed in listed(seeds, "seeds", "whole numbers")]
     problems = instances if isinstance(instances, Iterator) else listed(instances, "instances", "instances")
     Budget(time_limit_s, iterations, target_gap)
@@ -142,6 +144,11 @@ def compare(
         replace(summarise(one.problem, one.label, one.results, one.reason), number=one.number)
         for one in sweep(partial(_run, run), checked, loaded, numbers, stop)
     )
+
+
+def _label(method: Allocator) -> str:
+    """Return what an allocator is called in the rows, such as ``ga[population=20]``."""
+    return labelled_method(method.method.name, method.changed_parameters())
 
 
 def _run(run: Callable[..., Result], instance: Instance, method: str | Allocator, seed: int) -> Result | None:

@@ -3,11 +3,13 @@
 import threading
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 
 from alloc.allocators.experiments.sweep import by_label, mean, mean_and_worst, sweep
 from alloc.allocators.online.contract import Policy
 from alloc.allocators.online.registry import load_policy
-from alloc.allocators.online.run import simulate
+from alloc.allocators.online.run import simulate_until
+from alloc.allocators.runtime.interrupts import run_native
 from alloc.problems import MissingPackageError, Mission, MissionResult
 from alloc.problems.arguments import choice, event, listed, of_type, real, whole
 from alloc.problems.vocabulary import Knowledge
@@ -107,7 +109,7 @@ def compare_policies(
     knowledge, deadline_ms
         As in `simulate`.
     stop : threading.Event, optional
-        Setting it ends the comparison after the run in progress.
+        Setting it ends the comparison; of the run in progress there is no row.
 
     Returns
     -------
@@ -130,8 +132,11 @@ def compare_policies(
 
     checked = (of_type(mission, Mission, "missions") for mission in problems)
 
-    def run(mission: Mission, policy: Policy, seed: int) -> MissionResult:
-        return simulate(mission, policy, seed=seed, knowledge=known, deadline_ms=deadline).result
+    def run(mission: Mission, policy: Policy, seed: int) -> MissionResult | None:
+        ended = threading.Event()
+        simulation = partial(simulate_until, ended.is_set, mission, policy, known, seed, deadline)
+        found = run_native(simulation, stop.is_set, ended.set)  # on another thread, as a decision cannot be stopped
+        return None if found is None else found.result
 
     return (
         summarise_runs(one.problem, one.label, one.results, one.reason, one.number)

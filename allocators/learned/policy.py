@@ -48,7 +48,7 @@ class PolicyAllocator(Allocator):
     parameters = PlannerParameters()
 
     def __init__(self, policy: Path | str | None = None, device: str = "cpu") -> None:
-        self.device = usable(device)
+        self.device, self.policy = usable(device), None if policy is None else str(policy)
         if self.device.type != "cpu":
             self.parameters = replace(self.parameters, pairs_per_stream=GPU_PAIRS, games_per_region=GPU_GAMES)
         with plain_torch():
@@ -62,6 +62,11 @@ class PolicyAllocator(Allocator):
             files("alloc.allocators.learned.files") / "policies" / f"{self.trained_by}.safetensors"
         ) as shipped:
             return load_policy(shipped, self.trained_by, self.device)
+
+    def changed_parameters(self) -> dict[str, object]:
+        """Return the policy file and the device, where they are not the default ones."""
+        given = {"policy": self.policy, "device": str(self.device)}
+        return {name: value for name, value in given.items() if value not in (None, "cpu")}
 
     def refusal(self, instance: Instance, objective: Objective, budget: Budget) -> str | None:
         """Refuse where not even one game would end in time."""

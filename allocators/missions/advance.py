@@ -24,7 +24,7 @@ from alloc.allocators.missions.layout import (
 )
 from alloc.allocators.missions.motion import bring_up_to_date, distance_between, stop_work
 from alloc.allocators.missions.orders import balance, close, land, note_agent
-from alloc.allocators.runtime.compiled import compiled, inlined
+from alloc.allocators.runtime.compiled import compiled_in_place, inlined
 from alloc.problems.fields import IntArray
 from alloc.problems.missions.simulation.agenda import Turn
 from alloc.problems.missions.simulation.motion import CLOSE
@@ -34,7 +34,7 @@ BETWEEN, WITHIN, TALKING, ORDERED = range(4)
 """Where `advance` goes on: before the next hour, within it, after messages were asked for, after orders were."""
 
 
-@compiled
+@compiled_in_place
 def advance(state: MissionArrays) -> int:
     """Go on to where agents may send messages (`MESSAGES`) or get orders (`ORDERS`), or to the end (`OVER`).
 
@@ -94,7 +94,7 @@ def take_first(state: MissionArrays) -> bool:
     return False
 
 
-@compiled
+@compiled_in_place
 def arrive(state: MissionArrays, number: int) -> None:
     """End a flight; who has nothing to do there is to decide."""
     agent = state.agents[number]
@@ -106,7 +106,7 @@ def arrive(state: MissionArrays, number: int) -> None:
         state.head[0].is_news = 1
 
 
-@compiled
+@compiled_in_place
 def talk(state: MissionArrays) -> bool:
     """Let all agents look around; return whether any can send a message."""
     head, can_send = state.head[0], False
@@ -124,7 +124,7 @@ def talk(state: MissionArrays) -> bool:
     return can_send
 
 
-@compiled
+@compiled_in_place
 def send(state: MissionArrays) -> None:
     """Let all send that can and will; when they can the next time stands on the agenda."""
     head = state.head[0]
@@ -136,7 +136,7 @@ def send(state: MissionArrays) -> None:
     head.stage = WITHIN
 
 
-@compiled
+@compiled_in_place
 def find_deciding(head: Head, agents: Sequence[Agent], deciding: IntArray) -> bool:
     """Fill in who is to get orders now, in their order in the mission; return whether there is anybody."""
     head.deciding = 0
@@ -149,7 +149,7 @@ def find_deciding(head: Head, agents: Sequence[Agent], deciding: IntArray) -> bo
     return head.deciding > 0
 
 
-@compiled
+@compiled_in_place
 def look(state: MissionArrays) -> None:
     """Let all who decide look around, unless they have done so in this turn."""
     head = state.head[0]
@@ -172,7 +172,7 @@ def is_over(head: Head, agents: Sequence[Agent]) -> bool:
     return head.unfinished == 0 or head.failed == len(agents)
 
 
-@compiled
+@compiled_in_place
 def finish(state: MissionArrays) -> None:
     """End the mission: whoever is in flight lands, and whoever returns is home."""
     head = state.head[0]
@@ -193,7 +193,7 @@ def finish(state: MissionArrays) -> None:
             agent.x, agent.y, agent.z = home
 
 
-@compiled
+@compiled_in_place
 def fly_home(agent: Agent, length: float) -> None:
     """Count a flight that ends after the mission."""
     agent.flown = 1

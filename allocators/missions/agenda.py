@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from alloc.allocators.missions.layout import OPEN, Agent, Entry, Head, MissionArrays, Task
-from alloc.allocators.runtime.compiled import compiled, inlined
+from alloc.allocators.runtime.compiled import compiled_in_place, inlined
 from alloc.problems.missions.simulation.agenda import Turn
 
 ARRIVAL, COMPLETION, DEADLINE = int(Turn.ARRIVAL), int(Turn.COMPLETION), int(Turn.DEADLINE)
@@ -26,7 +26,7 @@ def push(state: MissionArrays, hour: float, turn: int, subject: int, version: in
     insert(head, agenda, hour, turn, subject, version)
 
 
-@compiled
+@compiled_in_place
 def insert(head: Head, agenda: Sequence[Entry], hour: float, turn: int, subject: int, version: int) -> None:
     """Put an entry on an agenda that has room for it."""
     head.count += 1
@@ -36,7 +36,7 @@ def insert(head: Head, agenda: Sequence[Entry], hour: float, turn: int, subject:
     rise(agenda, head.entries - 1)
 
 
-@compiled
+@compiled_in_place
 def pop(head: Head, agenda: Sequence[Entry]) -> None:
     """Take the first entry off the agenda; it then stands behind the last one."""
     head.entries -= 1
@@ -54,7 +54,7 @@ def pop(head: Head, agenda: Sequence[Entry]) -> None:
         place = least
 
 
-@compiled
+@compiled_in_place
 def rise(agenda: Sequence[Entry], place: int) -> None:
     """Let an entry rise to where it belongs."""
     while place > 0:
@@ -65,7 +65,7 @@ def rise(agenda: Sequence[Entry], place: int) -> None:
         place = parent
 
 
-@compiled
+@compiled_in_place
 def comes_before(one: Entry, other: Entry) -> bool:
     """Whether one entry comes before another."""
     if one.hour != other.hour:
@@ -75,7 +75,7 @@ def comes_before(one: Entry, other: Entry) -> bool:
     return one.count < other.count
 
 
-@compiled
+@compiled_in_place
 def exchange(one: Entry, other: Entry) -> None:
     """Exchange two entries."""
     one.hour, other.hour = other.hour, one.hour
@@ -85,7 +85,7 @@ def exchange(one: Entry, other: Entry) -> None:
     one.version, other.version = other.version, one.version
 
 
-@compiled
+@compiled_in_place
 def is_void(agents: Sequence[Agent], tasks: Sequence[Task], entry: Entry) -> bool:
     """Whether an entry will change nothing any more."""
     if entry.turn == ARRIVAL:
@@ -96,7 +96,7 @@ def is_void(agents: Sequence[Agent], tasks: Sequence[Task], entry: Entry) -> boo
     return False
 
 
-@compiled
+@compiled_in_place
 def drop_void(head: Head, agenda: Sequence[Entry], agents: Sequence[Agent], tasks: Sequence[Task]) -> None:
     """Take all void entries off a full agenda."""
     kept = 0

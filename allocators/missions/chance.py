@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from alloc.allocators.runtime.compiled import compiled
+from alloc.allocators.runtime.compiled import compiled_in_place
 
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 _FIRST, _SECOND = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
 _30, _27, _31, _11 = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(11)
 
 
-@compiled
+@compiled_in_place
 def keyed(state: int, part: int) -> int:
     """Return the state of the hash after another part of the key; it begins at 0 with `first_key`."""
     value = (np.uint64(state) ^ np.uint64(part)) + _GOLDEN
@@ -18,13 +18,13 @@ def keyed(state: int, part: int) -> int:
     return np.int64(value ^ (value >> _31))  # type: ignore[return-value]  # a plain int in compiled code
 
 
-@compiled
+@compiled_in_place
 def first_key(purpose: int) -> int:
     """Return the state of the hash after what the number is for."""
     return keyed(np.int64(_GOLDEN), purpose)  # type: ignore[arg-type]
 
 
-@compiled
+@compiled_in_place
 def fraction(state: int) -> float:
     """Return the number in [0, 1) of a whole key."""
     return float(np.uint64(state) >> _11) * 2.0**-53

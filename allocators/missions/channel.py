@@ -9,12 +9,12 @@ from alloc.allocators.missions.chance import fraction, keyed
 from alloc.allocators.missions.knowledge import Numbers, length
 from alloc.allocators.missions.layout import IDLE, NOBODY, WORKING, Agent, Head, MissionArrays
 from alloc.allocators.missions.motion import distance_between, place_of
-from alloc.allocators.runtime.compiled import compiled
+from alloc.allocators.runtime.compiled import compiled_in_place
 from alloc.problems.fields import BoolArray, FloatArray, IntArray
 from alloc.problems.missions.simulation.reports import BYTES_OF_AGENT, BYTES_OF_MESSAGE, BYTES_OF_TASK
 
 
-@compiled
+@compiled_in_place
 def is_silent(state: MissionArrays, number: int) -> bool:
     """Whether an agent can neither send nor hear now."""
     head = state.head[0]
@@ -32,7 +32,7 @@ def is_silent(state: MissionArrays, number: int) -> bool:
     return False
 
 
-@compiled
+@compiled_in_place
 def send_all(state: MissionArrays, slot: int) -> bool:
     """Send a message of each agent that can and will, all that it knows; return whether any is heard."""
     head, agents, speaks = state.head[0], state.agents, state.speaks
@@ -55,7 +55,7 @@ def send_all(state: MissionArrays, slot: int) -> bool:
     return found
 
 
-@compiled
+@compiled_in_place
 def keep(
     agents: Sequence[Agent],
     speaks: BoolArray,
@@ -77,7 +77,7 @@ def keep(
             agents[number].bytes += size * count
 
 
-@compiled
+@compiled_in_place
 def find_hearers(head: Head, speaks: BoolArray, visible: BoolArray, places: FloatArray, heard: BoolArray) -> bool:
     """Fill in who will hear the message that each agent sends now; return whether there is anybody."""
     found = False
@@ -101,7 +101,7 @@ def find_hearers(head: Head, speaks: BoolArray, visible: BoolArray, places: Floa
     return found
 
 
-@compiled
+@compiled_in_place
 def lose_in_bursts(head: Head, heard: BoolArray, number: IntArray, bad: IntArray) -> None:
     """Lose messages of this tick by the state of each link."""
     for sender in range(len(heard)):
@@ -113,7 +113,7 @@ def lose_in_bursts(head: Head, heard: BoolArray, number: IntArray, bad: IntArray
                 heard[sender, hearer] = fraction(key) >= loss
 
 
-@compiled
+@compiled_in_place
 def is_link_bad(head: Head, sender: int, hearer: int, number: IntArray, bad: IntArray) -> bool:
     """Whether a link is bad now; a Markov chain over all messages up to this one, whether sent or not."""
     key = keyed(keyed(head.burst_key, sender), hearer)
@@ -127,7 +127,7 @@ def is_link_bad(head: Head, sender: int, hearer: int, number: IntArray, bad: Int
     return bool(is_bad != 0)
 
 
-@compiled
+@compiled_in_place
 def deliver(state: MissionArrays, slot: int) -> None:
     """Let all hear what was sent to them."""
     head, heard = state.head[0], state.heard[slot]
@@ -140,7 +140,7 @@ def deliver(state: MissionArrays, slot: int) -> None:
     hear_of_agents(heard, told[0], told[1], state.agent_hour, state.agent_report)
 
 
-@compiled
+@compiled_in_place
 def hear_of_tasks(
     heard: BoolArray, told_hour: FloatArray, told_left: FloatArray, hour: FloatArray, left: FloatArray
 ) -> None:
@@ -154,7 +154,7 @@ def hear_of_tasks(
                         left[number, task] = told_left[sender, task]
 
 
-@compiled
+@compiled_in_place
 def hear_of_agents(heard: BoolArray, told_hour: FloatArray, told: Numbers, hour: FloatArray, report: Numbers) -> None:
     """Take over what is newer in messages than what is known of agents."""
     for sender in range(len(heard)):

@@ -13,13 +13,13 @@ from alloc.allocators.missions.layout import (
 )
 from alloc.allocators.missions.motion import bring_up_to_date
 from alloc.allocators.missions.orders import close, note_agent, note_task, stand_still
-from alloc.allocators.runtime.compiled import compiled
+from alloc.allocators.runtime.compiled import compiled_in_place
 
 JOINS, FAILS, RECALLED, RETURNS, RECHARGES, APPEARS, CANCELS, CHANGES, SILENT = range(9)
 """What happens, in the order of `alloc.problems.missions.events.EventKind`."""
 
 
-@compiled
+@compiled_in_place
 def happen(state: MissionArrays, number: int) -> None:
     """Let an event happen now; what it is about may have ended before, and then nothing changes."""
     event, head = state.events[number], state.head[0]
@@ -42,7 +42,7 @@ def happen(state: MissionArrays, number: int) -> None:
             worker = state.agents[worker].next
 
 
-@compiled
+@compiled_in_place
 def happen_to_agent(state: MissionArrays, number: int, kind: int, amount: float) -> None:
     """Let an agent join, fail, be recalled, return or be recharged."""
     agent = state.agents[number]
@@ -58,7 +58,7 @@ def happen_to_agent(state: MissionArrays, number: int, kind: int, amount: float)
         state.head[0].failed += kind == FAILS
 
 
-@compiled
+@compiled_in_place
 def happen_to_task(state: MissionArrays, number: int, kind: int, workload: float) -> None:
     """Let a task appear, be cancelled, or have more or less work."""
     task = state.tasks[number]

@@ -21,7 +21,7 @@ from alloc.allocators.missions.layout import (
     Task,
 )
 from alloc.allocators.missions.motion import battery_of, place_of, work_left
-from alloc.allocators.runtime.compiled import compiled, inlined
+from alloc.allocators.runtime.compiled import compiled_in_place, inlined
 from alloc.problems.fields import BoolArray, FloatArray
 
 Numbers = NDArray[np.int32]
@@ -30,7 +30,7 @@ INVISIBLE = -9.0
 """What is seen of a task that is to come."""
 
 
-@compiled
+@compiled_in_place
 def look_around(state: MissionArrays) -> None:
     """Let all agents that are to look around see all tasks and all agents in the mission within the sensing radius."""
     head, agents = state.head[0], state.agents
@@ -52,7 +52,7 @@ def look_around(state: MissionArrays) -> None:
     state.looks[:] = False
 
 
-@compiled
+@compiled_in_place
 def locate(head: Head, agents: Sequence[Agent], places: FloatArray, reports: Numbers) -> None:
     """Fill in where all agents are, and their last reports."""
     for number in range(len(agents)):
@@ -60,7 +60,7 @@ def locate(head: Head, agents: Sequence[Agent], places: FloatArray, reports: Num
         reports[number] = agents[number].report
 
 
-@compiled
+@compiled_in_place
 def seen_of(head: Head, agents: Sequence[Agent], task: Task, number: int) -> float:
     """Return the work left of a task, minus its status where it is closed."""
     if task.status == OPEN:
@@ -74,7 +74,7 @@ def length(is_manhattan: int, dx: float, dy: float, dz: float) -> float:
     return abs(dx) + abs(dy) + abs(dz) if is_manhattan else math.sqrt(dx * dx + dy * dy + dz * dz)
 
 
-@compiled
+@compiled_in_place
 def see_tasks(
     head: Head,
     looks: BoolArray,
@@ -97,7 +97,7 @@ def see_tasks(
                     task_left[number, task] = now[task]
 
 
-@compiled
+@compiled_in_place
 def see_agents(
     head: Head,
     looks: BoolArray,
@@ -120,7 +120,7 @@ def see_agents(
                     agent_report[number, other] = reports[other]
 
 
-@compiled
+@compiled_in_place
 def write_report(head: Head, agent: Agent, report: Report) -> None:
     """Write a report of an agent."""
     report.x, report.y, report.z = place_of(agent, head.hour)
@@ -128,11 +128,12 @@ def write_report(head: Head, agent: Agent, report: Report) -> None:
     report.task = agent.order_task if agent.order == TO_TASK else NOBODY
 
 
-@compiled
+@compiled_in_place
 def drop_unknown(state: MissionArrays) -> None:
     """Make room where no more reports can be kept: drop those that nobody knows any more."""
     head = state.head[0]
-    number = np.full(len(state.reports), NOBODY, dtype=np.int32)
+    number = state.renumbered
+    number[:] = NOBODY
     for known in state.agent_report.flat:
         if known != NOBODY:
             number[known] = 0
@@ -155,7 +156,7 @@ def drop_unknown(state: MissionArrays) -> None:
     renumber(state.sent_agent_report.reshape(-1), number)
 
 
-@compiled
+@compiled_in_place
 def renumber(known: Numbers, number: Numbers) -> None:
     """Replace numbers of reports by new ones."""
     for place in range(len(known)):
@@ -163,7 +164,7 @@ def renumber(known: Numbers, number: Numbers) -> None:
             known[place] = number[known[place]]
 
 
-@compiled
+@compiled_in_place
 def refresh(state: MissionArrays) -> None:
     """Let all know all that is so now."""
     head = state.head[0]
@@ -176,7 +177,7 @@ def refresh(state: MissionArrays) -> None:
             state.task_left[0, number] = seen_of(head, state.agents, state.tasks[number], number)
 
 
-@compiled
+@compiled_in_place
 def tell_all(state: MissionArrays, number: int) -> None:
     """Let all know what is so of an agent now."""
     write_report(state.head[0], state.agents[number], state.reports[number])

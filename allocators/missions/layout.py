@@ -228,6 +228,8 @@ class MissionArrays(NamedTuple):
     head : records, shape (1,)
     agents, tasks : records, shape (n,) and (m,)
     events, agenda, reports : records
+    renumbered : ndarray of int, shape (reports,)
+        New numbers of reports, when those are dropped that nobody knows any more.
     allowed : ndarray of bool, shape (n, m)
         Which agent may do which task, by its list and its skills.
     area : ndarray, shape (2, 3)
@@ -267,6 +269,7 @@ class MissionArrays(NamedTuple):
     events: Sequence[Happening]
     agenda: Sequence[Entry]
     reports: Sequence[Report]
+    renumbered: NDArray[np.int32]
     allowed: BoolArray
     area: FloatArray
     sites: FloatArray

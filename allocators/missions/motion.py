@@ -7,13 +7,13 @@ import numpy as np
 
 from alloc.allocators.missions.chance import fraction, keyed
 from alloc.allocators.missions.layout import FLYING, IDLE, NOBODY, OPEN, WORKING, Agent, Head, Task
-from alloc.allocators.runtime.compiled import compiled
+from alloc.allocators.runtime.compiled import compiled_in_place
 from alloc.problems.distances.reach import TOLERANCE
 
 Point = tuple[float, float, float]
 
 
-@compiled
+@compiled_in_place
 def distance_between(is_manhattan: int, one: Point, other: Point) -> float:
     """Return the distance of two places, 0 where one is unknown."""
     x, y, z = one[0] - other[0], one[1] - other[1], one[2] - other[2]
@@ -21,14 +21,14 @@ def distance_between(is_manhattan: int, one: Point, other: Point) -> float:
     return 0.0 if math.isnan(distance) else distance
 
 
-@compiled
+@compiled_in_place
 def flown_share(agent: Agent, hour: float) -> float:
     """Return the share of its flight that an agent has behind it."""
     hours = agent.arrives - agent.departs
     return 1.0 if hours <= 0 else min(1.0, max(0.0, (hour - agent.departs) / hours))
 
 
-@compiled
+@compiled_in_place
 def place_of(agent: Agent, hour: float) -> Point:
     """Return where an agent is now."""
     if agent.flight == 0 or math.isnan(agent.x) or math.isnan(agent.goal_x):
@@ -41,7 +41,7 @@ def place_of(agent: Agent, hour: float) -> Point:
     )
 
 
-@compiled
+@compiled_in_place
 def battery_of(agent: Agent, hour: float) -> float:
     """Return the battery of an agent now."""
     if agent.flight == 0:
@@ -49,7 +49,7 @@ def battery_of(agent: Agent, hour: float) -> float:
     return agent.battery - agent.energy_per_distance * (agent.length * flown_share(agent, hour))
 
 
-@compiled
+@compiled_in_place
 def can_fly(is_manhattan: int, agent: Agent, place: Point, battery: float, goal: Point) -> bool:
     """Whether an agent at a place can fly to a goal by its range and battery, and home if it returns."""
     distance = distance_between(is_manhattan, place, goal)
@@ -61,7 +61,7 @@ def can_fly(is_manhattan: int, agent: Agent, place: Point, battery: float, goal:
     return agent.energy_per_distance * distance <= battery + TOLERANCE
 
 
-@compiled
+@compiled_in_place
 def depart(head: Head, agent: Agent, goal: Point) -> None:
     """Let an agent that stands still begin a flight."""
     agent.length = distance_between(head.is_manhattan, (agent.x, agent.y, agent.z), goal)
@@ -71,7 +71,7 @@ def depart(head: Head, agent: Agent, goal: Point) -> None:
     agent.flight, agent.status = agent.flights, FLYING
 
 
-@compiled
+@compiled_in_place
 def break_off(agent: Agent, hour: float) -> None:
     """End a flight, if there is one, where the agent is now."""
     if agent.flight == 0:
@@ -92,7 +92,7 @@ def break_off(agent: Agent, hour: float) -> None:
         agent.x, agent.y, agent.z = place
 
 
-@compiled
+@compiled_in_place
 def begin_work(head: Head, agents: Sequence[Agent], tasks: Sequence[Task], number: int, at: int) -> None:
     """Let an agent that is at an open task join those who work there."""
     agent, task = agents[number], tasks[at]
@@ -108,7 +108,7 @@ def begin_work(head: Head, agents: Sequence[Agent], tasks: Sequence[Task], numbe
     agent.task, agent.status = at, WORKING
 
 
-@compiled
+@compiled_in_place
 def stop_work(head: Head, agents: Sequence[Agent], tasks: Sequence[Task], number: int) -> None:
     """Let an agent leave the task where it works, if there is one."""
     agent = agents[number]
@@ -128,7 +128,7 @@ def stop_work(head: Head, agents: Sequence[Agent], tasks: Sequence[Task], number
     agent.task, agent.status = NOBODY, IDLE
 
 
-@compiled
+@compiled_in_place
 def ability_at(agents: Sequence[Agent], task: Task) -> float:
     """Return the ability of all who work at a task."""
     total, number = 0.0, task.first
@@ -138,7 +138,7 @@ def ability_at(agents: Sequence[Agent], task: Task) -> float:
     return total
 
 
-@compiled
+@compiled_in_place
 def bring_up_to_date(head: Head, agents: Sequence[Agent], task: Task, number: int) -> None:
     """Count what was worked, or grew, on an open task since it was brought up to date."""
     hour = head.hour
@@ -154,7 +154,7 @@ def bring_up_to_date(head: Head, agents: Sequence[Agent], task: Task, number: in
     task.since = hour
 
 
-@compiled
+@compiled_in_place
 def work_left(head: Head, agents: Sequence[Agent], task: Task, number: int) -> float:
     """Return the work left of a task now, without a change to it."""
     hour = head.hour
@@ -165,7 +165,7 @@ def work_left(head: Head, agents: Sequence[Agent], task: Task, number: int) -> f
     return task.left
 
 
-@compiled
+@compiled_in_place
 def completion_hour(head: Head, agents: Sequence[Agent], task: Task, number: int) -> float:
     """Return when a task that is up to date will be done if nothing changes; ``inf`` if it will not in the mission."""
     needed = task.left / ability_at(agents, task)
@@ -183,7 +183,7 @@ def completion_hour(head: Head, agents: Sequence[Agent], task: Task, number: int
     return np.inf
 
 
-@compiled
+@compiled_in_place
 def paced_hours(head: Head, number: int, begin: float, end: float) -> float:
     """Return the hours between two hours, each counted as often as the pace says."""
     if not head.has_pace:
@@ -197,7 +197,7 @@ def paced_hours(head: Head, number: int, begin: float, end: float) -> float:
     return total
 
 
-@compiled
+@compiled_in_place
 def pace_factor(head: Head, number: int, period: int) -> float:
     """Return how fast any group works on a task in a period."""
     chance = fraction(keyed(keyed(head.pace_key, number), period))

@@ -31,13 +31,13 @@ from alloc.allocators.missions.motion import (
     stop_work,
     work_left,
 )
-from alloc.allocators.runtime.compiled import compiled, inlined
+from alloc.allocators.runtime.compiled import compiled_in_place, inlined
 from alloc.problems.missions.simulation.agenda import Turn
 
 ARRIVAL, COMPLETION = int(Turn.ARRIVAL), int(Turn.COMPLETION)
 
 
-@compiled
+@compiled_in_place
 def note_task(state: MissionArrays, number: int) -> None:
     """Note that the work of a task may end at another hour."""
     task, head = state.tasks[number], state.head[0]
@@ -47,7 +47,7 @@ def note_task(state: MissionArrays, number: int) -> None:
         head.changed_tasks += 1
 
 
-@compiled
+@compiled_in_place
 def note_agent(state: MissionArrays, number: int, left: int) -> None:
     """Note that the flight of an agent may end at another hour, and work at its task and the one that it left."""
     agent, head = state.agents[number], state.head[0]
@@ -59,7 +59,7 @@ def note_agent(state: MissionArrays, number: int, left: int) -> None:
     note_task(state, agent.task)
 
 
-@compiled
+@compiled_in_place
 def balance(state: MissionArrays) -> None:
     """Put the ends of flights and work of all that changed on the agenda."""
     head = state.head[0]
@@ -82,7 +82,7 @@ def balance(state: MissionArrays) -> None:
                 push(state, max(hour, head.hour), COMPLETION, number, task.version)
 
 
-@compiled
+@compiled_in_place
 def close(state: MissionArrays, number: int, status: int) -> None:
     """Let a task be done, missed or cancelled now; who worked there is idle, and is to decide."""
     task, head = state.tasks[number], state.head[0]
@@ -107,14 +107,14 @@ def close(state: MissionArrays, number: int, status: int) -> None:
         worker = agent.next
 
 
-@compiled
+@compiled_in_place
 def stand_still(state: MissionArrays, number: int) -> None:
     """Let an agent end its flight or its work where it is."""
     stop_work(state.head[0], state.agents, state.tasks, number)
     break_off(state.agents[number], state.head[0].hour)
 
 
-@compiled
+@compiled_in_place
 def land(state: MissionArrays, number: int) -> None:
     """End a flight at its goal: the agent works there, or is idle."""
     agent = state.agents[number]
@@ -143,7 +143,7 @@ def order(state: MissionArrays, number: int, kind: int, task: int, place: Point)
     return is_same(state.agents[number], kind, task, place) or follow(state, number, kind, task, place)
 
 
-@compiled
+@compiled_in_place
 def follow(state: MissionArrays, number: int, kind: int, task: int, place: Point) -> bool:
     """Give an agent an order that is not its last one; return whether it is followed."""
     agent = state.agents[number]
@@ -164,7 +164,7 @@ def follow(state: MissionArrays, number: int, kind: int, task: int, place: Point
     return True
 
 
-@compiled
+@compiled_in_place
 def is_same(agent: Agent, kind: int, task: int, place: Point) -> bool:
     """Whether an order is the last one of an agent."""
     if agent.order != kind:
@@ -174,7 +174,7 @@ def is_same(agent: Agent, kind: int, task: int, place: Point) -> bool:
     return kind == STAY or (agent.order_x == place[0] and agent.order_y == place[1] and agent.order_z == place[2])
 
 
-@compiled
+@compiled_in_place
 def obey(state: MissionArrays, number: int, kind: int, task: int, place: Point) -> bool:
     """Let an agent begin to follow an order; return whether it can."""
     agent, head = state.agents[number], state.head[0]
@@ -203,7 +203,7 @@ def obey(state: MissionArrays, number: int, kind: int, task: int, place: Point) 
     return True
 
 
-@compiled
+@compiled_in_place
 def count_switch(state: MissionArrays, number: int, to: int) -> None:
     """Count an order that sends a flying or working agent elsewhere while its task has work left."""
     agent = state.agents[number]

@@ -61,6 +61,7 @@ def pack(mission: Mission, knowledge: Knowledge | str | None = None) -> MissionA
         "events": events,
         "agenda": agenda,
         "reports": np.zeros(reports, record_type(layout.Report)),
+        "renumbered": np.zeros(reports, np.int32),
         "allowed": _allowed(mission),
         "area": np.array(mission.area),
         "sites": np.ascontiguousarray(instance.task_position.T),

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from alloc.allocators.online.contract import AgentDecider, Briefing, FleetDecider, Policy, PolicyError
 from alloc.allocators.online.registry import load_policy
+from alloc.allocators.parallel.engine import never_stop
 from alloc.problems import InputError, RefusedError
 from alloc.problems.arguments import choice, of_type, real, whole
 from alloc.problems.missions.files.log_file import MissionLog
@@ -77,6 +78,25 @@ def simulate(
     PolicyError
         If the policy answers what is no order.
     """
+    run = simulate_until(
+        never_stop, mission, policy, knowledge, seed, deadline_ms, parameters, observe=observe, **settings
+    )
+    assert run is not None
+    return run
+
+
+def simulate_until(
+    should_stop: Callable[[], bool],
+    mission: Mission,
+    policy: str | Policy,
+    knowledge: Knowledge | str | None = None,
+    seed: int = 0,
+    deadline_ms: float | None = None,
+    parameters: object = None,
+    observe: Callable[[Simulation], None] | None = None,
+    **settings: object,
+) -> MissionRun | None:
+    """Do as `simulate`, and return None if `should_stop` returns True between two decisions."""
     began = time.perf_counter()
     of_type(mission, Mission, "mission")
     of_type(policy, (str, Policy), "policy")
@@ -93,6 +113,8 @@ def simulate(
         observe(simulation)
     control = _Control(leader, simulation, number, deadline_s)
     while (request := simulation.advance()) is not None:
+        if should_stop():
+            return None
         control.answer(request)
     times = DecisionTimes.of(control.seconds, control.late, time.perf_counter() - began)
     result = measured(simulation, leader.info.name, number, times)

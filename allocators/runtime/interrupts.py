@@ -10,6 +10,8 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import TypeVar
 
+from alloc.problems import AllocError
+
 Answer = TypeVar("Answer")
 
 POLL_S = 0.02
@@ -26,6 +28,45 @@ _running: dict[object, tuple[threading.Thread, Callable[[], object]]] = {}
 
 _ending = threading.Event()
 """Set once the exit of the process has begun."""
+
+
+class Cancellation(threading.Event):
+    """A stop request by a caller who will not take the answer, so that nothing is done once the method has stopped.
+
+    Parameters
+    ----------
+    stop : threading.Event, optional
+        One that ends the run with an answer: it counts as set here, too.
+    """
+
+    def __init__(self, stop: threading.Event | None = None) -> None:
+        super().__init__()
+        self._stop = stop
+
+    @property
+    def is_cancelled(self) -> bool:
+        """Whether it was set itself."""
+        return super().is_set()
+
+    def is_set(self) -> bool:
+        """Return whether the run is to end, with an answer or without."""
+        return super().is_set() or (self._stop is not None and self._stop.is_set())
+
+
+class RunCancelledError(AllocError):
+    """A run was cancelled, and has no answer."""
+
+
+def require_wanted(stop: threading.Event) -> None:
+    """Raise an error where the answer is not wanted any more.
+
+    Raises
+    ------
+    RunCancelledError
+        If `stop` is a `Cancellation` that was set itself.
+    """
+    if isinstance(stop, Cancellation) and stop.is_cancelled:
+        raise RunCancelledError("the run was cancelled")
 
 
 @contextmanager

@@ -82,10 +82,10 @@ def evaluate_command(
     assert score is not None
     if json:
         write_json({"format": "alloc-evaluation/1", **_scores(result), "tasks": _tasks(result)})
+        if score.reward_saturated:
+            note("the reward (3) is too large for a float and stands at its most negative value")
     else:
         _tell(result)
-    if score.reward_saturated:
-        note("the reward (3) is too large for a float and stands at its most negative value")
     raise typer.Exit(1 if score.unserved_tasks or score.violations else 0)
 
 

@@ -13,6 +13,7 @@ from alloc.problems.vocabulary import Objective
 
 EXAMPLES = examples(
     "alloc methods",
+    "alloc methods ga",
     "alloc methods --json",
     "alloc methods --prepare",
     closing="Some methods and policies compile loops when first used; --prepare does this for all of them.",
@@ -48,16 +49,37 @@ def register(app: typer.Typer) -> None:
     app.command("methods", epilog=EXAMPLES)(methods_command)
 
 
+class Setting(TypedDict):
+    """One parameter of a method in the JSON of ``alloc methods NAME``."""
+
+    name: str
+    values: str
+    default: object
+    meaning: str
+
+
 def methods_command(
+    method: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="METHOD",
+            autocompletion=options.complete_methods,
+            help="List the parameters of this method, which --set takes.",
+            show_default="all methods",
+        ),
+    ] = None,
     json: options.JsonOption = False,
     prepare: Annotated[
         bool,
         typer.Option("--prepare", help="Compile the loops of all methods and policies now, not in first runs."),
     ] = False,
 ) -> None:
-    """List the methods, what each can do, and which packages it still needs."""
+    """List the methods, what each can do, and which packages it still needs; or the parameters of one."""
     from alloc.allocators import names
 
+    if method is not None:
+        _tell_of(method, json=json)
+        return
     if prepare:
         _prepare()
         return
@@ -69,6 +91,27 @@ def methods_command(
     citations = [f"{fact['name']}: {fact['citation']}" for fact in facts if fact["citation"]]
     lines = [table(header, [_row(fact) for fact in facts], left=len(header)), "", MOVES, "", *citations]
     say("\n".join(lines))
+
+
+def _tell_of(name: str, *, json: bool) -> None:
+    """Print one method: its summary, and each parameter with its values, default and meaning."""
+    from alloc.allocators import describe, describe_parameters
+    from alloc.allocators.contract.parameters import plain_values, written
+
+    method, found = describe(name), describe_parameters(name)
+    defaults = plain_values({one.name: one.default for one in found})
+    if json:
+        settings = [
+            Setting(name=one.name, values=one.kind, default=defaults[one.name], meaning=one.meaning) for one in found
+        ]
+        write_json({**_facts(name), "parameters": settings})
+        return
+    say(f"{name} ({method.kind}): {method.summary}")
+    if method.citation:
+        say(method.citation)
+    header = ["parameter", "values", "default", "meaning"]
+    rows = [[one.name, one.kind, written(one.default), one.meaning.replace("`", "")] for one in found]
+    say("\n" + (table(header, rows, left=len(header)) if rows else "It has no parameters."))
 
 
 def _prepare() -> None:

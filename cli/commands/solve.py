@@ -21,6 +21,7 @@ EXAMPLES = examples(
     "alloc solve demo.json",
     "alloc solve demo.json --method ga --time-limit 30 --seed 1 --output best.json",
     "alloc solve demo.json --method ga --set population=200",
+    "alloc solve demo.json --method milp --plain",
     "alloc solve demo.json --output plan.html",
     "alloc solve demo.json --objective makespan-energy --plot demo.png",
     "alloc solve demo.json --objective makespan-energy --makespan-slack 0.05",
@@ -67,6 +68,13 @@ PinFileOption = Annotated[
     str | None,
     typer.Option(metavar="FILE", help="Agents that must do the tasks that this plan gives them; --pin counts more."),
 ]
+PlainOption = Annotated[
+    bool,
+    typer.Option(
+        "--plain",
+        help="milp, cpsat: give the solver the model alone, without our searches; short for --set plain=true.",
+    ),
+]
 PolicyOption = Annotated[str | None, typer.Option(metavar="FILE", help="A trained policy, for learned methods.")]
 DeviceOption = Annotated[
     str | None, typer.Option(help="Where a learned method computes: cpu or cuda.", show_default="cpu")
@@ -100,6 +108,7 @@ def solve_command(
     pin_file: PinFileOption = None,
     move_price: MovePriceOption = 0.0,
     settings: options.SettingsOption = None,
+    plain: PlainOption = False,
     policy: PolicyOption = None,
     threads: options.ThreadsOption = None,
     device: DeviceOption = None,
@@ -138,7 +147,7 @@ def solve_command(
             makespan_slack=makespan_slack,
             makespan_limit=makespan_limit,
             on_improvement=progress.update,
-            **{**_settings(settings), "policy": policy, "device": device},
+            **{**_settings(settings), **({"plain": True} if plain else {}), "policy": policy, "device": device},
         )
     _save(result, output, plot, json=json, quiet=quiet)
     raise typer.Exit(0 if result.evaluation is not None and not result.evaluation.unserved_tasks else 1)
@@ -194,7 +203,7 @@ def _tell(result: "Result", *, summary: bool) -> None:
     for line in result.notes:
         note(line)
     _doubt(result)
-    if result.evaluation is not None and result.evaluation.reward_saturated:
+    if not summary and result.evaluation is not None and result.evaluation.reward_saturated:
         note("the reward (3) is too large for a float and stands at its most negative value")
 
 

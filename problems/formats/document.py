@@ -52,7 +52,7 @@ def from_document(document: object, *, default_name: str = DEFAULT_NAME) -> Inst
     Parameters
     ----------
     document : dict
-        As `json.load` gives it; see docs/formats.md.
+        As `json.load` gives it; see docs/data/formats.md.
     default_name : str
         The name of the instance where the document gives none.
 

@@ -9,10 +9,14 @@ import pytest
 
 from alloc.allocators import (
     Allocator,
+    GeneticAlgorithm,
     Method,
     Proposal,
+    Result,
     Search,
+    compare,
     describe,
+    describe_parameters,
     load,
     method_parameters,
     names,
@@ -21,6 +25,8 @@ from alloc.allocators import (
 )
 from alloc.allocators.contract.parameters import CheckedParameters, bounded
 from alloc.problems import Allocation, InputError, Instance
+
+TWO = Instance(ability=[5, 3], workload=[6, 4])
 
 
 @pytest.mark.parametrize("name", list(registry.BUILT_IN))
@@ -149,3 +155,42 @@ def test_parameters_of_every_method_can_be_listed() -> None:
     assert {"policy": None, "device": "cpu"}.items() <= method_parameters("gappo").items()
     for name in ("greedy", "local-search", "ga", "hedonic", "auction", "lp-round"):
         load(name, **method_parameters(name))
+
+
+@pytest.mark.parametrize("name", list(registry.BUILT_IN))
+def test_every_parameter_is_described(name: str) -> None:
+    """Each parameter of each method of ours has values, a default and a meaning in its docstring."""
+    found = describe_parameters(name)
+    assert {one.name: one.default for one in found} == method_parameters(name)
+    assert [one.name for one in found if not (one.meaning and one.kind)] == []
+
+
+def test_unknown_parameters_are_answered_by_all_that_there_are() -> None:
+    """A name that is none, and one with a slip, both get the list of what the method takes; one line each."""
+    for given in ("colour", "populatoin"):
+        with pytest.raises(InputError, match=r"there are population, population_genes, .*distance_weight$") as caught:
+            solve(TWO, "ga", parameters={given: 1})
+        assert caught.value.place == given
+        assert "\n" not in str(caught.value)
+
+
+def test_parameters_are_in_the_result_and_its_label() -> None:
+    """However parameters come, the result states those that are not the defaults, and reads them back."""
+    ways = [
+        solve(TWO, "ga", iterations=1, parameters={"population": 8, "smallest": 16}),
+        solve(TWO, "ga", iterations=1, population=8),
+        solve(TWO, GeneticAlgorithm(population=8), iterations=1),
+    ]
+    for result in ways:
+        assert (dict(result.parameters), result.label) == ({"population": 8}, "ga[population=8]")
+        assert result.to_dict()["parameters"] == {"population": 8}
+        assert Result.from_dict(result.to_dict(), TWO).to_dict() == result.to_dict()
+    assert "parameters" not in solve(TWO, "ga", iterations=1).to_dict()
+    several = solve(TWO, "hedonic", iterations=1, communication_radius=float("inf"))
+    assert several.to_dict()["parameters"] == {"communication_radius": "inf"}
+
+
+def test_rows_of_one_method_are_told_apart_by_parameters() -> None:
+    """Two allocators of one method have rows of their own, named as ``alloc compare`` takes them."""
+    rows = list(compare([TWO], [GeneticAlgorithm(population=8), GeneticAlgorithm()], iterations=1))
+    assert [row.method for row in rows] == ["ga[population=8]", "ga"]

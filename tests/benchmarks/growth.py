@@ -1,6 +1,6 @@
 """Growth of time and memory from a thousand to a million agents: whole commands, npz file to result file.
 
-    python tests/benchmarks/growth.py --methods greedy local-search --plot docs/scale.svg
+    python tests/benchmarks/growth.py --methods greedy local-search --plot docs/benchmarks/scale.png
 
 Each command is a process of its own. Its seconds are parted into start (interpreter and imports), reading, solving
 (`runtime_s` of the result) and the rest (bounds by linear programme, summary, writing); memory is its largest resident

@@ -1,9 +1,10 @@
-"""Machine covering: gaps to proven bounds, and the published tables of plans and bounds.
+r"""Machine covering: gaps to proven bounds, and the published tables of plans and bounds.
 
     python tests/benchmarks/machine_covering.py --methods cpsat,plain --seeds 2 --time-limit 10
-    python tests/benchmarks/machine_covering.py --families target,large --seeds 10 --publish docs/machine-covering.csv
+    python tests/benchmarks/machine_covering.py --families target,large --seeds 10 \
+        --publish docs/benchmarks/benchmarks/machine-covering.csv
     python tests/benchmarks/machine_covering.py --families open --seeds 1 --processor-time --methods auto,local-search \
-        --time-limit 10 --publish docs/machine-covering-open.csv
+        --time-limit 10 --publish docs/benchmarks/machine-covering-open.csv
 
 The first prints a line for each family and method: the mean gap (T - bound) / T to the method's own bound, how many are
 proven, and T against the best bound of all methods in the run. `target` are families that this project has set itself

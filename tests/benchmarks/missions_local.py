@@ -1,205 +1,126 @@
-"""Policies with local knowledge on missions that no training saw: mission time against `greedy`, paired.
+"""Policies with local knowledge on missions that no training, tuning or validation saw: `gappo` against each other one.
 
-    python tests/benchmarks/missions_local.py --missions 100
-    python tests/benchmarks/missions_local.py --missions 5 --policies greedy,hedonic,auction --rows 20/40
+    python tests/benchmarks/missions_local.py --csv docs/missions.csv
+    python tests/benchmarks/missions_local.py --csv new.csv --missions 5 --rows "20/40;10/40" --first-seed 4000000000
 
-Half of the missions are of the family `steady`, half of `failures`; all policies meet the same. `gappo`, `ppo`,
-`greedy` and `nearest` run in the compiled simulation, in twins that reach the same measures as the policies
-(`--check`), the others in the reference. The table has the mean difference of mission times in per cent with its 95 %
-interval, and means of energy, switches and messages per agent; missions that either policy leaves unfinished are
-counted apart.
+Half of the missions of a row are of the family `steady`, half of `failures`; all policies meet the same. They run in
+compiled loops, with the measures of the reference. The CSV has a line for each mission; one that is there is not run
+again, so that an interrupted benchmark goes on. The table has, of mission times and energy, the mean difference of
+`gappo` from each other policy in per cent, paired, with its 95 % interval (Student's t).
 """
 
 import argparse
-import math
-from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cache
+import csv
+from pathlib import Path
 
 import numpy as np
-from missions_greedy import NAMES, led, look_around
+from scipy import stats
 
-from alloc.allocators import simulate
-from alloc.allocators.learned.missions import situation as known
-from alloc.allocators.learned.missions.network import compiled_weights
-from alloc.allocators.learned.missions.network_arrays import MissionWeights
-from alloc.allocators.learned.missions.play import Room, is_busy, play, room_for
-from alloc.allocators.learned.missions.policy_file import SHIPPED, SHIPPED_PPO, load_network
-from alloc.allocators.learned.missions.situation import fill
-from alloc.allocators.missions.advance import advance
-from alloc.allocators.missions.chance import first_key, keyed
-from alloc.allocators.missions.layout import MESSAGES, OVER, TO_TASK, MissionArrays
-from alloc.allocators.missions.orders import order
-from alloc.allocators.missions.pack import begun, measure, pack
-from alloc.allocators.online.policies.greedy import GreedyParameters
-from alloc.allocators.runtime.compiled import compiled
-from alloc.problems.fields import IntArray
-from alloc.problems.missions.chance import EXPLORING
-from alloc.problems.missions.families.draw import random_mission
-from alloc.problems.missions.families.parameters import MissionParameters
-from alloc.problems.missions.mission import Mission
+from alloc.allocators import load_policy
+from alloc.allocators.online.compiled.run import run_compiled
+from alloc.problems import Mission, MissionParameters, random_mission
 from alloc.problems.missions.radio import Burst, Radio
-from alloc.problems.missions.simulation.measures import MissionResult
 
 FIRST_SEED = 3_000_000_000
-"""Trainings draw seeds below 1e9, and validations begin there."""
+"""Trainings and tunings draw seeds below 1e9, and their validations begin there."""
 
-
-@dataclass(frozen=True)
-class Row:
-    """A kind of missions."""
-
-    agents: int = 20
-    tasks: int = 40
-    radius: float = 0.3
-    radio: Radio | None = None
-    loss: float = 0.2
-
-    def mission(self, number: int) -> Mission:
-        """Return one of the missions of this kind."""
-        seed = FIRST_SEED + number
-        family = ("steady", "failures")[number % 2]
-        drawn = random_mission(
-            MissionParameters(family, self.agents, self.tasks, radius=self.radius, sensing=self.radius, loss=self.loss),
-            seed,
-        )
-        if self.radio is None:
-            return drawn
-        kept = ("joins", "appears", "deadline", "growth", "events", "horizon", "knowledge", "sensing", "seed")
-        return Mission(drawn.instance, **{name: getattr(drawn, name) for name in kept}, radio=self.radio)
-
-
-ROWS = {
-    "20/40": Row(),
-    "40/80": Row(40, 80),
-    "10/40": Row(10, 40),
-    "60/40": Row(60, 40),
-    "radii 0.15": Row(radius=0.15),
-    "loss 0": Row(loss=0.0),
-    "loss 50 %": Row(loss=0.5),
-    "loss 80 %": Row(loss=0.8),
-    "bursts": Row(radio=Radio(radius=0.3, burst=Burst(good=1.0, bad=1.0))),
-    "delay 0.5 h": Row(radio=Radio(radius=0.3, loss=0.2, delay=0.5)),
+ROWS: dict[str, dict[str, object]] = {
+    **{f"{n}/{m}": {"agents": n, "tasks": m} for n, m in ((20, 40), (40, 80), (10, 40), (60, 40))},
+    **{f"{n}/{m}, radii 0.15": {"agents": n, "tasks": m, "radius": 0.15} for n, m in ((20, 40), (40, 80), (10, 40))},
+    "60/40, radii 0.15": {"agents": 60, "radius": 0.15},
+    "loss 0": {"loss": 0.0},
+    "loss 80 %": {"loss": 0.8},
+    "bursts": {"radio": Radio(radius=0.3, burst=Burst(good=1.0, bad=1.0))},
+    "delay 0.5 h": {"radio": Radio(radius=0.3, loss=0.2, delay=0.5)},
 }
+POLICIES = ("gappo", "gappo[periods=1]", "ppo", "hedonic", "auction", "greedy", "nearest")
+MEASURES = ("mission_time", "energy", "switches", "messages")
+KEPT = ("joins", "appears", "deadline", "growth", "events", "horizon", "knowledge", "sensing", "seed")
+
+Lines = dict[tuple[str, int], dict[str, str]]
 
 
-@compiled
-def lead_nearest(state: MissionArrays, room: Room, seed: int, drawn: IntArray) -> None:
-    """Let all agents go to the nearest task until it is over, as `Nearest` does."""
-    head, key = state.head[0], keyed(first_key(EXPLORING), seed)
-    while True:
-        wanted = advance(state)
-        if wanted == OVER:
-            return
-        if wanted == MESSAGES:
-            continue
-        for place in range(head.deciding):
-            number = state.deciding[place]
-            if state.agents[number].order == TO_TASK and is_busy(state, number):
-                continue
-            fill(state, number, room.situation)
-            best, least = -1, np.inf
-            for j in range(len(room.situation.can)):
-                if room.situation.can[j] and room.situation.task[known.DISTANCE, j] < least:
-                    best, least = j, room.situation.task[known.DISTANCE, j]
-            if best >= 0:
-                order(state, number, TO_TASK, best, (0.0, 0.0, 0.0))
-            else:
-                look_around(state, number, key, drawn)
+def drawn(
+    seed: int,
+    agents: int = 20,
+    tasks: int = 40,
+    radius: float = 0.3,
+    loss: float = 0.2,
+    radio: Radio | None = None,
+) -> Mission:
+    """Return a mission; `radio` replaces what radius and loss say of it."""
+    family = ("steady", "failures")[seed % 2]
+    parameters = MissionParameters(family, agents, tasks, radius=radius, sensing=radius, loss=loss)
+    mission = random_mission(parameters, seed)
+    return (
+        mission
+        if radio is None
+        else Mission(mission.instance, **{name: getattr(mission, name) for name in KEPT}, radio=radio)
+    )
 
 
-@cache
-def weights(policy: str) -> MissionWeights:
-    """Return the weights of a shipped network."""
-    return compiled_weights(load_network({"gappo": SHIPPED, "ppo": SHIPPED_PPO}[policy]))
+def measured(mission: Mission, seed: int) -> dict[str, str]:
+    """Return the columns of a mission."""
+    found = {}
+    for label in POLICIES:
+        name, _, periods = label.rstrip("]").partition("[periods=")
+        result = run_compiled(mission, load_policy(name, **({"periods": int(periods)} if periods else {})), seed)
+        values = [getattr(result, measure) for measure in MEASURES]
+        found |= {
+            f"{label} {measure}": "" if value is None else f"{value:.4g}"
+            for measure, value in zip(MEASURES, values, strict=True)
+        }
+    return found
 
 
-def in_compiled_loops(mission: Mission, policy: str, seed: int) -> MissionResult:
-    """Return the measures of a mission under a policy that has a compiled twin."""
-    n, m = mission.instance.n, mission.instance.m
-    if policy == "greedy":
-        parameters = np.array([getattr(GreedyParameters(), name) for name in NAMES])
-        state = led(pack(mission), parameters, seed)
-    else:
-        state = begun(pack(mission), seed)
-        if policy == "nearest":
-            lead_nearest(state, room_for(n, m), seed, np.zeros(n, np.intp))
-        else:
-            name, periods = with_periods(policy)
-            play(state, room_for(n, m, periods), weights(name), seed)
-    return measure(mission, state, policy, seed)
+def column(lines: list[dict[str, str]], policy: str, measure: str) -> np.ndarray:
+    """Return a measure of all missions, NaN where a policy left tasks undone."""
+    return np.array([float(line[f"{policy} {measure}"] or "nan") for line in lines])
 
 
-def in_reference(mission: Mission, policy: str, seed: int) -> MissionResult:
-    """Return the measures of a mission under any policy."""
-    name, periods = with_periods(policy)
-    settings = {"periods": periods} if periods > 1 else {}
-    return simulate(mission, name, seed=seed, **settings).result
+def against(lines: list[dict[str, str]], rival: str, measure: str) -> str:
+    """Return the mean difference of `gappo` from a rival in per cent, its interval, and pairs left out."""
+    ratios = column(lines, "gappo", measure) / column(lines, rival, measure)
+    kept = 100 * (ratios[~np.isnan(ratios)] - 1)
+    half = stats.t.ppf(0.975, len(kept) - 1) * kept.std(ddof=1) / np.sqrt(len(kept))
+    left = f" ({len(ratios) - len(kept)})" if len(kept) < len(ratios) else ""
+    return f"{kept.mean():+.1f} ± {half:.1f}{left}"
 
 
-def with_periods(policy: str) -> tuple[str, int]:
-    """Return the name of a policy, and the radio periods for each message, as in ``gappo[periods=10]``."""
-    name, _, periods = policy.rstrip("]").partition("[periods=")
-    return name, int(periods or 1)
-
-
-TWINS = ("gappo", "gappo[periods=10]", "ppo", "greedy", "nearest")
-
-
-def run(row: Row, policy: str, missions: int) -> list[MissionResult]:
-    """Return the measures of all missions of a kind."""
-    way: Callable[[Mission, str, int], MissionResult] = in_compiled_loops if policy in TWINS else in_reference
-    return [way(row.mission(number), policy, number) for number in range(missions)]
-
-
-def difference(found: list[MissionResult], rivals: list[MissionResult]) -> str:
-    """Return the mean difference of mission times in per cent, with its 95 % interval."""
-    pairs = [(one.mission_time, other.mission_time) for one, other in zip(found, rivals, strict=True)]
-    times = np.array([100 * (one / other - 1) for one, other in pairs if one is not None and other is not None])
-    half = 1.96 * times.std(ddof=1) / math.sqrt(len(times)) if len(times) > 1 else math.nan
-    left = f" ({len(pairs) - len(times)} unfinished)" if len(times) < len(pairs) else ""
-    return f"{times.mean():+.1f} ± {half:.1f}{left}"
-
-
-def line(name: str, policy: str, found: list[MissionResult], rivals: list[MissionResult]) -> str:
-    """Return a line of the table."""
-    agents = ROWS[name].agents
-    time = np.mean([one.mission_time for one in found if one.mission_time is not None])
-    columns = [np.mean([getattr(one, kind) / agents for one in found]) for kind in ("energy", "switches", "messages")]
-    figures = " | ".join(f"{value:.1f}" for value in columns)
-    return f"| {name} | {policy} | {time:.2f} | {difference(found, rivals)} | {figures} |"
-
-
-def check() -> None:
-    """Compare twins with policies."""
-    for policy in TWINS:
-        for number, name in enumerate(("20/40", "bursts", "delay 0.5 h")):
-            mission = ROWS[name].mission(number)
-            one, other = in_compiled_loops(mission, policy, number), in_reference(mission, policy, number)
-            for kind in ("mission_time", "energy", "switches", "messages", "bytes"):
-                assert math.isclose(getattr(one, kind), getattr(other, kind), rel_tol=1e-9), (policy, name, kind)
-        print(policy, "is the same", flush=True)
+def tell(name: str, lines: list[dict[str, str]], measure: str) -> None:
+    """Print a row of a table."""
+    print("|", name, "|", " | ".join(against(lines, rival, measure) for rival in POLICIES[1:]), "|", flush=True)
 
 
 def main() -> None:
-    """Print the table, or check twins."""
+    """Run what is missing, and print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--missions", type=int, default=20)
-    parser.add_argument("--policies", default="greedy,gappo,gappo[periods=10],ppo,nearest,hedonic,auction")
-    parser.add_argument("--rows", default=",".join(ROWS))
-    parser.add_argument("--rival", default="greedy")
-    parser.add_argument("--check", action="store_true")
+    parser.add_argument("--csv", type=Path, required=True)
+    parser.add_argument("--missions", type=int, default=100)
+    parser.add_argument("--rows", default="", help="names, with a semicolon between them; all by default")
+    parser.add_argument("--first-seed", type=int, default=FIRST_SEED)
     given = parser.parse_args()
-    if given.check:
-        check()
-        return
-    print(f"| missions | policy | hours | time against {given.rival}, % | energy | switches | messages |")
-    print("|---|---|--:|--:|--:|--:|--:|")
-    for name in given.rows.split(","):
-        rivals = run(ROWS[name], given.rival, given.missions)
-        for policy in given.policies.split(","):
-            found = rivals if policy == given.rival else run(ROWS[name], policy, given.missions)
-            print(line(name, policy, found, rivals), flush=True)
+    names = given.rows.split(";") if given.rows else list(ROWS)
+    header = ["missions", "number", *(f"{policy} {measure}" for policy in POLICIES for measure in MEASURES)]
+    if not given.csv.exists():
+        given.csv.write_text(",".join(header) + "\n")
+    with given.csv.open(newline="") as file:
+        done: Lines = {(line["missions"], int(line["number"])): line for line in csv.DictReader(file)}
+    for number in range(given.missions):  # all rows grow together
+        for name in names:
+            if (name, number) not in done:
+                mission = drawn(given.first_seed + number, **ROWS[name])
+                done[name, number] = {"missions": name, "number": str(number), **measured(mission, number)}
+                with given.csv.open("a", newline="") as file:
+                    csv.DictWriter(file, header, lineterminator="\n").writerow(done[name, number])
+    for measure in ("mission_time", "energy"):
+        print(f"\n| {measure} | {' | '.join(POLICIES[1:])} |\n|---|{'--:|' * len(POLICIES[1:])}")
+        for name in names:
+            tell(name, [line for (row, _), line in done.items() if row == name], measure)
+    for name in names:
+        lines = [line for (row, _), line in done.items() if row == name]
+        means = [f"{np.nanmean(column(lines, policy, one)):.0f}" for policy in POLICIES for one in MEASURES[2:]]
+        print(name, "switches and messages of each policy:", *means)
 
 
 if __name__ == "__main__":

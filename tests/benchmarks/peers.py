@@ -1,4 +1,4 @@
-"""Our methods beside naive models and published programs, on the same instances, as one table in docs/peers.md.
+"""Our methods beside naive models and published programs, on the same instances: docs/benchmarks/peers.md.
 
     python tests/benchmarks/peers.py                                  # a look: small families, 2 seconds a run
     python tests/benchmarks/peers.py --families all --methods all --seeds 5 --time-limit 30 --pygrape DIR --write
@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from machine_covering import FAMILIES as COVERING
+from machine_covering import SHAPES as COVERING
 
 from alloc.allocators import describe, names
 from alloc.problems import (
@@ -37,7 +37,7 @@ from alloc.problems import (
 from alloc.problems import Family as Spread
 
 RUN = Path(__file__).with_name("peers_run.py")
-PAGE = Path(__file__).parents[2] / "docs" / "peers.md"
+PAGE = Path(__file__).parents[2] / "docs" / "benchmarks" / "peers.md"
 BEGIN, END = "<!-- table of tests/benchmarks/peers.py -->", "<!-- end of table -->"
 LOADING_S = 60.0
 """What a process may take beyond its time limit, for imports and for what does not keep to limits."""
@@ -54,7 +54,7 @@ def families() -> dict[str, tuple[str, Maker]]:
     found["reach"] = (energy, lambda seed: random_instance(Spread(starts="own", communication_range=(0.4, 0.8)), seed))
     found["speeds"] = (energy, lambda seed: random_instance(Spread(starts="own", speed=(0.5, 2.0), battery=None), seed))
     for kind, sizes in COVERING.items():
-        for n, m, low, high in sizes():
+        for n, m, low, high in sizes:
             for equal in (True, False):
                 name = f"{kind} ({n},{m}) U[{low},{high}] {'equal' if equal else 'unequal'}"
                 found[name] = (plain, lambda seed, size=(n, m, low, high), equal=equal: machine_covering(

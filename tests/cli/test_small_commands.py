@@ -66,6 +66,27 @@ def test_methods_lists_all(alloc):
     assert "makespan-moves" in ran.err
 
 
+def test_methods_tells_the_parameters_of_one(alloc):
+    """`alloc methods NAME` lists its parameters with values, default and meaning, for people and as JSON."""
+    ran = alloc("methods", "ga")
+    assert (ran.code, ran.out) == (0, "")
+    assert "population               whole number >= 4 or none  none     Individuals" in ran.err
+    settings = {one["name"]: one for one in alloc("methods", "lp-round", "--json").json["parameters"]}
+    assert settings["time_share"]["values"] == "number > 0, <= 1"
+    assert settings["makespan_excess"]["default"] == [0.0, 0.001, 0.003, 0.01, 0.03]
+    assert "has no parameters" in alloc("methods", "greedy").err
+    assert "did you mean 'ga'" in alloc("methods", "gaa").err
+
+
+def test_plain_is_short_for_a_parameter(alloc):
+    """`--plain` sets the parameter of milp and cpsat, which the result states; other methods say who has it."""
+    alloc("generate", "random", "--agents", "6", "--tasks", "3", "--seed", "1", "--output", "six.json")
+    ran = alloc("solve", "six.json", "--method", "cpsat", "--plain", "--json", "--quiet")
+    assert (ran.code, ran.json["parameters"], ran.json["status"]) == (0, {"plain": True}, "optimal")
+    ran = alloc("solve", "six.json", "--method", "ga", "--plain")
+    assert (ran.code, ran.err) == (2, "alloc: --plain: method 'ga' takes no option 'plain'; milp, cpsat do\n")
+
+
 def test_methods_names_what_is_missing(alloc, monkeypatch):
     """A method whose packages are not there says how to install them."""
     monkeypatch.setattr(

@@ -10,7 +10,14 @@ from pathlib import Path
 import pytest
 
 HERE = Path(__file__).parent
-JOURNEYS = sorted(path.parent.name for path in HERE.glob("*/journey.sh"))
+SLOW = ("notebooks", "own_policy", "tables")
+"""Journeys with trainings, or with many processes."""
+
+JOURNEYS = [
+    pytest.param(path.parent.name, marks=[pytest.mark.slow] * (path.parent.name in SLOW), id=path.parent.name)
+    for path in sorted(HERE.glob("*/journey.sh"))
+]
+NOTEBOOKS = HERE.parents[1] / "examples" / "notebooks"
 MOST_LINES = 15
 SCRIPTS = Path(sys.executable).parent
 
@@ -19,6 +26,8 @@ SCRIPTS = Path(sys.executable).parent
 def test_journey(name: str, tmp_path: Path) -> None:
     """Every command of the script works, and every file has what it must have."""
     folder = shutil.copytree(HERE / name, tmp_path / name)
+    if name == "notebooks":
+        shutil.copytree(NOTEBOOKS, folder, dirs_exist_ok=True)
     environment = {**os.environ, "PATH": f"{SCRIPTS}{os.pathsep}{os.environ['PATH']}"}
     printed = ""
     for line in (folder / "journey.sh").read_text(encoding="utf-8").splitlines():
@@ -26,7 +35,7 @@ def test_journey(name: str, tmp_path: Path) -> None:
             continue
         command = shlex.split(line)
         command = [sys.executable, *command[1:]] if command[0] == "python" else [sys.executable, "-m", *command]
-        ran = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=60)
+        ran = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=100)
         assert ran.returncode == 0, f"{line}\n{ran.stderr}"
         assert "Traceback" not in ran.stderr
         printed += ran.stdout

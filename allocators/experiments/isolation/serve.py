@@ -7,6 +7,7 @@ import os
 import pickle
 import time
 import traceback
+from base64 import b64encode
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -16,6 +17,7 @@ from typing import Any
 from alloc.allocators.contract.base import Allocator
 from alloc.allocators.experiments.store.key import MISSION, Run
 from alloc.allocators.experiments.store.outcome import Outcome
+from alloc.allocators.experiments.store.plan import packed
 from alloc.allocators.online.contract import Policy
 from alloc.allocators.online.registry import load_policy
 from alloc.allocators.online.run import simulate
@@ -151,6 +153,7 @@ def _figures(result: Result) -> Figures:
         "reward": None if score is None else score.reward,
         "unserved": result.instance.m if score is None else result.unserved_count,
         "runtime_s": result.runtime_s,
+        "plan": None if result.allocation is None else b64encode(packed(result.allocation)).decode("ascii"),
         "trace": [(point.time_s, point.makespan, point.energy, point.lower_bound) for point in result.trace],
     }
 

@@ -95,12 +95,13 @@ def fingerprint(problem: Instance | Mission) -> str:
     if isinstance(problem, Mission):
         document = {**mission_to_document(problem), "name": ""}
         return hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()
-    return _fingerprint(problem)
+    return fingerprint_of(to_npz(problem))
 
 
-def _fingerprint(instance: Instance) -> str:
+def fingerprint_of(content: bytes) -> str:
+    """Return the `fingerprint` of the instance in the bytes of an .npz file."""
     digest = hashlib.sha256()
-    for name, array in sorted(load(to_npz(instance)).items()):
+    for name, array in sorted(load(content).items()):
         if name != "name":
             digest.update(f"{name} {array.dtype.str} {array.shape}\n".encode())
             digest.update(array.tobytes())

@@ -86,6 +86,8 @@ class Ending:
         Of a mission: a `MissionResult` as JSON.
     host : str
         The machine of a cluster that made the run; empty for this one.
+    revision : str
+        Commit of alloc, where it ran from a checkout or was installed from one; see `revision`.
     """
 
     outcome: Outcome
@@ -118,3 +120,4 @@ class Ending:
     trace: TracePoints = ()
     measures: str | None = None
     host: str = ""
+    revision: str = ""

@@ -1,5 +1,9 @@
 """The tables of a store, and how those of an older version become those of this one."""
 
+import sqlite3
+
+from alloc.problems import InputError
+
 APPLICATION = 0x616C6C6F
 """Mark of our files among those of SQLite (``PRAGMA application_id``): "allo"."""
 
@@ -65,5 +69,26 @@ MIGRATIONS: tuple[str, ...] = (
     ALTER TABLE runs ADD COLUMN measures TEXT;
     ALTER TABLE runs ADD COLUMN host TEXT NOT NULL DEFAULT '';
     """,
+    """
+    ALTER TABLE runs ADD COLUMN revision TEXT NOT NULL DEFAULT '';
+    CREATE TABLE plans (key TEXT PRIMARY KEY, plan BLOB NOT NULL);
+    CREATE TABLE contents (instance TEXT PRIMARY KEY, content BLOB NOT NULL);
+    """,
 )
 """Statements that lead from each version to the next; that of a file (``PRAGMA user_version``) is how many it had."""
+
+
+def checked_version(connection: sqlite3.Connection, path: str) -> int:
+    """Return the version of a file, 0 for an empty one; raise an error if it is not ours, or of a later one."""
+    (version,) = connection.execute("PRAGMA user_version").fetchone()
+    (application,) = connection.execute("PRAGMA application_id").fetchone()
+    (tables,) = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
+    if application != APPLICATION and (version or application or tables):
+        raise InputError("is a database of another program; name another file", source=path)
+    if version > len(MIGRATIONS):
+        raise InputError(
+            f"is a store of version {version}, made by a later version of alloc; this one knows up to "
+            f"{len(MIGRATIONS)}: update alloc, or name another file",
+            source=path,
+        )
+    return int(version)

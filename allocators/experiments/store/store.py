@@ -11,12 +11,13 @@ from types import TracebackType
 from typing import Self
 
 from alloc.allocators.experiments.store.errors import BUSY_S, explained
-from alloc.allocators.experiments.store.key import Run, fingerprint
+from alloc.allocators.experiments.store.key import Run, fingerprint, fingerprint_of
 from alloc.allocators.experiments.store.outcome import TRANSIENT, Ending, Outcome
 from alloc.allocators.experiments.store.owner import is_gone, this_process
-from alloc.allocators.experiments.store.schema import APPLICATION, MIGRATIONS
+from alloc.allocators.experiments.store.schema import APPLICATION, MIGRATIONS, checked_version
 from alloc.problems import InputError, Instance, Mission
 from alloc.problems.formats.files import PathLike, named
+from alloc.problems.formats.npz import to_npz
 
 LEASE_S = 60.0
 """Seconds until the lease of a process of which nothing is known ends, unless it is renewed."""
@@ -92,14 +93,15 @@ class Store:
 
     def _prepare(self) -> None:
         self._connection.execute("BEGIN")  # all that is read is of one moment, also while another process begins it
-        version = self._checked_version()
+        version = checked_version(self._connection, self.path)
         self._connection.execute("COMMIT")
         self._use_wal()
         self._connection.execute("PRAGMA synchronous = NORMAL")  # a lease need not survive the loss of power
         if version == len(MIGRATIONS):
             return
         with self._transaction():
-            for script in MIGRATIONS[self._checked_version() :]:  # another process may have been faster
+            known = checked_version(self._connection, self.path)  # another process may have been faster
+            for script in MIGRATIONS[known:]:
                 for statement in filter(str.strip, script.split(";")):
                     self._connection.execute(statement)
             self._connection.execute(f"PRAGMA application_id = {APPLICATION}")
@@ -117,28 +119,16 @@ class Store:
                     raise
             time.sleep(0.01)
 
-    def _checked_version(self) -> int:
-        """Return the version of the file, 0 for an empty one; raise an error if it is not ours, or of a later one."""
-        (version,) = self._connection.execute("PRAGMA user_version").fetchone()
-        (application,) = self._connection.execute("PRAGMA application_id").fetchone()
-        (tables,) = self._connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
-        if application != APPLICATION and (version or application or tables):
-            raise InputError("is a database of another program; name another file", source=self.path)
-        if version > len(MIGRATIONS):
-            raise InputError(
-                f"is a store of version {version}, made by a later version of alloc; this one knows up to "
-                f"{len(MIGRATIONS)}: update alloc, or name another file",
-                source=self.path,
-            )
-        return int(version)
-
     def add(self, problem: Instance | Mission) -> str:
-        """Note the name and size of an instance or a mission, and return the hash of its content."""
-        known = fingerprint(problem)
+        """Note the name and size of a problem, and the content of an instance; return the hash of its content."""
+        content = None if isinstance(problem, Mission) else to_npz(problem)
+        known = fingerprint(problem) if content is None else fingerprint_of(content)
         sized = problem.instance if isinstance(problem, Mission) else problem
         row = (known, problem.name, sized.n, sized.m)
         with self._transaction():
             self._connection.execute("INSERT OR REPLACE INTO instances VALUES (?, ?, ?, ?)", row)
+            if content is not None:
+                self._connection.execute("INSERT OR IGNORE INTO contents VALUES (?, ?)", (known, content))
         return known
 
     def claim(self, keys: Sequence[str]) -> Claim:
@@ -183,8 +173,15 @@ class Store:
         with self._transaction():
             self._connection.execute("DELETE FROM leases WHERE key = ? AND owner = ?", (key, self.owner))
 
-    def finish(self, run: Run, ending: Ending) -> bool:
+    def finish(self, run: Run, ending: Ending, plan: bytes | None = None) -> bool:
         """Write a run that has ended, in one transaction.
+
+        Parameters
+        ----------
+        run : Run
+        ending : Ending
+        plan : bytes, optional
+            Its allocation; see `packed`.
 
         Returns
         -------
@@ -203,6 +200,9 @@ class Store:
                 f"INSERT OR REPLACE INTO runs ({', '.join(columns)}) VALUES ({_marks(columns)})",
                 [values[column] for column in columns],
             )
+            self._connection.execute("DELETE FROM plans WHERE key = ?", (key,))
+            if plan is not None:
+                self._connection.execute("INSERT INTO plans VALUES (?, ?)", (key, plan))
             self._connection.execute("DELETE FROM leases WHERE key = ?", (key,))
         return True
 
@@ -212,11 +212,11 @@ class Store:
         columns = ", ".join(("key", *RUN, *ENDING))
         with explained(self.path):
             if keys is None:
-                found |= map(_record, self._connection.execute(f"SELECT {columns} FROM runs"))
+                found |= map(record_of, self._connection.execute(f"SELECT {columns} FROM runs"))
             for start in range(0, len(keys or ()), MOST_KEYS):
                 part = (keys or ())[start : start + MOST_KEYS]
                 rows = self._connection.execute(f"SELECT {columns} FROM runs WHERE key IN ({_marks(part)})", part)
-                found |= map(_record, rows)
+                found |= map(record_of, rows)
         return found
 
     def settings(self) -> dict[tuple[object, ...], int]:
@@ -281,7 +281,8 @@ def _marks(values: Collection[str]) -> str:
     return ", ".join("?" * len(values))
 
 
-def _record(row: tuple[object, ...]) -> tuple[str, Record]:
+def record_of(row: tuple[object, ...]) -> tuple[str, Record]:
+    """Return the key and the run in a row of the columns ``key``, `RUN` and `ENDING`."""
     run = Run(**dict(zip(RUN, row[1:], strict=False)))  # type: ignore[arg-type]
     values = dict(zip(ENDING, row[1 + len(RUN) :], strict=True))
     values["outcome"] = Outcome(str(values["outcome"]))

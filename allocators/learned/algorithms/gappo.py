@@ -11,6 +11,7 @@ import copy
 import random
 from collections.abc import Callable, Sequence
 from types import FunctionType
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -37,7 +38,7 @@ class _Genome(list[float]):
 
 
 def fitness(
-    returns: Sequence[float], entropies: Sequence[float], evaluations: Sequence[int], parameters: BreedingParameters
+    returns: Sequence[float], entropies: Sequence[float], evaluations: Sequence[float], parameters: BreedingParameters
 ) -> list[float]:
     """Return the fitness (12) of each member; each term is divided by its largest magnitude in the population.
 
@@ -47,7 +48,7 @@ def fitness(
         Cumulative reward of each member on the validation games.
     entropies : sequence of float
         Mean entropy of each policy in nats.
-    evaluations : sequence of int
+    evaluations : sequence of float
         Network evaluations of each member, the cost E_i, which counts against it.
     """
     terms = (
@@ -77,17 +78,48 @@ def breed(
     parameters : BreedingParameters
     seed : int
     """
-    genomes = [
-        _Genome(_flat_weights(member["network"]).tolist(), index, score)
-        for index, (member, score) in enumerate(zip(members, scores, strict=True))
+    flat = [_flat_weights(member["network"]).tolist() for member in members]
+    return [
+        members[one.parent] if one.genome is None else _child(members[one.parent], one)
+        for one in offspring(flat, scores, parameters, random.Random(seed))
     ]
-    unchanged = min(parameters.elite, max(1, len(genomes) - 1))  # at least one of several members is a child
-    following = [members[genome.member] for genome in tools.selBest(genomes, unchanged)]
-    rng = random.Random(seed)
+
+
+class Offspring(NamedTuple):
+    """A member of the next generation.
+
+    Attributes
+    ----------
+    parent : int
+        Its first parent.
+    genome : list of float or None
+        None where it is the parent, unchanged.
+    rate_factor : float
+        By which its learning rate differs from the parent's.
+    """
+
+    parent: int
+    genome: list[float] | None = None
+    rate_factor: float = 1.0
+
+
+def offspring(
+    genomes: Sequence[list[float]], scores: Sequence[float], parameters: BreedingParameters, rng: random.Random
+) -> list[Offspring]:
+    """Return the next generation of as many genomes, the best first: the elite, and children of tournament winners."""
+    known = [_Genome(*one) for one in zip(genomes, range(len(genomes)), scores, strict=True)]
+    unchanged = min(parameters.elite, max(1, len(known) - 1))  # at least one of several members is a child
+    following = [Offspring(genome.member) for genome in tools.selBest(known, unchanged)]
     toolbox = _toolbox(parameters, rng)
-    while len(following) < len(members):
-        first, second = toolbox.select(genomes, 2)
-        following.append(_child(members[first.member], first, second, parameters, toolbox, rng))
+    while len(following) < len(known):
+        first, second = toolbox.select(known, 2)
+        genome, factor = copy.deepcopy(first), 1.0
+        if rng.random() < parameters.crossover_probability:
+            genome, _ = toolbox.mate(genome, copy.deepcopy(second))
+        if rng.random() < parameters.mutation_probability:
+            (genome,) = toolbox.mutate(genome)
+            factor = rng.choice(LEARNING_RATE_FACTORS)
+        following.append(Offspring(first.member, list(genome), factor))
     return following
 
 
@@ -115,26 +147,12 @@ def _with_generator(rng: random.Random, operator: FunctionType) -> Callable[...,
     return bound
 
 
-def _child(
-    parent: StateDict,
-    first: _Genome,
-    second: _Genome,
-    parameters: BreedingParameters,
-    toolbox: base.Toolbox,
-    rng: random.Random,
-) -> StateDict:
+def _child(parent: StateDict, born: Offspring) -> StateDict:
     """Return a child with the optimiser and the replay buffer of its first parent."""
-    genome = copy.deepcopy(first)
-    if rng.random() < parameters.crossover_probability:
-        genome, _ = toolbox.mate(genome, copy.deepcopy(second))
-    factor = 1.0
-    if rng.random() < parameters.mutation_probability:
-        (genome,) = toolbox.mutate(genome)
-        factor = rng.choice(LEARNING_RATE_FACTORS)
     child = copy.deepcopy(parent)
     for group in child["optimiser"]["param_groups"]:
-        group["lr"] *= factor
-    child["network"] = _named_weights(torch.tensor(list(genome)), child["network"])
+        group["lr"] *= born.rate_factor
+    child["network"] = _named_weights(torch.tensor(born.genome), child["network"])
     return child
 
 

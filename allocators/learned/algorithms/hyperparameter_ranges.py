@@ -60,13 +60,16 @@ RANGES: Mapping[str, Range] = {
         ("update_epochs", "minibatch_size", "batch_size", "num_steps", "target_update_interval", "tournament_size"),
         COUNT,
     ),
+    **dict.fromkeys(("replay_draws", "genes", "breeding_interval"), COUNT),
     **dict.fromkeys(("final_lr_fraction", "actor_lr_fraction", "tau", "mutated_fraction"), SHARE),
     **dict.fromkeys(("gae_lambda", "exploration_initial_eps", "crossover_probability", "mutation_probability"), SHARE),
     **dict.fromkeys(("learning_rate", "max_learning_rate", "gamma"), RATE),
     **dict.fromkeys(("clip_coef", "reward_scale", "max_grad_norm"), POSITIVE),
     **dict.fromkeys(("temperature", "final_temperature", "softmax_temperature"), POSITIVE),
     **dict.fromkeys(("ent_coef", "final_ent_coef", "vf_coef"), WEIGHT),
-    **dict.fromkeys(("return_weight", "entropy_weight", "cost_weight", "mutation_sigma", "replay_ratio"), WEIGHT),
+    **dict.fromkeys(
+        ("return_weight", "entropy_weight", "cost_weight", "mutation_sigma", "gene_sigma", "replay_ratio"), WEIGHT
+    ),
     **dict.fromkeys(("buffer_size", "elite"), Range(0, MAX_VALUE, whole=True)),
     "target_kl": Range(1 / MAX_VALUE, MAX_VALUE, optional=True),
 }

@@ -41,6 +41,8 @@ class PpoParameters:
         Norm to which gradients are clipped.
     buffer_size : int
         Capacity C of the replay buffer in states; 0 to learn from new games only.
+    replay_draws : int
+        Trajectories of the replay buffer that each update draws.
     """
 
     learning_rate: float = 1e-3
@@ -57,6 +59,7 @@ class PpoParameters:
     minibatch_size: int = 128
     max_grad_norm: float = 0.5
     buffer_size: int = 0
+    replay_draws: int = 1
 
     def __post_init__(self) -> None:
         check_ranges(self)
@@ -64,10 +67,24 @@ class PpoParameters:
 
 @dataclass(frozen=True)
 class GappoParameters(PpoParameters):
-    """PPO as GAPPO's members run it: with an adaptive learning rate and a replay buffer."""
+    """PPO as GAPPO's members run it: with an adaptive learning rate and a replay buffer, and many of them in a network.
+
+    Attributes
+    ----------
+    genes : int
+        Members that share all weights of one network but the biases, by which they differ (`genes.Genes`); 1 for a
+        network of its own.
+    gene_sigma : float
+        Standard deviation of the first differences between their biases, and of mutations.
+    breeding_interval : int
+        Updates between two generations of genes.
+    """
 
     target_kl: float | None = 0.012
     buffer_size: int = 10_000
+    genes: int = 1
+    gene_sigma: float = 0.03
+    breeding_interval: int = 30
 
 
 @dataclass(frozen=True)
@@ -75,7 +92,7 @@ class A2cParameters:
     """Hyperparameters of A2C.
 
     Rounded from one of five short trials with one seed each, too few to tell them apart; in twelve longer ones
-    (`tests/benchmarks/from_scratch_tuning.py`) none was better.
+    (`allocators/experiments/reproduction/protocol.py`) none was better.
 
     Attributes
     ----------
@@ -113,7 +130,7 @@ class DqnParameters:
     """Hyperparameters of DQN.
 
     Rounded from the best of four short trials with one seed each, too few to tell them apart; others that were slightly
-    better in small games: `tests/benchmarks/from_scratch_tuned.json`.
+    better in small games: `allocators/experiments/reproduction/protocol.py:TUNED`.
 
     Attributes
     ----------
@@ -166,7 +183,8 @@ class DdpgParameters:
     """Hyperparameters of DDPG.
 
     Rounded from the third of four short trials with one seed each, as the two ahead of it evaluate twice as many states
-    per decision; others that were slightly better in small games: `tests/benchmarks/from_scratch_tuned.json`.
+    per decision; others that were slightly better in small games:
+    `allocators/experiments/reproduction/protocol.py:TUNED`.
 
     Attributes
     ----------

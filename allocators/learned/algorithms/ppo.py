@@ -7,6 +7,7 @@ doi:10.20944/preprints202502.0192.v1. All agents that move in a step share its a
 arXiv:2103.01955).
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -55,6 +56,26 @@ class Samples(NamedTuple):
     centre: Tensor
     advantage: Tensor
     target: Tensor
+
+
+class Update(NamedTuple):
+    """An update on the new trajectories of one policy.
+
+    Attributes
+    ----------
+    decisions, evaluations : int
+        Decisions of agents that were played, and states that the network evaluated in playing and learning.
+    reward : float
+        Mean undiscounted return of a game.
+    approx_kl, entropy : float
+        Mean divergence from the policy that played, and mean entropy, in nats.
+    """
+
+    decisions: int
+    evaluations: int
+    reward: float
+    approx_kl: float
+    entropy: float
 
 
 def clipped_surrogate(ratio: Tensor, advantage: Tensor, clip_coef: float, centre: Tensor | float = 1.0) -> Tensor:
@@ -112,21 +133,32 @@ class Ppo:
         parameters = self.parameters
         rng, generator = np.random.default_rng(job.seed), torch.Generator().manual_seed(job.seed)
         max_rate = linear(parameters.max_learning_rate, parameters.final_lr_fraction, job.progress)
-        decisions = evaluations = 0
-        rewards, outcomes = [], []
-        while decisions < job.decisions:
+        updates: list[Update] = []
+        while sum(one.decisions for one in updates) < job.decisions:
             board = job.curriculum.draw(rng, job.progress)
-            steps = job.curriculum.max_steps(board)
-            played = collect(self.network, board, steps, generator, job.rules, parameters.reward_scale)
-            old = self.replay.draw(generator)
-            outcomes.append(self.update(played, old, job.rules, generator, max_rate))
-            self.replay.add(played)
-            decisions += played.decisions
-            evaluations += played.evaluations * (1 + parameters.update_epochs)
-            evaluations += 0 if old is None else 2 * old.evaluations
-            rewards.append(float(played.reward.sum(0).mean()) / parameters.reward_scale)
-        approx_kl, entropy = (float(np.mean(column)) for column in zip(*outcomes, strict=True))
-        return TrainingStats(decisions, evaluations, float(np.mean(rewards)), entropy, approx_kl, self.learning_rate)
+            updates += self.learn(board, job.curriculum.max_steps(board), job.rules, generator, max_rate)
+        reward, approx_kl, entropy = (
+            float(np.mean([getattr(one, name) for one in updates])) for name in ("reward", "approx_kl", "entropy")
+        )
+        decisions, evaluations = (sum(column) for column in zip(*(one[:2] for one in updates), strict=True))
+        return TrainingStats(decisions, evaluations, reward, entropy, approx_kl, self.learning_rate)
+
+    def learn(
+        self, board: Board, steps: int, rules: Rules, generator: torch.Generator, max_rate: float
+    ) -> "list[Update]":
+        """Play up to `steps` steps of each game on a board, and train on them; return the updates that were made."""
+        played = collect(self.network, board, steps, generator, rules, self.parameters.reward_scale)
+        return [self.learn_from(played, rules, generator, max_rate)]
+
+    def learn_from(self, played: Trajectories, rules: Rules, generator: torch.Generator, max_rate: float) -> "Update":
+        """Train on new trajectories and on drawn ones of the replay buffer, to which the new ones then go."""
+        parameters = self.parameters
+        old = [one for _ in range(parameters.replay_draws) if (one := self.replay.draw(generator)) is not None]
+        approx_kl, entropy = self.update(played, old, rules, generator, max_rate)
+        self.replay.add(played)
+        evaluations = played.evaluations * (1 + parameters.update_epochs) + sum(2 * one.evaluations for one in old)
+        reward = float(played.reward.sum(0).mean()) / parameters.reward_scale
+        return Update(played.decisions, evaluations, reward, approx_kl, entropy)
 
     @property
     def learning_rate(self) -> float:
@@ -134,9 +166,14 @@ class Ppo:
         return float(self.optimiser.param_groups[0]["lr"])
 
     def update(
-        self, fresh: Trajectories, old: Trajectories | None, rules: Rules, generator: torch.Generator, max_rate: float
+        self,
+        fresh: Trajectories,
+        old: Sequence[Trajectories],
+        rules: Rules,
+        generator: torch.Generator,
+        max_rate: float,
     ) -> tuple[float, float]:
-        """Train actor and critic on new trajectories, and on `old` ones of an earlier policy where there are any.
+        """Train actor and critic on new trajectories, and on `old` ones of other policies.
 
         Returns
         -------
@@ -149,9 +186,10 @@ class Ppo:
         batches = [
             (samples, index) for _ in range(parameters.update_epochs) for index in self._minibatches(samples, generator)
         ]
-        if old is not None:
-            replayed = off_policy_samples(self.network, old, parameters, rules)
+        for one in old:
+            replayed = off_policy_samples(self.network, one, parameters, rules)
             batches += [(replayed, index) for index in self._minibatches(replayed, generator)]
+        if old:
             order = torch.randperm(len(batches), generator=generator).tolist()
             batches = [batches[number] for number in order]
         divergences, entropies = [], []

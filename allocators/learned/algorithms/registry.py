@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from alloc.allocators.learned.network.actor_critic import NetworkSize
 
 METHODS: dict[str, tuple[str, str, type[Hyperparameters]]] = {
-    "gappo": ("ppo", "Ppo", GappoParameters),
+    "gappo": ("genes", "GeneticPpo", GappoParameters),
     "ppo": ("ppo", "Ppo", PpoParameters),
     "a2c": ("a2c", "A2c", A2cParameters),
     "dqn": ("dqn", "Dqn", DqnParameters),

@@ -52,6 +52,14 @@ STORED_NAMES = {
 }
 """Names in descriptions of this format, of parameters that have other names in the program."""
 
+LATER = {
+    "learner.breeding_interval": "30",
+    "learner.gene_sigma": "0.03",
+    "learner.genes": "1",
+    "learner.replay_draws": "1",
+}
+"""Parameters that descriptions may lack, and what they were before there was a choice."""
+
 
 def write_checkpoint(path: Path, description: Mapping[str, str], state: StateDict) -> None:
     """Write a checkpoint completely or not at all.
@@ -128,7 +136,9 @@ def read_checkpoint(path: Path, description: Mapping[str, str]) -> StateDict:
         message = f"is a checkpoint of another version ({state['format']}, not {CHECKPOINT_FORMAT}); train anew"
         raise InputError(message, "", source)
     theirs = dict(state["description"])
-    ours = {name: (value, theirs.pop(STORED_NAMES.get(name, name), None)) for name, value in description.items()}
+    ours = {
+        name: (value, theirs.pop(STORED_NAMES.get(name, name), LATER.get(name))) for name, value in description.items()
+    }
     pairs: dict[str, tuple[str | None, str | None]] = {
         **ours,
         **{name: (None, value) for name, value in theirs.items()},

@@ -7,7 +7,7 @@ import numpy as np
 from alloc.allocators.learned.missions import situation as known
 from alloc.allocators.learned.missions.situation import Situation
 from alloc.allocators.missions.chance import first_key, fraction, keyed
-from alloc.allocators.runtime.compiled import compiled
+from alloc.allocators.runtime.compiled import compiled_in_place
 from alloc.problems.fields import FloatArray
 
 CELLS = 8
@@ -23,7 +23,7 @@ EXPLORING = 11
 """What chances are for, as `alloc.problems.missions.chance` counts."""
 
 
-@compiled
+@compiled_in_place
 def centre(area: FloatArray, cell: int) -> tuple[float, float, float]:
     """Return the centre of a cell; `area` has the least and the largest coordinates in two rows."""
     x, y = (cell % CELLS + 0.5) / CELLS, (cell // CELLS + 0.5) / CELLS
@@ -31,7 +31,7 @@ def centre(area: FloatArray, cell: int) -> tuple[float, float, float]:
     return low[0] + x * (high[0] - low[0]), low[1] + y * (high[1] - low[1]), 0.5 * (low[2] + high[2])
 
 
-@compiled
+@compiled_in_place
 def notice(area: FloatArray, sensing: float, x: float, y: float, hour: float, seen: FloatArray) -> None:
     """Note that all within the sensing radius of a place was seen at an hour; `seen` has one hour for each cell."""
     wide, deep = (area[1, 0] - area[0, 0]) / CELLS, (area[1, 1] - area[0, 1]) / CELLS
@@ -44,12 +44,12 @@ def notice(area: FloatArray, sensing: float, x: float, y: float, hour: float, se
                     seen[row * CELLS + column] = max(seen[row * CELLS + column], hour)
 
 
-@compiled
+@compiled_in_place
 def find_unseen(
     situation: Situation,
     area: FloatArray,
     sensing: float,
-    seen: FloatArray,
+    last: FloatArray,
     seed: int,
     number: int,
     goal: int,
@@ -62,7 +62,8 @@ def find_unseen(
     situation : Situation
     area : ndarray, shape (2, 3)
     sensing : float
-    seen : ndarray, shape (cells,)
+    last : ndarray, shape (cells,)
+        Hour at which the agent last saw each cell; others it heard of are added.
     seed, number : int
         Of the run, and of the agent.
     goal : int
@@ -70,39 +71,32 @@ def find_unseen(
     look : ndarray, shape (3,)
         See `fill_options`.
     """
-    own, last = situation.own, seen.copy()
+    own = situation.own
     for i in range(len(situation.counts)):
         if situation.counts[i]:
             at = situation.other[known.OTHER_X, i], situation.other[known.OTHER_Y, i]
             notice(area, sensing, at[0], at[1], own[known.HOUR] - 1e-3, last)
-    look[0] = 0.0
-    if goal >= 0:
-        rate_cell(own, area, last, goal // CELLS, goal % CELLS, look)
-        return goal
-    key = keyed(keyed(first_key(EXPLORING), seed), number)
-    rated = np.zeros(3)
-    best, found = -np.inf, -1
-    for row in range(CELLS):
-        for column in range(CELLS):
-            way = rate_cell(own, area, last, row, column, rated)
-            value = rated[2] - rated[1] + SPREAD * fraction(keyed(key, row * CELLS + column))
+    best, found = -np.inf, goal
+    if goal < 0:
+        key = keyed(keyed(first_key(EXPLORING), seed), number)
+        for cell in range(CELLS * CELLS):
+            way, age = rate_cell(own, area, last, cell)
+            value = age - way / max(own[known.SPAN], 1e-9) + SPREAD * fraction(keyed(key, cell))
             is_cheap = own[known.ENERGY_PER_DISTANCE] * way <= BATTERY_SHARE * own[known.BATTERY]
             if value > best and is_cheap:
-                best, found = value, row * CELLS + column
-                look[:] = rated
+                best, found = value, cell
+    look[0] = found >= 0
+    if found >= 0:
+        way, look[2] = rate_cell(own, area, last, found)
+        look[1] = way / max(own[known.SPAN], 1e-9)
     return found
 
 
-@compiled
-def rate_cell(own: FloatArray, area: FloatArray, last: FloatArray, row: int, column: int, look: FloatArray) -> float:
-    """Fill in how far off and how long unseen a cell is; return the length of the way."""
-    low, high = area[0], area[1]
-    x = low[0] + (column + 0.5) / CELLS * (high[0] - low[0])
-    y = low[1] + (row + 0.5) / CELLS * (high[1] - low[1])
-    dx, dy, dz = x - own[known.X], y - own[known.Y], 0.5 * (low[2] + high[2]) - own[known.Z]
+@compiled_in_place
+def rate_cell(own: FloatArray, area: FloatArray, last: FloatArray, cell: int) -> tuple[float, float]:
+    """Return how far off a cell is, and how long it was not seen, from 0 to 1."""
+    x, y, z = centre(area, cell)
+    dx, dy, dz = x - own[known.X], y - own[known.Y], z - own[known.Z]
     way = math.sqrt(dx * dx + dy * dy + dz * dz)
-    seen = last[row * CELLS + column]
     scale = max(own[known.SPAN] / own[known.SPEED], 1e-9)
-    look[0], look[1] = 1.0, way / max(own[known.SPAN], 1e-9)
-    look[2] = min(1.0, (own[known.HOUR] - seen) / scale) if seen >= 0 else 1.0
-    return way
+    return way, min(1.0, (own[known.HOUR] - last[cell]) / scale) if last[cell] >= 0 else 1.0

@@ -5,7 +5,7 @@ import torch
 from torch import Tensor, nn
 
 from alloc.allocators.learned.missions.feature_names import FEATURES, FIRST_SKIP
-from alloc.allocators.learned.missions.network_arrays import HIDDEN, MissionWeights, Singles
+from alloc.allocators.learned.missions.network_arrays import HIDDEN, WIDTH, MissionWeights, Singles
 
 
 class MissionNetwork(nn.Module):
@@ -51,21 +51,22 @@ class MissionNetwork(nn.Module):
 def compiled_weights(network: MissionNetwork) -> MissionWeights:
     """Return the weights that score options."""
 
-    def matrix(layer: nn.Linear) -> Singles:
-        return np.ascontiguousarray(layer.weight.detach().numpy().T, dtype=np.float32)
+    def matrix(layer: nn.Linear, width: int = HIDDEN) -> Singles:
+        weight = layer.weight.detach().numpy()
+        return np.pad(weight, ((0, 0), (0, width - weight.shape[1]))).astype(np.float32)
 
     def bias(layer: nn.Linear) -> Singles:
         return layer.bias.detach().numpy().astype(np.float32)
 
     return MissionWeights(
-        inner=matrix(network.inner),
+        inner=matrix(network.inner, WIDTH),
         inner_bias=bias(network.inner),
-        query=matrix(network.query)[:, 0].copy(),
+        query=matrix(network.query)[0],
         own=matrix(network.own),
         own_bias=bias(network.own),
         context=matrix(network.context),
-        out=matrix(network.out)[:, 0].copy(),
-        skip=matrix(network.skip)[:, 0].copy(),
+        out=matrix(network.out)[0],
+        skip=matrix(network.skip, WIDTH)[0],
     )
 
 

@@ -10,9 +10,15 @@ Singles = NDArray[np.float32]
 HIDDEN = 16
 """Width of the network."""
 
+WIDTH = 32
+"""Columns for the features of an option: more than there are, as processors add up numbers by eight or sixteen."""
+
 
 class MissionWeights(NamedTuple):
-    """Weights of a `MissionNetwork` that score options; matrices by input, then output."""
+    """Weights of a `MissionNetwork` that score options; matrices by output, then input, as in torch.
+
+    `inner` and `skip` have `WIDTH` columns.
+    """
 
     inner: Singles
     inner_bias: Singles

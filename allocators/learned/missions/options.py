@@ -4,9 +4,11 @@ import numpy as np
 
 from alloc.allocators.learned.missions import feature_names as names
 from alloc.allocators.learned.missions import situation as known
+from alloc.allocators.learned.missions.densities import NOT_AS_FAR, fill_densities
 from alloc.allocators.learned.missions.network_arrays import Singles
 from alloc.allocators.learned.missions.situation import Situation
-from alloc.allocators.runtime.compiled import compiled, inlined
+from alloc.allocators.missions.layout import NOBODY
+from alloc.allocators.runtime.compiled import compiled_in_place, inlined
 from alloc.problems.fields import FloatArray, IntArray
 
 LOOK, WAIT = -1, -2
@@ -22,80 +24,78 @@ def squashed(value: float) -> float:
     return 1.0 - 1.0 / (1.0 + value)
 
 
-@compiled
+@compiled_in_place
 def time_scale(own: FloatArray) -> float:
     """Return the hours of the longest flight of an agent; 1 where flights take no time."""
     hours = own[known.SPAN] / own[known.SPEED]
     return hours if hours > 0 else 1.0
 
 
-@compiled
-def expect(situation: Situation, rank: IntArray, others: IntArray, rate: FloatArray, without: FloatArray) -> None:
-    """Fill in who comes to each task, and when it is done without the agent.
+@compiled_in_place
+def expect(situation: Situation) -> int:
+    """Fill in who comes to each task, and when it is done without the agent; return how many others have no task.
 
-    Parameters
-    ----------
-    situation : Situation
-    rank : ndarray of int, shape (n,)
-        Others by the hours at which they arrive; then -1, and -2 - i for each i that has no task.
-    others, rate, without : ndarray, shape (m,)
-        Others at each task or on their way, their ability, and the hour at which they have done it.
+    Only tasks that the agent can take are filled in.
     """
-    arrives, target, counts = situation.other[known.ARRIVES], situation.target, situation.counts
-    others[:] = 0
-    rate[:] = 0.0
-    without[:] = np.inf
-    done = np.zeros(len(without))
-    rank[:] = -1
-    found, last = 0, len(rank)
+    coming, arrives, target = situation.coming, situation.other[known.ARRIVES], situation.target
+    first, following, idle = coming.first, coming.following, coming.idle
+    first[:] = NOBODY
+    found = 0
     for i in range(len(target)):
-        if counts[i] and target[i] < 0:
-            last -= 1
-            rank[last] = -2 - i
-        elif counts[i]:
-            place = found
-            while place > 0 and arrives[rank[place - 1]] > arrives[i]:
-                rank[place] = rank[place - 1]
-                place -= 1
-            rank[place] = i
+        if not situation.counts[i]:
+            continue
+        if target[i] == NOBODY:
+            idle[found] = i
             found += 1
-    for place in range(found):
-        i = rank[place]
-        j = target[i]
-        others[j] += 1
-        begin = max(arrives[i], situation.task[known.KNOWN_AT, j])
-        if begin < without[j]:
-            rate[j] += situation.other[known.STRENGTH, i]
-            done[j] += situation.other[known.STRENGTH, i] * begin
-            without[j] = (situation.task[known.LEFT, j] + done[j]) / rate[j]
-
-
-@compiled
-def in_turn(rank: IntArray, target: IntArray, tasks: int) -> tuple[IntArray, IntArray]:
-    """Return who comes to each task first, and who comes there after each other agent; -1 for nobody."""
-    first, following = np.full(tasks, -1), np.full(len(rank), -1)
-    for place in range(len(rank) - 1, -1, -1):
-        i = rank[place]
-        if i >= 0:
-            following[i] = first[target[i]]
+            continue
+        before, after = NOBODY, first[target[i]]
+        while after != NOBODY and arrives[after] <= arrives[i]:
+            before, after = after, following[after]
+        following[i] = after
+        if before == NOBODY:
             first[target[i]] = i
-    return first, following
+        else:
+            following[before] = i
+    for j in range(len(first)):
+        if situation.can[j]:
+            coming.others[j], coming.without[j] = done_without(situation, j)
+    return found
 
 
 @inlined
-def done_with(
-    situation: Situation, first: int, following: IntArray, arrival: float, left: float, since: float
-) -> float:
-    """Return the hour at which a task is done if the agent arrives at an hour, with others who come there in turn."""
-    arrives, strength, ability = (
+def done_without(situation: Situation, j: int) -> tuple[int, float]:
+    """Return how many others come to a task, and the hour at which they have done it."""
+    arrives, strength, following = (
         situation.other[known.ARRIVES],
         situation.other[known.STRENGTH],
-        situation.own[known.ABILITY],
+        situation.coming.following,
     )
+    left, since = situation.task[known.LEFT, j], situation.task[known.KNOWN_AT, j]
+    others, rate, work, hour, i = 0, 0.0, 0.0, np.inf, situation.coming.first[j]
+    while i != NOBODY:
+        others += 1
+        begin = max(arrives[i], since)
+        if begin < hour:
+            rate += strength[i]
+            work += strength[i] * begin
+            hour = (left + work) / rate
+        i = following[i]
+    return others, hour
+
+
+@inlined
+def done_with(situation: Situation, j: int, arrival: float, left: float) -> float:
+    """Return the hour at which a task is done if the agent arrives at an hour, with others who come there in turn."""
+    arrives, strength, following = (
+        situation.other[known.ARRIVES],
+        situation.other[known.STRENGTH],
+        situation.coming.following,
+    )
+    ability, since = situation.own[known.ABILITY], situation.task[known.KNOWN_AT, j]
     rate = work = 0.0
-    hour, i, is_in = np.inf, first, False
-    while i >= 0 or not is_in:
-        is_next = not is_in and (i < 0 or arrives[i] > arrival)
+    hour, i, is_in = np.inf, situation.coming.first[j], False
+    while i != NOBODY or not is_in:
+        is_next = not is_in and (i == NOBODY or arrives[i] > arrival)
         begin = max(arrival if is_next else arrives[i], since)
         if begin >= hour:
             break
@@ -110,17 +110,8 @@ def done_with(
     return hour
 
 
-@compiled
-def fill_options(
-    situation: Situation,
-    look: FloatArray,
-    options: Singles,
-    choice: IntArray,
-    rank: IntArray,
-    others: IntArray,
-    rate: FloatArray,
-    without: FloatArray,
-) -> int:
+@compiled_in_place
+def fill_options(situation: Situation, look: FloatArray, options: Singles, choice: IntArray) -> int:
     """Fill in the options of an agent and their features; return how many there are.
 
     Parameters
@@ -131,11 +122,8 @@ def fill_options(
     options : ndarray, shape (m + 2, FEATURES)
     choice : ndarray of int, shape (m + 2,)
         Task of each, `LOOK` or `WAIT`.
-    rank, others, rate, without : ndarray
-        Scratch, see `expect`.
     """
-    expect(situation, rank, others, rate, without)
-    first, following = in_turn(rank, situation.target, len(without))
+    idle = expect(situation)
     count = 0
     for j in range(len(situation.can)):
         if situation.can[j]:
@@ -149,8 +137,7 @@ def fill_options(
     count += 1
     options[:count] = 0
     for row in range(tasks):
-        j = choice[row]
-        fill_task(situation, j, options[row], rank, first[j], following, others[j], without[j])
+        fill_task(situation, choice[row], options[row], idle)
     fill_crowding(situation, choice[:tasks], options)
     for row in range(tasks, count):
         option = options[row]
@@ -160,22 +147,15 @@ def fill_options(
         else:
             option[names.STAYS] = 1
     fill_whole(situation, choice, tasks, options[:count])
+    fill_densities(situation, choice, tasks, options[:count])
     return count
 
 
 @inlined
-def fill_task(
-    situation: Situation,
-    j: int,
-    option: Singles,
-    rank: IntArray,
-    first: int,
-    following: IntArray,
-    others: int,
-    without: float,
-) -> None:
+def fill_task(situation: Situation, j: int, option: Singles, idle: int) -> None:
     """Fill the features of a task."""
     own, task = situation.own, situation.task
+    others, without = situation.coming.others[j], situation.coming.without[j]
     hour, scale = own[known.HOUR], time_scale(own)
     is_order = own[known.TARGET] == j
     is_there = is_order and own[known.IS_WORKING] > 0
@@ -184,7 +164,7 @@ def fill_task(
     left = task[known.LEFT, j]
     if others == 0 and not is_there:
         left += task[known.GROWTH, j] * (arrival - task[known.KNOWN_AT, j])
-    with_me = max(hour, done_with(situation, first, following, arrival, left, task[known.KNOWN_AT, j]))
+    with_me = max(hour, done_with(situation, j, arrival, left))
     option[names.TRAVEL] = min(distance / own[known.SPAN], 2.0) if own[known.SPAN] > 0 else 0.0
     option[names.WITH_ME] = squashed((with_me - hour) / scale)
     option[names.WITHOUT] = squashed(max(0.0, without - hour) / scale)
@@ -202,38 +182,37 @@ def fill_task(
     option[names.GROWTH] = squashed(task[known.GROWTH, j] / own[known.ABILITY])
     energy = own[known.ENERGY_PER_DISTANCE] * distance
     option[names.ENERGY] = min(1.0, energy / own[known.BATTERY]) if energy > 0 else 0.0
-    option[names.RIVALS] = squashed(rivals(situation, rank, j, distance) / 3.0)
+    option[names.RIVALS] = squashed(rivals(situation, j, distance, idle) / 3.0)
 
 
 @inlined
-def rivals(situation: Situation, rank: IntArray, j: int, distance: float) -> float:
+def rivals(situation: Situation, j: int, distance: float, idle: int) -> float:
     """Return how many others that have no task are nearer to one."""
     other, found = situation.other, 0.0
     x, y, z = situation.task[known.TASK_X, j], situation.task[known.TASK_Y, j], situation.task[known.TASK_Z, j]
-    for place in range(len(rank) - 1, -1, -1):
-        if rank[place] >= -1:
-            break
-        i = -2 - rank[place]
+    for place in range(idle):
+        i = situation.coming.idle[place]
         dx, dy, dz = other[known.OTHER_X, i] - x, other[known.OTHER_Y, i] - y, other[known.OTHER_Z, i] - z
-        found += dx * dx + dy * dy + dz * dz < distance * distance
+        found += dx * dx + dy * dy + dz * dz < distance * distance * NOT_AS_FAR
     return found
 
 
-@compiled
+@compiled_in_place
 def fill_crowding(situation: Situation, tasks: IntArray, options: Singles) -> None:
     """Fill in how much other work there is near each task."""
     task, near = situation.task, (NEAR * situation.own[known.SPAN]) ** 2
-    x, y, z = task[known.TASK_X][tasks], task[known.TASK_Y][tasks], task[known.TASK_Z][tasks]
+    x, y, z = task[known.TASK_X], task[known.TASK_Y], task[known.TASK_Z]
     for row in range(len(tasks)):
-        at_x, at_y, at_z, found = x[row], y[row], z[row], 0
+        j, found = tasks[row], 0
         for place in range(len(tasks)):
-            dx, dy, dz = x[place] - at_x, y[place] - at_y, z[place] - at_z
+            other = tasks[place]
+            dx, dy, dz = x[other] - x[j], y[other] - y[j], z[other] - z[j]
             found += dx * dx + dy * dy + dz * dz < near
-        is_near_itself = near > 0.0 and at_x == at_x
+        is_near_itself = near > 0.0 and x[j] == x[j]
         options[row, names.CROWDING] = squashed((found - is_near_itself) / 3.0)
 
 
-@compiled
+@compiled_in_place
 def fill_whole(situation: Situation, choice: IntArray, tasks: int, options: Singles) -> None:
     """Fill the features that all options share, and those that compare with a mean."""
     own, agents, ability = situation.own, 1.0, situation.own[known.ABILITY]

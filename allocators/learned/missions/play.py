@@ -5,12 +5,11 @@ from typing import NamedTuple
 import numpy as np
 
 from alloc.allocators.learned.missions.exploring import CELLS, centre, find_unseen, notice
-from alloc.allocators.learned.missions.feature_names import FEATURES
 from alloc.allocators.learned.missions.forward import score
-from alloc.allocators.learned.missions.network_arrays import HIDDEN, MissionWeights, Singles
+from alloc.allocators.learned.missions.network_arrays import HIDDEN, WIDTH, MissionWeights, Singles
 from alloc.allocators.learned.missions.options import WAIT, fill_options
 from alloc.allocators.learned.missions.situation import IS_FLYING, TARGET, Situation, empty, fill
-from alloc.allocators.learned.missions.talking import is_to_send
+from alloc.allocators.learned.missions.talking import MOST_SAVED, is_to_send
 from alloc.allocators.missions.advance import advance
 from alloc.allocators.missions.channel import is_silent
 from alloc.allocators.missions.layout import (
@@ -26,7 +25,7 @@ from alloc.allocators.missions.layout import (
 )
 from alloc.allocators.missions.motion import place_of
 from alloc.allocators.missions.orders import order
-from alloc.allocators.runtime.compiled import compiled, inlined
+from alloc.allocators.runtime.compiled import compiled_in_place, inlined
 from alloc.problems.fields import FloatArray, IntArray
 
 REVIEW = 10
@@ -39,12 +38,13 @@ class Room(NamedTuple):
     Attributes
     ----------
     situation : Situation
-    options, token, scores : ndarray
+    options, token, pooled, scores : ndarray
         See `score`.
-    choice, rank, others : ndarray of int
-    rate, without : ndarray
-        See `fill_options`.
+    choice : ndarray of int
     look : ndarray, shape (3,)
+        See `fill_options`.
+    last : ndarray, shape (cells,)
+        See `find_unseen`.
     seen : ndarray, shape (n, cells)
         Hour at which each agent last saw each cell, -1 for never.
     goal : ndarray of int, shape (n,)
@@ -61,13 +61,11 @@ class Room(NamedTuple):
     situation: Situation
     options: Singles
     token: Singles
+    pooled: Singles
     scores: Singles
     choice: IntArray
-    rank: IntArray
-    others: IntArray
-    rate: FloatArray
-    without: FloatArray
     look: FloatArray
+    last: FloatArray
     seen: FloatArray
     goal: IntArray
     decided: FloatArray
@@ -82,21 +80,19 @@ def room_for(n: int, m: int, periods: int = 1) -> Room:
     """Return room for the decisions of n agents on m tasks, who send a message every so many radio periods."""
     return Room(
         situation=empty(n, m),
-        options=np.zeros((m + 2, FEATURES), np.float32),
+        options=np.zeros((m + 2, WIDTH), np.float32),
         token=np.zeros((m + 2, HIDDEN), np.float32),
+        pooled=np.zeros((2, HIDDEN), np.float32),
         scores=np.zeros(m + 2, np.float32),
         choice=np.zeros(m + 2, np.intp),
-        rank=np.zeros(n, np.intp),
-        others=np.zeros(m, np.intp),
-        rate=np.zeros(m),
-        without=np.zeros(m),
         look=np.zeros(3),
+        last=np.zeros(CELLS * CELLS),
         seen=np.full((n, CELLS * CELLS), -1.0),
         goal=np.full(n, -1),
         decided=np.full(n, -np.inf),
         tasks=np.zeros(n, np.intp),
         periods=periods,
-        saved=np.zeros(n, np.intp),
+        saved=np.full(n, MOST_SAVED * periods, np.intp),
         counted=np.zeros(n, np.intp),
         news=np.zeros(n, np.intp),
     )
@@ -108,7 +104,7 @@ def is_due(room: Room, number: int, hour: float, period: float, tasks: int, is_b
     return not is_busy or tasks != room.tasks[number] or hour - room.decided[number] >= REVIEW * period
 
 
-@compiled
+@compiled_in_place
 def consider(
     room: Room, area: FloatArray, sensing: float, seed: int, number: int, row: int, weights: MissionWeights
 ) -> int:
@@ -131,11 +127,11 @@ def consider(
     target = int(own[TARGET])
     if sensing < np.inf and (target < 0 or not room.situation.can[target]):
         goal = room.goal[row] if own[TARGET] < 0 and own[IS_FLYING] > 0 else -1
-        room.goal[row] = find_unseen(room.situation, area, sensing, room.seen[row], seed, number, goal, room.look)
-    count = fill_options(
-        room.situation, room.look, room.options, room.choice, room.rank, room.others, room.rate, room.without
-    )
-    score(room.options, count, weights, room.token, room.scores)
+        for cell in range(len(room.last)):
+            room.last[cell] = room.seen[row, cell]
+        room.goal[row] = find_unseen(room.situation, area, sensing, room.last, seed, number, goal, room.look)
+    count = fill_options(room.situation, room.look, room.options, room.choice)
+    score(room.options, count, weights, room.token, room.pooled, room.scores)
     return count
 
 
@@ -164,7 +160,7 @@ def note_choice(room: Room, row: int, choice: int) -> None:
         room.news[row] = 1
 
 
-@compiled
+@compiled_in_place
 def talk(state: MissionArrays, room: Room) -> None:
     """Say which agents send a message now."""
     head = state.head[0]
@@ -205,7 +201,7 @@ def wants(state: MissionArrays, room: Room, number: int) -> bool:
     return True
 
 
-@compiled
+@compiled_in_place
 def play(state: MissionArrays, room: Room, weights: MissionWeights, seed: int) -> int:
     """Let the network lead all agents to the end of a mission; return how often options were scored.
 

@@ -11,7 +11,7 @@ from alloc.allocators.learned.missions.play import Room, act, consider, talk, wa
 from alloc.allocators.missions.advance import advance
 from alloc.allocators.missions.chance import first_key, fraction, keyed
 from alloc.allocators.missions.layout import IDLE, MESSAGES, MISSED, OVER, WORKING, MissionArrays
-from alloc.allocators.runtime.compiled import compiled
+from alloc.allocators.runtime.compiled import compiled_in_place
 from alloc.problems.fields import FloatArray, IntArray
 
 SAMPLING = 12
@@ -72,7 +72,7 @@ def record_for(n: int, m: int, most: int, ideal: float) -> Record:
     )
 
 
-@compiled
+@compiled_in_place
 def account(state: MissionArrays, record: Record, number: int) -> None:
     """Count the hours since an agent was last asked, if it did not work."""
     head, agent = state.head[0], state.agents[number]
@@ -85,7 +85,7 @@ def account(state: MissionArrays, record: Record, number: int) -> None:
     record.asked[number] = head.hour
 
 
-@compiled
+@compiled_in_place
 def missed_cost(state: MissionArrays, ideal: float) -> float:
     """Return what tasks cost that are missed by now."""
     missed = total = 0.0
@@ -96,7 +96,7 @@ def missed_cost(state: MissionArrays, ideal: float) -> float:
     return MISSED_COST * ideal * missed / total if total > 0 else 0.0
 
 
-@compiled
+@compiled_in_place
 def sample(room: Room, count: int, key: int) -> tuple[int, float]:
     """Return an option that is drawn by the softmax of the scores, and the logarithm of its probability."""
     highest, chosen = -np.inf, 0
@@ -110,7 +110,7 @@ def sample(room: Room, count: int, key: int) -> tuple[int, float]:
     return chosen, room.scores[chosen] - largest - math.log(total)
 
 
-@compiled
+@compiled_in_place
 def rollout(state: MissionArrays, room: Room, weights: MissionWeights, seed: int, record: Record) -> None:
     """Let samples of the network lead all agents to the end of a mission, and record what they decide.
 
@@ -148,7 +148,7 @@ def rollout(state: MissionArrays, room: Room, weights: MissionWeights, seed: int
                 drawn += 1
                 k = record.length[0]
                 if k < len(record.choices):
-                    record.options[k, :count] = room.options[:count]
+                    record.options[k, :count] = room.options[:count, :FEATURES]
                     record.choices[k], record.action[k], record.agent[k] = count, option, number
                     record.log_probability[k], record.hour[k] = log_probability, head.hour
                     record.cost[k] = record.total[0] + missed

@@ -6,11 +6,35 @@ import numpy as np
 
 from alloc.allocators.missions.layout import NOBODY, TO_TASK, WORKING, MissionArrays
 from alloc.allocators.missions.motion import battery_of, can_fly, distance_between, place_of
-from alloc.allocators.runtime.compiled import compiled
+from alloc.allocators.runtime.compiled import compiled_in_place
 from alloc.problems.fields import BoolArray, FloatArray, IntArray
 
 MEMORY = 2.0
 """Hours after which what was heard of others no longer counts."""
+
+
+class Coming(NamedTuple):
+    """Who comes to which task, as `expect` finds it.
+
+    Attributes
+    ----------
+    first : ndarray of int, shape (m,)
+        Who is first at each task, or was there before, -1 for nobody.
+    following : ndarray of int, shape (n,)
+        Who comes to the same task next, -1 for nobody.
+    others : ndarray of int, shape (m,)
+        Others at each task or on their way.
+    without : ndarray, shape (m,)
+        Hour at which they have done it, ``inf`` where nobody comes.
+    idle : ndarray of int, shape (n,)
+        Others that have no task.
+    """
+
+    first: IntArray
+    following: IntArray
+    others: IntArray
+    without: FloatArray
+    idle: IntArray
 
 
 class Situation(NamedTuple):
@@ -30,6 +54,8 @@ class Situation(NamedTuple):
         Task to which it goes or where it works, -1 for none.
     counts : ndarray of bool, shape (n,)
         Whether anything recent is known of an agent, and it is another one.
+    coming : Coming
+        Room for what follows from all that.
     """
 
     own: FloatArray
@@ -38,6 +64,7 @@ class Situation(NamedTuple):
     other: FloatArray
     target: IntArray
     counts: BoolArray
+    coming: Coming
 
 
 HOUR, X, Y, Z, ABILITY, SPEED, BATTERY, ENERGY_PER_DISTANCE, SPAN, TARGET, IS_WORKING, IS_FLYING, OWN = range(13)
@@ -59,10 +86,17 @@ def empty(n: int, m: int) -> Situation:
         other=np.zeros((OTHER, n)),
         target=np.full(n, NOBODY),
         counts=np.zeros(n, np.bool_),
+        coming=Coming(
+            first=np.full(m, NOBODY),
+            following=np.full(n, NOBODY),
+            others=np.zeros(m, np.intp),
+            without=np.full(m, np.inf),
+            idle=np.full(n, NOBODY),
+        ),
     )
 
 
-@compiled
+@compiled_in_place
 def fill(state: MissionArrays, number: int, situation: Situation) -> None:
     """Fill in what an agent knows in a compiled mission."""
     fill_own(state, number, situation.own)
@@ -70,7 +104,7 @@ def fill(state: MissionArrays, number: int, situation: Situation) -> None:
     fill_others(state, number, situation.other, situation.target, situation.counts)
 
 
-@compiled
+@compiled_in_place
 def fill_own(state: MissionArrays, number: int, own: FloatArray) -> None:
     """Fill in what an agent knows of itself."""
     head, agent = state.head[0], state.agents[number]
@@ -83,7 +117,7 @@ def fill_own(state: MissionArrays, number: int, own: FloatArray) -> None:
     own[IS_WORKING], own[IS_FLYING] = agent.task != NOBODY, agent.flight != 0
 
 
-@compiled
+@compiled_in_place
 def fill_tasks(state: MissionArrays, number: int, task: FloatArray, can: BoolArray) -> None:
     """Fill in what an agent knows of tasks."""
     head, agent = state.head[0], state.agents[number]
@@ -103,7 +137,7 @@ def fill_tasks(state: MissionArrays, number: int, task: FloatArray, can: BoolArr
             task[DISTANCE, j] = distance_between(head.is_manhattan, here, place)
 
 
-@compiled
+@compiled_in_place
 def fill_others(state: MissionArrays, number: int, other: FloatArray, target: IntArray, counts: BoolArray) -> None:
     """Fill in what an agent knows of others."""
     head, row = state.head[0], state.agents[number].known

@@ -19,9 +19,22 @@ class AuctionPolicyParameters(CheckedParameters):
     ----------
     memory : float
         Hours after which a bid that was not renewed no longer counts.
+    stay : float
+        Factor on the bid for the task that an agent has, when it looks for a better one; ``inf``: it never does while
+        it has a seat there.
+    seats : float
+        Factor on the seats of a task.
+    flight : float
+        How much an hour of flight counts beside an hour of work.
+    age : float
+        How fast bids fall with the age, in hours, of what is known of the task.
     """
 
     memory: float = bounded(1.0, low=0)
+    stay: float = bounded(math.inf, low=1, infinite=True)
+    seats: float = bounded(1.0, low=0)
+    flight: float = bounded(1.0, low=0)
+    age: float = bounded(0.0, low=0)
 
 
 @dataclass(frozen=True)
@@ -57,7 +70,7 @@ class ConsensusAuction(Policy):
 
 class _Bidder(AgentDecider):
     def __init__(self, briefing: Briefing, parameters: AuctionPolicyParameters) -> None:
-        self._explorer, self._memory = Explorer(briefing), parameters.memory
+        self._explorer, self._parameters = Explorer(briefing), parameters
         self._bids: dict[str, _Bid] = {}
 
     def decide(self, view: View) -> Order | None:
@@ -65,28 +78,22 @@ class _Bidder(AgentDecider):
             self._take_over(message)
         own = view.own
         self._hear_of_orders(view)
-        tasks = view.open_tasks(own)
-        seats = self._seats(view)
-        best, highest = None, 0.0
-        for task in tasks:
-            amount = self._amount(view, task, seats)
-            if amount > highest and not self._is_outbid(view, task.facts.id, amount, seats):
-                best, highest = task.facts.id, amount
-        held = own.task
-        if held is not None and any(task.facts.id == held for task in tasks):
-            amount = self._amount(view, view.tasks[held], seats)
-            if not self._is_outbid(view, held, amount, seats):
-                best, highest = held, amount
+        seats, best, highest, bid = self._seats(view), None, 0.0, 0.0
+        for task in view.open_tasks(own):
+            name, amount = task.facts.id, self._amount(view, task, seats)
+            value = amount * (self._parameters.stay if name == own.task and amount > 0 else 1.0)
+            if value > highest and not self._is_outbid(view, name, amount, seats):
+                best, highest, bid = name, value, amount
         self._bids.pop(own.facts.id, None)
         if best is None:
             return self._explorer.order(view)
-        self._bids[own.facts.id] = _Bid(best, highest, view.hour)
+        self._bids[own.facts.id] = _Bid(best, bid, view.hour)
         return Order(best)
 
     def _seats(self, view: View) -> int:
         agents = sum(report.status in ACTIVE for report in view.agents.values())
         tasks = sum(report.status is TaskStatus.OPEN for report in view.tasks.values())
-        return max(1, math.ceil(agents / max(1, tasks)))
+        return max(1, math.ceil(self._parameters.seats * agents / max(1, tasks)))
 
     def _amount(self, view: View, task: TaskReport, seats: int) -> float:
         own = view.own
@@ -94,7 +101,10 @@ class _Bidder(AgentDecider):
         flight = 0.0 if is_there else view.hours(own, task)
         work = (task.left + 1e-9) / (own.facts.ability * seats)
         is_late = view.hour + flight >= task.facts.deadline
-        return 0.0 if is_late else (task.facts.priority + 1e-6) * work / (work + flight)
+        if is_late:
+            return 0.0
+        share = work / (work + self._parameters.flight * flight)
+        return (task.facts.priority + 1e-6) * share * math.exp(-self._parameters.age * (view.hour - task.hour))
 
     def _is_outbid(self, view: View, task: str, amount: float, seats: int) -> bool:
         """Whether others hold all seats of a task with higher bids; ids decide between equals."""
@@ -104,7 +114,7 @@ class _Bidder(AgentDecider):
             for name, bid in self._bids.items()
             if name != own
             and bid.task == task
-            and view.hour - bid.hour <= self._memory
+            and view.hour - bid.hour <= self._parameters.memory
             and (bid.amount, name) > (amount, own)
         ]
         return len(higher) >= seats

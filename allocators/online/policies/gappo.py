@@ -68,7 +68,8 @@ class NetworkPolicy(Policy):
         self, parameters: NetworkParameters | None = None, *, policy: Path | str | None = None, **settings: object
     ) -> None:
         super().__init__(parameters, **settings)
-        self._weights = compiled_weights(load_network(self.shipped if policy is None else policy))
+        self.network = load_network(self.shipped if policy is None else policy)
+        self._weights = compiled_weights(self.network)
         _compile_loops(self._weights)
 
     def begin(self, briefing: Briefing) -> AgentDecider:

@@ -3,31 +3,32 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from alloc.allocators.contract.parameters import CheckedParameters, bounded
+from alloc.allocators.contract.parameters import bounded
 from alloc.allocators.online.contract import AgentDecider, Briefing, Policy, PolicyInfo
 from alloc.allocators.online.policies.exploring import Explorer
-from alloc.allocators.online.policies.outlook import prospects
+from alloc.allocators.online.policies.outlook import UtilityParameters, prospects, utility
+from alloc.problems.missions.chance import uniform
 from alloc.problems.missions.simulation.reports import Message, View
 from alloc.problems.missions.simulation.state import Order, TaskStatus
 
+STAMP = 13
+"""What chances are for, as `alloc.problems.missions.chance` counts."""
+
 
 @dataclass(frozen=True)
-class HedonicPolicyParameters(CheckedParameters):
-    """Parameters of the game.
+class HedonicPolicyParameters(UtilityParameters):
+    """Parameters of the game, those of the utility of a coalition; the defaults are tuned.
 
-    Attributes
-    ----------
-    stay : float
-        Factor on the utility of the coalition that an agent is in.
-    crowding : float
-        How much each member of a coalition takes away from its utility, so that a stable partition exists.
-    memory : float
-        Hours after which an agent that was not heard of no longer counts.
+    A stable partition exists where each member takes away from the utility (`crowding`). `stay` is for the coalition
+    that an agent is in, and `memory` for others that were not heard of.
     """
 
-    stay: float = bounded(1.5, low=1)
-    crowding: float = bounded(0.5, low=0)
-    memory: float = bounded(5.0, low=0)
+    stay: float = bounded(7.5, low=1)
+    memory: float = bounded(4.9, low=0)
+    missed: float = bounded(0.61, low=0)
+    crowding: float = bounded(0.086, low=0)
+    flight: float = bounded(0.0125, low=0)
+    age: float = bounded(0.066, low=0)
 
 
 class HedonicCoalitions(Policy):
@@ -55,9 +56,9 @@ class HedonicCoalitions(Policy):
 
 class _Member(AgentDecider):
     def __init__(self, briefing: Briefing, parameters: HedonicPolicyParameters) -> None:
-        self._explorer, self._rng = Explorer(briefing), briefing.generator()
+        self._explorer, self._seed = Explorer(briefing), briefing.seed
         self._parameters = parameters
-        self._changes, self._stamp = 0.0, 0.0
+        self._changes, self._stamp, self._moves = 0.0, 0.0, 0
         self._partition: dict[str, str] = {}
 
     def decide(self, view: View) -> Order | None:
@@ -69,13 +70,9 @@ class _Member(AgentDecider):
         home, choice, highest = self._partition.get(own), None, 0.0
         for prospect in prospects(view, self._parameters.memory, self._partition):
             name = prospect.task.facts.id
-            if prospect.is_useful:
-                hours = max(prospect.with_me - view.hour, 1e-12)
-                value = (prospect.with_me - prospect.arrival) / hours * (prospect.task.facts.priority + 1e-6)
-                value *= self._parameters.stay if name == home else 1.0
-                value /= 1 + self._parameters.crowding * prospect.group
-                if value > highest:
-                    choice, highest = name, value
+            value = utility(view.hour, prospect, self._parameters, is_own=name == home)
+            if value > highest:
+                choice, highest = name, value
         if choice != home:
             self._move(own, choice)
         return self._explorer.order(view) if choice is None else Order(choice)
@@ -86,7 +83,8 @@ class _Member(AgentDecider):
         else:
             self._partition[own] = choice
         self._changes += 1
-        self._stamp = float(self._rng.random())
+        self._moves += 1
+        self._stamp = uniform(STAMP, *self._seed, self._moves)
 
     def _compare(self, message: Message) -> None:
         """Adopt the partition of a message if it takes precedence over the agent's own."""

@@ -4,8 +4,38 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from alloc.allocators.contract.parameters import CheckedParameters, bounded
 from alloc.problems.missions.simulation.reports import TaskReport, View
 from alloc.problems.missions.simulation.state import ACTIVE, AgentStatus
+
+
+@dataclass(frozen=True)
+class UtilityParameters(CheckedParameters):
+    """Parameters of the utility of a task; the defaults are those of `greedy`, tuned.
+
+    Attributes
+    ----------
+    stay : float
+        Factor on the utility of the task that an agent has already.
+    memory : float
+        Hours after which what was heard of others no longer counts.
+    missed : float
+        Factor on the utility of a task that will miss its deadline even with the agent.
+    crowding : float
+        How much each other agent that is at a task, or on its way there, takes away from its utility.
+    flight : float
+        How fast utility falls with the hours of the flight.
+    age : float
+        How fast utility falls with the age, in hours, of what is known of the task.
+    """
+
+    stay: float = bounded(4.8, low=0)
+    memory: float = bounded(5.0, low=0)
+    missed: float = bounded(0.016, low=0)
+    crowding: float = bounded(0.14, low=0)
+    flight: float = bounded(0.19, low=0)
+    age: float = bounded(0.02, low=0)
+
 
 Group = list[tuple[float, float]]
 """Hour of arrival and ability of each."""
@@ -61,6 +91,28 @@ def prospects(view: View, memory: float, task_of: Mapping[str, str] | None = Non
         with_me = done_at(left, task.hour, [*group, (arrival, own.facts.ability)])
         found.append(Prospect(task, arrival, without, with_me, len(group)))
     return found
+
+
+def utility(hour: float, prospect: Prospect, parameters: UtilityParameters, *, is_own: bool) -> float:
+    """Return the utility of a task: its priority times the share of the time until it is done that would be work.
+
+    Parameters
+    ----------
+    hour : float
+    prospect : Prospect
+    parameters : UtilityParameters
+    is_own : bool
+        Whether it is the task that the agent has already.
+    """
+    if not prospect.is_useful:
+        return 0.0
+    facts, hours = prospect.task.facts, prospect.with_me - hour
+    share = 1.0 if hours <= 0 else (prospect.with_me - prospect.arrival) / hours
+    value = share * (facts.priority + 1e-6) / (1 + parameters.crowding * prospect.group)
+    value *= math.exp(-parameters.flight * (prospect.arrival - hour) - parameters.age * (hour - prospect.task.hour))
+    if prospect.with_me > facts.deadline:
+        value *= parameters.missed
+    return value * (parameters.stay if is_own else 1.0)
 
 
 def _groups(view: View, memory: float, task_of: Mapping[str, str] | None) -> dict[str, Group]:

@@ -5,9 +5,10 @@ import json
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from queue import SimpleQueue
+from types import FrameType
 from typing import TYPE_CHECKING, Annotated, BinaryIO
 
 import typer
@@ -125,13 +126,21 @@ def read_lines(arrived: "SimpleQueue[str | None]") -> None:
 
 
 @contextlib.contextmanager
-def ended_by_signals(arrived: "SimpleQueue[str | None]") -> Iterator[None]:
-    """Let SIGTERM and Ctrl-C be the end of the input, behind the lines that are there, as long as this lasts."""
+def ended_by_signals(arrived: "SimpleQueue[str | None]", end: Callable[[], object] = lambda: None) -> Iterator[None]:
+    """Let SIGTERM and Ctrl-C be the end of the input, behind the lines that are there, as long as this lasts.
+
+    They call `end` as well.
+    """
+
+    def request_end(number: int, frame: FrameType | None) -> None:
+        end()
+        arrived.put(None)
+
     if threading.current_thread() is not threading.main_thread():
         yield
         return
     numbers = (signal.SIGTERM, signal.SIGINT)
-    before = [signal.signal(number, lambda *_: arrived.put(None)) for number in numbers]
+    before = [signal.signal(number, request_end) for number in numbers]
     try:
         yield
     finally:

@@ -21,6 +21,8 @@ SCHEMAS = {
     "alloc-mission-log/1": "the first line of what `alloc simulate --log` writes",
     "alloc-planner-request/1": "the lines that `alloc plan --stdio` reads",
     "alloc-planner-orders/1": "the lines that `alloc plan --stdio` writes",
+    "alloc-solve-request/1": "the requests that `alloc serve` takes",
+    "alloc-solve-answer/1": "the answers that `alloc serve` gives",
     "alloc-planner/1": "a planner, as `alloc plan --state` saves it",
 }
 """What each format with a schema is for."""

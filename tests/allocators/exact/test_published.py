@@ -8,7 +8,7 @@ import pytest
 
 from alloc.problems import Allocation, evaluate, machine_covering, makespan_lower_bound
 
-TABLE = Path(__file__).parents[3] / "docs" / "machine-covering.csv"
+TABLE = Path(__file__).parents[3] / "docs" / "benchmarks" / "machine-covering.csv"
 
 pytestmark = pytest.mark.skipif(not TABLE.exists(), reason="the tests run without the documentation")
 

@@ -1,6 +1,7 @@
 """Campaigns: what becomes of runs that crash, hang, eat memory or leave processes behind."""
 
 import os
+import sqlite3
 import threading
 from pathlib import Path
 
@@ -12,8 +13,9 @@ from alloc.allocators.experiments.campaign import Campaign, Job, Means
 from alloc.allocators.experiments.isolation import cores
 from alloc.allocators.experiments.store.key import Run, fingerprint, versions
 from alloc.allocators.experiments.store.outcome import Outcome
+from alloc.allocators.experiments.store.plan import unpacked
 from alloc.allocators.experiments.store.store import Store
-from alloc.problems import InputError, Instance
+from alloc.problems import Allocation, InputError, Instance
 
 INSTANCE = Instance(name="one", ability=[1, 2], workload=[3])
 
@@ -68,6 +70,8 @@ def test_a_run_that_hangs_or_ends_its_process_stops_nobody_else(plugin):
     assert endings["hang"].outcome is Outcome.HUNG
     assert (endings["leave"].outcome, endings["leave"].exit_code) == (Outcome.EXITED, 3)
     assert (endings["answer"].outcome, endings["answer"].makespan) == (Outcome.SOLVED, 1.0)
+    ((plan,),) = sqlite3.connect(plugin / "runs.db").execute("SELECT plan FROM plans").fetchall()
+    assert unpacked(plan) == Allocation([0, 0])
 
 
 @pytest.mark.slow
@@ -168,7 +172,7 @@ def test_a_campaign_that_is_stopped_gives_its_runs_back(plugin, monkeypatch):
 def test_a_store_that_fails_leaves_no_process_behind(plugin, monkeypatch):
     """Where a row cannot be written the campaign ends with that error, and so do all of its processes."""
 
-    def fail(self, run, ending):
+    def fail(self, run, ending, plan):
         raise InputError("the disk is full", source="runs.db")
 
     jobs = [job("pid", seed) for seed in range(3)]

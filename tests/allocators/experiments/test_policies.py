@@ -1,12 +1,13 @@
 """Policies compared in missions: rows, and paired differences with intervals."""
 
 import threading
+import time
 
 import numpy as np
 import pytest
 from scipy import stats
 
-from alloc.allocators import Briefing, Policy, PolicyInfo, compare_policies, paired_differences, simulate
+from alloc.allocators import AgentDecider, Briefing, Policy, PolicyInfo, compare_policies, paired_differences, simulate
 from alloc.problems import InputError, MissionParameters, random_mission
 
 MISSIONS = [random_mission(MissionParameters(agents=3, tasks=4), seed) for seed in (1, 2, 3)]
@@ -19,6 +20,20 @@ class Faulty(Policy):
 
     def begin(self, briefing: Briefing):
         raise ZeroDivisionError("nine")
+
+
+class Slow(Policy):
+    """Takes two seconds for a decision."""
+
+    info = PolicyInfo(name="slow", summary="")
+
+    def begin(self, briefing: Briefing):
+        return SlowDecider()
+
+
+class SlowDecider(AgentDecider):
+    def decide(self, view):
+        time.sleep(2)
 
 
 def test_a_row_has_means_over_the_seeds():
@@ -79,6 +94,17 @@ def test_a_stop_ends_the_comparison():
     assert next(rows).policy == "idle"
     stop.set()
     assert list(rows) == []
+
+
+def test_a_stop_ends_a_run_within_a_second():
+    """A stop ends a run within a second though a decision takes longer, and the rows before it stay."""
+    stop = threading.Event()
+    rows = compare_policies(MISSIONS[:1], ["idle", Slow()], stop=stop)
+    assert next(rows).policy == "idle"
+    threading.Timer(0.2, stop.set).start()
+    began = time.monotonic()
+    assert list(rows) == []
+    assert time.monotonic() - began < 1.2
 
 
 @pytest.mark.parametrize(

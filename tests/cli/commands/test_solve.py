@@ -89,16 +89,22 @@ def test_what_has_changed_since_the_start_was_made_is_a_note(alloc, small):
 
 
 def test_saturated_reward_is_a_note(alloc):
-    """A reward beyond the range of floats is told."""
+    """A reward beyond the range of floats is told where the answer shows it: in JSON, not in a summary."""
     document = {
         "format": "alloc-instance/1",
         "agents": [{"id": "a", "ability": 1}],
         "tasks": [{"id": "t", "workload": 1e6}],
     }
-    ran = alloc("solve", "-", "--method", "greedy", "--json", stdin=json.dumps(document))
+    ran = alloc("solve", "-", "--method", "greedy", "--json", "--output", "plan.json", stdin=json.dumps(document))
     assert ran.code == 0
     assert "too large for a float" in ran.err
     assert ran.json["reward"] < -1e300
+    ran = alloc("evaluate", "-", "plan.json", "--json", stdin=json.dumps(document))
+    assert "too large for a float" in ran.err
+    for command in (("solve", "-", "--method", "greedy"), ("evaluate", "-", "plan.json")):
+        ran = alloc(*command, stdin=json.dumps(document))
+        assert ran.code == 0
+        assert "reward" not in ran.err
 
 
 def test_the_picture_is_that_of_the_answer(alloc, small):

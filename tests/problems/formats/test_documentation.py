@@ -1,4 +1,4 @@
-"""What docs/formats.md shows is what the readers take."""
+"""What docs/data/formats.md shows is what the readers take."""
 
 import re
 import textwrap
@@ -19,7 +19,7 @@ from alloc.problems.formats.csv_folder import (
 from alloc.problems.formats.document import INSTANCE_FIELDS
 from alloc.problems.formats.npz_archive import FIELDS
 
-TEXT = (Path(__file__).parents[3] / "docs" / "formats.md").read_text("utf-8")
+TEXT = (Path(__file__).parents[3] / "docs" / "data" / "formats.md").read_text("utf-8")
 
 
 def section(title: str) -> str:

@@ -5,7 +5,7 @@ References
 Hansen and Ostermeier (2001), doi:10.1162/106365601750190398, as in DEAP (Fortin et al. 2012, JMLR 13:2171-2175).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -17,9 +17,10 @@ from alloc.allocators.learned.missions.training.curriculum import MissionCurricu
 from alloc.allocators.learned.missions.training.validation import validate
 from alloc.allocators.learned.training.member import Weights
 from alloc.allocators.parallel.engine import Engine
+from alloc.problems.fields import FloatArray
 
-STEP = 1.0
-"""Initial standard deviation of a weight."""
+STEP, FINE_STEP = 1.0, 0.3
+"""Initial standard deviation of a weight; the smaller one where a training goes on from a policy."""
 
 EVOLVED = ("skip.weight", "out.weight")
 """What is evolved: the weights of features, and those of the last layer, whose inputs stay as they were drawn."""
@@ -76,12 +77,14 @@ class Evolution:
         Candidates in a generation.
     missions : int
         On which all candidates of a generation are compared.
+    step : float
+        Initial standard deviation of a weight.
     """
 
-    def __init__(self, network: Weights, population: int, missions: int) -> None:
+    def __init__(self, network: Weights, population: int, missions: int, step: float = STEP) -> None:
         self._network, self._population, self._missions = network, population, missions
         first = torch.cat([network[name][0] for name in EVOLVED]).double().numpy()
-        self._strategy = cma.Strategy(centroid=first, sigma=STEP, lambda_=population)
+        self._strategy = cma.Strategy(centroid=first, sigma=step, lambda_=population)
 
     def advance(
         self, curriculum: MissionCurriculum, seed: int, progress: float, engine: Engine, should_stop: Callable[[], bool]
@@ -112,9 +115,20 @@ class Evolution:
 
     def state_dict(self) -> dict[str, torch.Tensor]:
         """Return what changes from generation to generation."""
-        return {name: torch.tensor(np.array(getattr(self._strategy, name))) for name in STATE}
+        return {name: torch.tensor(value) for name, value in state_of(self._strategy).items()}
 
     def load_state_dict(self, state: dict[str, torch.Tensor]) -> None:
         """Restore what `state_dict` returned."""
-        for name, value in state.items():
-            setattr(self._strategy, name, value.numpy() if value.dim() else value.item())
+        restore(self._strategy, {name: value.numpy() for name, value in state.items()})
+
+
+def state_of(strategy: cma.Strategy) -> dict[str, FloatArray]:
+    """Return what changes of a strategy from generation to generation."""
+    return {name: np.array(getattr(strategy, name)) for name in STATE}
+
+
+def restore(strategy: cma.Strategy, state: Mapping[str, FloatArray]) -> None:
+    """Restore what `state_of` returned."""
+    for name in STATE:
+        value = state[name]
+        setattr(strategy, name, value if value.ndim else value.item())

@@ -18,7 +18,7 @@ from alloc.allocators.learned.missions.feature_names import FEATURE_SET
 from alloc.allocators.learned.missions.network import MissionNetwork
 from alloc.allocators.learned.missions.policy_file import save_network
 from alloc.allocators.learned.missions.training.curriculum import MissionCurriculum
-from alloc.allocators.learned.missions.training.evolution import Evolution
+from alloc.allocators.learned.missions.training.evolution import FINE_STEP, STEP, Evolution
 from alloc.allocators.learned.missions.training.ppo import MissionPpo
 from alloc.allocators.learned.missions.training.validation import validate
 from alloc.allocators.learned.network.state_dict import StateDict
@@ -129,7 +129,8 @@ class MissionTrainer(PopulationTraining):
         members = [learner.state_dict()] * self.parameters.population
         super().__init__(self.parameters.breeding, seed, members)
         weights = {name: weight.clone() for name, weight in learner.network.state_dict().items()}
-        self.evolution = Evolution(weights, self.parameters.candidates, self.parameters.missions)
+        step = STEP if init is None else FINE_STEP
+        self.evolution = Evolution(weights, self.parameters.candidates, self.parameters.missions, step)
 
     def advance(
         self,

@@ -1,5 +1,7 @@
 """Validation of networks in missions that are never trained on."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from alloc.allocators.learned.missions.network import MissionNetwork, compiled_weights
@@ -19,8 +21,9 @@ DISTANCE_WEIGHT = 0.02
 def validate(network: MissionNetwork, missions: list[tuple[PackedMission, int]]) -> Validation:
     """Return how well a network leads missions.
 
-    Its cost is the hour at which the last task is done, over the ideal mission time, with what is missed or left, and a
-    little for distance; ``unserved`` counts tasks that are not done, and ``reward`` is minus the cost.
+    The cost of a mission is the hour at which the last task is done, over the ideal mission time, with what is missed
+    or left, and a little for distance; that of all is the geometric mean, as what counts is per cents of each, large
+    or small. ``unserved`` counts tasks that are not done, and ``reward`` is minus the cost.
 
     Parameters
     ----------
@@ -33,14 +36,15 @@ def validate(network: MissionNetwork, missions: list[tuple[PackedMission, int]])
         state = begun(mission.arrays, seed)
         play(state, room_for(len(state.agents), len(state.tasks), mission.periods), weights, seed)
         rows.append(figures(state, mission.ideal))
-    time, unserved, undone, distance = np.array(rows).mean(axis=0).tolist()
-    cost = cost_of(time, unserved, undone, distance)
+    time, unserved, _, distance = np.mean(rows, axis=0).tolist()
+    cost = cost_of(rows)
     return Validation(cost, unserved, time, distance, 0.0, -cost)
 
 
-def cost_of(time: float, unserved: float, undone: float, distance: float) -> float:
-    """Return the cost of missions by the means of their `figures`."""
-    return time + MISSED_WEIGHT * undone + DISTANCE_WEIGHT * distance
+def cost_of(rows: Sequence[tuple[float, ...]]) -> float:
+    """Return the cost of missions by the `figures` of each."""
+    time, _, undone, distance = np.array(rows).T
+    return float(np.exp(np.log(time + MISSED_WEIGHT * undone + DISTANCE_WEIGHT * distance).mean()))
 
 
 def figures(state: MissionArrays, ideal: float) -> tuple[float, float, float, float]:

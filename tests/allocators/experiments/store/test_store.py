@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import re
 import resource
 import signal
 import sqlite3
@@ -17,9 +18,12 @@ from alloc.allocators.experiments.store import store as store_module
 from alloc.allocators.experiments.store.key import Run, canonical, fingerprint, versions
 from alloc.allocators.experiments.store.outcome import Ending, Outcome
 from alloc.allocators.experiments.store.owner import is_gone, this_process
+from alloc.allocators.experiments.store.plan import packed, unpacked
+from alloc.allocators.experiments.store.revision import revision
 from alloc.allocators.experiments.store.schema import APPLICATION, MIGRATIONS
 from alloc.allocators.experiments.store.store import ENDING, RUN, Store
-from alloc.problems import InputError, Instance, Mission, MissionParameters, random_mission
+from alloc.problems import Allocation, InputError, Instance, Mission, MissionParameters, random_mission
+from alloc.problems.formats.npz import from_npz, to_npz
 
 RUNS = [
     Run(
@@ -153,7 +157,7 @@ def test_instances_are_known_by_content():
     assert fingerprint(one) != fingerprint(replace(one, task_ids=["x"]))
 
 
-def test_a_store_of_the_first_version_keeps_its_runs(tmp_path):
+def test_a_store_of_an_earlier_version_keeps_its_runs(tmp_path):
     """Runs that were written before there were missions are found under the same keys."""
     with sqlite3.connect(tmp_path / "runs.db") as old:
         old.executescript(MIGRATIONS[0] + f"; PRAGMA application_id = {APPLICATION}; PRAGMA user_version = 1;")
@@ -187,6 +191,16 @@ def test_policies_count_by_content(tmp_path):
     assert canonical({"policy": str(file), "b": 1}) == before
     file.write_bytes(b"two")
     assert canonical({"b": 1, "policy": str(file)}) != before
+
+
+def test_the_commit_is_that_of_this_package(tmp_path, monkeypatch):
+    """In a checkout of alloc it is 40 digits, with a plus after changes; elsewhere, or without git, it is empty."""
+    revision.cache_clear()
+    assert re.fullmatch(r"([0-9a-f]{40}\+?)?", revision())
+    revision.cache_clear()
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert revision() == ""
+    revision.cache_clear()
 
 
 def test_versions_name_this_package():
@@ -235,6 +249,44 @@ def test_two_commands_begin_a_store_at_once(tmp_path, monkeypatch):
     with Store(tmp_path / "runs.db") as store:
         assert store.claim(KEYS[:1]).key == KEYS[0]
     assert others
+
+
+def test_a_store_from_before_plans_takes_them_from_now_on(tmp_path):
+    """A file from before plans and instances were kept has its runs, without a commit, and takes plans from now on."""
+    with Store(tmp_path / "runs.db") as store:
+        finish(store, RUNS[0])
+    with sqlite3.connect(tmp_path / "runs.db") as older:
+        older.executescript(
+            "DROP TABLE plans; DROP TABLE contents; ALTER TABLE runs DROP COLUMN revision; PRAGMA user_version = 2"
+        )
+    with Store(tmp_path / "runs.db") as store:
+        assert store.records()[KEYS[0]].ending.revision == ""
+        assert store.claim([KEYS[1]]).key == KEYS[1]
+        store.finish(RUNS[1], SOLVED, packed(Allocation([0, -1])))
+    rows = sqlite3.connect(tmp_path / "runs.db").execute("SELECT key FROM plans").fetchall()
+    assert rows == [(KEYS[1],)]
+
+
+def test_instances_and_plans_are_kept(tmp_path):
+    """The content of an instance is that of an .npz file; a run that is made again has its new plan, or none."""
+    instance = Instance(name="one", ability=[1, 2], workload=[3])
+    with Store(tmp_path / "runs.db", again=[Outcome.SOLVED]) as store:
+        known = store.add(instance)
+        for plan in ([0, -1], [0, 0]):
+            assert store.claim([KEYS[0]]).key == KEYS[0]
+            store.finish(RUNS[0], replace(SOLVED, finished_at=0.0), packed(Allocation(plan)))
+    found = sqlite3.connect(tmp_path / "runs.db")
+    assert found.execute("SELECT instance FROM contents").fetchall() == [(known,)]
+    ((content,),) = found.execute("SELECT content FROM contents").fetchall()
+    assert to_npz(from_npz(content, "")) == to_npz(instance)
+    ((kept,),) = found.execute("SELECT plan FROM plans").fetchall()
+    assert unpacked(kept) == Allocation([0, 0])
+    with Store(tmp_path / "runs.db", again=[Outcome.SOLVED]) as store:
+        store.claim([KEYS[0]])
+        store.finish(RUNS[0], Ending(outcome=Outcome.FAILED))
+    assert found.execute("SELECT plan FROM plans").fetchall() == []
+    with pytest.raises(InputError, match="plan: is damaged"):
+        unpacked(kept[:-3])
 
 
 def test_a_later_store_is_refused(tmp_path):

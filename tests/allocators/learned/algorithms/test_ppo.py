@@ -148,7 +148,7 @@ def test_a_step_goes_against_the_loss_written_out(board: Board, rules: Rules) ->
     loss = loss / count + 0.7 * 0.5 * ((samples.target - scores.value) ** 2).mean() - 0.1 * entropy.mean()
     loss.backward()
     learner.optimiser = torch.optim.SGD(learner.network.parameters(), lr=0.1)
-    learner.update(fresh, None, rules, torch.Generator().manual_seed(0), max_rate=0.1)
+    learner.update(fresh, [], rules, torch.Generator().manual_seed(0), max_rate=0.1)
     for new, old in zip(learner.network.parameters(), network.parameters(), strict=True):
         slope = torch.zeros_like(old) if old.grad is None else old.grad
         torch.testing.assert_close(new, old - 0.1 * slope, atol=1e-5, rtol=1e-4)
@@ -159,7 +159,7 @@ def test_what_went_better_than_expected_becomes_likelier(board: Board) -> None:
     learner = Ppo(SMALL, PpoParameters(ent_coef=0.0, vf_coef=0.0))
     fresh = played(learner, board)
     samples = on_policy_samples(fresh, learner.parameters)
-    learner.update(fresh, None, PLANNING, torch.Generator().manual_seed(0), max_rate=1e-3)
+    learner.update(fresh, [], PLANNING, torch.Generator().manual_seed(0), max_rate=1e-3)
     scores = learner.network(board[samples.game], samples.state)
     now, _ = log_probabilities(board[samples.game], samples.state, scores, samples.actions)
     real = samples.actions >= 0
@@ -173,7 +173,7 @@ def test_divergence_tells_how_far_the_policy_moved(board: Board) -> None:
     for rate in (0.0, 1e-4, 1e-2):
         learner = Ppo(SMALL, PpoParameters(learning_rate=1e-2))
         fresh = played(learner, board)
-        found.append(learner.update(fresh, None, PLANNING, torch.Generator().manual_seed(0), max_rate=rate)[0])
+        found.append(learner.update(fresh, [], PLANNING, torch.Generator().manual_seed(0), max_rate=rate)[0])
     assert found[0] == pytest.approx(0, abs=1e-6)
     assert 0 < found[1] < found[2]
 
@@ -222,7 +222,7 @@ def test_a_single_decision_does_not_spoil_the_weights() -> None:
     """One agent, one task, one step: nothing can be compared, and nothing breaks."""
     board = layout(Instance(ability=[1], workload=[1]))
     learner = Ppo(SMALL)
-    learner.update(played(learner, board, steps=1), None, PLANNING, torch.Generator(), max_rate=1e-3)
+    learner.update(played(learner, board, steps=1), [], PLANNING, torch.Generator(), max_rate=1e-3)
     assert weights(learner).isfinite().all()
 
 
@@ -239,7 +239,7 @@ def test_extreme_games_do_not_spoil_the_weights() -> None:
         for seed in range(3):
             fresh = played(learner, board, seed=seed, steps=5)
             old = learner.replay.draw(torch.Generator().manual_seed(seed))
-            learner.update(fresh, old, PLANNING, torch.Generator(), max_rate=1e-2)
+            learner.update(fresh, [old] if old else [], PLANNING, torch.Generator(), max_rate=1e-2)
             learner.replay.add(fresh)
         assert weights(learner).isfinite().all()
 

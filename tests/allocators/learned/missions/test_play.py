@@ -9,7 +9,6 @@ import torch
 from alloc.allocators.learned.missions.feature_names import FEATURES
 from alloc.allocators.learned.missions.forward import score
 from alloc.allocators.learned.missions.network import compiled_weights, first_network
-from alloc.allocators.learned.missions.network_arrays import HIDDEN
 from alloc.allocators.learned.missions.play import play, room_for
 from alloc.allocators.learned.missions.policy_file import load_network, save_network
 from alloc.allocators.learned.missions.talking import is_to_send
@@ -25,9 +24,10 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]  # loops are compiled 
 
 def scored(options: np.ndarray, seed: int) -> np.ndarray:
     """Return the scores that the compiled network gives."""
-    token, scores = np.zeros((len(options), HIDDEN), np.float32), np.zeros(len(options), np.float32)
-    score(options, len(options), compiled_weights(first_network(seed)), token, scores)
-    return scores
+    room = room_for(0, len(options))
+    room.options[: len(options), :FEATURES] = options
+    score(room.options, len(options), compiled_weights(first_network(seed)), room.token, room.pooled, room.scores)
+    return room.scores[: len(options)]
 
 
 def test_compiled_scores_are_those_of_torch() -> None:
@@ -67,14 +67,15 @@ def test_policy_is_the_same_in_both_simulations(tmp_path: Path, family: str, kno
 
 
 def test_agents_send_seldom_and_sooner_with_news() -> None:
-    """Nobody sends more than every tenth time; news goes out as soon as that allows; one message is kept for it."""
-    saved, counted, news = (np.zeros(1, np.intp) for _ in range(3))
+    """After the first two, every tenth time; news goes out as soon as that allows; one message is kept for it."""
+    counted, news = np.zeros(1, np.intp), np.zeros(1, np.intp)
+    saved = room_for(1, 1, 10).saved  # of three messages
     sent = []
     for tick in range(100):
         news[0] |= 15 <= tick < 60
         if is_to_send(10, saved, counted, news, 0, tick):
             sent.append(tick)
-    assert sent == [15, 20, 30, 40, 50, 60, 80, 90]
+    assert sent == [0, 1, 10, 15, 20, 30, 40, 50, 60, 80, 90]
 
 
 def test_policy_file_for_missions_is_checked(tmp_path: Path) -> None:

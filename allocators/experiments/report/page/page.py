@@ -1,0 +1,190 @@
+"""The page: what stores hold as one HTML file that a browser opens from disk, without a network."""
+
+import json
+import os
+import time
+from collections import Counter
+from collections.abc import Sequence
+from importlib.metadata import version
+from importlib.resources import files
+
+from alloc.allocators.experiments.report.page.details import details, rounded
+from alloc.allocators.experiments.report.page.encode import compressed
+from alloc.allocators.experiments.report.page.groups import Layout, laid_out
+from alloc.allocators.experiments.report.page.libraries import libraries, require_packages
+from alloc.allocators.experiments.report.page.series import series
+from alloc.allocators.experiments.report.page.source import Archive, Progress, read_stores
+from alloc.allocators.experiments.report.page.summary import Entry, conditions, methods, notes, paired
+from alloc.allocators.experiments.store.outcome import Outcome
+from alloc.allocators.plotting.colours import SERIES
+from alloc.problems import InputError
+from alloc.problems.formats import check_writable, write_text_atomically
+from alloc.problems.formats.files import PathLike, is_stream, named
+from alloc.problems.text import one_line
+
+DETAIL_BYTES, DETAIL_BYTES_A_RUN = 1_500_000, 150
+"""Room for maps and traces on a page: so much, and so much more for each run."""
+
+MOST_FAILURES = 500
+"""Different failures whose tracebacks are on a page, those that were most frequent."""
+
+FIGURES = ("makespan", "served_makespan", "lower_bound", "gap", "energy", "runtime_s", "cpu_s", "memory_mb", "unserved")
+"""Fields of an ending that are columns of the table of runs."""
+
+SUFFIX = ".html"
+
+
+def check_page(path: PathLike) -> None:
+    """Raise an error if a page could not be written, for its suffix, a missing package, or its place."""
+    if not os.fspath(path).lower().endswith(SUFFIX) or is_stream(path):
+        raise InputError(f"must end in {SUFFIX}", source=named(path, output=True))
+    require_packages()
+    check_writable(path)
+
+
+def report_html(
+    stores: Sequence[PathLike],
+    output: PathLike,
+    *,
+    title: str | None = None,
+    against: str | None = None,
+    progress: Progress = lambda words: None,
+) -> None:
+    """Write what stores of runs hold as one page, which a browser opens from disk without a network.
+
+    It has tables of runs and methods, paired statistics, performance profiles, convergence, trade-offs, scaling, gaps,
+    failures, and maps of the plans.
+
+    Parameters
+    ----------
+    stores : sequence of str or path
+        Files of ``alloc compare --store``. They are read only, and may be written by others meanwhile.
+    output : str or path
+        A file that ends in ``.html``; written whole or not at all.
+    title : str, optional
+        By default the names of the stores.
+    against : str, optional
+        The method, written as in the tables, that all others are compared with; by default each with every other
+        where these are not too many, else all with the first one.
+    progress : callable, optional
+        Called now and then with what is done, in words.
+
+    Raises
+    ------
+    InputError
+        If a store cannot be read, `against` is no method in it, or the page cannot be written.
+    MissingPackageError
+        If Jinja2, vl-convert-python or itables is not installed.
+    """
+    check_page(output)
+    if not stores:
+        raise InputError("must name a store at least", "stores")
+    archive = read_stores(stores, progress)
+    layout = laid_out(archive)
+    if against is not None and against not in layout.labels:
+        raise InputError(f"{against!r} is not among the methods {', '.join(layout.labels) or '(none)'}", "against")
+    heading = one_line(title) if title else "Runs of " + ", ".join(os.path.basename(named(path)) for path in stores)
+    write_text_atomically(output, _rendered(heading, _contents(archive, layout, heading, against, progress)))
+
+
+def _contents(
+    archive: Archive, layout: Layout, heading: str, against: str | None, progress: Progress
+) -> dict[str, str]:
+    """Return the data of the page by the ids of its elements."""
+    groups = []
+    for number, group in enumerate(layout.groups, 1):
+        progress(f"statistics of {number} of {len(layout.groups)} conditions")
+        told: Entry = {"conditions": conditions(group), "methods": methods(group), "notes": notes(group)}
+        groups.append({**told, "paired": paired(layout, group, against), "series": series(layout, group)})
+    names = len(layout.names)
+    room = DETAIL_BYTES + DETAIL_BYTES_A_RUN * len(archive.records)
+    chunks, chunk_of = details(archive, layout, room, lambda count: progress(f"{count} of {names} instances"))
+    failures, failure_of = _failures(archive, layout)
+    main = {
+        "title": heading,
+        "stores": [one_line(named(path)) for path in archive.paths],
+        "made": time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime()),
+        "version": version("alloc-mrta"),
+        "colours": SERIES,
+        "labels": layout.labels,
+        "instances": {
+            "name": layout.names,
+            "agents": [one.agents for one in layout.known],
+            "tasks": [one.tasks for one in layout.known],
+            "chunk": [chunk_of.get(number, -1) for number in range(names)],
+        },
+        "groups": groups,
+        "failures": failures,
+    }
+    data = {"main": main, "runs": _columns(archive, layout, failure_of)}
+    found = {name: compressed(_json(value)) for name, value in data.items()}
+    return found | {f"detail-{number}": chunk for number, chunk in enumerate(chunks)}
+
+
+def _json(value: object) -> str:
+    return json.dumps(_short(value), allow_nan=False, separators=(",", ":"))
+
+
+def _short(value: object) -> object:
+    """Return a value with all its numbers rounded to six significant digits."""
+    if isinstance(value, float):
+        return rounded(value)
+    if isinstance(value, dict):
+        return {key: _short(item) for key, item in value.items()}
+    return [_short(item) for item in value] if isinstance(value, list | tuple) else value
+
+
+def _columns(archive: Archive, layout: Layout, failure_of: dict[str, int]) -> Entry:
+    """Return all runs as columns, what repeats as numbers."""
+    endings = [record.ending for record in archive.records.values()]
+    places = [layout.places[key] for key in archive.records]
+    found: Entry = {
+        name: [getattr(place, name) for place in places] for name in ("group", "method", "instance", "seed")
+    }
+    found |= {name: [getattr(ending, name) for ending in endings] for name in FIGURES}
+    found |= {name: [str(getattr(ending, name)) for ending in endings] for name in ("outcome", "status", "stop_reason")}
+    found["started"] = [round(ending.started_at) for ending in endings]
+    found["failure"] = [failure_of.get(key, -1) for key in archive.records]
+    return found
+
+
+def _failures(archive: Archive, layout: Layout) -> tuple[list[Entry], dict[str, int]]:
+    """Return how runs failed, what repeats once and the most frequent first, and which of these each run is."""
+    kinds = {
+        key: (layout.places[key].group, layout.places[key].method, record.ending)
+        for key, record in archive.records.items()
+        if record.ending.outcome is not Outcome.SOLVED
+    }
+    same = {key: (group, method, one.outcome, one.reason, one.details) for key, (group, method, one) in kinds.items()}
+    count = Counter(same.values())
+    number = {kind: place for place, (kind, _) in enumerate(count.most_common(MOST_FAILURES))}
+    first: dict[object, str] = {}
+    for key, kind in same.items():
+        first.setdefault(kind, key)
+    found: list[Entry] = [
+        {
+            "group": kind[0],
+            "method": kind[1],
+            "outcome": str(kind[2]),
+            "reason": kind[3],
+            "details": kind[4],
+            "runs": count[kind],
+            "instance": layout.places[first[kind]].instance,
+            "seed": layout.places[first[kind]].seed,
+        }
+        for kind in number
+    ]
+    return found, {key: number[kind] for key, kind in same.items() if kind in number}
+
+
+def _rendered(heading: str, data: dict[str, str]) -> str:
+    from jinja2 import Environment, StrictUndefined
+
+    own = files(__package__)
+    parts = {
+        name: (own / name).read_text(encoding="utf-8") for name in ("report.css", "report.js", "charts.js", "map.js")
+    }
+    template = Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    ).from_string((own / "report.html.jinja").read_text(encoding="utf-8"))
+    return template.render(title=heading, data={**libraries(), **data}, parts=parts)

@@ -1,0 +1,391 @@
+"use strict";
+// The page: what is chosen, its tables, and what is drawn when. All that was stored goes in as text, never as HTML.
+
+const byId = (id) => document.getElementById(id);
+const state = { group: 0, off: new Set(), instance: -1, plan: -1, measure: "runtime_s", against: -1 };
+let page, runs, DataTable, turn = 0;
+const tables = new Map();
+
+async function unpack(id) {
+  const bytes = Uint8Array.from(atob(byId(`data-${id}`).textContent), (letter) => letter.charCodeAt(0));
+  return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).text();
+}
+async function load(id) {
+  const address = URL.createObjectURL(new Blob([await unpack(id)], { type: "text/javascript" }));
+  return import(address).finally(() => URL.revokeObjectURL(address));
+}
+function add(parent, name, text = "", attributes = {}) {
+  const made = parent.appendChild(document.createElement(name));
+  made.textContent = text;
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+  return made;
+}
+const group = () => page.groups[state.group];
+const shown = () => group().methods.map((one) => one.method).filter((method) => !state.off.has(method));
+const figure = (value, digits = 5) => (value === null || value === undefined ? "-" : String(Number(value.toPrecision(digits))));
+const share = (value, digits = 3) => (value === null || value === undefined ? "-" : `${Number((100 * value).toPrecision(digits))} %`);
+const signed = (value) => (value === null ? "-" : `${value > 0 ? "+" : ""}${share(value)}`);
+const counted = (count, noun) => `${count.toLocaleString("en")} ${noun}${count === 1 ? "" : "s"}`;
+const escaped = (text) => String(text).replace(/[&<>"']/g, (letter) => `&#${letter.charCodeAt(0)};`);
+const when = (seconds) => new Date(1000 * seconds).toISOString().slice(0, 16).replace("T", " ");
+
+// tables
+const text = (title, get) => ({ title, get, isText: true, show: (value) => value });
+const number = (title, get, show = figure) => ({ title, get, show });
+
+// rows are whatever `get` of the columns takes; nothing is last in either direction
+function makeTable(element, columns, rows, { order = [], paging = false, filters = false, pick = null } = {}) {
+  if (tables.has(element)) tables.get(element).destroy();
+  element.replaceChildren();
+  const head = add(element, "thead");
+  const titles = add(head, "tr");
+  columns.forEach((column) => add(titles, "th", column.title, { class: column.isText ? "text" : "" }));
+  const fields = filters ? add(head, "tr") : null;
+  if (fields) columns.forEach((column) => add(add(fields, "td"), "input", "", { type: "search", "aria-label": `filter ${column.title}` }));
+  const table = new DataTable(element, {
+    data: rows.map((row) => [row]), order, paging, pageLength: 25, deferRender: true, autoWidth: false, searching: true, info: paging, titleRow: 0,
+    layout: { topStart: null, topEnd: null, bottomStart: paging ? ["info", "pageLength"] : null, bottomEnd: paging ? "paging" : null },
+    columns: columns.map((column) => ({ className: column.isText ? "text" : "", type: column.isText ? "string" : "figure",
+      data: ([row], kind) => {
+        const value = column.get(row);
+        return kind === "display" ? escaped(column.show(value)) : column.isText ? value : value ?? null;
+      } })),
+  });
+  if (fields) [...fields.querySelectorAll("input")].forEach((input, i) => {
+    let timer;
+    input.onclick = (event) => event.stopPropagation();
+    input.oninput = () => { clearTimeout(timer); timer = setTimeout(() => filter(table, i, columns[i], input.value.trim()), 150); };
+  });
+  if (pick) element.tBodies[0].onclick = (event) => {
+    const data = table.row(event.target.closest("tr")).data();
+    if (data) pick(data[0]);
+  };
+  element.classList.toggle("pickable", Boolean(pick));
+  tables.set(element, table);
+  return table;
+}
+const TESTS = { "<": (a, b) => a < b, "<=": (a, b) => a <= b, ">": (a, b) => a > b, ">=": (a, b) => a >= b, "=": (a, b) => a === b };
+function filter(table, index, column, wanted) {
+  const found = /^(<=|>=|<|>|=)\s*(-?[\d.]+(?:e-?\d+)?)\s*(%?)$/i.exec(wanted);
+  const limit = found && Number(found[2]) / (found[3] ? 100 : 1);
+  const passes = (value) => {
+    if (found && !column.isText) return value !== null && value !== undefined && TESTS[found[1]](value, limit);
+    if (wanted.toLowerCase() === "none" && !column.isText) return value === null || value === undefined;
+    return String(column.show(value)).toLowerCase().includes(wanted.toLowerCase());
+  };
+  table.search.fixed(`column ${index}`, wanted ? (_, [row]) => passes(column.get(row)) : null).draw();
+}
+function orderFigures() {
+  const missing = (value) => value === null || Number.isNaN(value);
+  const order = (sign) => (a, b) => (missing(a) || missing(b) ? missing(a) - missing(b) : sign * (a - b));
+  DataTable.ext.type.order["figure-asc"] = order(1);
+  DataTable.ext.type.order["figure-desc"] = order(-1);
+}
+
+// charts
+const embed = (element, spec) => vegaEmbed(element, { $schema: "https://vega.github.io/schema/vega-lite/v6.json", config: config(), ...spec },
+  { renderer: "svg", actions: { export: true, source: false, compiled: false, editor: false }, tooltip: { theme: isDark() ? "dark" : "light" } });
+async function draw(element, spec) {
+  if (typeof spec === "string") {
+    element.replaceChildren();
+    add(element, "p", spec, { class: "none" });
+  } else await embed(element, { width: "container", height: 270, autosize: { type: "fit-x", contains: "padding" }, ...spec });
+}
+function layFigures() {
+  for (const chart of CHARTS) {
+    const made = add(byId("figures"), "figure", "", { id: `chart-${chart.id}` });
+    const caption = add(made, "figcaption");
+    add(caption, "b", chart.title);
+    add(caption, "span", chart.note);
+    add(made, "div", "", { class: "chart" });
+    if (!chart.measures) continue;
+    const select = add(caption, "select", "", { "aria-label": "measure" });
+    Object.entries(chart.measures).forEach(([value, title]) => add(select, "option", title, { value }));
+    select.onchange = () => { state.measure = select.value; drawCharts(); };
+  }
+}
+async function drawCharts() {
+  const mine = ++turn;
+  for (const chart of CHARTS) {
+    const element = byId(`chart-${chart.id}`).querySelector(".chart");
+    await draw(element, chart.draw(page, group(), shown(), element.clientWidth, state.measure));
+    await new Promise((done) => setTimeout(done));
+    if (turn !== mine) return;
+  }
+}
+
+// what was run
+function tellAll() {
+  byId("about").textContent = `${page.stores.join(", ")}; written ${page.made} by alloc ${page.version}`;
+  const all = page.groups.flatMap((one) => one.methods);
+  const failed = all.reduce((sum, one) => sum + one.runs - (one.outcomes.solved || 0), 0);
+  const total = all.reduce((sum, one) => sum + one.runs, 0);
+  const cards = { runs: total, instances: page.instances.name.length, methods: page.labels.length, conditions: page.groups.length, "runs not solved": failed };
+  const hours = page.groups.reduce((sum, one) => sum + one.conditions.cpu_s, 0) / 3600;
+  for (const [name, value] of [...Object.entries(cards).map(([key, count]) => [key, count.toLocaleString("en")]), ["processor hours", figure(hours, 3)]])
+    add(add(byId("cards"), "div", name), "b", value);
+  byId("cards").querySelectorAll("div").forEach((card) => card.prepend(card.lastChild));
+  const of = (get) => (index) => get(page.groups[index].conditions);
+  const limit = (one) => [one.time_limit_s === null ? "" : `${one.time_limit_s} s`, one.iterations === null ? "" : counted(one.iterations, "iteration"),
+    one.target_gap === null ? "" : `gap ${share(one.target_gap)}`].filter(Boolean).join(", ") || "none";
+  page.groups.forEach((one, i) => add(byId("group"), "option", `${one.conditions.objective}, ${limit(one.conditions)}, ${one.conditions.version}, ${counted(one.conditions.runs, "run")}`, { value: i }));
+  byId("group").onchange = () => choose(Number(byId("group").value));
+  byId("pick").hidden = page.groups.length < 2;
+  makeTable(byId("conditions"), [text("objective", of((one) => one.objective)), text("budget", of(limit)), number("threads", of((one) => one.threads)),
+    number("runs", of((one) => one.runs)), number("instances", of((one) => one.instances)), text("version", of((one) => one.version)),
+    text("commit", of((one) => one.revision.replace(/[0-9a-f]{40}/g, (hash) => hash.slice(0, 10)) || "-")), text("machine", of((one) => one.machine)),
+    text("from (UTC)", of((one) => one.from)), text("to", of((one) => one.to))],
+  page.groups.map((_, i) => i), { pick: choose, paging: page.groups.length > 25 });
+}
+function layChips() {
+  byId("chips").replaceChildren();
+  for (const { method } of group().methods) {
+    const chip = add(byId("chips"), "button", "", { type: "button", "aria-pressed": !state.off.has(method) });
+    const colour = colourOf(page, method);
+    add(chip, "i", "", { style: `background: ${colour}; border-color: ${colour}` });
+    chip.append(page.labels[method]);
+    chip.onclick = () => {
+      if (!state.off.delete(method)) state.off.add(method);
+      update(false);
+    };
+  }
+}
+function tellMethods() {
+  byId("notes").replaceChildren();
+  group().notes.forEach((note) => add(byId("notes"), "li", note));
+  const rows = group().methods.filter((one) => !state.off.has(one.method));
+  const columns = [text("method", (one) => page.labels[one.method]), number("runs", (one) => one.runs), number("solved", (one) => one.solved, share),
+    number("proven optimal", (one) => one.proven), number("instances", (one) => one.instances), number("served", (one) => one.served),
+    number("best on", (one) => one.best), number("T / best", (one) => one.ratio), number("T", (one) => one.makespan), number("gap", (one) => one.gap, share),
+    number("energy", (one) => one.energy), number("time (s)", (one) => one.runtime_s, (value) => figure(value, 3)),
+    number("most memory (MiB)", (one) => one.memory_mb, (value) => figure(value, 3))];
+  if (rows.some((one) => one.picked)) columns.push(text("ran", (one) => one.picked));
+  makeTable(byId("summary"), columns, rows);
+}
+function tellPaired() {
+  const place = byId("paired");
+  place.replaceChildren();
+  const references = [...new Set(group().paired.map((one) => one.against))];
+  if (!references.length) {
+    add(place, "p", "There is nothing to compare: it takes two methods with results on the same instances.", { class: "none" });
+    return;
+  }
+  if (!references.includes(state.against)) state.against = references[0];
+  const line = add(place, "label", "against ");
+  const select = add(line, "select", "", { id: "against" });
+  references.forEach((method) => add(select, "option", page.labels[method], { value: method }));
+  select.value = state.against;
+  select.onchange = () => { state.against = Number(select.value); tellPaired(); };
+  add(place, "p", `Relative differences on the same instances, with 95 % BCa bootstrap intervals of the mean, and Wilcoxon's signed-rank test, two-sided, corrected by
+    Holm's procedure. Instances on which one of the two has no score are left out. Energy is that at the makespan that a method found: less of it at a longer one is not better.`, { class: "hint" });
+  for (const score of ["makespan", "energy"]) {
+    const rows = group().paired.filter((one) => one.score === score && one.against === state.against && !state.off.has(one.method));
+    if (!rows.length) continue;
+    const name = score === "makespan" ? "T" : "energy";
+    makeTable(add(add(place, "div", "", { class: "table" }), "table"), [text(`${name} against ${page.labels[state.against]}`, (one) => page.labels[one.method]),
+      number("less", (one) => one.better), number("equal", (one) => one.equal), number("more", (one) => one.worse),
+      number("difference", (one) => one.mean, signed), number("from", (one) => one.low, signed), number("to", (one) => one.high, signed),
+      number("p", (one) => one.p, (value) => figure(value, 2)), number("p (Holm)", (one) => one.p_holm, (value) => figure(value, 2)),
+      number("instances", (one) => one.instances), number("left out", (one) => one.left_out), text("", (one) => (one.small ? "small sample" : ""))], rows);
+    if (rows.some((one) => one.low !== null)) draw(add(place, "div", "", { class: "chart" }), differences(page, rows.filter((one) => one.low !== null)));
+  }
+}
+
+// an instance
+async function showInstance(index) {
+  state.instance = index;
+  const { name, agents, tasks, chunk } = page.instances;
+  byId("find").value = name[index];
+  const detail = chunk[index] < 0 ? { traces: [], runs: 0 } : JSON.parse(await unpack(`detail-${chunk[index]}`))[index];
+  const map = detail.map;
+  const plans = map ? map.plans.filter((plan) => plan.group === state.group && !state.off.has(plan.method)) : [];
+  let about = `${name[index]}: ${counted(agents[index], "agent")}, ${counted(tasks[index], "task")}.`;
+  if (chunk[index] < 0) about += " Its map and traces are left out, to keep the page small; those of other instances are there.";
+  if (map && map.agents > map.agent.id.length) about += ` Thinned: the map shows ${counted(map.agent.id.length, "agent")}, evenly chosen.`;
+  if (map && map.tasks > map.task.id.length) about += ` Thinned: it shows the ${counted(map.task.id.length, "task")} with the largest workload.`;
+  if (detail.runs > 200) about += " Curves are of 200 of its runs.";
+  byId("size").textContent = about;
+  if (!plans.some((plan) => plan.method === state.plan)) state.plan = plans.length ? plans[0].method : -1;
+  byId("plans").replaceChildren();
+  for (const plan of plans) {
+    const figures = `T ${figure(plan.makespan, 4)}, energy ${figure(plan.energy, 4)}${plan.unserved ? `, ${plan.unserved} unserved` : ""}, seed ${plan.seed}`;
+    const chip = add(byId("plans"), "button", "", { type: "button", "aria-pressed": plan.method === state.plan });
+    add(chip, "i", "", { style: `background: ${colourOf(page, plan.method)}; border-color: ${colourOf(page, plan.method)}` });
+    chip.append(`${page.labels[plan.method]}: ${figures}`);
+    chip.onclick = () => { state.plan = plan.method; showInstance(index); };
+  }
+  await showPlan(map, plans.find((plan) => plan.method === state.plan));
+  await showTraces(detail.traces);
+}
+const caption = (id, title, note) => {
+  const place = byId(id).querySelector("figcaption");
+  place.replaceChildren();
+  add(place, "b", title);
+  place.append(note);
+};
+async function showPlan(map, plan) {
+  const chart = byId("place").querySelector(".chart");
+  const [width, height] = [Math.max(chart.clientWidth - 75, 180), window.innerWidth < 760 ? 320 : 420];
+  caption("place", plan ? `Plan of ${page.labels[plan.method]}` : "Map", plan
+    ? "Sites by workload (area) and time done; orange rings are unserved. Squares are starts, hollow where all stay idle. Drag to move, turn the wheel to zoom."
+    : "Sites by workload (area); squares are starts. Drag to move, turn the wheel to zoom.");
+  const [laid, zoom] = map ? await drawMap(chart, map, plan, width, height) : [null, null];
+  byId("zoom").hidden = !zoom;
+  byId("groups").hidden = !plan;
+  if (!zoom) await draw(chart, map ? "There is no map: the instance has no positions." : "There is no map: the store has no content of this instance, as it was made before alloc kept that, or it is left out here.");
+  else if (!plan) add(chart, "p", "No plan is kept under these conditions: no run was solved, or they were made before alloc kept plans.", { class: "none" });
+  for (const [id, factor] of [["in", 1 / 1.6], ["out", 1.6], ["fit", 0]]) byId(id).onclick = () => zoom(factor);
+  if (!plan) return;
+  makeTable(byId("groups").querySelector("table"), [text("task", (task) => task.id), number("workload", (task) => task.work), number("done at", (task) => task.done),
+    number("ability", (task) => task.ability), number("agents", (task) => task.count), text("who", (task) => listed(task.agents, task.count) || "-")],
+  laid.tasks, { paging: laid.tasks.length > 25 });
+}
+async function showTraces(traces) {
+  const own = traces.filter((one) => one.group === state.group && !state.off.has(one.method) && one.steps.length);
+  const chart = byId("trace").querySelector(".chart");
+  caption("trace", "What each run found when", "Makespan of the best plan so far, a line for each run.");
+  if (!own.length) return draw(chart, "There is nothing to draw: no run has a trace with a makespan.");
+  const end = Math.max(...own.map((one) => one.steps[one.steps.length - 2])) + 2;
+  const values = own.flatMap((one) => {
+    const points = one.steps.flatMap((step, i) => (i % 2 ? [] : [{ x: step, y: one.steps[i + 1] }]));
+    points.push({ x: end, y: points[points.length - 1].y });
+    return points.map(({ x, y }) => ({ x: 1e-3 * 10 ** (x / 20), y, method: page.labels[one.method], seed: one.seed, run: `${one.method} ${one.seed}` }));
+  });
+  const methods = [...new Set(own.map((one) => one.method))];
+  const { color, strokeDash } = byMethod(page, methods, chart.clientWidth);
+  return draw(chart, { height: 340, data: { values }, mark: { type: "line", interpolate: "step-after", strokeWidth: 1.5, opacity: 0.8, tooltip: true },
+    encoding: { x: quantitative("x", "time (s)", seconds), y: quantitative("y", "T", { scale: { zero: false } }), color, strokeDash, detail: { field: "run" } } });
+}
+function layInstances() {
+  const numbers = new Map(page.instances.name.map((name, i) => [name, i]));
+  byId("find").onfocus = () => {
+    byId("find").select();
+    if (!byId("names").children.length) page.instances.name.slice(0, 3000).forEach((name) => add(byId("names"), "option", "", { value: name }));
+  };
+  byId("find").onchange = () => {
+    const wanted = byId("find").value.trim();
+    const index = numbers.get(wanted) ?? page.instances.name.findIndex((name) => name.toLowerCase().includes(wanted.toLowerCase()));
+    if (index >= 0) showInstance(index);
+  };
+  const total = page.instances.name.length;
+  byId("before").onclick = () => showInstance((state.instance + total - 1) % total);
+  byId("after").onclick = () => showInstance((state.instance + 1) % total);
+}
+
+// runs
+async function tellRuns() {
+  runs = JSON.parse(await unpack("runs"));
+  const of = (name) => (row) => runs[name][row];
+  const columns = [text("instance", (row) => page.instances.name[runs.instance[row]]), number("agents", (row) => page.instances.agents[runs.instance[row]]),
+    number("tasks", (row) => page.instances.tasks[runs.instance[row]]), text("method", (row) => page.labels[runs.method[row]]), number("seed", of("seed"), String),
+    text("outcome", of("outcome")), text("status", of("status")), number("T", of("makespan"), (value) => figure(value, 6)), number("gap", of("gap"), share),
+    number("energy", of("energy")), number("unserved", of("unserved")), number("time (s)", of("runtime_s"), (value) => figure(value, 4)),
+    number("memory (MiB)", of("memory_mb"), (value) => figure(value, 3)), text("began (UTC)", (row) => when(runs.started[row]))];
+  makeTable(byId("all"), columns, runs.seed.map((_, row) => row), { paging: true, filters: true, pick: showRun });
+  filterRuns();
+}
+const filterRuns = () => runs && tables.get(byId("all")).search.fixed("chosen", (_, [row]) => runs.group[row] === state.group && !state.off.has(runs.method[row])).draw();
+function showRun(row) {
+  const place = byId("run").querySelector("div");
+  place.replaceChildren();
+  const failure = page.failures[runs.failure[row]];
+  const name = page.instances.name[runs.instance[row]];
+  add(place, "h3", `${page.labels[runs.method[row]]} on ${name}, seed ${runs.seed[row]}`);
+  const list = add(place, "dl");
+  const told = { outcome: "outcome", status: "status", stop_reason: "stopped, because", makespan: "T", served_makespan: "T of served tasks", lower_bound: "bound on T",
+    gap: "gap to the best bound", energy: "energy", unserved: "unserved tasks", runtime_s: "time (s)", cpu_s: "processor time (s)", memory_mb: "memory (MiB)" };
+  for (const [field, title] of Object.entries(told)) {
+    const value = runs[field][row];
+    add(list, "dt", title);
+    add(list, "dd", typeof value === "string" ? value || "-" : field === "gap" ? share(value) : figure(value, 6));
+  }
+  if (failure) tellFailure(place, failure);
+  const button = add(place, "button", "map and traces of this instance", { type: "button" });
+  button.onclick = () => {
+    byId("run").close();
+    state.plan = runs.method[row];
+    showInstance(runs.instance[row]);
+    byId("instance").scrollIntoView();
+  };
+  byId("run").showModal();
+}
+
+// failures
+function tellFailure(place, failure) {
+  add(place, "p", failure.reason || "no reason is known");
+  if (failure.details) add(place, "pre", failure.details);
+}
+function tellFailures() {
+  const place = byId("failed");
+  place.replaceChildren();
+  const own = page.failures.filter((one) => one.group === state.group && !state.off.has(one.method));
+  const missing = group().methods.filter((one) => !state.off.has(one.method)).reduce((sum, one) => sum + one.runs - (one.outcomes.solved || 0), 0);
+  const count = own.reduce((sum, one) => sum + one.runs, 0);
+  if (!missing) add(place, "p", "None: every run was solved.");
+  else add(place, "p", `${counted(missing, "run")} not solved, the most frequent kinds first; refusals are no faults.${missing > count ? ` ${counted(missing - count, "run")} of rarer kinds are left out, to keep the page small.` : ""}`);
+  const lay = (some) => some.forEach((failure) => {
+    const box = add(place, "details", "", { class: "failure" });
+    add(box, "summary", `${page.labels[failure.method]}: ${failure.outcome}, ${counted(failure.runs, "run")}: ${failure.reason.split("\n")[0].slice(0, 200)}`);
+    box.ontoggle = () => {
+      if (box.children.length > 1) return;
+      add(box, "p", `First on ${page.instances.name[failure.instance]}, seed ${failure.seed}.`, { class: "hint" });
+      tellFailure(box, failure);
+    };
+  });
+  lay(own.slice(0, 30));
+  if (own.length > 30) {
+    const more = add(place, "button", `${own.length - 30} more kinds`, { type: "button" });
+    more.onclick = () => { more.remove(); lay(own.slice(30)); };
+  }
+}
+
+function choose(index) {
+  state.group = index;
+  update(true);
+}
+function update(isOther) {
+  byId("group").value = state.group;
+  [...byId("conditions").tBodies[0].rows].forEach((row) => row.classList.toggle("chosen", tables.get(byId("conditions")).row(row).data()?.[0] === state.group));
+  layChips();
+  tellMethods();
+  tellPaired();
+  tellFailures();
+  filterRuns();
+  const first = runs && isOther ? runs.instance[runs.group.indexOf(state.group)] : state.instance;
+  return drawCharts().then(() => showInstance(first >= 0 ? first : Math.max(page.instances.chunk.indexOf(0), 0)));
+}
+function setTheme() {
+  document.documentElement.classList.toggle("dark", window.matchMedia("(prefers-color-scheme: dark)").matches);
+}
+async function main() {
+  setTheme();
+  page = JSON.parse(await unpack("main"));
+  if (!page.groups.length) {
+    byId("about").textContent = `${page.stores.join(", ")}; written ${page.made} by alloc ${page.version}`;
+    byId("problem").hidden = false;
+    byId("problem").textContent = "There are no runs: none has ended yet. `alloc compare ... --store` makes some.";
+    return;
+  }
+  byId("main").hidden = false;
+  add(document.head, "style", await unpack("library-css"));
+  document.head.append(document.querySelector("style")); // ours comes last
+  ({ default: DataTable } = await load("library-js"));
+  orderFigures();
+  tellAll();
+  layFigures();
+  layInstances();
+  new IntersectionObserver((entries, observer) => {
+    if (!entries.some((entry) => entry.isIntersecting)) return;
+    observer.disconnect();
+    tellRuns();
+  }, { rootMargin: "300px" }).observe(byId("runs"));
+  await load("library-vega");
+  await update(true);
+  window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { setTheme(); update(false); });
+  document.documentElement.dataset.ready = "yes";
+}
+main().catch((error) => {
+  byId("problem").hidden = false;
+  byId("problem").textContent = `The page could not be drawn (${error}); it needs a browser of 2023 or later.`;
+  throw error;
+});

@@ -1,0 +1,148 @@
+"""What stores hold, read for a page: all runs, with traces no finer than a page draws them."""
+
+import math
+import os
+import sqlite3
+from bisect import bisect_left
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, closing, contextmanager
+from dataclasses import dataclass, field, replace
+from urllib.request import pathname2url
+
+from alloc.allocators.contract.tolerance import relative_gap
+from alloc.allocators.experiments.store.errors import BUSY_S, explained
+from alloc.allocators.experiments.store.outcome import TracePoints
+from alloc.allocators.experiments.store.schema import checked_version
+from alloc.allocators.experiments.store.store import ENDING, RUN, Record, record_of
+from alloc.problems.formats.files import PathLike, named
+
+EDGES_S = tuple(1e-3 * 10 ** (step / 20) for step in range(256))
+"""Moments, 20 a decade, at which a page tells what a run had found: shares and quantiles at these are exact."""
+
+WITH_PLANS = 2
+"""Version of stores from which on they have plans and the content of instances."""
+
+EVERY = 1000
+"""Runs between two calls that tell how far the reading is."""
+
+Progress = Callable[[str], None]
+"""Called now and then with what is done, in words."""
+
+
+@dataclass(frozen=True)
+class Known:
+    """An instance of a store: its name, which need not be the only one of its kind, and its size."""
+
+    name: str
+    agents: int
+    tasks: int
+
+
+@dataclass(frozen=True)
+class Archive:
+    """What several stores hold.
+
+    Attributes
+    ----------
+    paths : sequence of path
+    records : dict
+        Runs by key, in the order in which they began. Of a run in several stores, what ended last.
+    instances : dict
+        By the hash of their content.
+    """
+
+    paths: Sequence[PathLike]
+    records: dict[str, Record] = field(default_factory=dict)
+    instances: dict[str, Known] = field(default_factory=dict)
+
+    def contents(self, wanted: Sequence[str]) -> Iterator[tuple[str, bytes]]:
+        """Yield the hash and the .npz of each instance that is wanted and kept, in the order that is wanted."""
+        yield from self._blobs("SELECT content FROM contents WHERE instance = ?", wanted)
+
+    def plans(self, wanted: Sequence[str]) -> dict[str, bytes]:
+        """Return the plans that are kept of these runs, packed, by key."""
+        return dict(self._blobs("SELECT plan FROM plans WHERE key = ?", wanted))
+
+    def _blobs(self, query: str, wanted: Sequence[str]) -> Iterator[tuple[str, bytes]]:
+        with ExitStack() as stack:
+            opened = [(stack.enter_context(_opened(path)), named(path)) for path in self.paths]
+            able = [one for one in opened if checked_version(*one) >= WITH_PLANS]
+            for key in wanted:
+                for connection, name in able:
+                    with explained(name):
+                        row = connection.execute(query, (key,)).fetchone()
+                    if row is not None:
+                        yield key, row[0]
+                        break
+
+
+def read_stores(paths: Sequence[PathLike], progress: Progress = lambda words: None) -> Archive:
+    """Return what stores hold; they are not changed, also where an earlier version made them.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be read, is damaged, of a later version, or no store.
+    """
+    found: dict[str, Record] = {}
+    instances: dict[str, Known] = {}
+    for path in paths:
+        with _opened(path) as connection:
+            if checked_version(connection, named(path)) == 0:  # an empty file: no run has begun
+                continue
+            for known, *about in connection.execute("SELECT instance, name, agents, tasks FROM instances"):
+                instances[known] = Known(*about)
+            for key, record in _records(connection):
+                if key not in found or found[key].ending.finished_at < record.ending.finished_at:
+                    found[key] = record
+                if len(found) % EVERY == 0:
+                    progress(f"{len(found)} runs read")
+    order = sorted(found, key=lambda key: found[key].ending.started_at)
+    return Archive(paths, _with_shared_bounds({key: found[key] for key in order}), instances)
+
+
+def _with_shared_bounds(records: dict[str, Record]) -> dict[str, Record]:
+    """Return runs with their gaps against the best bound that any run proved on the instance: it holds for all."""
+    best: dict[str, float] = {}
+    for record in records.values():
+        if record.ending.lower_bound is not None:
+            best[record.run.instance] = max(record.ending.lower_bound, best.get(record.run.instance, 0.0))
+    return {key: _against(record, best.get(record.run.instance)) for key, record in records.items()}
+
+
+def _against(record: Record, bound: float | None) -> Record:
+    makespan = record.ending.makespan
+    if makespan is None or bound is None:
+        return record
+    return Record(record.run, replace(record.ending, gap=relative_gap(makespan, bound)))
+
+
+def _records(connection: sqlite3.Connection) -> Iterator[tuple[str, Record]]:
+    has = {row[1] for row in connection.execute("PRAGMA table_info(runs)")}
+    columns = ", ".join(name if name in has else f"'' AS {name}" for name in ("key", *RUN, *ENDING))
+    for row in connection.execute(f"SELECT {columns} FROM runs"):
+        key, record = record_of(row)
+        ending = replace(record.ending, trace=thinned(record.ending.trace))
+        yield key, Record(record.run, ending)
+
+
+@contextmanager
+def _opened(path: PathLike) -> Iterator[sqlite3.Connection]:
+    """Open a store for reading; a file in a folder that is read-only cannot be written by others meanwhile."""
+    place = os.path.abspath(os.fspath(path))
+    mode = "mode=ro" if os.access(os.path.dirname(place), os.W_OK) else "immutable=1"
+    with explained(named(path)):
+        opened = sqlite3.connect(f"file:{pathname2url(place)}?{mode}", uri=True, timeout=BUSY_S)
+    with closing(opened) as connection, explained(named(path)):
+        yield connection
+
+
+def moment(time_s: float) -> int:
+    """Return the number of the first of `EDGES_S` at or after a time."""
+    return min(bisect_left(EDGES_S, time_s), len(EDGES_S) - 1)
+
+
+def thinned(trace: TracePoints) -> TracePoints:
+    """Return the last point of a trace up to each of `EDGES_S`: what is known at these does not change."""
+    last = {moment(point[0]): point for point in trace if math.isfinite(point[0])}
+    return tuple(last.values())

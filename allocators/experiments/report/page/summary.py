@@ -1,0 +1,146 @@
+"""The tables of a page: under which conditions runs were made, what each method came to, and how methods differ."""
+
+import time
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import asdict
+
+import numpy as np
+from numpy.typing import NDArray
+
+from alloc.allocators.experiments.report.page.groups import Group, Layout
+from alloc.allocators.experiments.statistics import LEAST, SMALL, differences, scores
+from alloc.allocators.experiments.store.outcome import Ending, Outcome
+from alloc.allocators.experiments.stored import Endings, doubts
+from alloc.problems.text import counted
+
+Entry = dict[str, object]
+
+MOST_PAIRED = 100_000
+"""Pairs of methods times instances up to which every method is compared with every other: intervals take time."""
+
+SCORES = ("makespan", "energy")
+
+
+def conditions(group: Group) -> Entry:
+    """Return under which conditions the runs of a group were made, and when, for a row of a table."""
+    run, ended = group.run, _flat(group.endings)
+    return {
+        "objective": run.objective,
+        "time_limit_s": run.time_limit_s,
+        "iterations": run.iterations,
+        "target_gap": run.target_gap,
+        "threads": run.threads,
+        "version": run.version.partition(" + ")[0],
+        "revision": ", ".join(sorted({one.revision for one in ended if one.revision})),
+        "machine": run.machine,
+        "runs": len(ended),
+        "instances": len(group.instances),
+        "from": _date(min(one.started_at for one in ended)),
+        "to": _date(max(one.finished_at for one in ended)),
+        "cpu_s": sum(one.cpu_s or 0.0 for one in ended),
+    }
+
+
+def _date(seconds: float) -> str:
+    return time.strftime("%Y-%m-%d %H:%M", time.gmtime(seconds))
+
+
+def _flat(endings: Endings) -> list[Ending]:
+    return [one for runs in endings.values() for some in runs for one in some if one is not None]
+
+
+def methods(group: Group) -> list[Entry]:
+    """Return what each method came to, a row for each."""
+    makespans = {label: scores(runs, "makespan") for label, runs in group.endings.items()}
+    ratios = relative_to_best(list(makespans.values()))
+    rows = []
+    for (label, runs), number, ratio in zip(group.endings.items(), group.methods, ratios, strict=True):
+        ended = [one for some in runs for one in some if one is not None]
+        rows.append(
+            {
+                "method": number,
+                "runs": len(ended),
+                "outcomes": {str(outcome): count for outcome, count in _outcomes(ended).items()},
+                "solved": _outcomes(ended)[Outcome.SOLVED] / len(ended),
+                "proven": sum(one.status == "optimal" for one in ended),
+                "instances": sum(bool(some) for some in runs),
+                "served": int((~np.isnan(makespans[label])).sum()),
+                "best": int((ratio <= 1 + 1e-9).sum()),
+                "ratio": _finite(np.exp(_mean(np.log(ratio[ratio > 0])))),
+                "makespan": _finite(_mean(makespans[label])),
+                "gap": _finite(_mean(scores(runs, "gap"))),
+                "energy": _finite(_mean(scores(runs, "energy"))),
+                "runtime_s": _finite(_mean(scores(runs, "runtime_s"))),
+                "memory_mb": max(one.memory_mb for one in ended),
+                "picked": ", ".join(sorted({one.picked for one in ended if one.picked and one.picked != label})),
+            }
+        )
+    return rows
+
+
+def _outcomes(ended: Sequence[Ending]) -> Counter[Outcome]:
+    return Counter(one.outcome for one in ended)
+
+
+def relative_to_best(values: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Return values over the least one of each instance, shape (methods, instances); NaN where there is none, or 0."""
+    table = np.array(values)
+    best = np.fmin.reduce(table, axis=0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where((best > 0) & np.isfinite(table), table / best, np.nan)
+
+
+def _mean(values: NDArray[np.float64]) -> float:
+    known = values[~np.isnan(values)]
+    return float(known.mean()) if len(known) else float("nan")
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def paired(layout: Layout, group: Group, against: str | None = None) -> list[Entry]:
+    """Return how methods differ from each reference: from every method where that is quick, else from one.
+
+    Parameters
+    ----------
+    layout : Layout
+    group : Group
+    against : str, optional
+        The only reference; without it the first is the first method that was run.
+    """
+    number = {layout.labels[method]: method for method in group.methods}
+    every = len(number) * (len(number) - 1) * len(group.instances) <= MOST_PAIRED
+    references = [against] if against in number else list(number) if every else list(number)[:1]
+    found = []
+    for score in SCORES if len(number) > 1 else ():
+        for reference in references:
+            ordered = {reference: group.endings[reference], **group.endings}
+            for one in differences(ordered, score):
+                numbers = {"method": number[one.method], "against": number[one.against]}
+                if one.instances:
+                    found.append({**asdict(one), **numbers, "small": one.is_small})
+    return found
+
+
+def notes(group: Group) -> list[str]:
+    """Return what is to be known about the figures of a group, in a sentence each."""
+    found = doubts(group.endings)
+    every, common = len(group.instances), len(group.common)
+    if len(group.endings) == 1:
+        found.append("Only one method was run under these conditions: there is nothing to compare it with.")
+    elif not common:
+        found.append("No instance was run by every method: there are no profiles, and differences are of pairs alone.")
+    elif common < every:
+        share = f"{common} of {counted(every, 'instance')}"
+        found.append(f"Profiles and curves over time are of the {share} that every method was run on.")
+    if len(group.endings) > 1 and common and common < SMALL:
+        least = f"; fewer than {LEAST} allow neither interval nor test" if common < LEAST else ""
+        found.append(f"Small sample: {counted(common, 'instance')} in common{least}.")
+    ended = _flat(group.endings)
+    if all(one.outcome is not Outcome.SOLVED for one in ended):
+        found.append("No run was solved: there are no scores to draw. See the failures below.")
+    elif all(one.lower_bound is None for one in ended):
+        found.append("No run proved a bound on the makespan: there are no gaps to a bound.")
+    return found

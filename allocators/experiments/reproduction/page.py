@@ -1,0 +1,232 @@
+"""The page of a reproduction, made from its rows alone."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from alloc.allocators.experiments.reproduction.claims import CLAIMS, NOT, UNKNOWN, Data, told
+from alloc.allocators.experiments.reproduction.prose import ASSUMED, ASSUMPTIONS, FIGURES, HEAD, PROCEDURE, SEEDS
+from alloc.allocators.experiments.reproduction.protocol import (
+    OTHERS,
+    PAPER_BATTERY,
+    PAPER_METHODS,
+    SCENARIOS,
+    TESTS,
+    VARIANTS,
+)
+from alloc.allocators.experiments.reproduction.rows import Learned, Solved
+from alloc.allocators.experiments.reproduction.summary import (
+    effect,
+    final,
+    latest_length,
+    of_scenario,
+    reached,
+    runs_of,
+)
+from alloc.allocators.experiments.statistics import holm, interval
+from alloc.problems.text import counted
+
+GAIN = 0.01
+"""p-value, corrected by Holm's procedure, below which the population is said to bring something."""
+
+
+def page(learned: Sequence[Learned], solved: Sequence[Solved], environments: Sequence[dict[str, str]]) -> str:
+    """Return the page in Markdown."""
+    rows = latest_length(learned)
+    data = Data(rows, solved)
+    parts = [
+        HEAD,
+        _extent(rows, solved),
+        "## What becomes of the claims",
+        _claims(data),
+        "## Figures",
+        FIGURES,
+        *(_figure(scenario) for scenario in SCENARIOS),
+        "![Battery left](reproduction/figure-6.png)",
+        "## Equal decisions",
+        _tests(rows),
+        _population(rows),
+        "## The four scenarios",
+        _scenarios(rows),
+        "Battery is that of the episode, where every hop is flown; a mean over the runs, as are hops per agent.",
+        "## Methods that learn nothing, on the same instances",
+        _others(solved),
+        PROCEDURE,
+        ASSUMPTIONS,
+        _table(["open", "ours"], ASSUMED, left=2),
+        SEEDS,
+        "## Versions and machines",
+        _environments(environments),
+    ]
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def _extent(rows: Sequence[Learned], solved: Sequence[Solved]) -> str:
+    """Say how many runs there are: the paper has 100."""
+    counts = {method: len(runs_of(of_scenario(rows, TESTS), method)) for method in VARIANTS}
+    named = ", ".join(f"`{method}` {count}" for method, count in counts.items() if count)
+    others = len({row.run for row in solved})
+    length = max(row.iterations for row in rows)
+    fewest = min((count for count in counts.values() if count), default=0)
+    short = (
+        "" if fewest >= 100 else f"**The paper has more than 100 runs of each method; here are as few as {fewest}.** "
+    )
+    tail = f"The methods that learn nothing: {counted(others, 'run')}." if others else ""
+    return f"{short}Runs of {length} iterations: {named}. {tail}".rstrip()
+
+
+def _table(header: Sequence[str], rows: Sequence[Sequence[str]], left: int = 1) -> str:
+    rule = ["---"] * left + ["--:"] * (len(header) - left)
+    return "\n".join("| " + " | ".join(line) + " |" for line in (header, rule, *rows))
+
+
+def _claims(data: Data) -> str:
+    lines = []
+    verdicts = []
+    for claim in CLAIMS:
+        found, verdict = claim.find(data)
+        verdicts.append(verdict)
+        lines.append([claim.where, f"“{claim.words}”", claim.test, found, f"**{verdict}**"])
+    fail, unknown = (sum(one.startswith(kind) for one in verdicts) for kind in (NOT, UNKNOWN))
+    total = (
+        f"Of {len(verdicts)} claims {len(verdicts) - fail - unknown} hold, {fail} do not, {unknown} cannot be checked."
+    )
+    return f"{total}\n\n" + _table(["where", "the paper", "our test", "effect", "verdict"], lines, left=5)
+
+
+def _figure(scenario: int) -> str:
+    return f"![Makespan over iterations, scenario {scenario}](reproduction/figure-{scenario + 1}.png)"
+
+
+def _mean(values: Sequence[float], form: str) -> str:
+    """Return a mean with its interval."""
+    finite = np.array([value for value in values if np.isfinite(value)])
+    if not len(finite):
+        return "-"
+    low, high = interval(finite)
+    between = "" if low is None or high is None else f" [{low:{form}}, {high:{form}}]"
+    return f"{finite.mean():{form}}{between}"
+
+
+def _tests(rows: Sequence[Learned]) -> str:
+    """Return the table of the test games, with the differences from `ppo`."""
+    own = of_scenario(rows, TESTS)
+    present = [name for name in VARIANTS if runs_of(own, name)]
+    effects = {
+        (name, figure): effect(own, name, "ppo", final(figure))
+        for figure in ("makespan", "drawn")
+        for name in present
+        if name != "ppo"
+    }
+    known = [one for one in effects.values() if one is not None]
+    corrected = iter(holm([one.p for one in known]))
+    p_values = {key: next(corrected) for key, one in effects.items() if one is not None}
+
+    def less(name: str, figure: str, form: str) -> str:
+        if (name, figure) not in p_values:
+            return ""
+        p = p_values[name, figure]
+        return told(effects[name, figure], form) + ("" if p is None else f", p = {p:.2g}")
+
+    lines = []
+    for name in present:
+        runs = runs_of(own, name)
+        steps = np.sort([reached(1.05)(run) for run in runs])
+        middle = steps[(len(steps) - 1) // 2]
+        lines.append(
+            [
+                f"`{name}`",
+                str(len(runs)),
+                _mean([run[-1].makespan for run in runs], ".3f"),
+                less(name, "makespan", "+.3f"),
+                _mean([run[-1].drawn for run in runs], ".4f"),
+                less(name, "drawn", "+.4f"),
+                f"{middle:.0f}" if np.isfinite(middle) else "-",
+                _mean([run[-1].unserved for run in runs], ".2f"),
+                f"{np.mean([run[-1].decisions for run in runs]):,.0f}",
+            ]
+        )
+    header = ["method", "runs", "final T", "less `ppo`'s", "best of 8 drawn", "less `ppo`'s"]
+    return _table([*header, "iterations to T = 1.05", "unserved", "decisions"], lines)
+
+
+def _population(rows: Sequence[Learned]) -> str:
+    """Say whether the population of GAPPO brings anything: in the final T, and in the best of several drawn games."""
+    own = of_scenario(rows, TESTS)
+    pairs = {
+        "final T against one member": effect(own, "gappo", "gappo-single", final("makespan")),
+        "against `ppo`": effect(own, "gappo", "ppo", final("makespan")),
+        "best of 8 drawn games against one member": effect(own, "gappo", "gappo-single", final("drawn")),
+        "against `ppo`, best of 8": effect(own, "gappo", "ppo", final("drawn")),
+    }
+    known = {name: one for name, one in pairs.items() if one is not None}
+    corrected = holm([one.p for one in known.values()])
+    gains = [
+        name
+        for (name, one), p in zip(known.items(), corrected, strict=True)
+        if one.mean < 0 and p is not None and p < GAIN
+    ]
+    figures = "; ".join(f"{name} {told(one, '+.4f')}" for name, one in known.items())
+    if gains:
+        return f"**The population brings something** ({', '.join(gains)}; p < {GAIN} after Holm): {figures}."
+    return f"**Nothing is shown to come of the population** (no p < {GAIN} after Holm): {figures or 'no runs'}."
+
+
+def _scenarios(rows: Sequence[Learned]) -> str:
+    lines = []
+    for scenario in SCENARIOS:
+        for name in VARIANTS:
+            runs = runs_of(of_scenario(rows, scenario), name)
+            if not runs:
+                continue
+            last = [run[-1] for run in runs]
+            stated = PAPER_BATTERY["gappo" if name == "gappo" else "others"][scenario] if name in PAPER_METHODS else ()
+            lines.append(
+                [
+                    str(scenario),
+                    f"`{name}`",
+                    f"{np.median([row.makespan for row in last]):.3f}",
+                    _mean([row.makespan for row in last], ".3f"),
+                    _mean([row.battery for row in last], ".1f"),
+                    " to ".join(f"{value}" for value in dict.fromkeys(stated)),
+                    f"{np.mean([row.hops for row in last]):.2f}",
+                    f"{np.mean([row.unserved for row in last]):.2f}",
+                ]
+            )
+    header = ["scenario", "method", "median T", "mean T", "battery (%)", "in the paper", "hops", "unserved"]
+    return _table(header, lines, left=2)
+
+
+def _others(solved: Sequence[Solved]) -> str:
+    lines = []
+    for scenario in SCENARIOS:
+        for name in OTHERS:
+            rows = [row for row in of_scenario(solved, scenario) if row.method == name]
+            if rows:
+                makespans = [row.makespan for row in rows]
+                optimal = sum(row.makespan <= row.lower_bound * (1 + 1e-6) for row in rows)
+                lines.append(
+                    [
+                        str(scenario),
+                        f"`{name}`",
+                        f"{np.median(makespans):.4f}",
+                        f"{np.max(makespans):.4f}",
+                        f"{optimal} of {len(rows)}",
+                        f"{np.nanmean([row.battery for row in rows]):.1f}"
+                        if any(row.battery > 0 for row in rows)
+                        else "-",
+                    ]
+                )
+    header = ["scenario", "method", "median T", "worst T", "proven optimal T", "battery of the plan (%)"]
+    limits = sorted({row.time_limit_s for row in solved})
+    told_limits = " and ".join(f"{limit:g} s" for limit in limits)
+    if not lines:
+        return "None was run."
+    return f"Objective makespan-energy, {told_limits} and one thread each.\n\n{_table(header, lines, left=2)}"
+
+
+def _environments(environments: Sequence[dict[str, str]]) -> str:
+    lines = [
+        [entry["machine"], ", ".join(f"{k} {v}" for k, v in entry.items() if k != "machine")] for entry in environments
+    ]
+    return _table(["machine", "versions"], lines, left=2) if lines else "None is noted."

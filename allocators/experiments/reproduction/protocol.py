@@ -1,0 +1,114 @@
+"""What is run, and all that the paper leaves open about it; does not import torch."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+PAPER_METHODS = ("gappo", "a2c", "ppo", "dqn", "ddpg")
+"""The five of the paper, in its order."""
+
+VARIANTS: Mapping[str, tuple[str, Mapping[str, object]]] = {
+    "gappo": ("gappo", {"genes": 3}),
+    "gappo-single": ("gappo", {"genes": 1}),
+    **{name: (name, {}) for name in PAPER_METHODS[1:]},
+}
+"""Method and what differs from `TUNED`, by the name in the rows; `gappo-single` is without a population."""
+
+_PPO: Mapping[str, object] = {
+    "learning_rate": 0.003274,
+    "gamma": 0.9782,
+    "gae_lambda": 0.8767,
+    "clip_coef": 0.3271,
+    "ent_coef": 0.006903,
+    "update_epochs": 2,
+    "minibatch_size": 219,
+}
+
+TUNED: Mapping[str, Mapping[str, object]] = {
+    "gappo": {**_PPO, "target_kl": 0.02244},
+    "ppo": _PPO,
+    "a2c": {"learning_rate": 0.0011, "num_steps": 2, "gamma": 0.97, "ent_coef": 0.024},
+    "dqn": {
+        "learning_rate": 0.00112,
+        "gamma": 0.7673,
+        "temperature": 0.2235,
+        "batch_size": 228,
+        "target_update_interval": 178,
+    },
+    "ddpg": {
+        "learning_rate": 0.0008559,
+        "gamma": 0.8291,
+        "softmax_temperature": 0.7769,
+        "ent_coef": 0.007846,
+        "batch_size": 77,
+        "tau": 0.01958,
+    },
+}
+"""Hyperparameters: the best of twelve trials of 60,000 decisions for each method, by the search of `alloc tune`; GAPPO
+has those of PPO, which it extends, and the divergence target of twelve trials of its own."""
+
+OTHERS = ("greedy", "ga", "local-search", "milp", "cpsat")
+"""Methods that learn nothing, and are run on the same instances."""
+
+SCENARIOS = (1, 2, 3, 4)
+
+ITERATIONS: Mapping[int, int] = {1: 200, 2: 300, 3: 300, 4: 300}
+"""The paper's, of each scenario."""
+
+DECISIONS = 200
+"""Decisions of agents in an iteration, by all members of a population together; the paper gives no unit."""
+
+POINTS = (5, 10, 25, 50, 75, 100, 125, 150, 175, 200, 225, 250, 275, 300)
+"""Iterations after which a policy is judged, besides 0; schedules follow them."""
+
+ENERGY_WEIGHT = 0.3
+"""Weight of energy in all games."""
+
+INSTANCE_SEED = 6000
+"""Seed of the instances of the first run; those of the others follow. Nothing is trained or tuned on them."""
+
+TEST_SEED, TEST_GAMES = 5000, 12
+"""Further instances of scenario 1, the same for all runs: the sharpest comparison of methods."""
+
+TESTS = 0
+"""Number of the test games in the rows, where others have that of a scenario."""
+
+DRAWN = 8
+"""Games with drawn bids on each test instance, of which the best counts, at the end of a run."""
+
+PAPER_BATTERY: Mapping[str, Mapping[int, tuple[float, float]]] = {
+    "gappo": {1: (91.9, 91.9), 2: (91.7, 91.8), 3: (91.7, 91.8), 4: (91.7, 91.8)},
+    "others": {1: (52.2, 55.5), 2: (74.2, 81.6), 3: (74.2, 81.6), 4: (74.2, 81.6)},
+}
+"""Least and most battery left in percent that the text to figure 6 gives; that of scenario 2 is not given alone."""
+
+
+@dataclass(frozen=True, order=True)
+class Job:
+    """One run: a training by a learning method, or the solving of a run's instances by another one.
+
+    Attributes
+    ----------
+    run : int
+        From 0; decides the instances and all random numbers.
+    method : str
+        Of `VARIANTS` or `OTHERS`.
+    iterations : int
+        Of a training, at most 300.
+    time_limit_s : float
+        Of solving one instance.
+    """
+
+    run: int
+    method: str
+    iterations: int = 300
+    time_limit_s: float = 1.0
+
+    @property
+    def learns(self) -> bool:
+        """Whether the method learns."""
+        return self.method in VARIANTS
+
+
+def planned(runs: int, methods: tuple[str, ...], iterations: int, time_limit_s: float) -> list[Job]:
+    """Return all jobs: all methods of a run before the next run, so that a part of them compares all alike."""
+    return [Job(run, method, iterations, time_limit_s) for run in range(runs) for method in methods]

@@ -1,0 +1,85 @@
+"""Figures from rows: runs of a method, paired differences, and when a makespan was reached."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+
+from alloc.allocators.experiments.reproduction.rows import Learned, Solved
+from alloc.allocators.experiments.statistics import interval, signed_rank
+
+Row = TypeVar("Row", Learned, Solved)
+
+Runs = list[list[Learned]]
+"""Rows of each run, in the order of their iterations."""
+
+
+@dataclass(frozen=True)
+class Effect:
+    """Mean of the paired differences of two methods over runs, its BCa interval and Wilcoxon's p.
+
+    Attributes
+    ----------
+    runs : int
+    mean : float
+    low, high, p : float or None
+        None for fewer than three runs.
+    """
+
+    runs: int
+    mean: float
+    low: float | None
+    high: float | None
+    p: float | None
+
+
+def of_scenario(rows: Sequence[Row], scenario: int) -> list[Row]:
+    """Return the rows of a scenario."""
+    return [row for row in rows if row.scenario == scenario]
+
+
+def latest_length(rows: Sequence[Learned]) -> list[Learned]:
+    """Return the rows of the longest runs alone, as shorter ones have other schedules."""
+    longest = max((row.iterations for row in rows), default=0)
+    return [row for row in rows if row.iterations == longest]
+
+
+def runs_of(rows: Sequence[Learned], method: str) -> Runs:
+    """Return the runs of a method, in their order."""
+    found: dict[int, list[Learned]] = {}
+    for row in sorted(rows, key=lambda row: (row.run, row.iteration)):
+        if row.method == method:
+            found.setdefault(row.run, []).append(row)
+    return list(found.values())
+
+
+def effect(rows: Sequence[Learned], method: str, other: str, figure: Callable[[list[Learned]], float]) -> Effect | None:
+    """Return by how much a figure of a run differs between two methods, paired by run; None without a common run.
+
+    Runs in which it is not finite for one of the two are left out.
+    """
+    ours, theirs = ({run[0].run: figure(run) for run in runs_of(rows, name)} for name in (method, other))
+    pairs = [(ours[run], theirs[run]) for run in sorted(ours.keys() & theirs.keys())]
+    values = np.array([one - two for one, two in pairs if np.isfinite(one) and np.isfinite(two)])
+    values[np.abs(values) < 1e-9] = 0.0
+    if not len(values):
+        return None
+    low, high = interval(values)
+    return Effect(len(values), float(values.mean()), low, high, signed_rank(values))
+
+
+def final(name: str) -> Callable[[list[Learned]], float]:
+    """Return the function that gives a figure at the end of a run."""
+    return lambda run: float(getattr(run[-1], name))
+
+
+def reached(makespan: float) -> Callable[[list[Learned]], float]:
+    """Return the function that gives the first iteration at which a run was judged to be at a makespan, or inf."""
+    return lambda run: float(next((row.iteration for row in run if row.makespan <= makespan), np.inf))
+
+
+def fluctuation(run: list[Learned]) -> float:
+    """Return the mean rise of the makespan from a point to the next in the second half of a run, 0 where it falls."""
+    late = [row.makespan for row in run if row.iteration >= run[-1].iteration / 2]
+    return float(np.mean(np.maximum(0.0, np.diff(late)))) if len(late) > 1 else 0.0

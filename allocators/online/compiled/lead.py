@@ -1,0 +1,116 @@
+"""Missions under policies that are no networks, in compiled loops."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from alloc.allocators.learned.missions import situation as known
+from alloc.allocators.learned.missions.play import Room, is_busy, room_for
+from alloc.allocators.learned.missions.situation import fill_own, fill_tasks
+from alloc.allocators.missions.advance import advance
+from alloc.allocators.missions.chance import first_key, keyed
+from alloc.allocators.missions.layout import MESSAGES, NOBODY, OVER, TO_TASK, MissionArrays
+from alloc.allocators.missions.orders import order
+from alloc.allocators.missions.pack import begun
+from alloc.allocators.online.compiled.auction import bid
+from alloc.allocators.online.compiled.hedonic import join
+from alloc.allocators.online.compiled.looking import look_around
+from alloc.allocators.online.compiled.notes import BIDS, PARTITION, Notes, hear, notes_for, send
+from alloc.allocators.online.compiled.utility import best_task, fill_with
+from alloc.allocators.runtime.compiled import compiled_in_place
+from alloc.problems.fields import FloatArray, IntArray
+from alloc.problems.missions.chance import EXPLORING
+
+NEAREST, GREEDY, HEDONIC, AUCTION = range(4)
+"""Who leads."""
+
+NAMES = ("nearest", "greedy", "hedonic", "auction")
+NOTES = (0, 0, PARTITION, BIDS)
+
+
+class Memory(NamedTuple):
+    """What agents remember: notes, how many chances and changes there were, and the order of their ids; and nothing."""
+
+    notes: Notes
+    drawn: IntArray
+    moves: IntArray
+    rank: IntArray
+    none: FloatArray
+
+
+@compiled_in_place
+def nearest(state: MissionArrays, number: int, room: Room) -> int:
+    """Return the nearest task, -1 for none."""
+    fill_own(state, number, room.situation.own)
+    fill_tasks(state, number, room.situation.task, room.situation.can)
+    best, least = NOBODY, np.inf
+    for j in range(len(room.situation.can)):
+        if room.situation.can[j] and room.situation.task[known.DISTANCE, j] < least:
+            best, least = j, room.situation.task[known.DISTANCE, j]
+    return best
+
+
+@compiled_in_place
+def choose(
+    state: MissionArrays, number: int, room: Room, leader: int, parameters: FloatArray, memory: Memory, seed: int
+) -> int:
+    """Return the task that an agent is to go to, -1 for none."""
+    if leader == GREEDY:
+        fill_with(state, number, room.situation, parameters[1], memory.none)
+        return best_task(room, int(room.situation.own[known.TARGET]), parameters)
+    if leader == HEDONIC:
+        return join(state, number, room, parameters, memory.notes, seed, memory.moves)
+    if leader == AUCTION:
+        return bid(state, number, room, parameters, memory.notes, memory.rank)
+    return nearest(state, number, room)
+
+
+@compiled_in_place
+def lead(
+    state: MissionArrays, room: Room, leader: int, kind: int, parameters: FloatArray, memory: Memory, seed: int
+) -> None:
+    """Let a policy lead all agents to the end of a mission; its notes are of some kind."""
+    head, key = state.head[0], keyed(first_key(EXPLORING), seed)
+    while True:
+        wanted = advance(state)
+        if wanted == OVER:
+            return
+        if kind:
+            hear(state, memory.notes, kind)
+        if wanted == MESSAGES:
+            if kind:
+                send(state, memory.notes, kind)
+            continue
+        for place in range(head.deciding):
+            number = state.deciding[place]
+            if leader == NEAREST and state.agents[number].order == TO_TASK and is_busy(state, number):
+                continue
+            task = choose(state, number, room, leader, parameters, memory, seed)
+            if task >= 0:
+                order(state, number, TO_TASK, task, (0.0, 0.0, 0.0))
+            else:
+                look_around(state, number, key, memory.drawn)
+
+
+def led(arrays: MissionArrays, policy: str, parameters: FloatArray, seed: int, rank: IntArray) -> MissionArrays:
+    """Return a mission that is over.
+
+    Parameters
+    ----------
+    arrays : MissionArrays
+        As `pack` makes them.
+    policy : str
+        One of `NAMES`.
+    parameters : ndarray
+        Of the policy, in the order of their fields.
+    seed : int
+        Of the run.
+    rank : ndarray of int, shape (n,)
+        Of the ids of agents in the order of letters.
+    """
+    state, leader = begun(arrays, seed), NAMES.index(policy)
+    n, m, slots = len(state.agents), len(state.tasks), len(state.heard)
+    none = np.zeros(n, np.intp)
+    memory = Memory(notes_for(NOTES[leader], n, slots), none, none.copy(), rank, np.zeros(0))
+    lead(state, room_for(n, m), leader, NOTES[leader], parameters, memory, seed)
+    return state

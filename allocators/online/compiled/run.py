@@ -1,0 +1,56 @@
+"""Runs of policies with local knowledge in the compiled simulation, with the measures of the reference."""
+
+import dataclasses
+
+import numpy as np
+
+from alloc.allocators.learned.missions.network import compiled_weights
+from alloc.allocators.learned.missions.play import play, room_for
+from alloc.allocators.missions.pack import begun, measure, pack
+from alloc.allocators.online.compiled.lead import NAMES, led
+from alloc.allocators.online.contract import Policy
+from alloc.allocators.online.policies.gappo import NetworkPolicy
+from alloc.problems.errors import InputError
+from alloc.problems.fields import FloatArray, IntArray
+from alloc.problems.missions.mission import Mission
+from alloc.problems.missions.simulation.measures import MissionResult
+
+
+def run_compiled(mission: Mission, policy: Policy, seed: int = 0) -> MissionResult:
+    """Return the measures of a mission under a policy: those of `simulate`, but for the times of decisions.
+
+    Parameters
+    ----------
+    mission : Mission
+    policy : Policy
+        `nearest`, `greedy`, `hedonic`, `auction`, `gappo` or `ppo`, with its parameters.
+    seed : int
+        Of the run.
+
+    Raises
+    ------
+    InputError
+        If the policy has no compiled loops.
+    RefusedError
+        If the mission has distances that they do not know, or is too large.
+    """
+    arrays, name = pack(mission), policy.info.name
+    if isinstance(policy, NetworkPolicy):
+        state = begun(arrays, seed)
+        room = room_for(mission.instance.n, mission.instance.m, policy.parameters.periods)
+        play(state, room, compiled_weights(policy.network), seed)
+    elif name in NAMES:
+        state = led(arrays, name, parameters_of(policy), seed, rank_of(mission.instance.agent_ids))
+    else:
+        raise InputError(f"policy {name!r} has no compiled loops", "policy")
+    return measure(mission, state, name, seed)
+
+
+def parameters_of(policy: Policy) -> FloatArray:
+    """Return the parameters of a policy in the order of their fields."""
+    return np.array(dataclasses.astuple(policy.parameters) if policy.parameters_type else (), float)
+
+
+def rank_of(names: tuple[str, ...]) -> IntArray:
+    """Return the rank of each name in the order of letters."""
+    return np.argsort(np.argsort(np.array(names))).astype(np.intp)

@@ -1,0 +1,127 @@
+"""The parameters of a policy, tuned by the optimiser and on the missions that `gappo` is evolved with.
+
+References
+----------
+Hansen and Ostermeier (2001), doi:10.1162/106365601750190398, as in DEAP (Fortin et al. 2012, JMLR 13:2171-2175).
+"""
+
+import dataclasses
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from deap import base, cma
+
+from alloc.allocators.learned.missions.training.curriculum import PackedMission
+from alloc.allocators.learned.missions.training.evolution import restore, state_of
+from alloc.allocators.learned.missions.training.trainer import MissionTrainingParameters
+from alloc.allocators.learned.missions.training.validation import cost_of, figures
+from alloc.allocators.online.compiled.lead import led
+from alloc.allocators.online.compiled.run import rank_of
+from alloc.allocators.online.registry import load_policy
+from alloc.problems.errors import InputError
+from alloc.problems.fields import FloatArray
+
+STEP = 0.5
+"""Initial standard deviation of the logarithm of a parameter."""
+
+FIRST = {
+    "greedy": {"stay": 1.25, "memory": 1.5, "missed": 0.05, "crowding": 0.05, "flight": 0.05, "age": 0.05},
+    "hedonic": {"stay": 1.5, "memory": 2.0, "missed": 0.05, "crowding": 0.5, "flight": 0.05, "age": 0.05},
+    "auction": {"memory": 1.0, "stay": 3.0, "seats": 1.0, "flight": 1.0, "age": 0.05},
+}
+"""Where the parameters of each policy begin."""
+
+
+VALIDATED_EVERY = 5
+"""Generations from one validation to the next."""
+
+
+class _Fitness(base.Fitness):  # type: ignore[misc]
+    weights = (-1.0,)
+
+
+class _Candidate(list[float]):
+    """Logarithms of parameters, as DEAP expects individuals."""
+
+    def __init__(self, values: FloatArray, cost: float) -> None:
+        super().__init__(values.tolist())
+        self.fitness = _Fitness((cost,))
+
+
+@dataclass(frozen=True)
+class Tuned:
+    """A generation of a tuning.
+
+    Attributes
+    ----------
+    generation : int
+    parameters : dict
+        Of the mean.
+    cost : float
+        On the missions of validation, as `validate` counts it.
+    missions : int
+        Runs of training missions up to now.
+    """
+
+    generation: int
+    parameters: dict[str, float]
+    cost: float | None
+    missions: int
+
+
+def tune(
+    policy: str,
+    generations: int,
+    seed: int = 0,
+    state: Path | None = None,
+    setting: MissionTrainingParameters | None = None,
+) -> Iterator[Tuned]:
+    """Tune the parameters of a policy, and tell each generation; the one of lowest cost is best.
+
+    Parameters
+    ----------
+    policy : {"greedy", "hedonic", "auction"}
+    generations : int
+        Those of `gappo` in which scores are evolved, for the same budget.
+    seed : int
+        Of all random numbers.
+    state : Path, optional
+        File from which an interrupted tuning goes on.
+    setting : MissionTrainingParameters, optional
+        Candidates, missions and validations, those of `gappo` by default.
+    """
+    if policy not in FIRST:
+        raise InputError(f"{policy!r} is not to be tuned; {', '.join(FIRST)} are", "policy")
+    setting = setting or MissionTrainingParameters()
+    fields = dataclasses.fields(load_policy(policy).parameters)
+    names, lows = [field.name for field in fields], np.array([field.metadata["low"] for field in fields])
+    first = np.log([FIRST[policy][name] for name in names])
+    validation = setting.curriculum.validation(setting.validations)
+    strategy = cma.Strategy(centroid=first, sigma=STEP, lambda_=setting.candidates)
+    if state is not None and state.exists():
+        restore(strategy, np.load(state))
+    for generation in range(strategy.update_count, generations):
+        rng = np.random.default_rng((seed, generation))
+        missions = setting.curriculum.draw(rng, setting.missions, generation / generations)
+        steps = rng.standard_normal((setting.candidates, strategy.dim)) @ strategy.BD.T
+        rows = strategy.centroid + strategy.sigma * steps
+        costs = [_cost(policy, np.maximum(np.exp(row), lows), missions) for row in rows]
+        strategy.update([_Candidate(row, cost) for row, cost in zip(rows, costs, strict=True)])
+        mean = np.maximum(np.exp(strategy.centroid), lows)
+        if state is not None:
+            np.savez(state, **state_of(strategy))
+        is_due = (generation + 1) % VALIDATED_EVERY == 0 or generation + 1 == generations
+        found = _cost(policy, mean, validation) if is_due else None
+        parameters = dict(zip(names, mean.tolist(), strict=True))
+        yield Tuned(generation + 1, parameters, found, (generation + 1) * setting.candidates * setting.missions)
+
+
+def _cost(policy: str, parameters: FloatArray, missions: list[tuple[PackedMission, int]]) -> float:
+    """Return the mean cost of missions."""
+    rows = []
+    for one, seed in missions:
+        ranks = rank_of(tuple(f"a{number}" for number in range(1, len(one.arrays.agents) + 1)))
+        rows.append(figures(led(one.arrays, policy, parameters, seed, ranks), one.ideal))
+    return cost_of(rows)

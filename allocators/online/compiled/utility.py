@@ -1,0 +1,88 @@
+"""The task of highest utility, compiled: see `alloc.allocators.online.policies.outlook`."""
+
+import math
+
+import numpy as np
+
+from alloc.allocators.learned.missions import situation as known
+from alloc.allocators.learned.missions.options import done_with, expect
+from alloc.allocators.learned.missions.play import Room
+from alloc.allocators.learned.missions.situation import Situation, fill_own, fill_tasks
+from alloc.allocators.missions.layout import NOBODY, WORKING, MissionArrays
+from alloc.allocators.missions.motion import distance_between
+from alloc.allocators.runtime.compiled import compiled_in_place
+from alloc.problems.fields import FloatArray
+
+
+@compiled_in_place
+def fill_with(state: MissionArrays, number: int, situation: Situation, memory: float, goals: FloatArray) -> None:
+    """Fill in what an agent knows, and of others what it heard at most `memory` hours ago.
+
+    Parameters
+    ----------
+    state : MissionArrays
+    number : int
+        Of the agent.
+    situation : Situation
+    memory : float
+    goals : ndarray, shape (n,) or (0,)
+        Task of each agent, -1 for none, where that is agreed; where they were going by the last that was heard else.
+    """
+    fill_own(state, number, situation.own)
+    fill_tasks(state, number, situation.task, situation.can)
+    head, row, other = state.head[0], state.agents[number].known, situation.other
+    for i in range(len(situation.counts)):
+        hour = state.agent_hour[row, i]
+        situation.counts[i] = i != number and hour >= 0 and head.hour - hour <= memory
+        if not situation.counts[i]:
+            continue
+        report, agent = state.reports[state.agent_report[row, i]], state.agents[i]
+        situation.counts[i] = 1 <= report.status <= WORKING
+        goal = int(goals[i]) if len(goals) else report.task
+        situation.target[i] = goal if goal != NOBODY and state.task_hour[row, goal] >= 0 else NOBODY
+        other[known.STRENGTH, i] = agent.ability
+        if situation.target[i] != NOBODY:
+            facts = state.tasks[goal]
+            place = (facts.x, facts.y, facts.z)
+            way = distance_between(head.is_manhattan, (report.x, report.y, report.z), place)
+            is_there = report.status == WORKING and report.task == goal
+            other[known.ARRIVES, i] = -np.inf if is_there else hour + way / agent.speed
+
+
+@compiled_in_place
+def best_task(room: Room, home: int, parameters: FloatArray) -> int:
+    """Return the task of highest utility in the situation that is filled in, -1 for none.
+
+    Parameters
+    ----------
+    room : Room
+    home : int
+        Task that the agent has already, -1 for none.
+    parameters : ndarray
+        In the order of `UtilityParameters`.
+    """
+    stay, _, missed, crowding, flight, age = parameters
+    situation = room.situation
+    expect(situation)
+    others, without = situation.coming.others, situation.coming.without
+    own, task, best, highest = situation.own, situation.task, NOBODY, 0.0
+    hour = own[known.HOUR]
+    for j in range(len(situation.can)):
+        if not situation.can[j]:
+            continue
+        is_there = own[known.TARGET] == j and own[known.IS_WORKING] > 0
+        arrival = hour + (0.0 if is_there else task[known.DISTANCE, j] / own[known.SPEED])
+        left, since = task[known.LEFT, j], task[known.KNOWN_AT, j]
+        if others[j] == 0 and not is_there:
+            left += task[known.GROWTH, j] * (arrival - since)
+        with_me = done_with(situation, j, arrival, left)
+        if with_me >= without[j]:
+            continue
+        hours = with_me - hour
+        value = (1.0 if hours <= 0 else (with_me - arrival) / hours) * (task[known.PRIORITY, j] + 1e-6)
+        value = value / (1 + crowding * others[j]) * math.exp(-flight * (arrival - hour) - age * (hour - since))
+        value *= missed if with_me > task[known.DEADLINE, j] else 1.0
+        value *= stay if home == j else 1.0
+        if value > highest:
+            best, highest = j, value
+    return best

@@ -1,0 +1,1 @@
+"""Runs for other programs: awaited, by lines of JSON, and over HTTP."""

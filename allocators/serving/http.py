@@ -1,0 +1,144 @@
+"""A service over HTTP: FastAPI, with OpenAPI, health, metrics, and limits on what strangers may ask for."""
+
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator
+from http import HTTPStatus
+from importlib.metadata import version
+
+from fastapi import FastAPI, Request, Response
+from fastapi.responses import JSONResponse
+
+from alloc.allocators.serving.metrics import Metrics
+from alloc.allocators.serving.service import Answer, Outcome, Service, failure
+from alloc.problems.formats.schemas import schema
+
+STATUS = {
+    Outcome.SOLVED: HTTPStatus.OK,
+    Outcome.INPUT: HTTPStatus.BAD_REQUEST,
+    Outcome.REFUSED: HTTPStatus.UNPROCESSABLE_ENTITY,
+    Outcome.BUSY: HTTPStatus.SERVICE_UNAVAILABLE,
+    Outcome.CANCELLED: HTTPStatus.REQUEST_TIMEOUT,
+    Outcome.FAILED: HTTPStatus.INTERNAL_SERVER_ERROR,
+}
+
+BODY_S = 10.0
+"""Seconds for the body of a request to arrive."""
+
+
+def build_app(service: Service, *, most_bytes: int = 4_000_000) -> FastAPI:
+    """Return the application.
+
+    Parameters
+    ----------
+    service : Service
+        Closed when the application ends.
+    most_bytes : int
+        Largest body of a request.
+    """
+    metrics = Metrics(service)
+
+    @contextlib.asynccontextmanager
+    async def lifespan(_: FastAPI) -> AsyncIterator[None]:
+        yield
+        service.end()
+        await asyncio.to_thread(service.close)
+
+    app = FastAPI(title="alloc", version=version("alloc-mrta"), lifespan=lifespan)
+
+    @app.post("/solve", responses=_responses(), openapi_extra=_body())
+    async def solve(request: Request) -> Response:
+        """Allocate the agents of an instance to its tasks."""
+        with metrics.timed() as timed:
+            body = await _body_of(request, most_bytes)
+            if isinstance(body, HTTPStatus):
+                timed.outcome = Outcome.INPUT
+                answer = failure(
+                    "", Outcome.INPUT, f"body: {body.phrase}; at most {most_bytes} bytes within {BODY_S:g} s"
+                )
+                return _response(answer, body)
+            answer = await _answer(service, request, body)
+            timed.outcome = answer.outcome
+            return _response(answer, STATUS[answer.outcome])
+
+    @app.get("/health")
+    async def health() -> JSONResponse:
+        """Whether requests are taken, and how many are open."""
+        content = {"status": "ending" if service.is_ending else "ok", "open_requests": service.open_requests}
+        return JSONResponse(content, HTTPStatus.SERVICE_UNAVAILABLE if service.is_ending else HTTPStatus.OK)
+
+    @app.get("/metrics")
+    async def read_metrics() -> Response:
+        """Counts and times for Prometheus."""
+        return Response(metrics.text(), media_type=metrics.media_type)
+
+    return app
+
+
+async def _body_of(request: Request, most_bytes: int) -> str | HTTPStatus:
+    """Return the body as text, or the status where it is too large, takes too long or is no UTF-8."""
+    found = bytearray()
+    try:
+        async with asyncio.timeout(BODY_S):
+            async for chunk in request.stream():
+                found += chunk
+                if len(found) > most_bytes:
+                    return HTTPStatus.REQUEST_ENTITY_TOO_LARGE
+        return found.decode()
+    except TimeoutError:
+        return HTTPStatus.REQUEST_TIMEOUT
+    except UnicodeDecodeError:
+        return HTTPStatus.BAD_REQUEST
+
+
+async def _answer(service: Service, request: Request, body: str) -> Answer:
+    """Return the answer; a client that leaves cancels its run."""
+    job = service.submit(body)
+    answer = asyncio.wrap_future(job.answer)
+    left = asyncio.ensure_future(_left(request))
+    try:
+        await asyncio.wait([answer, left], return_when=asyncio.FIRST_COMPLETED)
+        if not answer.done():
+            job.cancel()
+        return await answer
+    except asyncio.CancelledError:
+        job.cancel()
+        raise
+    finally:
+        left.cancel()
+
+
+async def _left(request: Request) -> None:
+    """Return once the client has closed the connection."""
+    while (await request.receive())["type"] != "http.disconnect":
+        pass
+
+
+def _response(answer: Answer, status: HTTPStatus) -> Response:
+    headers = {"Retry-After": "1"} if status is HTTPStatus.SERVICE_UNAVAILABLE else {}
+    if status in (HTTPStatus.REQUEST_ENTITY_TOO_LARGE, HTTPStatus.REQUEST_TIMEOUT):
+        headers["Connection"] = "close"
+    return Response(answer.text, status, headers, "application/json")
+
+
+def _body() -> dict[str, object]:
+    content = {"application/json": {"schema": _schema("alloc-solve-request/1")}}
+    return {"requestBody": {"required": True, "content": content}}
+
+
+def _responses() -> dict[int | str, dict[str, object]]:
+    content = {"application/json": {"schema": _schema("alloc-solve-answer/1")}}
+    words = {
+        HTTPStatus.OK: "The result.",
+        HTTPStatus.BAD_REQUEST: "The request breaks the rules of its format, or a limit.",
+        HTTPStatus.REQUEST_TIMEOUT: "The body took too long to arrive.",
+        HTTPStatus.REQUEST_ENTITY_TOO_LARGE: "The body is too large.",
+        HTTPStatus.UNPROCESSABLE_ENTITY: "The method refuses the instance.",
+        HTTPStatus.SERVICE_UNAVAILABLE: "Too many requests are open, or the service is ending.",
+    }
+    return {status.value: {"description": text, "content": content} for status, text in words.items()}
+
+
+def _schema(name: str) -> dict[str, object]:
+    """Return the schema of a format as OpenAPI embeds it."""
+    return {key: value for key, value in schema(name).items() if not key.startswith("$")}

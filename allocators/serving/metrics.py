@@ -1,0 +1,53 @@
+"""Counts and times of a service, for Prometheus."""
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, Counter, Gauge, Histogram, generate_latest
+
+from alloc.allocators.serving.service import Outcome, Service
+
+BUCKETS_S = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0)
+
+
+@dataclass
+class Timed:
+    """A request that is being answered, and what became of it."""
+
+    outcome: Outcome = Outcome.CANCELLED
+
+
+class Metrics:
+    """Metrics of one service, in a registry of their own."""
+
+    media_type = CONTENT_TYPE_LATEST
+
+    def __init__(self, service: Service) -> None:
+        self._registry = CollectorRegistry()
+        self._requests = Counter(
+            "alloc_requests", "Requests by what became of them.", ["outcome"], registry=self._registry
+        )
+        self._seconds = Histogram(
+            "alloc_request_seconds", "Seconds to answer.", buckets=BUCKETS_S, registry=self._registry
+        )
+        Gauge("alloc_open_requests", "Requests that run or wait.", registry=self._registry).set_function(
+            lambda: service.open_requests
+        )
+        for outcome in Outcome:
+            self._requests.labels(outcome)
+
+    @contextmanager
+    def timed(self) -> Iterator[Timed]:
+        """Count and time the request that is answered in the block."""
+        timed, begin = Timed(), time.monotonic()
+        try:
+            yield timed
+        finally:
+            self._requests.labels(timed.outcome).inc()
+            self._seconds.observe(time.monotonic() - begin)
+
+    def text(self) -> bytes:
+        """Return all metrics as Prometheus reads them."""
+        return generate_latest(self._registry)

@@ -1,0 +1,137 @@
+"""What a request of a service asks for, checked: a document becomes arguments of `solve`."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from alloc.allocators.contract.parameters import CheckedParameters, bounded
+from alloc.problems import InputError, Instance
+from alloc.problems.arguments import of_type, real, shown, text, whole
+from alloc.problems.formats.document import from_document
+from alloc.problems.formats.json_columns import Row, require_known
+from alloc.problems.formats.json_text import require_object
+
+REQUEST_FORMAT, ANSWER_FORMAT = "alloc-solve-request/1", "alloc-solve-answer/1"
+
+ARGUMENTS = ("objective", "target_gap", "start", "makespan_slack", "makespan_limit", "move_price", "pins")
+"""Fields that are arguments of `solve` by the same name, checked there."""
+
+COUNTS = ("iterations", "seed", "threads")
+"""Fields that are whole numbers."""
+
+FIELDS = ("format", "id", "instance", "method", "parameters", "limit_ms", *ARGUMENTS, *COUNTS)
+
+LOCAL_PARAMETERS = ("policy", "device")
+"""Parameters that name files or hardware, which strangers do not choose."""
+
+LARGEST_PARAMETER = 10_000
+"""Largest whole number that a stranger sets a parameter to: more could take all memory."""
+
+
+@dataclass(frozen=True)
+class ServiceLimits(CheckedParameters):
+    """What a service takes on.
+
+    Attributes
+    ----------
+    agents, tasks : int
+        Most of an instance.
+    limit_ms : float
+        Longest time limit, in milliseconds, and that of requests without one.
+    parallel : int
+        Runs at the same time.
+    queue : int
+        Requests that wait for one of them to end; further ones are turned away.
+    strangers : bool
+        Whether requests come from elsewhere, so that they choose no files, no devices and no large parameters.
+    """
+
+    agents: int = bounded(2_000, low=1)
+    tasks: int = bounded(500, low=1)
+    limit_ms: float = bounded(10_000.0, low=0)
+    parallel: int = bounded(1, low=1, high=1024)
+    queue: int = bounded(64, low=0)
+    strangers: bool = False
+
+
+@dataclass(frozen=True)
+class SolveRequest:
+    """One request.
+
+    Attributes
+    ----------
+    instance : Instance
+    method : str
+    parameters : dict
+        Of the method, by name.
+    limit_s : float
+        Seconds from the arrival of the request to its answer.
+    arguments : dict
+        Further arguments of `solve`, by name.
+    """
+
+    instance: Instance
+    method: str
+    parameters: dict[str, object]
+    limit_s: float
+    arguments: dict[str, object]
+
+    @classmethod
+    def of(cls, row: Row, limits: ServiceLimits) -> "SolveRequest":
+        """Return what a document asks for.
+
+        Raises
+        ------
+        InputError
+            If a field is unknown, missing or wrong, or exceeds the limits; its place is the field.
+        """
+        require_known(row, FIELDS, "")
+        if row.get("format", REQUEST_FORMAT) != REQUEST_FORMAT:
+            raise InputError(f"must be {REQUEST_FORMAT}, got {shown(row['format'])}", "format")
+        counts = {name: whole(integral(row[name]), name) for name in COUNTS if row.get(name) is not None}
+        given = {name: row[name] for name in ARGUMENTS if row.get(name) is not None}
+        limit_ms = limits.limit_ms if row.get("limit_ms") is None else row["limit_ms"]
+        return cls(
+            instance=_instance(row.get("instance"), limits),
+            method=text(row.get("method", "auto"), "method"),
+            parameters=_parameters(row.get("parameters") or {}, limits),
+            limit_s=real(limit_ms, "limit_ms", high=limits.limit_ms) / 1000,
+            arguments={**given, **counts},
+        )
+
+
+def integral(value: object) -> object:
+    """Return a number without a fraction as an int, as which JSON has it."""
+    return int(value) if isinstance(value, float) and value.is_integer() else value
+
+
+def _instance(given: object, limits: ServiceLimits) -> Instance:
+    """Return the instance, refused before it is read where it is too large."""
+    if given is None:
+        raise InputError("is missing; give one of the format alloc-instance/1", "instance")
+    document = require_object(given, "instance")
+    for name, most in (("agents", limits.agents), ("tasks", limits.tasks)):
+        rows = document.get(name)
+        if isinstance(rows, list) and len(rows) > most:
+            raise InputError(f"has {len(rows)} {name}; this service takes {most} at most", f"instance.{name}")
+    try:
+        return from_document({"format": "alloc-instance/1", **document})
+    except InputError as error:
+        raise InputError(error.message, f"instance.{error.place}" if error.place else "instance") from error
+
+
+def _parameters(given: object, limits: ServiceLimits) -> dict[str, object]:
+    """Return the parameters of the method as Python's own values."""
+    named = {str(name): _value(value) for name, value in of_type(given, Mapping, "parameters").items()}
+    for name, value in named.items() if limits.strangers else ():
+        if name in LOCAL_PARAMETERS:
+            raise InputError("cannot be chosen by a request to this service", f"parameters.{name}")
+        if isinstance(value, int) and value > LARGEST_PARAMETER:
+            raise InputError(f"must be at most {LARGEST_PARAMETER} in this service", f"parameters.{name}")
+    return named
+
+
+def _value(value: object) -> object:
+    if isinstance(value, list):
+        return tuple(_value(entry) for entry in value)
+    return math.inf if value == "inf" else integral(value)

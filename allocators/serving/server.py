@@ -1,0 +1,76 @@
+"""The process that serves over HTTP: uvicorn, which a signal ends cleanly."""
+
+import socket
+import sys
+from collections.abc import Callable
+from types import FrameType
+
+import uvicorn
+
+from alloc.allocators.serving.http import build_app
+from alloc.allocators.serving.service import Service
+from alloc.problems import InputError
+
+SWITCH_S = 0.001
+"""Seconds after which a thread that computes in Python lets others go on: the event loop must not wait for it."""
+
+GRACE_S = 5
+"""Seconds that open requests have for their answers once a signal has come."""
+
+
+class Server(uvicorn.Server):
+    """Ends its runs on a signal, so that open requests are answered soon; a second one ends it at once."""
+
+    def __init__(self, config: uvicorn.Config, service: Service, tell: Callable[[str], object]) -> None:
+        super().__init__(config)
+        self._service, self._tell = service, tell
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Listen, and tell where."""
+        await super().startup(sockets)
+        for server in self.servers:
+            for listening in server.sockets:
+                host, port = listening.getsockname()[:2]
+                self._tell(f"http://{f'[{host}]' if ':' in host else host}:{port}")
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        """Do not raise the signal again at the end, as uvicorn would: this end is a clean one."""
+        self._service.end()
+        self.force_exit = self.should_exit
+        self.should_exit = True
+
+
+def run_server(service: Service, host: str, port: int, most_bytes: int, tell: Callable[[str], object]) -> None:
+    """Serve until a signal comes.
+
+    Parameters
+    ----------
+    service : Service
+    host : str
+    port : int
+        0 for a free one.
+    most_bytes : int
+        Largest body of a request.
+    tell : callable
+        Called with the address once the service listens.
+
+    Raises
+    ------
+    InputError
+        If it cannot listen there.
+    """
+    config = uvicorn.Config(
+        build_app(service, most_bytes=most_bytes),
+        host=host,
+        port=port,
+        log_level="warning",
+        access_log=False,
+        timeout_graceful_shutdown=GRACE_S,
+        server_header=False,
+    )
+    sys.setswitchinterval(SWITCH_S)
+    server = Server(config, service, tell)
+    try:
+        server.run()
+    except SystemExit as error:  # uvicorn has logged why
+        raise InputError(f"cannot listen on {host}:{port}; is the port taken?", "http") from error

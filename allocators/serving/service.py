@@ -1,0 +1,228 @@
+"""Solves requests in a few threads, with methods that are loaded once, a bounded queue, deadlines and cancellation."""
+
+import json
+import logging
+import threading
+import time
+from collections import OrderedDict
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from alloc.allocators.contract.base import Allocator
+from alloc.allocators.parallel.processors import available_threads
+from alloc.allocators.registry import load
+from alloc.allocators.result import Result
+from alloc.allocators.runtime.interrupts import Cancellation, RunCancelledError
+from alloc.allocators.serving.request import ANSWER_FORMAT, ServiceLimits, SolveRequest, integral
+from alloc.allocators.solve import solve
+from alloc.problems import InputError, RefusedError
+from alloc.problems.formats.json_columns import Row
+from alloc.problems.formats.json_text import parse, require_object
+from alloc.problems.formats.messages import one_line
+
+LOG = logging.getLogger("alloc.serve")
+
+MOST_METHODS = 16
+"""Methods with parameters of requests that stay loaded; the one not used for longest goes."""
+
+
+class Outcome(StrEnum):
+    """What became of a request."""
+
+    SOLVED = "solved"
+    INPUT = "input"
+    REFUSED = "refused"
+    BUSY = "busy"
+    CANCELLED = "cancelled"
+    FAILED = "failed"
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The answer to a request: what became of it, and the document."""
+
+    outcome: Outcome
+    document: Row
+
+    @property
+    def text(self) -> str:
+        """The document as JSON, in one line."""
+        return json.dumps(self.document, allow_nan=False, separators=(",", ":"))
+
+
+@dataclass(eq=False)
+class Job:
+    """A request on its way.
+
+    Attributes
+    ----------
+    given : str or dict
+        The document, as JSON text or read already.
+    cancellation : Cancellation
+    arrived : float
+        On the monotonic clock.
+    answer : Future of Answer
+    """
+
+    given: str | Row
+    cancellation: Cancellation
+    arrived: float = field(default_factory=time.monotonic)
+    answer: "Future[Answer]" = field(default_factory=Future)
+
+    def __post_init__(self) -> None:
+        self.answer.set_running_or_notify_cancel()  # who waits for it cannot cancel it, but by `cancel`
+
+    def cancel(self) -> None:
+        """End the run at once; the answer says that it was cancelled."""
+        self.cancellation.set()
+
+
+class Service:
+    """Takes requests, and answers each.
+
+    Parameters
+    ----------
+    limits : ServiceLimits
+    methods : mapping, optional
+        Methods that are loaded now, with the parameters that they have where a request sets none.
+
+    Raises
+    ------
+    InputError
+        If one of the methods cannot be loaded.
+    """
+
+    def __init__(self, limits: ServiceLimits, methods: Mapping[str, Mapping[str, object]] | None = None) -> None:
+        self.limits = limits
+        self._own = {name: load(name, **settings) for name, settings in (methods or {}).items()}
+        self._others: OrderedDict[str, Allocator] = OrderedDict()
+        self._loading = threading.Lock()
+        self._threads = max(1, available_threads() // limits.parallel)
+        self._ending = threading.Event()
+        self._counting = threading.Lock()
+        self._open = 0
+        self._pool = ThreadPoolExecutor(limits.parallel, thread_name_prefix="alloc-serve")
+
+    @property
+    def open_requests(self) -> int:
+        """Requests that run or wait."""
+        return self._open
+
+    @property
+    def is_ending(self) -> bool:
+        """Whether `end` was called."""
+        return self._ending.is_set()
+
+    def submit(self, given: str | Row, then: Callable[[Answer], None] = lambda answer: None) -> Job:
+        """Take a request on, or turn it away where the queue is full.
+
+        Parameters
+        ----------
+        given : str or dict
+            A document of the format ``alloc-solve-request/1``, as JSON text or read already.
+        then : callable
+            Called with the answer, in whichever thread has it.
+
+        Returns
+        -------
+        Job
+        """
+        job = Job(given, Cancellation(self._ending))
+        job.answer.add_done_callback(lambda future: then(future.result()))
+        with self._counting:
+            is_full = self._open >= self.limits.parallel + self.limits.queue or self.is_ending
+            self._open += not is_full
+        if is_full:
+            words = "is ending" if self.is_ending else f"is busy: {self._open} requests are open; try again later"
+            job.answer.set_result(failure(given, Outcome.BUSY, f"the service {words}"))
+        else:
+            self._pool.submit(self._answer, job)
+        return job
+
+    def end(self) -> None:
+        """End all runs as their time limits do, and turn further requests away."""
+        self._ending.set()
+
+    def close(self) -> None:
+        """Wait for all requests to be answered, and end the threads."""
+        self._pool.shutdown()
+
+    def _answer(self, job: Job) -> None:
+        answer = self._answered(job)
+        with self._counting:
+            self._open -= 1
+        job.answer.set_result(answer)
+
+    def _answered(self, job: Job) -> Answer:
+        """Return the answer; whatever fails is one, too."""
+        given = job.given
+        try:
+            if job.cancellation.is_cancelled:
+                raise RunCancelledError("the run was cancelled")
+            waited_s = time.monotonic() - job.arrived
+            given = require_object(parse(given)) if isinstance(given, str) else given
+            result = self._solve(SolveRequest.of(given, self.limits), job)
+            document = result.to_dict()
+            if job.cancellation.is_cancelled:
+                raise RunCancelledError("the run was cancelled")
+        except RunCancelledError as error:
+            return failure(given, Outcome.CANCELLED, str(error))
+        except InputError as error:
+            return failure(given, Outcome.INPUT, str(error))
+        except RefusedError as error:
+            return failure(given, Outcome.REFUSED, str(error))
+        except MemoryError:
+            return failure(given, Outcome.FAILED, "there is not enough memory for this")
+        except Exception as error:
+            LOG.exception("a request failed")
+            return failure(given, Outcome.FAILED, f"defect in alloc or a plugin: {type(error).__name__}: {error}")
+        notes = {"notes": list(result.notes)} if result.notes else {}
+        return Answer(Outcome.SOLVED, {**_head(given), "waited_ms": 1000 * waited_s, "result": document, **notes})
+
+    def _solve(self, request: SolveRequest, job: Job) -> Result:
+        """Run the method for what is left of the time since the request arrived."""
+        arguments = dict(request.arguments)
+        asked = arguments.pop("threads", None)
+        threads = self._threads if asked is None else min(int(str(asked)), self._threads)
+        method = self._method(request)
+        left_s = max(0.0, request.limit_s - (time.monotonic() - job.arrived))
+        return solve(
+            request.instance,
+            method,
+            time_limit_s=left_s,
+            threads=max(1, threads),
+            stop=job.cancellation,
+            handle_signals=False,
+            **arguments,  # type: ignore[arg-type]
+        )
+
+    def _method(self, request: SolveRequest) -> Allocator | str:
+        """Return the method, loaded at its first use."""
+        name, parameters = request.method, request.parameters
+        if name == "auto":
+            if parameters:
+                raise InputError("are for a method that is named", "parameters")
+            return name
+        if not parameters and name in self._own:
+            return self._own[name]
+        key = f"{name} {sorted(parameters.items())}"
+        with self._loading:
+            if key not in self._others:
+                self._others[key] = load(name, parameters)
+                if len(self._others) > MOST_METHODS:
+                    self._others.popitem(last=False)
+            self._others.move_to_end(key)
+            return self._others[key]
+
+
+def failure(given: str | Row, outcome: Outcome, message: str) -> Answer:
+    """Return the answer to a request that has no result."""
+    return Answer(outcome, {**_head(given), "error": {"kind": str(outcome), "message": one_line(message)}})
+
+
+def _head(given: str | Row) -> Row:
+    """Return the fields that every answer has: the id is that of the request."""
+    identity = integral(given.get("id")) if isinstance(given, dict) else None
+    return {"format": ANSWER_FORMAT, "id": identity if isinstance(identity, str | float | int) else None}

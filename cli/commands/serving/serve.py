@@ -1,0 +1,117 @@
+"""``alloc serve``."""
+
+import threading
+from queue import SimpleQueue
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from alloc.cli import options
+from alloc.cli.commands.missions.plan import ended_by_signals, read_lines
+from alloc.cli.options import examples
+from alloc.cli.output.console import say, write_out
+
+if TYPE_CHECKING:
+    from alloc.allocators.serving.service import Service
+
+EXAMPLES = examples(
+    "alloc serve --stdio --load gappo",
+    "alloc serve --http 127.0.0.1:8080 --load 'gappo[policy=mine.safetensors],local-search'",
+    "alloc serve --http 8080 --parallel 4 --queue 32 --most-agents 500 --most-ms 1000",
+    closing="Each request is one of alloc-solve-request/1, each answer one of alloc-solve-answer/1. "
+    "SIGTERM ends all runs as their time limits do.",
+)
+
+LOCAL = "127.0.0.1"
+"""Where the service listens where no host is given: nobody else can reach it there."""
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to `app`."""
+    app.command("serve", epilog=EXAMPLES)(serve_command)
+
+
+def serve_command(
+    stdio: Annotated[
+        bool, typer.Option("--stdio", help="Read requests from standard input, write answers to standard output.")
+    ] = False,
+    http: Annotated[
+        str | None,
+        typer.Option(metavar="[HOST:]PORT", help=f"Listen here; {LOCAL} where no host is given.", show_default=False),
+    ] = None,
+    load: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME,NAME,...",
+            autocompletion=options.complete_methods,
+            help="Methods to load now, perhaps with parameters, as in gappo[policy=mine.safetensors]; "
+            "others are loaded at their first use.",
+            show_default=False,
+        ),
+    ] = None,
+    parallel: Annotated[
+        int | None, typer.Option(min=1, max=1024, help="Runs at the same time.", show_default="processors")
+    ] = None,
+    queue: Annotated[int, typer.Option(min=0, help="Requests that may wait; further ones are turned away.")] = 64,
+    most_agents: Annotated[int, typer.Option(min=1, help="Most agents of an instance.")] = 2_000,
+    most_tasks: Annotated[int, typer.Option(min=1, help="Most tasks of an instance.")] = 500,
+    most_ms: Annotated[
+        float, typer.Option(min=0, help="Longest time limit, and that of requests without one.")
+    ] = 10_000,
+    most_bytes: Annotated[int, typer.Option(min=1, help="Largest request over HTTP.")] = 4_000_000,
+) -> None:
+    """Solve for other programs: lines of JSON on standard input, or HTTP."""
+    from alloc.allocators.parallel.processors import available_threads
+    from alloc.allocators.serving.request import ServiceLimits
+    from alloc.allocators.serving.service import Service
+
+    if stdio == (http is not None):
+        raise typer.BadParameter("is needed, or --http, but not both", param_hint="'--stdio'")
+    host, port = (LOCAL, 0) if http is None else _address(http)
+    limits = ServiceLimits(
+        agents=most_agents,
+        tasks=most_tasks,
+        limit_ms=most_ms,
+        parallel=parallel or available_threads(),
+        queue=queue,
+        strangers=not stdio,
+    )
+    methods = {} if load is None else {name: given or {} for name, given in options.listed(load, "--load").values()}
+    service = Service(limits, methods)
+    if stdio:
+        serve_lines(service)
+    else:
+        serve_http(service, host, port, most_bytes)
+
+
+def serve_lines(service: "Service") -> None:
+    """Answer all lines that come before the input ends or a signal does."""
+    from alloc.allocators.serving.lines import RequestLines
+
+    arrived: SimpleQueue[str | None] = SimpleQueue()
+    threading.Thread(target=read_lines, args=(arrived,), name="alloc-lines", daemon=True).start()
+    lines = RequestLines(service, lambda line: write_out(line + "\n"))
+    with ended_by_signals(arrived, service.end):
+        while (line := arrived.get()) is not None:
+            lines.take(line)
+        service.close()
+
+
+def serve_http(service: "Service", host: str, port: int, most_bytes: int) -> None:
+    """Answer requests until a signal comes; those that are open then are answered still."""
+    from alloc.problems import MissingPackageError
+
+    try:
+        from alloc.allocators.serving.server import run_server
+    except ImportError as error:
+        message = f"needs {error.name}; install with: pip install 'alloc-mrta[serve]'"
+        raise MissingPackageError(message, "--http") from error
+    run_server(service, host, port, most_bytes, lambda address: say(f"listening on {address}"))
+
+
+def _address(text: str) -> tuple[str, int]:
+    """Return host and port of ``HOST:PORT`` or ``PORT``."""
+    host, _, port = text.rpartition(":")
+    if not (port.isdecimal() and int(port) < 2**16):
+        raise typer.BadParameter(f"{text!r} is not PORT or HOST:PORT, such as 127.0.0.1:8080", param_hint="'--http'")
+    return host.strip("[]") or LOCAL, int(port)

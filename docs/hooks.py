@@ -1,0 +1,85 @@
+"""What `mkdocs` calls while it builds the site: pages from elsewhere, links, and a check that nothing is loaded."""
+
+import posixpath
+import re
+import sys
+from pathlib import Path
+
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.exceptions import PluginError
+from mkdocs.structure.files import File, Files
+from mkdocs.structure.pages import Page
+
+ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT / "docs"))
+
+import make_commands  # noqa: E402  (beside this file, which is no package)
+
+PAGES_OUTSIDE = ("CONTRIBUTING.md", "CHANGELOG.md", "LICENSE", "CITATION.cff")
+EXAMPLES = (".csv", ".ipynb", ".json", ".md", ".py", ".toml", ".txt", ".yaml")
+"""Suffixes of the files in examples/ that pages may link to."""
+
+LINK = re.compile(r"\[([^\[\]]*)\]\(([^)\s#:]+)(#[^)\s]*)?\)")
+EXTERNAL = re.compile(
+    r"<(?:script|img|iframe|source)\b[^>]*?\bsrc=[\"']?https?:|<link\b(?![^>]*\bcanonical)[^>]*?\bhref=[\"']?https?:"
+)
+"""What makes a browser load something from elsewhere when it shows a page; plain links do not."""
+
+
+def on_files(files: Files, config: MkDocsConfig) -> Files:
+    """Add the page of all options, and files of the repository that stand outside docs/."""
+    files.append(File.generated(config, "use/commands.md", content=make_commands.page()))
+    examples = [path for path in (ROOT / "examples").rglob("*") if path.suffix in EXAMPLES and is_kept(path)]
+    for path in [*(ROOT / name for name in PAGES_OUTSIDE), *examples]:
+        files.append(File.generated(config, path.relative_to(ROOT).as_posix(), abs_src_path=str(path)))
+    return files
+
+
+def is_kept(path: Path) -> bool:
+    """Whether a file belongs to the repository, and is not left over from a build or a run."""
+    return not any(part in ("build", "__pycache__") or part.endswith(".egg-info") for part in path.parts)
+
+
+def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
+    """Lead links where their targets stand in the site, and colour commands, which have no prompt, as a shell's."""
+    if page.is_homepage:
+        page.meta["hide"] = ["navigation"]  # it would have a single entry
+    return site_links(markdown, page.file.src_uri).replace("```console\n", "```bash\n")
+
+
+def site_links(markdown: str, source: str) -> str:
+    """Return the text of a page with links as they are in the site, where a page is called by its title.
+
+    Parameters
+    ----------
+    markdown : str
+        The page; links are relative to its place in the repository.
+    source : str
+        Its place in the site.
+    """
+    place = source if (ROOT / source).is_file() else f"docs/{source}"
+
+    def lead(match: re.Match[str]) -> str:
+        label, target = match[1], posixpath.normpath(posixpath.join(posixpath.dirname(place), match[2]))
+        if label == posixpath.basename(target):
+            label = title(ROOT / target)
+        if (ROOT / target).is_dir():
+            target = f"{target}/README.md" if (ROOT / target / "README.md").is_file() else "examples/README.md"
+        found = posixpath.relpath(target.removeprefix("docs/"), posixpath.dirname(source) or ".")
+        return f"[{label}]({found}{match[3] or ''})"
+
+    return LINK.sub(lead, markdown)
+
+
+def title(path: Path) -> str:
+    """Return the heading of a page, or the name of another file."""
+    heading = re.match(r"# (.+)", path.read_text(encoding="utf-8")) if path.suffix == ".md" else None
+    return heading[1] if heading else path.name
+
+
+def on_post_build(config: MkDocsConfig) -> None:
+    """Raise an error if a page would load anything from the network."""
+    for path in Path(config.site_dir).rglob("*.html"):
+        found = EXTERNAL.search(path.read_text(encoding="utf-8"))
+        if found:
+            raise PluginError(f"{path} loads from the network: {found[0]}")

@@ -1,0 +1,49 @@
+"""The plain model, given to the solvers without our own stages."""
+
+import numpy as np
+import pytest
+from oracle import brute_force, least_energy_within
+from tiny_instances import tiny_instance
+
+from alloc.allocators import Milp, RefusedError, Status, StopReason, load, solve
+from alloc.problems import Instance
+from alloc.problems.generate import paper_like
+
+
+@pytest.mark.parametrize("name", ["milp", "cpsat"])
+@pytest.mark.parametrize("seed", range(6))
+def test_answer_is_that_of_brute_force(name, seed):
+    """The solver alone proves the least makespan, then the least energy at it, whatever the abilities are."""
+    instance = tiny_instance(seed)
+    if instance.has_travel_time:
+        instance = Instance(ability=instance.ability, workload=instance.workload)
+    result = solve(instance, name, objective="makespan-energy", parameters={"plain": True})
+    best = brute_force(instance)
+    assert result.unserved_count == best.unserved
+    assert result.served_makespan == pytest.approx(best.makespan, rel=2e-6)
+    if result.status is Status.OPTIMAL:
+        assert result.energy == pytest.approx(least_energy_within(instance, result.makespan), rel=2e-6, abs=1e-9)
+    else:
+        assert result.status is Status.INFEASIBLE
+
+
+@pytest.mark.parametrize("name", ["milp", "cpsat"])
+def test_time_limit_ends_the_solver(name):
+    """The plain model of a large instance is far from solved in 0.1 s, and the run ends then."""
+    result = solve(paper_like(300, 30, 1200, seed=1), load(name, plain=True), time_limit_s=0.1)
+    assert result.stop_reason is StopReason.TIME_LIMIT
+    assert result.parameters == {"plain": True}
+
+
+def test_what_it_cannot_state_is_refused():
+    """Finite speeds, and more pairs than fit a model, are refused beforehand."""
+    with pytest.raises(RefusedError, match="finite speeds"):
+        solve(Instance(ability=[1.0], workload=[1.0], speed=[1.0]), Milp(plain=True))
+    wide = Instance(ability=np.ones(20_000), workload=np.ones(200))
+    with pytest.raises(RefusedError, match="pairs of agent and task"):
+        solve(wide, Milp(plain=True))
+
+
+def test_no_work_is_done_at_once():
+    """An instance without work has the idle plan."""
+    assert solve(Instance(ability=[1.0], workload=[0.0]), Milp(plain=True)).makespan == 0

@@ -1,0 +1,67 @@
+"""Policies that are no networks in compiled loops, against the reference, and their tuning."""
+
+import math
+from pathlib import Path
+
+import pytest
+
+from alloc.allocators import load_policy, simulate
+from alloc.allocators.learned.missions.training.trainer import MissionTrainingParameters
+from alloc.allocators.online.compiled.run import run_compiled
+from alloc.allocators.online.compiled.tuning import tune
+from alloc.problems import InputError, MissionParameters, random_mission
+from alloc.problems.missions.mission import Mission
+from alloc.problems.missions.radio import Burst, Radio
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]  # loops are compiled first: half a minute, more under load
+
+RADIOS = [None, Radio(radius=0.3, burst=Burst(good=1.0, bad=1.0)), Radio(radius=0.4, loss=0.2, delay=0.17)]
+KEPT = ("joins", "appears", "deadline", "growth", "events", "horizon", "knowledge", "sensing", "seed")
+
+
+def missions() -> list[Mission]:
+    """Return small missions with all that the loops have to know: events, deadlines, growth, bursts and delays."""
+    kinds = ("steady", "failures", "recharging", "growth", "deadlines", "silence")
+    drawn = [random_mission(MissionParameters(kind, 7, 10), seed) for seed, kind in enumerate(kinds)]
+    radios = [RADIOS[number % len(RADIOS)] or mission.radio for number, mission in enumerate(drawn)]
+    return [
+        Mission(mission.instance, **{name: getattr(mission, name) for name in KEPT}, radio=radio)
+        for mission, radio in zip(drawn, radios, strict=True)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("name", "settings"),
+    [
+        ("nearest", {}),
+        ("greedy", {"age": 0.1, "memory": 3.0}),
+        ("hedonic", {"age": 0.1, "flight": 0.2}),
+        ("auction", {"stay": math.inf}),
+        ("auction", {"stay": 2.0, "age": 0.1, "seats": 1.5, "flight": 2.0}),
+        ("gappo", {"periods": 10}),
+    ],
+)
+def test_compiled_runs_have_the_measures_of_the_reference(name: str, settings: dict[str, float]) -> None:
+    """A policy reaches the same mission time, energy, switches and bytes in both simulations."""
+    policy = load_policy(name, **settings)
+    for seed, mission in enumerate(missions()):
+        expected, found = simulate(mission, policy, seed=seed).result, run_compiled(mission, policy, seed)
+        for kind in ("mission_time", "tasks_done", "energy", "switches", "messages", "bytes"):
+            value = getattr(expected, kind)
+            assert getattr(found, kind) == (None if value is None else pytest.approx(value, rel=1e-9)), (seed, kind)
+
+
+def test_policies_without_loops_are_refused() -> None:
+    """What leads all agents is an error, not a wrong figure."""
+    with pytest.raises(InputError, match="no compiled loops"):
+        run_compiled(missions()[0], load_policy("idle"))
+
+
+def test_a_tuning_goes_on_where_it_was_interrupted(tmp_path: Path) -> None:
+    """Two generations in two goes are those of one go."""
+    small = MissionTrainingParameters(missions=1, candidates=4, validations=1)
+    whole = list(tune("auction", 2, 3, setting=small))
+    state = tmp_path / "state.npz"
+    first = next(tune("auction", 2, 3, state, small))
+    assert [first, *tune("auction", 2, 3, state, small)] == whole
+    assert whole[1].missions == 8

@@ -1,0 +1,95 @@
+"""`solve_async`: awaited runs give the answers of `solve`, and cancelled ones leave nothing behind."""
+
+import asyncio
+import random
+import threading
+import time
+
+import pytest
+
+from alloc.allocators import InputError, Result, StopReason, load, registry, solve, solve_async
+from alloc.problems import Instance, paper_like
+from alloc.problems.generate import paper
+
+HARD = paper_like(60, 25, 400, seed=1)
+"""Too few agents per task for any method to prove the least energy soon."""
+
+
+def test_answer_is_that_of_solve() -> None:
+    """Two runs at once, awaited while the loop goes on, have the answers that `solve` gives."""
+
+    async def both() -> list[Result]:
+        runs = (solve_async(HARD, "ga", iterations=3, time_limit_s=None, seed=seed) for seed in (0, 1))
+        return list(await asyncio.gather(*runs))
+
+    for seed, result in enumerate(asyncio.run(both())):
+        assert result.allocation == solve(HARD, "ga", iterations=3, time_limit_s=None, seed=seed).allocation
+
+
+def test_errors_are_those_of_solve() -> None:
+    """What `solve` raises is raised where the run is awaited."""
+    with pytest.raises(InputError, match="there is no method"):
+        asyncio.run(solve_async(HARD, "nothing"))
+
+
+def test_improvements_are_told_in_the_loop() -> None:
+    """The callback runs in the thread of the event loop; an exception from it ends the run and propagates."""
+    seen: list[threading.Thread] = []
+    asyncio.run(solve_async(HARD, "local-search", on_improvement=lambda _: seen.append(threading.current_thread()),
+                            iterations=5, time_limit_s=None))  # fmt: skip
+    assert set(seen) == {threading.current_thread()}
+
+    def enough(_: object) -> None:
+        raise KeyError("enough")
+
+    with pytest.raises(KeyError, match="enough"):
+        asyncio.run(solve_async(HARD, "local-search", objective="makespan-energy", on_improvement=enough))
+
+
+def test_event_ends_a_run_with_an_answer() -> None:
+    """A stop event is no cancellation: the best allocation so far comes back."""
+    stop = threading.Event()
+    threading.Timer(0.05, stop.set).start()
+    result = asyncio.run(solve_async(HARD, "local-search", objective="makespan-energy", stop=stop, time_limit_s=60))
+    assert result.stop_reason is StopReason.INTERRUPTED
+    assert result.allocation is not None
+
+
+async def cancelled_after(instance: Instance, method: object, seconds: float, objective: str) -> float | None:
+    """Return how long a run took to end once it was cancelled; None if it had ended before."""
+    run = asyncio.create_task(solve_async(instance, method, objective=objective, time_limit_s=60, threads=2))
+    await asyncio.sleep(seconds)
+    begin = time.process_time()
+    run.cancel()
+    try:
+        await run
+    except asyncio.CancelledError:
+        return time.process_time() - begin
+    return None
+
+
+@pytest.mark.parametrize("name", list(registry.BUILT_IN))
+def test_cancelled_runs_leave_no_thread(name: str) -> None:
+    """Every method ends soon after it is cancelled, and as many threads as before run then.
+
+    Processor time is measured, of which a busy machine takes none; ten times what is promised fails for sure.
+    """
+    method, before = load(name), threading.active_count()
+    for seconds in (0.0, 0.03, 0.1):
+        late = asyncio.run(cancelled_after(HARD, method, seconds, "makespan-energy"))
+        assert late is None or late < 0.5
+        assert threading.active_count() == before
+
+
+@pytest.mark.slow
+def test_cancelled_at_random_moments() -> None:
+    """At 200 random moments, on an instance of the paper's size, all methods end and leave no thread."""
+    rng, before = random.Random(1), threading.active_count()
+    methods = [load(name) for name in registry.BUILT_IN]
+    times = []
+    for number in range(200):
+        objective = rng.choice(["makespan", "makespan-energy"])
+        run = cancelled_after(paper(1, seed=number), rng.choice(methods), rng.uniform(0, 0.3), objective)
+        times.append(asyncio.run(run) or 0.0)
+        assert threading.active_count() == before
+    assert sorted(times)[-4] < 0.1

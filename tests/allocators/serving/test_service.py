@@ -1,0 +1,172 @@
+"""The service: requests by limits, deadlines, queue and cancellation; and over lines of JSON."""
+
+import json
+import threading
+import time
+
+import pytest
+from schema_checks import faults
+
+from alloc.allocators import solve
+from alloc.allocators.serving.lines import RequestLines
+from alloc.allocators.serving.request import ServiceLimits
+from alloc.allocators.serving.service import Answer, Outcome, Service
+from alloc.problems import InputError, Instance, paper_like
+from alloc.problems.formats import to_document
+
+EASY = {"agents": [{"id": "a", "ability": 2}], "tasks": [{"id": "t", "workload": 4}]}
+FLYING = {"agents": [{"id": "a", "ability": 2, "speed": 1}], "tasks": EASY["tasks"]}
+HARD = to_document(paper_like(60, 25, 400, seed=1))
+LONG = {"instance": HARD, "method": "local-search", "objective": "makespan-energy"}
+
+
+@pytest.fixture
+def service():
+    """A service of one run at a time for strangers, with one request that may wait."""
+    found = Service(ServiceLimits(agents=100, tasks=50, queue=1, limit_ms=60_000, strangers=True))
+    yield found
+    found.end()
+    found.close()
+
+
+def answered(service: Service, request: object) -> Answer:
+    """Return the answer to one request, valid by the schemas of both."""
+    if isinstance(request, dict):
+        assert faults({"format": "alloc-solve-request/1", **request}) == []
+    answer = service.submit(request if isinstance(request, str) else json.dumps(request)).answer.result(30)
+    assert faults(json.loads(answer.text)) == []
+    return answer
+
+
+def test_answer_has_the_result_of_solve(service):
+    """A request gives what `solve` gives, with its id; the method is loaded once."""
+    request = {"id": 3, "instance": HARD, "method": "ga", "parameters": {"population": 8}, "iterations": 3, "seed": 5}
+    answer = answered(service, request)
+    assert (answer.outcome, answer.document["id"]) == (Outcome.SOLVED, 3)
+    expected = solve(paper_like(60, 25, 400, seed=1), "ga", population=8, iterations=3, seed=5, threads=1)
+    assert answer.document["result"]["assignment"] == expected.to_dict()["assignment"]
+    assert answer.document["result"]["parameters"] == {"population": 8}
+    loaded = next(iter(service._others.values()))
+    answered(service, request)
+    assert list(service._others.values()) == [loaded]
+
+
+@pytest.mark.parametrize(
+    ("request_", "kind", "words"),
+    [
+        ("", "input", "is empty"),
+        ("{", "input", "line 1 column 2"),
+        ("[]", "input", "must be a JSON object"),
+        ('{"instance": {}, "instance": {}}', "input", "occurs twice"),
+        ({"instance": EASY, "colour": 1}, "input", "unknown field 'colour'"),
+        ({"cancel": 1}, "input", "unknown field 'cancel'"),
+        ({"instance": {"agents": [{"id": "a"}], "tasks": EASY["tasks"]}}, "input", "instance.agents[0].ability"),
+        ({"instance": {**EASY, "agents": [{}] * 101}}, "input", "101 agents; this service takes 100 at most"),
+        ({"instance": EASY, "limit_ms": 70_000}, "input", "limit_ms: must be a finite number >= 0 and at most 60000"),
+        ({"instance": EASY, "method": "gaa"}, "input", "did you mean 'ga'"),
+        ({"instance": EASY, "method": "ga", "parameters": {"pop": 1}}, "input", "there are population,"),
+        ({"instance": EASY, "parameters": {"pop": 1}}, "input", "are for a method that is named"),
+        ({"instance": EASY, "method": "gappo", "parameters": {"policy": "/etc/passwd"}}, "input", "cannot be chosen"),
+        ({"instance": EASY, "method": "gappo", "parameters": {"device": "cuda"}}, "input", "cannot be chosen"),
+        ({"instance": EASY, "method": "ga", "parameters": {"population": 10**7}}, "input", "at most 10000"),
+        ({"instance": EASY, "start": {"b": "t"}, "method": "ga"}, "input", "start"),
+        ({"instance": FLYING, "method": "ga"}, "refused", "speeds"),
+    ],
+)  # fmt: skip
+def test_bad_requests_are_answered_by_one_line(service, request_, kind, words):
+    """Whatever is wrong with a request is told with its place, and the service goes on."""
+    if isinstance(request_, dict):
+        request_ = json.dumps(request_)
+    answer = service.submit(request_).answer.result(30)
+    assert answer.outcome == kind
+    assert words in answer.document["error"]["message"]
+    assert answered(service, {"instance": EASY}).outcome is Outcome.SOLVED
+
+
+def test_a_full_queue_turns_requests_away(service):
+    """Beyond one run and one that waits, a request is answered as busy at once; cancelled ones make room."""
+    jobs = [service.submit({**LONG, "id": number}) for number in range(3)]
+    assert jobs[2].answer.result(0).outcome is Outcome.BUSY
+    assert service.open_requests == 2
+    for job in jobs:
+        job.cancel()
+    assert [job.answer.result(30).outcome for job in jobs] == [Outcome.CANCELLED, Outcome.CANCELLED, Outcome.BUSY]
+    assert service.open_requests == 0
+    assert answered(service, {"instance": EASY}).outcome is Outcome.SOLVED
+
+
+def test_a_deadline_counts_from_the_arrival(service):
+    """A request that has waited its time away is given its first plan, and not its time anew."""
+    first = service.submit({**LONG, "limit_ms": 400})
+    began = time.monotonic()
+    second = service.submit({**LONG, "limit_ms": 400})
+    result = second.answer.result(30).document["result"]
+    assert first.answer.result(30).document["result"]["runtime_s"] >= 0.3
+    assert result["runtime_s"] < 0.3 or time.monotonic() - began > 2  # unless the machine is very busy
+    assert result["status"] == "feasible"
+
+
+def test_the_end_gives_open_requests_their_best(service):
+    """A service that ends answers what is open by the best so far, and turns further requests away."""
+    job = service.submit(LONG)
+    time.sleep(0.1)
+    service.end()
+    assert job.answer.result(30).document["result"]["stop_reason"] == "interrupted"
+    assert service.submit(LONG).answer.result(0).outcome is Outcome.BUSY
+
+
+def test_defects_are_answers_too(service, monkeypatch):
+    """An unforeseen exception is answered as failed, and logged with its traceback."""
+
+    def fail(*_: object, **__: object) -> None:
+        raise ZeroDivisionError("by nothing")
+
+    monkeypatch.setattr("alloc.allocators.serving.service.solve", fail)
+    answer = answered(service, {"instance": EASY})
+    assert (answer.outcome, "by nothing" in answer.document["error"]["message"]) == (Outcome.FAILED, True)
+
+
+def test_methods_of_the_operator_have_their_parameters():
+    """A method that is loaded with parameters has them in requests that set none."""
+    service = Service(ServiceLimits(), {"ga": {"population": 8}})
+    try:
+        result = service.submit({"instance": EASY, "method": "ga"}).answer.result(30).document["result"]
+        assert result["parameters"] == {"population": 8}
+    finally:
+        service.close()
+    with pytest.raises(InputError):
+        Service(ServiceLimits(), {"ga": {"population": 0}})
+
+
+def test_lines_are_answered_as_they_end():
+    """Over lines, requests are told apart by ids: short ones overtake, cancelled ones end, errors have a line."""
+    service, written, grown = Service(ServiceLimits(parallel=2)), [], threading.Event()
+
+    def write(line: str) -> None:
+        written.append(json.loads(line))
+        grown.set()
+
+    lines = RequestLines(service, write)
+    lines.take(json.dumps({**LONG, "id": "long"}))
+    lines.take(json.dumps({"id": 1, "instance": EASY}))
+    assert grown.wait(30)
+    lines.take(json.dumps({**LONG, "id": "long"}))
+    lines.take("\n")
+    lines.take("nonsense")
+    lines.take(json.dumps({"instance": EASY}))
+    lines.take('{"cancel": 99}')
+    lines.take('{"cancel": "long"}')
+    service.close()
+    assert [faults(answer) for answer in written] == [[]] * len(written)
+    kinds = [(answer["id"], answer.get("error", {}).get("kind", "solved")) for answer in written]
+    assert kinds[:2] == [(1, "solved"), ("long", "input")]
+    assert sorted(map(str, kinds[2:])) == sorted(
+        map(str, [(None, "input"), (None, "input"), (None, "input"), ("long", "cancelled")])
+    )
+
+
+def test_instances_come_back_as_they_went(service):
+    """The assignment of an answer is one of the instance of the request."""
+    instance = Instance(ability=[2.0, 1.0], workload=[4.0, 1.0])
+    answer = answered(service, {"instance": to_document(instance), "method": "greedy"})
+    assert set(answer.document["result"]["assignment"]) == set(instance.agent_ids)

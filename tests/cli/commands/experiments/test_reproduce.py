@@ -1,0 +1,34 @@
+"""``alloc reproduce``."""
+
+import shutil
+from pathlib import Path
+
+DOCS = Path(__file__).parents[4] / "docs" / "reproduction"
+
+
+def test_a_page_from_rows_alone(alloc):
+    """With --page nothing is run: the page and the figures come from the rows in the folder."""
+    shutil.copytree(DOCS, "here/reproduction", ignore=shutil.ignore_patterns("*.png"))
+    ran = alloc("reproduce", "here", "--page")
+    assert (ran.code, ran.out) == (0, "")
+    assert ran.err.startswith("here/reproduction.md: ")
+    assert Path("here/reproduction.md").read_bytes() == DOCS.with_suffix(".md").read_bytes()
+    assert Path("here/reproduction/figure-6.png").exists()
+
+
+def test_a_short_run(alloc):
+    """Runs are made in processes and not made again; what was not run is said."""
+    command = ("reproduce", "out", "--runs", "1", "--methods", "greedy", "--workers", "1")
+    ran = alloc(*command)
+    assert (ran.code, ran.err) == (2, "alloc: out/reproduction: holds no runs of methods that learn; make some first\n")
+    rows = Path("out/reproduction/others.csv").read_text()
+    assert rows.count("\n") == 5
+    alloc(*command)
+    assert Path("out/reproduction/others.csv").read_text() == rows
+
+
+def test_bad_usage(alloc):
+    """Unknown methods and folders without runs are told in one line."""
+    for options in (("out", "--methods", "gapo"), ("nowhere", "--page"), ("out", "--runs", "0")):
+        ran = alloc("reproduce", *options)
+        assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)

@@ -1,0 +1,111 @@
+"""The site of the documents: all pages are in it, links lead somewhere there, and nothing is loaded from elsewhere."""
+
+import importlib.util
+import re
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+from command_line import COMMANDS
+
+from alloc import allocators, problems
+from alloc.allocators.contract.built_in import BUILT_IN
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+
+
+def loaded(name: str) -> ModuleType:
+    """Return a script of docs/ as a module."""
+    spec = importlib.util.spec_from_file_location(name, DOCS / f"{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture
+def hooks(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    """What mkdocs calls."""
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    return loaded("hooks")
+
+
+def test_every_page_is_in_the_navigation() -> None:
+    """Each page of docs/ is named once in mkdocs.yml, and each that is named is there or is made."""
+    named = re.findall(r": ([\w/.-]+\.md)$", (ROOT / "mkdocs.yml").read_text("utf-8"), re.MULTILINE)
+    pages = {path.relative_to(DOCS).as_posix() for path in DOCS.rglob("*.md")}
+    assert len(named) == len(set(named))
+    assert set(named) == pages | {"use/commands.md", "examples/README.md", "CONTRIBUTING.md", "CHANGELOG.md"}
+
+
+@pytest.mark.parametrize("path", [*DOCS.rglob("*.md"), ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md"], ids=str)
+def test_lists_are_lists_in_the_site(path: Path) -> None:
+    """A list that follows a paragraph does so after an empty line, without which it is a part of it."""
+    text = re.sub(r"^```.*?^```", "", path.read_text("utf-8"), flags=re.MULTILINE | re.DOTALL)
+    assert re.findall(r"^(?!- |\d+\. |#| |\||<!--).+\n(?=- |1\. )", text, re.MULTILINE) == []
+
+
+def test_the_page_of_all_options_has_all_of_them() -> None:
+    """Every command has a chapter, with each option that its help shows."""
+    page = loaded("make_commands").page()
+    chapters = dict(re.findall(r"^## alloc ([\w-]+)\n(.*?)(?=^## |\Z)", page, re.MULTILINE | re.DOTALL))
+    assert set(chapters) == set(COMMANDS)
+    for name, command in COMMANDS.items():
+        shown = [one for one in command.params if not getattr(one, "hidden", False)]
+        assert [
+            option for one in shown for option in one.opts if option.startswith("--") and option not in chapters[name]
+        ] == []
+
+
+def test_the_table_of_methods_says_what_they_can() -> None:
+    """Each method has a page that is linked, and the marks of the table are those of its description."""
+    page = (DOCS / "methods" / "index.md").read_text("utf-8")
+    rows = re.findall(r"^\| (`[^|]*`) \|(.*)\|$", page.split("## What each can do")[1].split("## ")[0], re.MULTILINE)
+    found = {
+        name: [cell.strip() == "yes" for cell in cells.split("|")]
+        for names, cells in rows
+        for name in re.findall(r"`([\w-]+)`", names)
+    }
+    assert found == {
+        one.name: [one.finite_speeds, one.makespan_slack, one.warm_start, one.anytime, one.proves]
+        for one in BUILT_IN.values()
+    }
+    for name in BUILT_IN:
+        assert re.search(rf"\[[^\]]*`{name}`[^\]]*\]\([\w-]+\.md\)", page), name
+
+
+def test_the_picture_of_the_layers_has_every_package() -> None:
+    """A folder that is added to a package stands in the picture of the architecture."""
+    picture = (DOCS / "developing" / "architecture.svg").read_text("utf-8")
+    folders = [
+        path.parent.name
+        for package in (allocators, problems)
+        for path in Path(package.__path__[0]).glob("*/__init__.py")
+    ]
+    assert [name for name in folders if f"{name}/" not in picture] == []
+
+
+@pytest.mark.needs("mkdocs")
+def test_links_out_of_docs_lead_into_the_site(hooks: ModuleType) -> None:
+    """Files beside docs/ stand beside its pages in the site, and a label that is a file's name becomes its title."""
+    assert hooks.site_links("[e](../../examples/replan.py)", "use/replanning.md") == "[e](../examples/replan.py)"
+    assert hooks.site_links("[p](../../examples/plugin)", "use/plugins.md") == "[p](../examples/plugin/README.md)"
+    assert hooks.site_links("[a](docs/glossary.md#x)", "CONTRIBUTING.md") == "[a](glossary.md#x)"
+    assert hooks.site_links("[cli.md](cli.md)", "use/embedding.md") == "[The command line](cli.md)"
+    assert hooks.site_links("[h](https://example.org/a.md)", "index.md") == "[h](https://example.org/a.md)"
+
+
+@pytest.mark.needs("mkdocs")
+def test_what_loads_from_the_network_is_noticed(hooks: ModuleType) -> None:
+    """Scripts, styles and pictures of other hosts are; files of the site and links for readers are not."""
+    for text in (
+        '<script src="https://x.org/a.js">',
+        '<link rel="stylesheet" href="https://x.org/a.css">',
+        "<img src=http://x.org/a.png>",
+    ):
+        assert hooks.EXTERNAL.search(text)
+    for text in ('<script src="../a.js">', '<a href="https://x.org">', '<link rel="canonical" href="https://x.org/">'):
+        assert not hooks.EXTERNAL.search(text)
