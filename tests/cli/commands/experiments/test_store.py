@@ -166,7 +166,7 @@ def test_a_full_disk_is_one_line_and_loses_nothing(alloc, plugin):
     """Where the disk is full half-way, what was written stays; with room the same command goes on from there."""
     words = ("compare", f"{TINY}:0-1", "--methods", "greedy,answer", "--seeds", "10", *QUICK)
     before, handler = resource.getrlimit(resource.RLIMIT_FSIZE), signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, before[1]))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (150_000, before[1]))
     try:
         ran = alloc(*words)
     finally:
