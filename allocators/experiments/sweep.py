@@ -137,9 +137,9 @@ def _with_seeds(run: Callable[[int], R | None], seeds: Sequence[int], stop: thre
 
 
 def mean_and_worst(values: Sequence[float | None]) -> tuple[float | None, float | None]:
-    """Return mean and maximum; None where a value is missing, as a mean over the others alone would be too good."""
+    """Return mean and maximum; None where there is no value, or one is missing, as a mean would be too good."""
     known = [value for value in values if value is not None]
-    return (float(np.mean(known)), max(known)) if len(known) == len(values) else (None, None)
+    return (float(np.mean(known)), max(known)) if known and len(known) == len(values) else (None, None)
 
 
 def mean(values: Sequence[float | None]) -> float | None:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from alloc.cli.commands.experiments.sources import covering
 from alloc.cli.options import examples
 from alloc.cli.output.console import STANDARD, say
 from alloc.problems.vocabulary import Distribution, Knowledge, MissionFamily, Sites, Starts
@@ -149,31 +150,11 @@ def _instance(family: Family, wanted: dict[str, Any], seed: int) -> "Instance | 
     if family is Family.CFSTP:
         return random_cfstp(**wanted, seed=seed)
     if family is Family.COVERING:
-        return _covering(seed=seed, **wanted)
+        return covering(seed, **wanted)
     if family is not Family.RANDOM:
         return paper(int(family.removeprefix("paper-")), seed)
     spreads: dict[str, Any] = {name: _spread(value, name) for name, value in wanted.items() if name in SPREADS}
     return random_instance(Parameters(**{**wanted, **spreads}), seed)
-
-
-def _covering(
-    seed: int,
-    agents: int = 100,
-    tasks: int = 25,
-    ability_min: float = 1,
-    ability_max: float = 1000,
-    workload: Distribution = Distribution.EQUAL,
-    integer: bool = True,
-) -> "Instance":
-    from alloc.problems import InputError, machine_covering
-
-    if workload not in (Distribution.EQUAL, Distribution.UNIFORM):
-        raise InputError("must be equal or uniform here", "workload")
-    for name, value in (("ability_min", ability_min), ("ability_max", ability_max)):
-        if value != int(value):
-            raise InputError(f"must be a whole number here, got {value}", name)
-    equal, ends = workload is Distribution.EQUAL, (int(ability_min), int(ability_max))
-    return machine_covering(agents, tasks, *ends, seed, equal=equal, whole=integer)
 
 
 def _write(made: "Instance | Mission", output: str, *, into_folder: bool) -> None:

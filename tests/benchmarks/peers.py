@@ -1,179 +1,187 @@
-"""Our methods beside naive models and published programs, on the same instances: docs/benchmarks/peers.md.
+"""Models as one would state them without further thought, and published programs, as methods of `alloc compare`.
 
-    python tests/benchmarks/peers.py                                  # a look: small families, 2 seconds a run
-    python tests/benchmarks/peers.py --families all --methods all --seeds 5 --time-limit 30 --pygrape DIR --write
+    export PYTHONPATH=tests/benchmarks:FOLDER    # with peers-1.0.dist-info and, for pygrape, pyGRAPE.py
+    alloc compare paper-1:0-4 'covering[agents=9,tasks=3,ability_max=20]:0-4' --methods cpsat,naive-cvxpy,naive-cpsat,prtpy \
+        --time-limit 3 --store peers.db --report peers.md
 
-Every run is a process of its own (`peers_run.py`), so that libraries do not clash and memory is each method's own.
-`naive-cvxpy` and `naive-cpsat` decide every pair of agent and task (e_ij); `prtpy` is its integer programme for the
-weighted largest smallest sum (pip install alloc-mrta[bench]); `pygrape` needs a folder with pyGRAPE.py
-(github.com/inmo-jang/pyGRAPE), and `hedonic@0.5` or `pygrape@0.5` lets agents hear each other up to that distance. All
-answers are scored by `alloc.problems.evaluate`; gaps are against the best bound that any of our methods proved on
-that instance, the makespans of exact methods included. Figures are means over the seeds.
-"""
+`naive-cvxpy` and `naive-cpsat` decide every pair of agent and task (e_ij), first for the makespan and then, in what time
+is left, for the energy at it; `prtpy` is its integer programme for the weighted largest smallest sum (pip install
+alloc-mrta[bench]); `pygrape` is github.com/inmo-jang/pyGRAPE, in which agents hear each other up to
+`communication_radius`.
+"""  # noqa: E501
 
-import argparse
-import json
-import math
-import subprocess
 import sys
-import tempfile
-from collections.abc import Callable
+import types
 from dataclasses import dataclass
-from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
-from machine_covering import SHAPES as COVERING
 
-from alloc.allocators import describe, names
-from alloc.problems import (
-    Allocation,
-    Instance,
-    evaluate,
-    machine_covering,
-    paper,
-    random_instance,
-    write_instance,
-)
-from alloc.problems import Family as Spread
-
-RUN = Path(__file__).with_name("peers_run.py")
-PAGE = Path(__file__).parents[2] / "docs" / "benchmarks" / "peers.md"
-BEGIN, END = "<!-- table of tests/benchmarks/peers.py -->", "<!-- end of table -->"
-LOADING_S = 60.0
-"""What a process may take beyond its time limit, for imports and for what does not keep to limits."""
-
-Maker = Callable[[int], Instance]
+from alloc.allocators import Allocator, Method, Proposal, Search
+from alloc.allocators.contract.parameters import CheckedParameters, bounded
+from alloc.problems import Allocation, Objective, RefusedError
 
 
-def families() -> dict[str, tuple[str, Maker]]:
-    """Return objective and maker of the instances of each family."""
-    energy, plain = "makespan-energy", "makespan"
-    found: dict[str, tuple[str, Maker]] = {}
-    for number in (1, 2, 3, 4):
-        found[f"paper-{number}"] = (energy, lambda seed, number=number: paper(number, seed))
-    found["reach"] = (energy, lambda seed: random_instance(Spread(starts="own", communication_range=(0.4, 0.8)), seed))
-    found["speeds"] = (energy, lambda seed: random_instance(Spread(starts="own", speed=(0.5, 2.0), battery=None), seed))
-    for kind, sizes in COVERING.items():
-        for n, m, low, high in sizes:
-            for equal in (True, False):
-                name = f"{kind} ({n},{m}) U[{low},{high}] {'equal' if equal else 'unequal'}"
-                found[name] = (plain, lambda seed, size=(n, m, low, high), equal=equal: machine_covering(
-                    *size, seed, equal=equal))  # fmt: skip
-    return found
+def stages(search: Search) -> int:
+    """Return how many programmes are solved: one for the makespan, and where it counts one for the energy."""
+    return 2 if search.objective is Objective.MAKESPAN_ENERGY else 1
 
 
-QUICK = ["paper-1", "reach", "speeds", "small (9,3) U[1,20] equal", "small (9,3) U[1,20] unequal"]
-QUICK_METHODS = ["naive-cvxpy", "naive-cpsat", "prtpy", "greedy", "local-search", "hedonic", "auction", "cpsat"]
-NAIVE = ["naive-cvxpy", "naive-cpsat", "prtpy"]
+def refuse_ranges(search: Search) -> None:
+    """Refuse an instance in which an agent cannot take every task."""
+    if not search.instance.reach.is_complete:
+        raise RefusedError("ranges are beyond it")
+
+
+class NaiveCvxpy(Allocator):
+    """Maximise 1 / T over every e_ij, then fly least at that T."""
+
+    method = Method(name="naive-cvxpy", summary="every e_ij by cvxpy and HiGHS", requires=("cvxpy", "highspy"))
+
+    def allocate(self, search: Search) -> Proposal:
+        """Solve both programmes, as far as the time goes."""
+        import cvxpy as cp
+
+        instance = search.instance
+        e, pace = cp.Variable((instance.n, instance.m), boolean=True), cp.Variable()
+        reach = instance.reach.mask[instance.reach.origin].astype(float)
+        rules = [cp.sum(e, axis=1) <= 1, e <= reach]
+        goals = [(cp.Maximize(pace), instance.ability @ e >= pace * instance.workload)]
+        has_work = instance.workload > 0
+        for stage in range(stages(search)):
+            goal, rule = goals[stage]
+            if search.remaining_s <= 0:
+                break
+            problem = cp.Problem(goal, [*rules, rule])
+            try:
+                problem.solve(solver=cp.HIGHS, highs_options={"time_limit": search.remaining_s, "threads": 1})
+            except cp.error.SolverError:
+                break
+            if e.value is None or problem.status not in ("optimal", "optimal_inaccurate", "user_limit"):
+                break
+            whole = np.round(e.value)
+            group = instance.ability @ whole
+            if (group[has_work] <= 0).any():
+                break  # at a limit without an incumbent cvxpy gives zeros
+            search.submit(Allocation(np.where(whole.any(axis=1), whole.argmax(axis=1), -1)))
+            best = float((group[has_work] / instance.workload[has_work]).min())
+            distance = instance.reach.distance[instance.reach.origin]
+            enough = instance.workload * best * (1 - 1e-9)
+            goals.append((cp.Minimize(cp.sum(cp.multiply(distance, e))), instance.ability @ e >= enough))
+        return Proposal()
+
+
+class NaiveCpsat(Allocator):
+    """Do the same by CP-SAT; abilities and workloads are scaled to whole numbers."""
+
+    method = Method(name="naive-cpsat", summary="every e_ij by CP-SAT", requires=("ortools",))
+
+    def allocate(self, search: Search) -> Proposal:
+        """Solve both programmes, as far as the time goes."""
+        from ortools.sat.python import cp_model
+
+        instance = search.instance
+        whole = (instance.ability == np.round(instance.ability)).all() and (instance.workload % 1 == 0).all()
+        scale, fine = 1 if whole else 10**4, 10**6
+        ability = np.round(instance.ability * scale).astype(int).tolist()
+        work = np.round(instance.workload * scale).astype(int).tolist()
+        mask, distance = (table[instance.reach.origin] for table in (instance.reach.mask, instance.reach.distance))
+        model = cp_model.CpModel()
+        e = {(i, j): model.new_bool_var("") for i, j in np.argwhere(mask).tolist()}
+        for i in range(instance.n):
+            model.add_at_most_one(e[i, j] for j in np.flatnonzero(mask[i]).tolist())
+        pace = model.new_int_var(0, int(fine * sum(ability) / max(1, min(h for h in work if h > 0))) + 1, "")
+        for j, h in enumerate(work):
+            if h > 0:
+                model.add(fine * sum(ability[i] * e[i, j] for i in np.flatnonzero(mask[:, j]).tolist()) >= h * pace)
+        model.maximize(pace)
+        for _ in range(stages(search)):
+            solver = cp_model.CpSolver()
+            if search.remaining_s <= 0:
+                break
+            solver.parameters.max_time_in_seconds = search.remaining_s
+            solver.parameters.num_workers = search.threads
+            if solver.solve(model) not in (cp_model.OPTIMAL, cp_model.FEASIBLE):
+                break
+            plan = np.full(instance.n, -1)
+            for (i, j), variable in e.items():
+                if solver.value(variable):
+                    plan[i] = j
+            search.submit(Allocation(plan))
+            model.add(pace >= solver.value(pace))
+            model.minimize(sum(int(10**6 * distance[pair]) * variable for pair, variable in e.items()))
+        return Proposal()
+
+
+class Prtpy(Allocator):
+    """Maximise the smallest weighted sum; it sorts its bins, so they go to the tasks in order of their workloads."""
+
+    method = Method(name="prtpy", summary="the integer programme of prtpy", requires=("prtpy",))
+
+    def allocate(self, search: Search) -> Proposal:
+        """Partition the abilities."""
+        import prtpy as library
+
+        refuse_ranges(search)
+        instance = search.instance
+        items = dict(enumerate(instance.ability.tolist()))
+        bins = library.partition(
+            algorithm=library.partitioning.integer_programming,
+            numbins=instance.m,
+            items=items,
+            weights=instance.workload.tolist(),
+            objective=library.obj.MaximizeSmallestSum,
+            outputtype=library.out.Partition,
+            time_limit=search.remaining_s,
+        )
+        plan = np.full(instance.n, -1)
+        by_sum = sorted(bins, key=lambda members: sum(items[i] for i in members))
+        for members, task in zip(by_sum, np.argsort(instance.workload).tolist(), strict=True):
+            plan[members] = task
+        return Proposal(Allocation(plan))
 
 
 @dataclass(frozen=True)
-class Row:
-    """What one method made of one instance; `why` says why there is nothing."""
+class PyGrapeParameters(CheckedParameters):
+    """How far agents hear each other from their starts."""
 
-    makespan: float = math.nan
-    energy: float = math.nan
-    bound: float = 0.0
-    seconds: float = math.nan
-    memory_mib: float = math.nan
-    why: str = ""
+    communication_radius: float = bounded(np.inf, 0.0, infinite=True)
 
 
-def measure(method: str, instance: Instance, objective: str, options: argparse.Namespace) -> Row:
-    """Run one method on one instance in a process of its own, and score its answer."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "instance.npz"
-        write_instance(instance, path)
-        command = [sys.executable, str(RUN), method, str(path), objective, str(options.time_limit)]
-        command += [str(options.threads), str(options.pygrape or "")]
-        try:
-            done = subprocess.run(
-                command, capture_output=True, text=True, timeout=options.time_limit + LOADING_S, check=False
-            )
-        except subprocess.TimeoutExpired:
-            return Row(why=f"not done {LOADING_S:.0f} s after its limit")
-    if done.returncode:
-        return Row(why=(done.stderr.strip().splitlines() or ["failed"])[-1][:100])
-    answer = json.loads(done.stdout.splitlines()[-1])
-    if "why" in answer:
-        return Row(why=answer["why"], seconds=answer.get("seconds", math.nan))
-    score = evaluate(instance, Allocation(np.array(answer["task"], dtype=np.intp)))
-    assert not score.violations, f"{method} sends agents where they cannot go"
-    makespan = math.inf if score.makespan is None else score.makespan
-    bound = answer["bound"] or 0.0
-    return Row(makespan, score.energy, bound, answer["seconds"], answer["memory_mib"])
+class PyGrape(Allocator):
+    """Play with its utility for unequal agents, by shares of abilities; agents communicate within a radius."""
 
+    method = Method(name="pygrape", summary="the reference of the game that hedonic plays", requires=("pyGRAPE",))
+    parameters_type: ClassVar[type] = PyGrapeParameters
+    parameters: PyGrapeParameters
 
-def lines(family: str, objective: str, results: dict[str, list[Row]]) -> list[str]:
-    """Return a row of the table per method."""
-    seeds = len(next(iter(results.values())))
-    bounds = [max(rows[seed].bound for rows in results.values()) for seed in range(seeds)]
-    table = []
-    for method, rows in results.items():
-        solved = [(row, bound) for row, bound in zip(rows, bounds, strict=True) if not row.why]
-        if not solved:
-            table.append(f"| {family} | {method} | - | - | - | - | - | {rows[0].why} |")
-            continue
-        gap = np.mean(
-            [(row.makespan - bound) / row.makespan if row.makespan < math.inf else 1 for row, bound in solved]
-        )
-        makespan, seconds = np.mean([row.makespan for row, _ in solved]), np.mean([row.seconds for row, _ in solved])
-        energy = f"{np.mean([row.energy for row, _ in solved]):.1f}" if objective == "makespan-energy" else "-"
-        memory = np.mean([row.memory_mib for row, _ in solved])
-        remark = f"{len(solved)} of {seeds} answered" if len(solved) < seeds else ""
-        table.append(
-            f"| {family} | {method} | {makespan:.4f} | {gap:.2%} | {energy} | {seconds:.3f} | {memory:.0f} | {remark} |"
-        )
-    return table
+    def allocate(self, search: Search) -> Proposal:
+        """Play to the end, whatever the limit."""
+        refuse_ranges(search)
+        for name in ("imageio", "imageio.v2"):  # for films alone
+            sys.modules.setdefault(name, types.ModuleType(name))
+        import pyGRAPE  # type: ignore[import-not-found]
 
+        from alloc.allocators.heuristic.decentralised.communication import communication_graph
 
-def chosen_methods(options: argparse.Namespace) -> list[str]:
-    if options.methods == "all":
-        chosen = [*NAIVE, *(name for name in names() if not describe(name).missing)]
-    else:
-        chosen = QUICK_METHODS if options.methods == "quick" else options.methods.split(",")
-    if options.pygrape:
-        chosen = [*chosen, *(name for name in options.communication.split(",") if name)]
-    return chosen
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--families", default="quick", help="quick, all, or names (or their beginnings) split by ;")
-    parser.add_argument("--methods", default="quick", help="quick, all, or names split by commas")
-    parser.add_argument("--seeds", type=int, default=1)
-    parser.add_argument("--first-seed", type=int, default=0)
-    parser.add_argument("--time-limit", type=float, default=2.0, help="seconds per run")
-    parser.add_argument("--threads", type=int, default=1)
-    parser.add_argument("--pygrape", type=Path, help="folder with pyGRAPE.py; left out without")
-    parser.add_argument(
-        "--communication", default="pygrape,pygrape@0.5,hedonic@0.5", help="methods to add with --pygrape"
-    )
-    parser.add_argument("--write", action="store_true", help=f"put the table into {PAGE.name}")
-    options = parser.parse_args()
-    known = families()
-    begins = tuple(QUICK if options.families == "quick" else options.families.split(";"))
-    wanted = [name for name in known if options.families == "all" or name.startswith(begins)]
-    table = ["| instances | method | T | gap | energy | s | MiB | |", "|---|---|---|---|---|---|---|---|"]
-    print("\n".join(table), flush=True)
-    for family in wanted:
-        objective, maker = known[family]
-        instances = [maker(seed) for seed in range(options.first_seed, options.first_seed + options.seeds)]
-        results = {
-            method: [measure(method, instance, objective, options) for instance in instances]
-            for method in chosen_methods(options)
+        instance, n = search.instance, search.instance.n
+        graph = communication_graph(instance, self.parameters.communication_radius)
+        heard = np.ones((n, n), dtype=int) - np.eye(n, dtype=int)
+        if not graph.is_complete:
+            heard[:] = 0
+            heard[np.repeat(np.arange(n), np.diff(graph.begin)), graph.neighbour] = 1
+        np.random.seed(0)  # noqa: NPY002 (the one that it draws from)
+        scenario = {
+            "num_agents": n,
+            "num_tasks": instance.m,
+            "agent_comm_matrix": heard,
+            "initial_allocation": np.full(n, -1),
+            "environment": {
+                "task_locations": np.nan_to_num(instance.task_position),
+                "task_demands": instance.workload,
+                "agent_locations": np.nan_to_num(instance.start_position),
+                "agent_resources": instance.ability,
+            },
         }
-        found = lines(family, objective, results)
-        print("\n".join(found), flush=True)
-        table += found
-    if options.write:
-        text = PAGE.read_text(encoding="utf-8")
-        before, _, rest = text.partition(BEGIN)
-        note = f"\n\n{options.seeds} seeds, {options.time_limit:g} s, {options.threads} threads.\n\n"
-        PAGE.write_text(
-            before + BEGIN + note + "\n".join(table) + "\n\n" + END + rest.partition(END)[2], encoding="utf-8"
-        )
-
-
-if __name__ == "__main__":
-    main()
+        found = pyGRAPE.grape_allocation(scenario, display_progress=False, util_type="energy_balanced")
+        return Proposal(Allocation(np.array(found["final_allocation"])))

@@ -1,5 +1,6 @@
 """``alloc compare --policies``: policies in missions, as a part of ``alloc compare``."""
 
+import contextlib
 import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -107,10 +108,12 @@ def _in_store(
     from alloc.allocators import load_policy
     from alloc.allocators.experiments.report.missions import write_mission_report
     from alloc.allocators.experiments.stored_missions import planned_missions, policy_rows
+    from alloc.problems import MissingPackageError
 
     for name, settings in policies.values():
         if settings:
-            load_policy(name, **settings)  # what is wrong with them is told before anything runs
+            with contextlib.suppress(MissingPackageError):  # its runs will tell; what else is wrong is told now
+                load_policy(name, **settings)
     variants = {label: (name, settings or {}) for label, (name, settings) in policies.items()}
 
     def plan(store: "Store", machine: str) -> "Comparison":

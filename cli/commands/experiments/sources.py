@@ -4,6 +4,8 @@ import csv
 import glob
 import os
 import re
+from collections.abc import Collection
+from inspect import signature
 from typing import TYPE_CHECKING, Any
 
 from alloc.cli.options import BETWEEN_SETTINGS, values
@@ -12,7 +14,7 @@ from alloc.cli.output.files import read_instances
 if TYPE_CHECKING:
     from alloc.problems import Instance
 
-FAMILY = re.compile(r"(paper-[1-4]|random)(?:\[(.*)\])?:(\d{1,9})(?:-(\d{1,9}))?")
+FAMILY = re.compile(r"(paper-[1-4]|random|covering)(?:\[(.*)\])?:(\d{1,9})(?:-(\d{1,9}))?")
 """A generated family with its seeds, both ends included."""
 
 MOST_GENERATED = 100_000
@@ -70,15 +72,53 @@ def _generated(source: str, family: str, settings: str | None, first: str, last:
     if not 0 < len(seeds) <= MOST_GENERATED:
         raise InputError(f"must be from a seed to a later one, at most {MOST_GENERATED} of them", source=source)
     try:
+        given: dict[str, Any] = values(BETWEEN_SETTINGS.split(settings) if settings else [])
+        if family == "covering":
+            _check_known(given, signature(covering).parameters, family)
+            return [covering(seed, **given) for seed in seeds]
         if family != "random":
             if settings is not None:
-                raise InputError("takes no parameters; random does", family)
+                raise InputError("takes no parameters; random and covering do", family)
             return [paper(int(family.removeprefix("paper-")), seed) for seed in seeds]
-        given: dict[str, Any] = values(BETWEEN_SETTINGS.split(settings) if settings else [])
-        unknown = sorted(given.keys() - Family.__dataclass_fields__.keys())
-        if unknown:
-            raise InputError("is no parameter of a random family", unknown[0])
+        _check_known(given, Family.__dataclass_fields__, family)
         title = source.rpartition(":")[0]
         return [random_instance(Family(**given), seed, name=f"{title}:{seed}") for seed in seeds]
     except InputError as error:
         raise InputError(error.message, error.place, source) from error
+
+
+def _check_known(given: Collection[str], known: Collection[str], family: str) -> None:
+    """Raise an error for a parameter that a family does not have; its seed stands behind the colon."""
+    from alloc.problems import InputError
+
+    unknown = sorted(set(given) - (set(known) - {"seed"}))
+    if unknown:
+        raise InputError(f"is no parameter of a {family} family", unknown[0])
+
+
+def covering(
+    seed: int,
+    agents: int = 100,
+    tasks: int = 25,
+    ability_min: float = 1,
+    ability_max: float = 1000,
+    workload: str = "equal",
+    integer: bool = True,
+) -> "Instance":
+    """Return an instance of machine covering, by the parameters of ``alloc generate covering``.
+
+    Raises
+    ------
+    InputError
+        If abilities are no whole numbers, or workloads neither equal nor uniform.
+    """
+    from alloc.problems import InputError, machine_covering
+    from alloc.problems.arguments import real
+
+    if workload not in ("equal", "uniform"):
+        raise InputError("must be equal or uniform here", "workload")
+    for name, value in (("ability_min", ability_min), ("ability_max", ability_max)):
+        if real(value, name) != int(value):
+            raise InputError(f"must be a whole number here, got {value}", name)
+    equal, ends = workload == "equal", (int(ability_min), int(ability_max))
+    return machine_covering(agents, tasks, *ends, seed, equal=equal, whole=integer)

@@ -1,5 +1,6 @@
 """A comparison whose runs are kept in a store: only those are made that it has not yet."""
 
+import contextlib
 import sys
 import threading
 from collections.abc import Callable, Mapping, Sequence
@@ -148,9 +149,11 @@ def _tell_differences(kept: Kept) -> None:
 def _check_method(name: str, settings: Mapping[str, object]) -> None:
     """Raise an error if there is no such method, or it does not take these parameters."""
     from alloc.allocators import describe, load
+    from alloc.problems import MissingPackageError
 
     if settings:
-        load(name, **settings)
+        with contextlib.suppress(MissingPackageError):  # its runs will tell
+            load(name, **settings)
     elif name != "auto":
         describe(name)
 

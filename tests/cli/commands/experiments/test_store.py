@@ -130,6 +130,8 @@ def test_sources_of_instances(alloc):
         ("none/*.json", "none/*.json: matches no file"),
         ("paper-1:3-2", "paper-1:3-2: must be from a seed to a later one"),
         ("random[agent=3]:0", "random[agent=3]:0: agent: is no parameter of a random family"),
+        ("covering[agent=3]:0", "covering[agent=3]:0: agent: is no parameter of a covering family"),
+        ("covering[ability_min=x]:0", "covering[ability_min=x]:0: ability_min: must be a finite number"),
         ("random[agents=0]:0", "random[agents=0]:0: agents: must be"),
         ("paper-1[agents=3]:0", "paper-1[agents=3]:0: paper-1: takes no parameters"),
         ("list.csv", "list.csv: has no column 'instance'"),
@@ -159,6 +161,17 @@ def test_wrong_methods_are_one_line(alloc, methods, message):
     assert ran.code == 2
     assert message in ran.err
     assert not Path("runs.db").exists()
+
+
+@pytest.mark.usefixtures("in_process")
+def test_a_method_without_any_figure_is_reported(alloc, plugin):
+    """A method that refuses everything, or whose package is missing, has dashes in the report and a reason each."""
+    words = ("compare", f"{TINY}:0", "covering[agents=4,tasks=2]:0", "--methods", "greedy,refuse,missing", *QUICK)
+    ran = alloc(*words, "--report", "table.md")
+    assert ran.code == 0
+    assert "covering-4x2-1-1000-equal-seed-0: not this one" in ran.err
+    assert "pip install absent" in ran.err
+    assert "| refuse | 0 | 0 | - | - | - | - |" in Path("table.md").read_text()
 
 
 @pytest.mark.usefixtures("in_process")
