@@ -19,8 +19,9 @@ EXAMPLES = examples(
 
 
 def register(app: typer.Typer) -> None:
-    """Add the command to `app`."""
-    app.command("export", epilog=EXAMPLES)(export_command)
+    """Add the command to `app`, by both of its names."""
+    for name in ("export", "export-model"):
+        app.command(name, epilog=EXAMPLES.replace("alloc export ", f"alloc {name} "))(export_command)
 
 
 def export_command(

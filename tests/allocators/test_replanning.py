@@ -12,6 +12,8 @@ from alloc.problems import IDLE, Allocation, InputError, Instance, Objective, ev
 
 METHODS = ("cpsat", "milp", "local-search", "ga", "gappo", "hedonic", "auction", "lp-round", "greedy")
 EXACT = ("cpsat", "milp")
+LONG = ("gappo", "hedonic", "lp-round", "ga")
+"""Methods whose comparison with brute force takes seconds, and is left to CI."""
 
 
 def cases() -> list[tuple[Instance, Allocation, dict[str, str | None]]]:
@@ -54,7 +56,9 @@ def best_cost(
 @pytest.mark.parametrize(
     ("objective", "price"), [(Objective.MAKESPAN_MOVES, 0.0), (Objective.MAKESPAN_ENERGY, 2.5)], ids=["moves", "price"]
 )
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(
+    "method", [pytest.param(method, marks=[pytest.mark.slow] * (method in LONG)) for method in METHODS]
+)
 def test_moves_against_brute_force(method: str, objective: Objective, price: float) -> None:
     """Exact methods find the least cost of moves with all pins kept, and no method claims less."""
     allocator = load(method)
@@ -139,7 +143,7 @@ def test_what_is_proven_with_pins_is_said_to_hold_for_them() -> None:
 
 
 @pytest.mark.parametrize("method", EXACT)
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow), pytest.param(2, marks=pytest.mark.slow)])
 def test_the_energy_stage_counts_costs(method: str, seed: int) -> None:
     """Flights back of all cost what twice the energy does: the same optimum, proven, with many pairs."""
     rng = np.random.default_rng(seed)

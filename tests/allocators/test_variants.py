@@ -58,7 +58,7 @@ def test_exact_methods_find_the_optimum(method: str, objective: Objective) -> No
 
 
 @pytest.mark.parametrize("objective", OBJECTIVES)
-@pytest.mark.parametrize("method", OTHERS)
+@pytest.mark.parametrize("method", [pytest.param(one, marks=[pytest.mark.slow] * (one == "gappo")) for one in OTHERS])
 def test_all_methods_stay_within_the_rules(method: str, objective: Objective) -> None:
     """Every method serves as many tasks as can be, sends nobody astray, and beats no optimum."""
     allocator = load(method)

@@ -280,6 +280,7 @@ def test_malformed_files_are_one_line_with_the_file(alloc, tmp_path, command, co
         "evaluate": ["x.json"],
         "plot": ["x.json", "--output", "p.png"],
         "export": ["--output", "m.lp"],
+        "export-model": ["--output", "m.lp"],
         "compare": ["--methods", "greedy"],
     }.get(command, ["--json"])
     ran = alloc(command, "bad.json", *more)

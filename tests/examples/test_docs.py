@@ -156,7 +156,13 @@ def test_every_document_is_tested_or_has_nothing_to_run():
     assert {"README.md", "docs/use/cli.md"} < tested
 
 
-@pytest.mark.parametrize("document", RUN, ids=name)
+LONG = {"docs/missions/missions.md", "docs/missions/missions_tutorial.md", "docs/use/comparing.md", "docs/use/cli.md"}
+"""Documents whose commands take some seconds of processor time each, and are left to CI."""
+
+
+@pytest.mark.parametrize(
+    "document", [pytest.param(path, marks=[pytest.mark.slow] * (name(path) in LONG)) for path in RUN], ids=name
+)
 def test_document_runs(document, folder):
     """Every block of the document runs to its end."""
     run_document(TEXTS[document], name(document), folder)

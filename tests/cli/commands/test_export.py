@@ -15,6 +15,13 @@ def test_the_solution_of_an_exported_model_is_evaluated(alloc, small):
     assert alloc("evaluate", "small.json", "small.sol", "--json").json["makespan"] == pytest.approx(13 / 11)
 
 
+def test_the_command_has_two_names(alloc, small):
+    """`export-model` writes what `export` does."""
+    for name in ("export", "export-model"):
+        assert alloc(name, "small.json", "--output", f"{name}.mps").code == 0
+    assert Path("export.mps").read_bytes() == Path("export-model.mps").read_bytes()
+
+
 def test_standard_output_needs_a_format(alloc, small):
     """A model goes to standard output in the format that is named; without one, an error names the option."""
     ran = alloc("export", "small.json", "--output", "-", "--format", "mps", "--model", "plain")
