@@ -30,6 +30,10 @@ GAIN = 0.01
 """p-value, corrected by Holm's procedure, below which the population is said to bring something."""
 
 
+DECISIVE = 10
+"""Runs below which not even the same sign in all of them is below `GAIN`, after Holm over four tests."""
+
+
 def page(learned: Sequence[Learned], solved: Sequence[Solved], environments: Sequence[dict[str, str]]) -> str:
     """Return the page in Markdown."""
     rows = latest_length(learned)
@@ -169,7 +173,9 @@ def _population(rows: Sequence[Learned]) -> str:
     figures = "; ".join(f"{name} {told(one, '+.4f')}" for name, one in known.items())
     if gains:
         return f"**The population brings something** ({', '.join(gains)}; p < {GAIN} after Holm): {figures}."
-    return f"**Nothing is shown to come of the population** (no p < {GAIN} after Holm): {figures or 'no runs'}."
+    few = max((one.runs for one in known.values()), default=0) < DECISIVE
+    why = f"fewer than {DECISIVE} runs cannot show it" if few else f"no p < {GAIN} after Holm"
+    return f"**Nothing is shown to come of the population** ({why}): {figures or 'no runs'}."
 
 
 def _scenarios(rows: Sequence[Learned]) -> str:

@@ -114,7 +114,7 @@ def test_verdicts_follow_the_rows() -> None:
     """The first claim holds where `gappo` is ahead of all in every run, fails where it is behind, else is left open."""
     assert verdicts(1.0, 1.1, runs=12)[0] == HOLDS
     assert verdicts(1.3, 1.1, runs=12)[0].startswith(NOT)
-    assert verdicts(1.0, 1.1, runs=2)[0].startswith(UNKNOWN)
+    assert verdicts(1.0, 1.1, runs=5)[0].startswith(UNKNOWN)
 
 
 @pytest.mark.slow
