@@ -17,6 +17,7 @@ from alloc.allocators.experiments.reproduction.summary import (
     runs_of,
 )
 from alloc.allocators.experiments.statistics import holm
+from alloc.problems.generate.paper_scenarios import SCENARIOS as PAPER_SCENARIOS
 from alloc.problems.text import counted
 
 RIVALS = PAPER_METHODS[1:]
@@ -24,6 +25,9 @@ RIVALS = PAPER_METHODS[1:]
 SIGNIFICANT = 0.05
 OPTIMAL = 1 + 1e-4
 """Makespan that counts as the optimum, which is 1 h."""
+
+ENERGY_PER_DISTANCE = 6.0
+"""Of all instances, as `paper_like` makes them."""
 
 ENOUGH = 8
 """Runs below which not even the same sign in all of them is significant against four rivals."""
@@ -111,6 +115,26 @@ def _traditional(data: Data) -> Finding:
         worse |= float(np.median(ours)) > best + 1e-4
         parts.append(f"scenario {scenario}: {np.median(ours):.3f}, the best of the others {best:.3f}")
     return "; ".join(parts) or "no runs", (NOT if worse else HOLDS) if parts else UNKNOWN
+
+
+def _least_energy(data: Data) -> Finding:
+    """Compare the battery left by plans, flown directly, with that of methods that learn nothing."""
+    parts, less = [], False
+    for scenario in SCENARIOS:
+        runs = runs_of(of_scenario(data.learned, scenario), "gappo")
+        known = [row for row in of_scenario(data.solved, scenario) if np.isfinite(row.battery)]
+        means = [float(np.mean([row.battery for row in known if row.method == name])) for name in _methods(known)]
+        if not runs or not means:
+            continue
+        per_distance = 100 * ENERGY_PER_DISTANCE / PAPER_SCENARIOS[scenario].battery
+        ours = 100 - per_distance * float(np.mean([run[-1].distance for run in runs]))
+        less |= ours < max(means) - 0.1
+        parts.append(f"scenario {scenario}: {ours:.1f} %, the best of the others {max(means):.1f} %")
+    return "; ".join(parts) or "no runs", (NOT if less else HOLDS) if parts else UNKNOWN
+
+
+def _methods(rows: Sequence[Solved]) -> list[str]:
+    return [name for name in OTHERS if any(row.method == name for row in rows)]
 
 
 def _optimal(data: Data) -> Finding:

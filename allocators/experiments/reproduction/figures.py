@@ -1,6 +1,7 @@
 """Figures 2 to 6 in the paper's form: makespan over iterations in each scenario, and battery left at the end."""
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -33,7 +34,7 @@ def draw_all(learned: Sequence[Learned], solved: Sequence[Solved], folder: Path)
     kept = latest_length(learned)
     for scenario in ITERATIONS:
         rows, beside = of_scenario(kept, scenario), of_scenario(solved, scenario)
-        drawn(lambda r=rows, b=beside, s=scenario: _convergence(r, b, s), str(folder / f"figure-{scenario + 1}.png"))
+        drawn(partial(_convergence, rows, beside, scenario), str(folder / f"figure-{scenario + 1}.png"))
     drawn(lambda: _batteries(kept), str(folder / "figure-6.png"))
 
 
