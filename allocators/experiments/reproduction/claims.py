@@ -157,7 +157,7 @@ def _proven(data: Data) -> Finding:
 
 
 def _scale(data: Data) -> Finding:
-    """Compare the lead over the best rival in scenarios 2 to 4 with that in scenario 1."""
+    """Compare the lead over the nearest rival in scenarios 2 to 4 with that in scenario 1."""
     leads: list[Effect] = []
     for scenario in SCENARIOS:
         rows = of_scenario(data.learned, scenario)
@@ -233,6 +233,12 @@ CLAIMS = (
         lambda data: against_all(data, TESTS, final("battery"), 1, "+.1f"),
     ),
     Claim(
+        "abstract",
+        "minimizes energy consumption across diverse configurations",
+        "battery left where agents fly to their task directly, against methods that learn nothing",
+        _least_energy,
+    ),
+    Claim(
         "abstract", "robust solution for real-time multi-agent task allocation", "-", _unchecked("no times are given")
     ),
     Claim(
@@ -267,10 +273,16 @@ CLAIMS = (
         lambda data: against_all(data, TESTS, fluctuation, -1, "+.4f"),
     ),
     Claim(
-        "4.1", "advantages become increasingly apparent as the task scale expands", "lead over the best rival", _scale
+        "4.1",
+        "advantages become increasingly apparent as the task scale expands",
+        "mean lead over the nearest rival",
+        _scale,
     ),
     Claim(
-        "4.1", "consistently demonstrates its ability to identify optimal solutions", "runs that end at T = 1", _optimal
+        "4.1",
+        "consistently demonstrates its ability to identify optimal solutions",
+        "runs that end at T = 1 h",
+        _optimal,
     ),
     Claim("4.1", "optimal completion time, by exhaustive search, is 1 hour", "bound and best plan", _proven),
     Claim(

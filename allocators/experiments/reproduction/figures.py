@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-COLOURS = dict(zip(PAPER_METHODS, SERIES, strict=False))
-STYLES = dict(zip(PAPER_METHODS, ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1))), strict=True))
+COLOURS = dict(zip(PAPER_METHODS, (SERIES[number] for number in (0, 1, 2, 5, 4)), strict=True))
+STYLES = dict(zip(PAPER_METHODS, ("-", "--", "-.", (0, (8, 2)), (0, (5, 1, 1, 1, 1, 1))), strict=True))
 MARKS = dict(zip(OTHERS, "os^vD", strict=True))
 OPTIMUM = "#e377c2"
 """Pink, as in the paper."""
@@ -96,14 +96,15 @@ def _batteries(rows: Sequence[Learned]) -> "Figure":
             axes.fill_between([x - width / 2, x + width / 2], low - 0.4, high + 0.4, color="0.3", alpha=0.45, lw=0)
             if last:
                 label = method.upper() if not place else None
-                spread = np.std(last, ddof=1) if len(last) > 1 else 0.0
-                axes.bar(x, np.mean(last), width * 0.9, color=COLOURS[method], label=label, yerr=spread, zorder=0)
+                mean = np.mean(last)
+                ends = [[mean - min(last)], [max(last) - mean]]
+                axes.bar(x, mean, width * 0.9, color=COLOURS[method], label=label, yerr=ends, zorder=0)
     axes.fill_between([], [], [], color="0.3", alpha=0.45, label="in the paper")
     axes.set_xticks(
         range(len(ITERATIONS)), [f"{SCENARIOS[k].agents} agents, {SCENARIOS[k].tasks} tasks" for k in ITERATIONS]
     )
     axes.set_ylim(0, 100)
-    axes.set_ylabel("battery left after the episode (%)")
+    axes.set_ylabel("battery left after the episode (%): mean, least and most")
     axes.spines[["top", "right"]].set_visible(False)
     axes.legend(frameon=False, fontsize=9, ncols=6, loc="upper center", bbox_to_anchor=(0.5, 1.12))
     return figure

@@ -7,6 +7,7 @@ import numpy as np
 from alloc.allocators.experiments.reproduction.claims import CLAIMS, NOT, UNKNOWN, Data, told
 from alloc.allocators.experiments.reproduction.prose import ASSUMED, ASSUMPTIONS, FIGURES, HEAD, PROCEDURE, SEEDS
 from alloc.allocators.experiments.reproduction.protocol import (
+    DECISIONS,
     OTHERS,
     PAPER_BATTERY,
     PAPER_METHODS,
@@ -48,8 +49,7 @@ def page(learned: Sequence[Learned], solved: Sequence[Solved], environments: Seq
         *(_figure(scenario) for scenario in SCENARIOS),
         "![Battery left](reproduction/figure-6.png)",
         "## Equal decisions",
-        _tests(rows),
-        _population(rows),
+        *(part for length in _lengths(learned) for part in _budget(learned, length)),
         "## The four scenarios",
         _scenarios(rows),
         "Battery is that of the episode, where every hop is flown; a mean over the runs, as are hops per agent.",
@@ -63,6 +63,17 @@ def page(learned: Sequence[Learned], solved: Sequence[Solved], environments: Seq
         _environments(environments),
     ]
     return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def _lengths(rows: Sequence[Learned]) -> list[int]:
+    """Return the numbers of iterations of which there are runs, the most first."""
+    return sorted({row.iterations for row in rows}, reverse=True)
+
+
+def _budget(learned: Sequence[Learned], length: int) -> tuple[str, ...]:
+    """Return title, table and finding of all runs with so many iterations."""
+    rows = [row for row in learned if row.iterations == length]
+    return f"### {length} iterations, {DECISIONS * length:,} decisions", _tests(rows), _population(rows)
 
 
 def _extent(rows: Sequence[Learned], solved: Sequence[Solved]) -> str:
