@@ -56,10 +56,9 @@ def _convergence(rows: Sequence[Learned], solved: Sequence[Solved], scenario: in
             right.plot(number, np.median(found), MARKS[method], color="0.25")
     _frame(left, right, rows, scenario)
     sizes = SCENARIOS[scenario]
-    count = len({row.run for row in rows})
-    figure.suptitle(
-        f"{sizes.agents} agents and {sizes.tasks} tasks, {counted(count, 'run')}: median and quartiles", fontsize=11
-    )
+    counts = {len(runs_of(rows, method)) for method in PAPER_METHODS} - {0}
+    runs = counted(max(counts), "run") if len(counts) == 1 else f"{min(counts)} to {max(counts)} runs"
+    figure.suptitle(f"{sizes.agents} agents and {sizes.tasks} tasks, {runs}: median and quartiles", fontsize=11)
     return figure
 
 
@@ -104,7 +103,7 @@ def _batteries(rows: Sequence[Learned]) -> "Figure":
         range(len(ITERATIONS)), [f"{SCENARIOS[k].agents} agents, {SCENARIOS[k].tasks} tasks" for k in ITERATIONS]
     )
     axes.set_ylim(0, 100)
-    axes.set_ylabel("battery left after the episode (%): mean, least and most")
+    axes.set_ylabel("battery left after the episode (%)")
     axes.spines[["top", "right"]].set_visible(False)
     axes.legend(frameon=False, fontsize=9, ncols=6, loc="upper center", bbox_to_anchor=(0.5, 1.12))
     return figure

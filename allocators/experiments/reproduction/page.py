@@ -4,7 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from alloc.allocators.experiments.reproduction.claims import CLAIMS, NOT, UNKNOWN, Data, told
+from alloc.allocators.experiments.reproduction.claims import CLAIMS
+from alloc.allocators.experiments.reproduction.findings import NOT, UNKNOWN, Data, told
 from alloc.allocators.experiments.reproduction.prose import ASSUMED, ASSUMPTIONS, FIGURES, HEAD, PROCEDURE, SEEDS
 from alloc.allocators.experiments.reproduction.protocol import (
     DECISIONS,
@@ -48,6 +49,7 @@ def page(learned: Sequence[Learned], solved: Sequence[Solved], environments: Seq
         FIGURES,
         *(_figure(scenario) for scenario in SCENARIOS),
         "![Battery left](reproduction/figure-6.png)",
+        "Bars are means, lines the least and the most of the runs; grey is what the paper has.",
         "## Equal decisions",
         *(part for length in _lengths(learned) for part in _budget(learned, length)),
         "## The four scenarios",

@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from alloc.allocators.experiments.reproduction import folder as module
-from alloc.allocators.experiments.reproduction.claims import CLAIMS, HOLDS, NOT, UNKNOWN, Data
+from alloc.allocators.experiments.reproduction.claims import CLAIMS
+from alloc.allocators.experiments.reproduction.findings import HOLDS, NOT, UNKNOWN, Data
 from alloc.allocators.experiments.reproduction.folder import Folder
 from alloc.allocators.experiments.reproduction.protocol import OTHERS, PAPER_METHODS, TESTS, Job, planned
 from alloc.allocators.experiments.reproduction.rows import Learned, Solved, append, begin, read
