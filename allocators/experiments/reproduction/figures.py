@@ -57,8 +57,8 @@ def _convergence(rows: Sequence[Learned], solved: Sequence[Solved], scenario: in
     _frame(left, right, rows, scenario)
     sizes = SCENARIOS[scenario]
     counts = {len(runs_of(rows, method)) for method in PAPER_METHODS} - {0}
-    runs = counted(max(counts), "run") if len(counts) == 1 else f"{min(counts)} to {max(counts)} runs"
-    figure.suptitle(f"{sizes.agents} agents and {sizes.tasks} tasks, {runs}: median and quartiles", fontsize=11)
+    extent = counted(max(counts), "run") if len(counts) == 1 else f"{min(counts)} to {max(counts)} runs"
+    figure.suptitle(f"{sizes.agents} agents and {sizes.tasks} tasks, {extent}: median and quartiles", fontsize=11)
     return figure
 
 
