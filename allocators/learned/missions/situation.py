@@ -9,8 +9,8 @@ from alloc.allocators.missions.motion import battery_of, can_fly, distance_betwe
 from alloc.allocators.runtime.compiled import compiled_in_place
 from alloc.problems.fields import BoolArray, FloatArray, IntArray
 
-MEMORY = 2.0
-"""Hours after which what was heard of others no longer counts."""
+MEMORY = 20
+"""Radio periods after which what was heard of others no longer counts, whatever the unit of time."""
 
 
 class Coming(NamedTuple):
@@ -143,7 +143,7 @@ def fill_others(state: MissionArrays, number: int, other: FloatArray, target: In
     head, row = state.head[0], state.agents[number].known
     hours, known, task_hours = state.agent_hour[row], state.agent_report[row], state.task_hour[row]
     for i in range(len(hours)):
-        counts[i] = i != number and hours[i] >= 0 and head.hour - hours[i] <= MEMORY
+        counts[i] = i != number and hours[i] >= 0 and head.hour - hours[i] <= MEMORY * head.period
         if not counts[i]:
             continue
         report, agent = state.reports[known[i]], state.agents[i]

@@ -121,7 +121,7 @@ class _NetworkDecider(AgentDecider):
             return None
         room.decided[0], room.tasks[0] = view.hour, len(tasks)
         room = self._with_room(len(view.agents), len(tasks) + 1)
-        _fill(view, room.situation, tasks, self._span)
+        _fill(view, room.situation, tasks, self._span, MEMORY * self._period)
         count = consider(room, self._area, self._sensing, self._seed, self._number, 0, self._weights)
         choice = int(room.choice[np.argmax(room.scores[:count])])
         note_choice(room, 0, choice)
@@ -158,7 +158,7 @@ def _compile_loops(weights: MissionWeights) -> None:
     centre(area, 0)
 
 
-def _fill(view: View, situation: Situation, tasks: list[TaskReport], span: float) -> None:
+def _fill(view: View, situation: Situation, tasks: list[TaskReport], span: float, memory: float) -> None:
     """Fill in what an agent knows; tasks are the open ones, behind which one stands for all that are over."""
     own = view.own
     index = {task.facts.id: j for j, task in enumerate(tasks)}
@@ -183,7 +183,7 @@ def _fill(view: View, situation: Situation, tasks: list[TaskReport], span: float
         numbers = (task.left, task.hour, known.priority, known.deadline, known.growth, view.distance(own, task))
         situation.task[:, j] = (*(known.place.position or NOWHERE), *numbers)
     for i, (name, report) in enumerate(view.agents.items()):
-        is_recent = name != view.id and view.hour - report.hour <= MEMORY and report.status in ACTIVE
+        is_recent = name != view.id and view.hour - report.hour <= memory and report.status in ACTIVE
         situation.counts[i] = is_recent
         if is_recent:
             situation.target[i] = _target(view, report, index)
