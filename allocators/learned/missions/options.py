@@ -175,11 +175,11 @@ def fill_task(situation: Situation, j: int, option: Singles, idle: int) -> None:
     option[names.SHARE] = max(option[names.SHARE], np.float32(0))
     option[names.GAIN] = squashed(max(0.0, without - with_me) / scale)
     deadline = task[known.DEADLINE, j]
-    option[names.SLACK] = min(1.0, max(-1.0, (deadline - with_me) / scale))
+    option[names.SLACK] = min(max(-1.0, (deadline - with_me) / scale), 1.0)
     option[names.MISSES] = with_me > deadline
     option[names.GROWTH] = squashed(task[known.GROWTH, j] / own[known.ABILITY])
     energy = own[known.ENERGY_PER_DISTANCE] * distance
-    option[names.ENERGY] = min(1.0, energy / own[known.BATTERY]) if energy > 0 else 0.0
+    option[names.ENERGY] = min(energy / own[known.BATTERY], 1.0) if energy > 0 else 0.0
     option[names.RIVALS] = squashed(rivals(situation, j, distance, idle) / 3.0)
 
 
@@ -228,6 +228,6 @@ def fill_whole(situation: Situation, choice: IntArray, tasks: int, options: Sing
         option[names.KNOWN_AGENTS] = squashed((agents - 1) / 5.0)
         option[names.WORK_AHEAD] = squashed(work / ability / time_scale(own))
         if row < tasks:
-            option[names.STRENGTH] = min(3.0, own[known.ABILITY] * agents / ability - 1)
+            option[names.STRENGTH] = min(own[known.ABILITY] * agents / ability - 1, 3.0)
             own_priority = situation.task[known.PRIORITY, choice[row]]
             option[names.PRIORITY] = own_priority / (own_priority + priority) - 0.5 if priority > 0 else 0.0
