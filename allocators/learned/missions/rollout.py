@@ -1,4 +1,4 @@
-"""Missions led by samples of the network, with a record of each decision, in compiled loops."""
+"""Missions led by samples of the network in compiled loops, with a record of each decision."""
 
 import math
 from typing import NamedTuple

@@ -123,7 +123,7 @@ def fill_tasks(state: MissionArrays, number: int, task: FloatArray, can: BoolArr
     head, agent = state.head[0], state.agents[number]
     here, battery = place_of(agent, head.hour), battery_of(agent, head.hour)
     hours, left, allowed = state.task_hour[agent.known], state.task_left[agent.known], state.allowed[number]
-    for j in range(len(hours)):
+    for j in range(len(can)):
         can[j] = hours[j] >= 0 and left[j] >= 0
         if can[j]:
             facts = state.tasks[j]
@@ -142,7 +142,7 @@ def fill_others(state: MissionArrays, number: int, other: FloatArray, target: In
     """Fill in what an agent knows of others."""
     head, row = state.head[0], state.agents[number].known
     hours, known, task_hours = state.agent_hour[row], state.agent_report[row], state.task_hour[row]
-    for i in range(len(hours)):
+    for i in range(len(counts)):
         counts[i] = i != number and hours[i] >= 0 and head.hour - hours[i] <= MEMORY * head.period
         if not counts[i]:
             continue
