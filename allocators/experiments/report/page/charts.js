@@ -4,22 +4,24 @@
 const isDark = () => document.documentElement.classList.contains("dark");
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 const DASHES = [[1, 0], [6, 3], [2, 2], [8, 3, 2, 3]];
+const SHAPES = ["circle", "square", "triangle-up", "cross"];
 const OUTCOMES = {
   solved: "#009e73", refused: "#999999", failed: "#d55e00", exited: "#cc79a7", killed: "#8c564b", hung: "#e69f00",
   "out of memory": "#0072b2", "missing package": "#56b4e9",
 };
 
+const ON_DARK = { "#000000": "#e8eaed", "#0072b2": "#2a8fd6" }; // what could hardly be seen there
 function colourOf(page, method) {
   const colour = page.colours[method % page.colours.length];
-  return colour === "#000000" && isDark() ? "#e8eaed" : colour;
+  return (isDark() && ON_DARK[colour]) || colour;
 }
-const dashOf = (page, method) => DASHES[Math.floor(method / page.colours.length) % DASHES.length];
+const turnOf = (page, method, kinds) => kinds[Math.floor(method / page.colours.length) % kinds.length];
 
 function config() {
   const [ink, soft, line] = [css("--ink"), css("--soft"), css("--line")];
-  const axis = { labelColor: soft, titleColor: ink, gridColor: line, gridOpacity: 0.6, domainColor: line, tickColor: line,
-    titleFontWeight: 500, titleFontSize: 12, labelFontSize: 11, labelLimit: 150, labelOverlap: true };
-  const legend = { labelColor: ink, labelFontSize: 12, labelLimit: 190, title: null, orient: "bottom", symbolStrokeWidth: 2.5 };
+  const axis = { labelColor: soft, titleColor: ink, gridColor: line, gridOpacity: 0.4, domainColor: line, tickColor: line,
+    titleFontWeight: 500, titleFontSize: 12, labelFontSize: 11, labelLimit: 150, labelOverlap: "greedy", labelSeparation: 8 };
+  const legend = { labelColor: ink, labelFontSize: 12, labelLimit: 190, title: null, orient: "bottom", symbolStrokeWidth: 2.5, symbolOpacity: 1 };
   return { background: "transparent", font: "system-ui, sans-serif", view: { stroke: null }, axis, legend, text: { color: ink } };
 }
 
@@ -28,11 +30,8 @@ function byMethod(page, methods, width) {
   const domain = methods.map((method) => page.labels[method]);
   const legend = { columns: Math.max(1, Math.floor(width / 170)) };
   const scale = { domain, range: methods.map((method) => colourOf(page, method)) };
-  const dash = { domain, range: methods.map((method) => dashOf(page, method)) };
-  return {
-    color: { field: "method", type: "nominal", scale, legend },
-    strokeDash: { field: "method", type: "nominal", scale: dash, legend: methods.some((one) => one >= page.colours.length) ? legend : null },
-  };
+  const other = (range) => ({ field: "method", type: "nominal", scale: { domain, range: methods.map((one) => turnOf(page, one, range)) }, legend });
+  return { color: { field: "method", type: "nominal", scale, legend }, strokeDash: other(DASHES), shape: other(SHAPES) };
 }
 
 const flat = (page, entries, row) =>
@@ -43,8 +42,8 @@ const highest = (values, share) => {
   const known = values.filter((value) => value !== null).sort((a, b) => a - b);
   return known[Math.min(known.length - 1, Math.floor(share * known.length))];
 };
-const seconds = { scale: { type: "log" }, axis: { format: "~g", tickCount: 6 } };
-const horizontal = (count) => ({ step: count > 12 ? 18 : 26 });
+const seconds = { scale: { type: "log", nice: false }, axis: { format: "~g", tickCount: 6 } };
+const horizontal = (count) => count * (count > 12 ? 18 : 26);
 
 function profiles(page, group, methods, width) {
   const entries = group.series.profiles.filter((one) => methods.includes(one.method));
@@ -77,7 +76,7 @@ function distance(page, group, methods, width) {
   const x = quantitative("x", "time (s)", seconds);
   return { data: { values }, layer: [
     { mark: { type: "area", interpolate: "step-after", opacity: 0.15 },
-      encoding: { x, y: quantitative("low", "T above the best known", y), y2: { field: "high" }, color: { ...color, legend: null } } },
+      encoding: { x, y: quantitative("low", "T above the best known", y), y2: { field: "high" }, color } },
     { mark: { type: "line", interpolate: "step-after", strokeWidth: 2, tooltip: true },
       encoding: { x, y: quantitative("middle", "T above the best known", y), color, strokeDash } }] };
 }
@@ -85,7 +84,7 @@ function distance(page, group, methods, width) {
 function tradeoff(page, group, methods, width) {
   const entries = group.series.tradeoff.filter((one) => methods.includes(one.method));
   if (!entries.length) return "There is nothing to draw: no method has both a makespan and an energy above 0.";
-  const { color } = byMethod(page, methods, width);
+  const { color, shape } = byMethod(page, methods, width);
   const values = flat(page, entries, (entry, i) => ({ x: entry.x[i] - 1, y: entry.y[i] - 1, instance: page.instances.name[entry.instance[i]] }));
   const medians = entries.map((one) => ({ method: page.labels[one.method], x: one.x_median - 1, y: one.y_median - 1 }));
   const scale = (name) => ({ type: "sqrt", domain: [0, Math.max(highest(values.map((row) => row[name]), 0.98), 1e-6) * 1.05], clamp: true });
@@ -94,7 +93,7 @@ function tradeoff(page, group, methods, width) {
   const tooltip = [{ field: "instance", type: "nominal" }, { field: "method", type: "nominal" },
     { field: "x", type: "quantitative", format: ".2%", title: "T above" }, { field: "y", type: "quantitative", format: ".2%", title: "energy above" }];
   return { layer: [
-    { data: { values }, mark: { type: "point", filled: true, size: 28, opacity: 0.45 }, encoding: { x, y, color, tooltip } },
+    { data: { values }, mark: { type: "point", filled: true, size: 28, opacity: 0.45 }, encoding: { x, y, color, shape, tooltip } },
     { data: { values: medians }, mark: { type: "point", shape: "diamond", filled: true, size: 190, stroke: css("--paper"), strokeWidth: 1.5, opacity: 1 },
       encoding: { x, y, color, tooltip: tooltip.slice(1) } }] };
 }

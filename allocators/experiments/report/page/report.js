@@ -23,8 +23,9 @@ function add(parent, name, text = "", attributes = {}) {
 const group = () => page.groups[state.group];
 const shown = () => group().methods.map((one) => one.method).filter((method) => !state.off.has(method));
 const figure = (value, digits = 5) => (value === null || value === undefined ? "-" : String(Number(value.toPrecision(digits))));
-const share = (value, digits = 3) => (value === null || value === undefined ? "-" : `${Number((100 * value).toPrecision(digits))} %`);
+const share = (value, digits = 3) => (value === null || value === undefined ? "-" : Math.abs(value) < 5e-7 ? "0 %" : `${Number((100 * value).toPrecision(digits))} %`);
 const signed = (value) => (value === null ? "-" : `${value > 0 ? "+" : ""}${share(value)}`);
+const chance = (value) => (value !== null && value < 1e-3 ? value.toExponential(1) : figure(value, 2));
 const counted = (count, noun) => `${count.toLocaleString("en")} ${noun}${count === 1 ? "" : "s"}`;
 const escaped = (text) => String(text).replace(/[&<>"']/g, (letter) => `&#${letter.charCodeAt(0)};`);
 const when = (seconds) => new Date(1000 * seconds).toISOString().slice(0, 16).replace("T", " ");
@@ -155,10 +156,10 @@ function tellMethods() {
   group().notes.forEach((note) => add(byId("notes"), "li", note));
   const rows = group().methods.filter((one) => !state.off.has(one.method));
   const columns = [text("method", (one) => page.labels[one.method]), number("runs", (one) => one.runs), number("solved", (one) => one.solved, share),
-    number("proven optimal", (one) => one.proven), number("instances", (one) => one.instances), number("served", (one) => one.served),
+    number("proven", (one) => one.proven), number("instances", (one) => one.instances), number("served", (one) => one.served),
     number("best on", (one) => one.best), number("T / best", (one) => one.ratio), number("T", (one) => one.makespan), number("gap", (one) => one.gap, share),
     number("energy", (one) => one.energy), number("time (s)", (one) => one.runtime_s, (value) => figure(value, 3)),
-    number("most memory (MiB)", (one) => one.memory_mb, (value) => figure(value, 3))];
+    number("memory (MiB)", (one) => one.memory_mb, (value) => figure(value, 3))];
   if (rows.some((one) => one.picked)) columns.push(text("ran", (one) => one.picked));
   makeTable(byId("summary"), columns, rows);
 }
@@ -185,7 +186,7 @@ function tellPaired() {
     makeTable(add(add(place, "div", "", { class: "table" }), "table"), [text(`${name} against ${page.labels[state.against]}`, (one) => page.labels[one.method]),
       number("less", (one) => one.better), number("equal", (one) => one.equal), number("more", (one) => one.worse),
       number("difference", (one) => one.mean, signed), number("from", (one) => one.low, signed), number("to", (one) => one.high, signed),
-      number("p", (one) => one.p, (value) => figure(value, 2)), number("p (Holm)", (one) => one.p_holm, (value) => figure(value, 2)),
+      number("p", (one) => one.p, chance), number("p (Holm)", (one) => one.p_holm, chance),
       number("instances", (one) => one.instances), number("left out", (one) => one.left_out), text("", (one) => (one.small ? "small sample" : ""))], rows);
     if (rows.some((one) => one.low !== null)) draw(add(place, "div", "", { class: "chart" }), differences(page, rows.filter((one) => one.low !== null)));
   }
@@ -382,7 +383,7 @@ async function main() {
   await load("library-vega");
   await update(true);
   window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { setTheme(); update(false); });
-  document.documentElement.dataset.ready = "yes";
+  document.documentElement.dataset.ready = Math.round(performance.now()); // milliseconds until all is drawn
 }
 main().catch((error) => {
   byId("problem").hidden = false;
