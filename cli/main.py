@@ -20,12 +20,12 @@ from alloc.cli.commands import (
     methods,
     pareto,
     plot,
-    report,
     schema,
     solve,
     validate,
     whatif,
 )
+from alloc.cli.commands.experiments import report
 from alloc.cli.commands.missions import import_mission, plan, replay, simulate
 from alloc.cli.commands.training import train, tune
 from alloc.cli.options import Parameter, examples, option_of
