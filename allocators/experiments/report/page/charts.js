@@ -21,14 +21,22 @@ function config() {
   const [ink, soft, line] = [css("--ink"), css("--soft"), css("--line")];
   const axis = { labelColor: soft, titleColor: ink, gridColor: line, gridOpacity: 0.4, domainColor: line, tickColor: line,
     titleFontWeight: 500, titleFontSize: 12, labelFontSize: 11, labelLimit: 150, labelOverlap: "greedy", labelSeparation: 8 };
-  const legend = { labelColor: ink, labelFontSize: 12, labelLimit: 190, title: null, orient: "bottom", symbolStrokeWidth: 2.5, symbolOpacity: 1 };
+  const legend = { labelColor: ink, labelFontSize: 12, title: null, orient: "bottom", symbolStrokeWidth: 2.5, symbolOpacity: 1 };
   return { background: "transparent", font: "system-ui, sans-serif", view: { stroke: null }, axis, legend, text: { color: ink } };
 }
 
+// as many columns as there is room for the longest name
+function legendOf(names, width) {
+  const longest = Math.min(Math.max(...names.map((name) => 7.2 * name.length), 40), 230);
+  return { columns: Math.max(1, Math.floor((width - 70) / (longest + 34))), labelLimit: longest };
+}
+// a name for each row of a bar chart
+const rowNames = (width) => ({ labelOverlap: false, labelLimit: Math.min(230, width * 0.35) });
+
 // colours and dashes of the methods that are shown, the same in all charts
-function byMethod(page, methods, width) {
+function byMethod(page, methods, width, more = {}) {
   const domain = methods.map((method) => page.labels[method]);
-  const legend = { columns: Math.max(1, Math.floor(width / 170)) };
+  const legend = { ...legendOf(domain, width), ...more };
   const scale = { domain, range: methods.map((method) => colourOf(page, method)) };
   const other = (range) => ({ field: "method", type: "nominal", scale: { domain, range: methods.map((one) => turnOf(page, one, range)) }, legend });
   return { color: { field: "method", type: "nominal", scale, legend }, strokeDash: other(DASHES), shape: other(SHAPES) };
@@ -68,7 +76,7 @@ function targets(page, group, methods, width) {
 function distance(page, group, methods, width) {
   const entries = group.series.time.filter((one) => methods.includes(one.method) && one.middle.some((y) => y !== null));
   if (!entries.length) return "There is nothing to draw: no run has a trace with a makespan.";
-  const { color, strokeDash } = byMethod(page, methods, width);
+  const { color, strokeDash } = byMethod(page, methods, width, { symbolType: "stroke" });
   const values = flat(page, entries, (entry, i) => ({ low: entry.low[i], middle: entry.middle[i], high: entry.high[i] }))
     .filter((row) => row.middle !== null);
   const most = Math.max(highest(values.map((row) => row.high), 0.98) || 0, 1e-6);
@@ -103,7 +111,7 @@ function scaling(page, group, methods, width, measure) {
   const values = group.series.scaling.filter((one) => one.measure === measure && methods.includes(one.method))
     .map((one) => ({ ...one, method: page.labels[one.method] })).filter((one) => measure === "gap" || measure === "ratio" || one.high > 0);
   if (!values.length) return `There is nothing to draw: no method has a figure for ${MEASURES[measure]}.`;
-  const { color, strokeDash } = byMethod(page, methods, width);
+  const { color, strokeDash } = byMethod(page, methods, width, { symbolType: "stroke" });
   const isLog = measure === "runtime_s" || measure === "memory_mb";
   const sizes = new Set(values.map((one) => one.agents));
   const x = quantitative("agents", "agents", { scale: { type: "log", padding: 12, nice: sizes.size < 2 }, axis: { format: "~s", tickCount: 6 } });
@@ -118,11 +126,11 @@ function scaling(page, group, methods, width, measure) {
     { mark: { type: "point", filled: true, size: 45, opacity: 1 }, encoding: { x, y: { ...quantitative("middle", y.title), ...y }, color, tooltip } }] };
 }
 
-function gaps(page, group, methods) {
+function gaps(page, group, methods, width) {
   const values = group.series.gaps.filter((one) => methods.includes(one.method)).map((one) => ({ ...one, method: page.labels[one.method], bounds: `${one.instances} of ${one.of}` }));
   if (!values.length) return "There is nothing to draw: no run proved a bound on the makespan of an instance that was served.";
   const sort = methods.map((method) => page.labels[method]);
-  const y = { field: "method", type: "nominal", title: null, sort, axis: { labelLimit: 150 } };
+  const y = { field: "method", type: "nominal", title: null, sort, axis: rowNames(width) };
   const scale = { domain: sort, range: methods.map((method) => colourOf(page, method)) };
   const color = { field: "method", type: "nominal", scale, legend: null };
   const x = (field) => quantitative(field, "gap to the best bound", { axis: { ...percent(2), tickCount: 6 } });
@@ -141,16 +149,16 @@ function outcomes(page, group, methods, width) {
   const domain = Object.keys(OUTCOMES).filter((outcome) => values.some((one) => one.outcome === outcome));
   const range = domain.map((outcome) => OUTCOMES[outcome]);
   return { data: { values }, height: horizontal(methods.length), mark: { type: "bar", tooltip: true }, encoding: {
-    y: { field: "method", type: "nominal", title: null, sort: methods.map((method) => page.labels[method]) },
+    y: { field: "method", type: "nominal", title: null, sort: methods.map((method) => page.labels[method]), axis: rowNames(width) },
     x: quantitative("runs", "share of runs", { stack: "normalize", axis: { format: ".0%" } }),
-    color: { field: "outcome", type: "nominal", scale: { domain, range }, legend: { columns: Math.max(1, Math.floor(width / 150)) } },
+    color: { field: "outcome", type: "nominal", scale: { domain, range }, legend: legendOf(domain, 0.62 * width) },
     tooltip: ["method", "outcome", "runs"].map((field) => ({ field, type: "nominal" })) } };
 }
 
-function differences(page, rows) {
+function differences(page, rows, width) {
   const values = rows.map((one) => ({ ...one, method: page.labels[one.method] }));
   const scale = { domain: values.map((one) => one.method), range: rows.map((one) => colourOf(page, one.method)) };
-  const y = { field: "method", type: "nominal", title: null, sort: null };
+  const y = { field: "method", type: "nominal", title: null, sort: null, axis: rowNames(width) };
   const color = { field: "method", type: "nominal", scale, legend: null };
   const x = (field) => quantitative(field, `difference of ${rows[0].score === "makespan" ? "T" : "energy"}, with 95 % interval`,
     { axis: { format: "+.2~%", tickCount: 6 } });

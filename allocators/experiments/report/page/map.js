@@ -36,13 +36,20 @@ function mapWindow(map, laid, width, height) {
   return { x: around(left, right, (unit * width) / 2), y: around(bottom, upper, (unit * height) / (2 * map.aspect)) };
 }
 
-const listed = (names, count) => names.slice(0, 12).join(", ") + (count > Math.min(names.length, 12) ? ` and ${count - Math.min(names.length, 12)} more` : "");
+// names of agents, of which not all need be known
+function listed(names, count) {
+  const shown = names.slice(0, 12);
+  if (!shown.length) return counted(count, "agent");
+  return shown.join(", ") + (count > shown.length ? ` and ${count - shown.length} more` : "");
+}
+
+const crowd = (count) => Math.min(1, 60 / count + 0.15); // marks are smaller where there are many
 
 function mapSites(laid, plan) {
   const most = laid.tasks.reduce((so, task) => Math.max(so, task.work), 1e-12);
-  const scale = 500 * Math.min(1, 40 / laid.tasks.length + 0.15);
+  const scale = 500 * Math.min(1, 40 / laid.tasks.length + 0.1);
   return laid.tasks.filter((task) => task.place).map((task) => ({ x: task.place[0], y: task.place[1], task: task.id, workload: task.work,
-    size: 40 + (scale * task.work) / most, done: task.done, ability: task.ability,
+    size: 40 * crowd(laid.tasks.length) + (scale * task.work) / most, done: task.done, ability: task.ability,
     group: task.count ? listed(task.agents, task.count) : "nobody", open: Boolean(plan) && task.work > 0 && task.done === null }));
 }
 
@@ -55,7 +62,7 @@ function mapSpec(map, laid, plan, width, height) {
     width: Math.min(0.8 + 0.5 * Math.sqrt(move.agents.length), 5), agents: listed(move.agents, move.agents.length), from: move.from.name, to: move.task.id }));
   const sites = mapSites(laid, plan);
   const starts = laid.bases.map((base) => ({ x: base.place[0], y: base.place[1], start: base.name, agents: listed(base.agents, base.agents.length),
-    size: Math.min(28 + 8 * Math.sqrt(base.agents.length), 120), idle: base.idle === base.agents.length && Boolean(plan) }));
+    size: Math.min(28 + 8 * Math.sqrt(base.agents.length), 120) * crowd(laid.bases.length), idle: base.idle === base.agents.length && Boolean(plan) }));
   const tip = (...fields) => fields.map((field) => ({ field, type: "nominal", title: field === "done" ? `done at${time}` : field }));
   const [x, y] = [at("x", "x"), at("y", "y")];
   const served = sites.filter((site) => !site.open);
@@ -68,7 +75,7 @@ function mapSpec(map, laid, plan, width, height) {
     { params: [{ name: "zoom", select: { type: "interval", encodings: ["x", "y"] }, bind: "scales" }],
       data: { values: moves }, mark: { type: "rule", clip: true, opacity: moves.length > 300 ? 0.3 : 0.6, color: soft },
       encoding: { x, y, x2: { field: "x2" }, y2: { field: "y2" }, strokeWidth: { field: "width", type: "quantitative", scale: null }, tooltip: tip("from", "to", "agents") } },
-    { data: { values: starts }, mark: { type: "point", shape: "square", filled: true, clip: true, opacity: 1, stroke: soft, strokeWidth: 1.5 },
+    { data: { values: starts }, mark: { type: "point", shape: "square", filled: true, clip: true, opacity: 1, stroke: soft, strokeWidth: starts.length > 200 ? 0.7 : 1.5 },
       encoding: { x, y, size: { field: "size", type: "quantitative", scale: null }, fill: { condition: { test: "datum.idle", value: paper }, value: soft }, tooltip: tip("start", "agents") } },
     { data: { values: served }, mark: { type: "point", shape: "circle", filled: true, clip: true, opacity: 1, stroke: paper, strokeWidth: 1 },
       encoding: { x, y, size: { field: "size", type: "quantitative", scale: null }, fill: color, tooltip: tip("task", "workload", "done", "ability", "group") } },

@@ -3,6 +3,7 @@
 
 const byId = (id) => document.getElementById(id);
 const state = { group: 0, off: new Set(), instance: -1, plan: -1, measure: "runtime_s", against: -1 };
+const SOON = 20000; // runs up to which their table is made at once; more of them wait until one looks at it
 let page, runs, DataTable, turn = 0;
 const tables = new Map();
 
@@ -183,12 +184,13 @@ function tellPaired() {
     const rows = group().paired.filter((one) => one.score === score && one.against === state.against && !state.off.has(one.method));
     if (!rows.length) continue;
     const name = score === "makespan" ? "T" : "energy";
-    makeTable(add(add(place, "div", "", { class: "table" }), "table"), [text(`${name} against ${page.labels[state.against]}`, (one) => page.labels[one.method]),
+    makeTable(add(add(place, "div", "", { class: "table" }), "table"), [text(`${name} of`, (one) => page.labels[one.method]),
       number("less", (one) => one.better), number("equal", (one) => one.equal), number("more", (one) => one.worse),
       number("difference", (one) => one.mean, signed), number("from", (one) => one.low, signed), number("to", (one) => one.high, signed),
       number("p", (one) => one.p, chance), number("p (Holm)", (one) => one.p_holm, chance),
       number("instances", (one) => one.instances), number("left out", (one) => one.left_out), text("", (one) => (one.small ? "small sample" : ""))], rows);
-    if (rows.some((one) => one.low !== null)) draw(add(place, "div", "", { class: "chart" }), differences(page, rows.filter((one) => one.low !== null)));
+    const known = rows.filter((one) => one.low !== null);
+    if (known.length) draw(add(place, "div", "", { class: "chart" }), differences(page, known, place.clientWidth));
   }
 }
 
@@ -199,7 +201,7 @@ async function showInstance(index) {
   byId("find").value = name[index];
   const detail = chunk[index] < 0 ? { traces: [], runs: 0 } : JSON.parse(await unpack(`detail-${chunk[index]}`))[index];
   const map = detail.map;
-  const plans = map ? map.plans.filter((plan) => plan.group === state.group && !state.off.has(plan.method)) : [];
+  const plans = map ? map.plans.filter((plan) => plan.group === state.group && !state.off.has(plan.method)).sort((one, other) => one.method - other.method) : [];
   let about = `${name[index]}: ${counted(agents[index], "agent")}, ${counted(tasks[index], "task")}.`;
   if (chunk[index] < 0) about += " Its map and traces are left out, to keep the page small; those of other instances are there.";
   if (map && map.agents > map.agent.id.length) about += ` Thinned: the map shows ${counted(map.agent.id.length, "agent")}, evenly chosen.`;
@@ -238,7 +240,7 @@ async function showPlan(map, plan) {
   for (const [id, factor] of [["in", 1 / 1.6], ["out", 1.6], ["fit", 0]]) byId(id).onclick = () => zoom(factor);
   if (!plan) return;
   makeTable(byId("groups").querySelector("table"), [text("task", (task) => task.id), number("workload", (task) => task.work), number("done at", (task) => task.done),
-    number("ability", (task) => task.ability), number("agents", (task) => task.count), text("who", (task) => listed(task.agents, task.count) || "-")],
+    number("ability", (task) => task.ability), number("agents", (task) => task.count), text("who", (task) => task.count ? listed(task.agents, task.count) : "-")],
   laid.tasks, { paging: laid.tasks.length > 25 });
 }
 async function showTraces(traces) {
@@ -375,14 +377,19 @@ async function main() {
   tellAll();
   layFigures();
   layInstances();
-  new IntersectionObserver((entries, observer) => {
+  await load("library-vega");
+  await update(true);
+  if (page.groups.reduce((sum, one) => sum + one.conditions.runs, 0) <= SOON) await tellRuns();
+  else new IntersectionObserver((entries, observer) => {
     if (!entries.some((entry) => entry.isIntersecting)) return;
     observer.disconnect();
     tellRuns();
   }, { rootMargin: "300px" }).observe(byId("runs"));
-  await load("library-vega");
-  await update(true);
-  window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { setTheme(); update(false); });
+  window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+    if (window.matchMedia("print").matches) return; // paper is light, and is printed before charts could be drawn again
+    setTheme();
+    update(false);
+  });
   document.documentElement.dataset.ready = Math.round(performance.now()); // milliseconds until all is drawn
 }
 main().catch((error) => {
