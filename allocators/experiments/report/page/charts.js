@@ -79,7 +79,7 @@ function distance(page, group, methods, width) {
   const { color, strokeDash } = byMethod(page, methods, width, { symbolType: "stroke" });
   const values = flat(page, entries, (entry, i) => ({ low: entry.low[i], middle: entry.middle[i], high: entry.high[i] }))
     .filter((row) => row.middle !== null);
-  const most = Math.max(highest(values.map((row) => row.high), 0.98) || 0, 1e-6);
+  const most = Math.max(highest(values.map((row) => row.high), 0.98) || 0, 0.01);
   const y = { scale: { type: "sqrt", domain: [0, most], clamp: true }, axis: { ...percent(1), tickCount: 6 } };
   const x = quantitative("x", "time (s)", seconds);
   return { data: { values }, layer: [
@@ -95,7 +95,7 @@ function tradeoff(page, group, methods, width) {
   const { color, shape } = byMethod(page, methods, width);
   const values = flat(page, entries, (entry, i) => ({ x: entry.x[i] - 1, y: entry.y[i] - 1, instance: page.instances.name[entry.instance[i]] }));
   const medians = entries.map((one) => ({ method: page.labels[one.method], x: one.x_median - 1, y: one.y_median - 1 }));
-  const scale = (name) => ({ type: "sqrt", domain: [0, Math.max(highest(values.map((row) => row[name]), 0.98), 1e-6) * 1.05], clamp: true });
+  const scale = (name) => ({ type: "sqrt", domain: [0, Math.max(highest(values.map((row) => row[name]), 0.98), 0.01) * 1.05], clamp: true });
   const x = quantitative("x", "T above the least", { scale: scale("x"), axis: { ...percent(1), tickCount: 6 } });
   const y = quantitative("y", "energy above the least", { scale: scale("y"), axis: { ...percent(1), tickCount: 6 } });
   const tooltip = [{ field: "instance", type: "nominal" }, { field: "method", type: "nominal" },
@@ -104,6 +104,12 @@ function tradeoff(page, group, methods, width) {
     { data: { values }, mark: { type: "point", filled: true, size: 28, opacity: 0.45 }, encoding: { x, y, color, shape, tooltip } },
     { data: { values: medians }, mark: { type: "point", shape: "diamond", filled: true, size: 190, stroke: css("--paper"), strokeWidth: 1.5, opacity: 1 },
       encoding: { x, y, color, tooltip: tooltip.slice(1) } }] };
+}
+
+function thinned(group, methods) {
+  const entries = group.series.tradeoff.filter((one) => methods.includes(one.method));
+  const [drawn, all] = [(one) => one.x.length, (one) => one.points].map((get) => entries.reduce((sum, one) => sum + get(one), 0));
+  return drawn < all ? `Drawn are ${drawn.toLocaleString("en")} of ${counted(all, "point")}.` : "";
 }
 
 const MEASURES = { runtime_s: "time (s)", gap: "gap to the best bound", ratio: "T over the best method's", memory_mb: "memory (MiB)" };
@@ -176,7 +182,7 @@ const CHARTS = [
     note: "A target is the best known T of an instance, or 1 % or 5 % more. Share of all targets that runs have reached by then." },
   { id: "distance", title: "Convergence", draw: distance,
     note: "T found by then, above the best known of the instance: median over runs, and the middle half of them as a band." },
-  { id: "tradeoff", title: "Makespan against energy", draw: tradeoff,
+  { id: "tradeoff", title: "Makespan against energy", draw: tradeoff, more: thinned,
     note: "Each point is a method on an instance, above the least of any method there; diamonds are medians. The furthest 2 % are drawn at the edge." },
   { id: "scaling", title: "Scaling", draw: scaling, measures: MEASURES,
     note: "Against the number of agents: median over instances and the middle half of them." },

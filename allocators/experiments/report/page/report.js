@@ -85,8 +85,8 @@ function orderFigures() {
 }
 
 // charts
-const embed = (element, spec) => vegaEmbed(element, { $schema: "https://vega.github.io/schema/vega-lite/v6.json", config: config(), ...spec },
-  { renderer: "svg", actions: { export: true, source: false, compiled: false, editor: false }, tooltip: { theme: isDark() ? "dark" : "light" } });
+const embed = (element, spec) => vegaEmbed(element, { config: config(), ...spec },
+  { mode: "vega-lite", renderer: "svg", actions: { export: true, source: false, compiled: false, editor: false }, tooltip: { theme: isDark() ? "dark" : "light" } });
 async function draw(element, spec) {
   if (typeof spec === "string") {
     element.replaceChildren();
@@ -110,6 +110,7 @@ async function drawCharts() {
   const mine = ++turn;
   for (const chart of CHARTS) {
     const element = byId(`chart-${chart.id}`).querySelector(".chart");
+    if (chart.more) byId(`chart-${chart.id}`).querySelector("span").textContent = `${chart.note} ${chart.more(group(), shown())}`;
     await draw(element, chart.draw(page, group(), shown(), element.clientWidth, state.measure));
     await new Promise((done) => setTimeout(done));
     if (turn !== mine) return;
@@ -366,6 +367,7 @@ async function main() {
   if (!page.groups.length) {
     byId("about").textContent = `${page.stores.join(", ")}; written ${page.made} by alloc ${page.version}`;
     byId("problem").hidden = false;
+    document.querySelector("nav").hidden = true;
     byId("problem").textContent = "There are no runs: none has ended yet. `alloc compare ... --store` makes some.";
     return;
   }

@@ -60,7 +60,8 @@ def _over_time(group: Group) -> list[Entry]:
     steps = [moment(point[0]) for one in ended for point in one.trace]
     if not steps:
         return []
-    first, last = max(min(steps) - 1, 0), max(*steps, *(moment(one.runtime_s or 0.0) for one in ended))
+    last = max(max(steps) + 2, *(moment(one.runtime_s or 0.0) for one in ended))
+    first, last = max(min(steps) - 1, 0), min(last, len(EDGES_S) - 1)
     times = EDGES_S[first : last + 1]
     reached = targets_reached(common, times)
     best = [_best([one for runs in common.values() for one in runs[n]]) for n in range(len(group.common))]
