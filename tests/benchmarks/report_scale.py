@@ -1,11 +1,8 @@
-"""How long `alloc report` takes on runs that are made up, and how large its page is.
+"""How long `alloc report` takes on made-up runs: ``python tests/benchmarks/report_scale.py FOLDER 10000 100000``."""
 
-python tests/benchmarks/report_scale.py --runs 10000 100000 --folder pages
-"""
-
-import argparse
 import json
 import sqlite3
+import sys
 import time
 from dataclasses import asdict
 from pathlib import Path
@@ -58,17 +55,11 @@ def fill(path: Path, runs: int) -> None:
             direct.commit()
 
 
-parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-parser.add_argument("--runs", type=int, nargs="+", default=[10_000], help="runs in each store")
-parser.add_argument("--folder", type=Path, default=Path(), help="where stores and pages go")
-options = parser.parse_args()
-for runs in options.runs:
-    store, page = (options.folder / f"made-up-{runs}.{suffix}" for suffix in ("db", "html"))
+for runs in map(int, sys.argv[2:]):
+    store, page = (Path(sys.argv[1]) / f"made-up-{runs}.{suffix}" for suffix in ("db", "html"))
     if not store.exists():
         fill(store, runs)
     begin, before = time.monotonic(), time.process_time()
     report_html([store], page)
     took, spent = time.monotonic() - begin, time.process_time() - before
-    print(
-        f"{runs} runs: {took:.1f} s ({spent:.1f} s of processor time), {page.stat().st_size / 1e6:.2f} MB", flush=True
-    )
+    print(f"{runs} runs: {took:.1f} s, {spent:.1f} s of processor time, {page.stat().st_size / 1e6:.2f} MB", flush=True)
