@@ -33,6 +33,9 @@ FIGURES = ("makespan", "served_makespan", "lower_bound", "gap", "energy", "runti
 
 SUFFIX = ".html"
 
+PARTS = ("report.html.jinja", "report.css", "charts.js", "tables.js", "map.js", "instance.js", "report.js")
+"""Files beside this module: the frame, the style, and the scripts in the order in which they run."""
+
 GREY = "#999999"
 """The eighth colour of methods, as the palette has no other that can be seen on white."""
 
@@ -184,10 +187,7 @@ def _rendered(heading: str, data: dict[str, str]) -> str:
     from jinja2 import Environment, StrictUndefined
 
     own = files(__package__)
-    parts = {
-        name: (own / name).read_text(encoding="utf-8") for name in ("report.css", "report.js", "charts.js", "map.js")
-    }
-    template = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    ).from_string((own / "report.html.jinja").read_text(encoding="utf-8"))
-    return str(template.render(title=heading, data={**libraries(), **data}, parts=parts))
+    template, style, *scripts = ((own / name).read_text(encoding="utf-8") for name in PARTS)
+    frame = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    values = {"title": heading, "data": {**libraries(), **data}, "style": style, "scripts": scripts}
+    return str(frame.from_string(template).render(values))
