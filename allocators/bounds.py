@@ -105,7 +105,12 @@ def seconds_for_bounds(search: Search) -> float:
     if search.interrupted:
         return 0.1 if "scipy.optimize" in sys.modules else 0.0
     limit = search.budget.time_limit_s
-    return 0.2 + 0.1 * min(10.0, 10.0 if limit is None else limit)
+    return bounds_s(10.0 if limit is None else limit)
+
+
+def bounds_s(limit_s: float) -> float:
+    """Return the seconds for linear programmes after a run of so many seconds: hardly any where it is a short one."""
+    return min(0.2, max(0.0, limit_s - 0.1) / 2) + 0.1 * min(10.0, limit_s)
 
 
 def _unless_interrupted(search: Search, work: Callable[[], float | None]) -> float | None:
