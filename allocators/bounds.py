@@ -16,6 +16,9 @@ from alloc.problems.distances.neighbours import estimated_pairs
 from alloc.problems.distances.reach import Reach
 from alloc.problems.matching.clock import GATHERED_PER_SECOND
 
+LEAST_BOUNDS_S = 0.01
+"""Seconds that are too few for linear programmes, small ones included."""
+
 UNLIMITED_S = 30.0
 """Time limit of the linear programme before a run without one; so long that the clock does not decide."""
 
@@ -85,15 +88,16 @@ def bounds_after(search: Search, proposal: Proposal) -> float | None:
     float or None
         The bound on the energy; None where energy is no objective, or no bound was found.
     """
-    end = time.monotonic() + seconds_for_bounds(search)
-    if not search.fast_enough:
+    seconds = seconds_for_bounds(search)
+    end = time.monotonic() + seconds
+    if not search.fast_enough and seconds > 0:
         raise_makespan_bound(search, end)
     if search.objective is Objective.MAKESPAN or search.best is None or search.best.evaluation.makespan is None:
         return None
     if search.best.evaluation.cost == 0:
         return 0.0
     known = proposal.energy_lower_bound
-    if known is not None and known >= search.best.evaluation.cost * (1 - PROVEN):
+    if seconds == 0 or (known is not None and known >= search.best.evaluation.cost * (1 - PROVEN)):
         return known
     makespan, seconds = search.makespan_limit, max(0.0, end - time.monotonic())
     found = _unless_interrupted(search, lambda: energy_lower_bound(search.instance, makespan, seconds))
@@ -109,8 +113,9 @@ def seconds_for_bounds(search: Search) -> float:
 
 
 def bounds_s(limit_s: float) -> float:
-    """Return the seconds for linear programmes after a run of so many seconds: hardly any where it is a short one."""
-    return min(0.2, max(0.0, limit_s - 0.1) / 2) + 0.1 * min(10.0, limit_s)
+    """Return the seconds for linear programmes after a run of so many seconds: hardly any, or none, after a short one."""
+    seconds = min(0.2, max(0.0, limit_s - 0.1) / 2) + 0.1 * min(10.0, limit_s)
+    return seconds if seconds > LEAST_BOUNDS_S else 0.0
 
 
 def _unless_interrupted(search: Search, work: Callable[[], float | None]) -> float | None:
