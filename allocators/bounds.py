@@ -16,8 +16,8 @@ from alloc.problems.distances.neighbours import estimated_pairs
 from alloc.problems.distances.reach import Reach
 from alloc.problems.matching.clock import GATHERED_PER_SECOND
 
-LEAST_BOUNDS_S = 0.01
-"""Seconds that are too few for linear programmes, small ones included."""
+SHORT_S = 0.1
+"""Time limit up to which no linear programme follows the run: even small ones take some milliseconds."""
 
 UNLIMITED_S = 30.0
 """Time limit of the linear programme before a run without one; so long that the clock does not decide."""
@@ -113,9 +113,8 @@ def seconds_for_bounds(search: Search) -> float:
 
 
 def bounds_s(limit_s: float) -> float:
-    """Return the seconds for linear programmes after a run of so many seconds: hardly any, or none, after a short one."""
-    seconds = min(0.2, max(0.0, limit_s - 0.1) / 2) + 0.1 * min(10.0, limit_s)
-    return seconds if seconds > LEAST_BOUNDS_S else 0.0
+    """Return the seconds for linear programmes after a run of so many seconds: few, or none, after a short one."""
+    return 0.0 if limit_s <= SHORT_S else min(0.2, (limit_s - SHORT_S) / 2) + 0.1 * min(10.0, limit_s)
 
 
 def _unless_interrupted(search: Search, work: Callable[[], float | None]) -> float | None:
