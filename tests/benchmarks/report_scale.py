@@ -41,6 +41,7 @@ def made_up(rng: np.random.Generator, level: float, agents: int) -> Ending:
 def fill(path: Path, runs: int) -> None:
     """Write a store with about so many runs."""
     rng, columns = np.random.default_rng(0), ("key", *RUN, *ENDING)
+    insert = f"INSERT INTO runs ({', '.join(columns)}) VALUES ({', '.join('?' * len(columns))})"
     with Store(path) as store, sqlite3.connect(path) as direct:
         for number in range(runs // len(PLACES)):
             one = random_instance(Family(agents=20 * 2 ** (number % 5), tasks=8), number, name=f"family:{number}")
@@ -49,10 +50,7 @@ def fill(path: Path, runs: int) -> None:
                 run = Run(method=METHODS[method], seed=seed, **same)
                 ending = made_up(rng, 1 + 0.02 * method + 0.05 * rng.random(), one.n)
                 row = {**asdict(run), **asdict(ending), "key": run.key, "trace": json.dumps(ending.trace)}
-                direct.execute(
-                    f"INSERT INTO runs ({', '.join(columns)}) VALUES ({', '.join('?' * len(columns))})",
-                    [row[c] for c in columns],
-                )
+                direct.execute(insert, [row[c] for c in columns])
                 plan = run.key, packed(Allocation(rng.integers(0, one.m, one.n)))
                 direct.execute("INSERT INTO plans VALUES (?, ?)", plan)
             direct.commit()
