@@ -16,6 +16,9 @@ from alloc.problems.distances.neighbours import estimated_pairs
 from alloc.problems.distances.reach import Reach
 from alloc.problems.matching.clock import GATHERED_PER_SECOND
 
+SHORT_S = 0.1
+"""Time limit up to which no linear programme follows the run: even small ones take some milliseconds."""
+
 UNLIMITED_S = 30.0
 """Time limit of the linear programme before a run without one; so long that the clock does not decide."""
 
@@ -85,15 +88,16 @@ def bounds_after(search: Search, proposal: Proposal) -> float | None:
     float or None
         The bound on the energy; None where energy is no objective, or no bound was found.
     """
-    end = time.monotonic() + seconds_for_bounds(search)
-    if not search.fast_enough:
+    seconds = seconds_for_bounds(search)
+    end = time.monotonic() + seconds
+    if not search.fast_enough and seconds > 0:
         raise_makespan_bound(search, end)
     if search.objective is Objective.MAKESPAN or search.best is None or search.best.evaluation.makespan is None:
         return None
     if search.best.evaluation.cost == 0:
         return 0.0
     known = proposal.energy_lower_bound
-    if known is not None and known >= search.best.evaluation.cost * (1 - PROVEN):
+    if seconds == 0 or (known is not None and known >= search.best.evaluation.cost * (1 - PROVEN)):
         return known
     makespan, seconds = search.makespan_limit, max(0.0, end - time.monotonic())
     found = _unless_interrupted(search, lambda: energy_lower_bound(search.instance, makespan, seconds))
@@ -105,7 +109,12 @@ def seconds_for_bounds(search: Search) -> float:
     if search.interrupted:
         return 0.1 if "scipy.optimize" in sys.modules else 0.0
     limit = search.budget.time_limit_s
-    return 0.2 + 0.1 * min(10.0, 10.0 if limit is None else limit)
+    return bounds_s(10.0 if limit is None else limit)
+
+
+def bounds_s(limit_s: float) -> float:
+    """Return the seconds for linear programmes after a run of so many seconds: few, or none, after a short one."""
+    return 0.0 if limit_s <= SHORT_S else min(0.2, (limit_s - SHORT_S) / 2) + 0.1 * min(10.0, limit_s)
 
 
 def _unless_interrupted(search: Search, work: Callable[[], float | None]) -> float | None:

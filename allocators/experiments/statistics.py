@@ -24,6 +24,9 @@ SMALL = 10
 LEAST = 3
 """Instances below which there is no interval and no test."""
 
+MOST_DRAWN = 20_000_000
+"""Values that the bootstrap draws at once, for the sake of memory: all of them up to 2,000 instances."""
+
 EQUAL = 1e-9
 """Relative difference up to which two scores are equal, as for the evaluator."""
 
@@ -165,6 +168,7 @@ def interval(values: NDArray[np.float64]) -> tuple[float | None, float | None]:
         (values,),
         np.mean,
         n_resamples=RESAMPLES,
+        batch=max(1, MOST_DRAWN // len(values)),
         confidence_level=CONFIDENCE,
         method="BCa",
         rng=np.random.default_rng(0),

@@ -81,24 +81,32 @@ def keep(
 def find_hearers(head: Head, speaks: BoolArray, visible: BoolArray, places: FloatArray, heard: BoolArray) -> bool:
     """Fill in who will hear the message that each agent sends now; return whether there is anybody."""
     found = False
-    radius, loss, is_manhattan, tick = head.radius, head.loss, head.is_manhattan, head.tick
-    at_x, at_y, at_z = places[0], places[1], places[2]
+    loss, tick = head.loss, head.tick
     for sender in range(len(speaks)):
         hears = heard[sender]
-        hears[:] = False
         if not speaks[sender]:
+            hears[:] = False
             continue
-        x, y, z = at_x[sender], at_y[sender], at_z[sender]
+        find_near(head.is_manhattan, head.radius, places, sender, visible, hears)
+        hears[sender] = False
         key = keyed(head.loss_key, sender)
-        for number in range(len(visible)):
-            if length(is_manhattan, at_x[number] - x, at_y[number] - y, at_z[number] - z) > radius:
-                continue
-            if not visible[number] or number == sender:
-                continue
-            if loss > 0 and fraction(keyed(keyed(key, number), tick)) < loss:
-                continue
-            hears[number] = found = True
+        for number in range(len(hears)):
+            if hears[number]:
+                hears[number] = not (loss > 0 and fraction(keyed(keyed(key, number), tick)) < loss)
+                found = found or hears[number]
     return found
+
+
+@compiled_in_place
+def find_near(
+    is_manhattan: int, radius: float, places: FloatArray, sender: int, visible: BoolArray, is_near: BoolArray
+) -> None:
+    """Fill in which agents in the mission are within the radius of one of them."""
+    at_x, at_y, at_z = places[0], places[1], places[2]
+    x, y, z = at_x[sender], at_y[sender], at_z[sender]
+    for number in range(len(is_near)):
+        far = length(is_manhattan, at_x[number] - x, at_y[number] - y, at_z[number] - z) > radius
+        is_near[number] = visible[number] & (not far)
 
 
 @compiled_in_place
@@ -135,32 +143,25 @@ def deliver(state: MissionArrays, slot: int) -> None:
         is_there = IDLE <= state.agents[number].status <= WORKING
         if not is_there or (head.silences and is_silent(state, number)):
             heard[:, number] = False
-    hear_of_tasks(heard, state.sent_task_hour[slot], state.sent_task_left[slot], state.task_hour, state.task_left)
-    told = state.sent_agent_hour[slot], state.sent_agent_report[slot]
-    hear_of_agents(heard, told[0], told[1], state.agent_hour, state.agent_report)
+    hear(heard, state.sent_task_hour[slot], state.sent_task_left[slot], state.task_hour, state.task_left)
+    hear(heard, state.sent_agent_hour[slot], state.sent_agent_report[slot], state.agent_hour, state.agent_report)
 
 
 @compiled_in_place
-def hear_of_tasks(
-    heard: BoolArray, told_hour: FloatArray, told_left: FloatArray, hour: FloatArray, left: FloatArray
+def hear(
+    heard: BoolArray, told_hour: FloatArray, told: FloatArray | Numbers, hour: FloatArray, known: FloatArray | Numbers
 ) -> None:
-    """Take over what is newer in messages than what is known of tasks."""
+    """Take over what is newer in messages than what is known of tasks, or of agents."""
     for sender in range(len(heard)):
         for number in range(len(heard)):
             if heard[sender, number]:
-                for task in range(hour.shape[1]):
-                    if told_hour[sender, task] > hour[number, task]:
-                        hour[number, task] = told_hour[sender, task]
-                        left[number, task] = told_left[sender, task]
+                take_over(told_hour[sender], told[sender], hour[number], known[number])
 
 
 @compiled_in_place
-def hear_of_agents(heard: BoolArray, told_hour: FloatArray, told: Numbers, hour: FloatArray, report: Numbers) -> None:
-    """Take over what is newer in messages than what is known of agents."""
-    for sender in range(len(heard)):
-        for number in range(len(heard)):
-            if heard[sender, number]:
-                for agent in range(hour.shape[1]):
-                    if told_hour[sender, agent] > hour[number, agent]:
-                        hour[number, agent] = told_hour[sender, agent]
-                        report[number, agent] = told[sender, agent]
+def take_over(told_hour: FloatArray, told: FloatArray | Numbers, hour: FloatArray, known: FloatArray | Numbers) -> None:
+    """Take over from one message what is newer than what one agent knows."""
+    for one in range(len(hour)):
+        if told_hour[one] > hour[one]:
+            hour[one] = told_hour[one]
+            known[one] = told[one]

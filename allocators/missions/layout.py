@@ -221,7 +221,7 @@ class MissionArrays(NamedTuple):
     """A mission as it goes on, for compiled code.
 
     Row r of what is known is that of agent r, or the only one where all know all. n agents, m tasks, k messages of each
-    agent on the air at once at the most.
+    agent on the air at once at the most. Rows of what is known have columns behind these, of which nothing is known.
 
     Attributes
     ----------

@@ -27,6 +27,10 @@ MOST_KNOWN = 50_000_000
 """Pairs of who knows and what is known up to which a mission is simulated."""
 
 
+LEAST_COLUMNS, COLUMNS = 40, 8
+"""What is known stands in rows of a multiple of so many columns, as processors compare several at once."""
+
+
 def pack(mission: Mission, knowledge: Knowledge | str | None = None) -> MissionArrays:
     """Return a mission at hour 0 for compiled code; `begun` makes it ready for a run.
 
@@ -46,6 +50,7 @@ def pack(mission: Mission, knowledge: Knowledge | str | None = None) -> MissionA
         raise RefusedError("the compiled simulation has neither geographic distances nor tables of distances")
     known = mission.knowledge if knowledge is None else Knowledge(knowledge)
     n, m = instance.n, instance.m
+    wide_n, wide_m = (max(LEAST_COLUMNS, -(-count // COLUMNS) * COLUMNS) for count in (n, m))
     rows, slots = (n, int(mission.radio.delay // mission.radio.period) + 2) if known is Knowledge.LOCAL else (1, 0)
     if (rows + slots * n) * (n + m) > MOST_KNOWN:
         raise RefusedError(f"{n} agents and {m} tasks are too many for the compiled simulation with local knowledge")
@@ -71,14 +76,14 @@ def pack(mission: Mission, knowledge: Knowledge | str | None = None) -> MissionA
         "looks": np.zeros(n, np.bool_),
         "speaks": np.zeros(n, np.bool_),
         "numbers": np.zeros(n, np.int32),
-        "task_hour": np.full((rows, m), -1.0),
-        "task_left": np.zeros((rows, m)),
-        "agent_hour": np.full((rows, n), -1.0),
-        "agent_report": np.full((rows, n), NOBODY, np.int32),
-        "sent_task_hour": np.full((slots, n, m), -1.0),
-        "sent_task_left": np.zeros((slots, n, m)),
-        "sent_agent_hour": np.full((slots, n, n), -1.0),
-        "sent_agent_report": np.full((slots, n, n), NOBODY, np.int32),
+        "task_hour": np.full((rows, wide_m), -1.0),
+        "task_left": np.zeros((rows, wide_m)),
+        "agent_hour": np.full((rows, wide_n), -1.0),
+        "agent_report": np.full((rows, wide_n), NOBODY, np.int32),
+        "sent_task_hour": np.full((slots, n, wide_m), -1.0),
+        "sent_task_left": np.zeros((slots, n, wide_m)),
+        "sent_agent_hour": np.full((slots, n, wide_n), -1.0),
+        "sent_agent_report": np.full((slots, n, wide_n), NOBODY, np.int32),
         "heard": np.zeros((slots, n, n), np.bool_),
         "link_number": np.full((n, n) if mission.radio.burst else (0, 0), -1),
         "link_bad": np.zeros((n, n) if mission.radio.burst else (0, 0), np.intp),

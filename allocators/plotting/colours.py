@@ -15,9 +15,6 @@ UNSERVED, MAKESPAN, LIMIT = "#d55e00", "#d55e00", "#56b4e9"
 """From the palette of Okabe and Ito."""
 MOVE = "#56606b"
 
-SERIES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
-"""Colours of lines, from the same palette."""
-
 NEGLIGIBLE = 1e-3
 """Relative difference of completion times that no colours show."""
 

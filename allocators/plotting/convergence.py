@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from alloc.allocators.plotting.colours import SERIES
+from alloc.allocators.plan.palette import SERIES
 from alloc.allocators.plotting.sites import plain_text
 from alloc.allocators.plotting.style import drawn, new_figure
 from alloc.problems import InputError, Objective

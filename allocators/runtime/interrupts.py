@@ -14,7 +14,7 @@ from alloc.problems import AllocError
 
 Answer = TypeVar("Answer")
 
-POLL_S = 0.02
+POLL_S = 0.01
 GRACE_S = 0.3
 """How long a native solver may take to stop before its thread is abandoned."""
 
@@ -103,7 +103,7 @@ def run_native(work: Callable[[], Answer], should_stop: Callable[[], bool], halt
     work : callable
         Calls the solver; its exceptions are raised here.
     should_stop : callable
-        Called every 20 ms in the calling thread, where signal handlers run. The exit of the process counts as well.
+        Called every 10 ms in the calling thread, where signal handlers run. The exit of the process counts as well.
     halt : callable
         Requests the solver to stop; called at most once.
 

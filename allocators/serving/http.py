@@ -8,6 +8,7 @@ from importlib.metadata import version
 
 from fastapi import FastAPI, Request, Response
 from fastapi.responses import JSONResponse
+from starlette.requests import ClientDisconnect
 
 from alloc.allocators.serving.metrics import Metrics
 from alloc.allocators.serving.service import Answer, Outcome, Service, failure
@@ -51,6 +52,8 @@ def build_app(service: Service, *, most_bytes: int = 4_000_000) -> FastAPI:
         """Allocate the agents of an instance to its tasks."""
         with metrics.timed() as timed:
             body = await _body_of(request, most_bytes)
+            if body is None:
+                return Response()  # to nobody
             if isinstance(body, HTTPStatus):
                 timed.outcome = Outcome.INPUT
                 answer = failure(
@@ -75,8 +78,8 @@ def build_app(service: Service, *, most_bytes: int = 4_000_000) -> FastAPI:
     return app
 
 
-async def _body_of(request: Request, most_bytes: int) -> str | HTTPStatus:
-    """Return the body as text, or the status where it is too large, takes too long or is no UTF-8."""
+async def _body_of(request: Request, most_bytes: int) -> str | HTTPStatus | None:
+    """Return the body as text, the status where it is too large, too slow or no UTF-8, or None if the client left."""
     found = bytearray()
     try:
         async with asyncio.timeout(BODY_S):
@@ -85,6 +88,8 @@ async def _body_of(request: Request, most_bytes: int) -> str | HTTPStatus:
                 if len(found) > most_bytes:
                     return HTTPStatus.REQUEST_ENTITY_TOO_LARGE
         return found.decode()
+    except ClientDisconnect:
+        return None
     except TimeoutError:
         return HTTPStatus.REQUEST_TIMEOUT
     except UnicodeDecodeError:
@@ -97,7 +102,8 @@ async def _answer(service: Service, request: Request, body: str) -> Answer:
     answer = asyncio.wrap_future(job.answer)
     left = asyncio.ensure_future(_left(request))
     try:
-        await asyncio.wait([answer, left], return_when=asyncio.FIRST_COMPLETED)
+        either: list[asyncio.Future[Answer] | asyncio.Future[None]] = [answer, left]
+        await asyncio.wait(either, return_when=asyncio.FIRST_COMPLETED)
         if not answer.done():
             job.cancel()
         return await answer

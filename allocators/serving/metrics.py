@@ -50,4 +50,5 @@ class Metrics:
 
     def text(self) -> bytes:
         """Return all metrics as Prometheus reads them."""
-        return generate_latest(self._registry)
+        text: bytes = generate_latest(self._registry)
+        return text

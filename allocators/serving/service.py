@@ -10,6 +10,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+from alloc.allocators.bounds import bounds_s
 from alloc.allocators.contract.base import Allocator
 from alloc.allocators.parallel.processors import available_threads
 from alloc.allocators.registry import load
@@ -63,12 +64,15 @@ class Job:
     cancellation : Cancellation
     arrived : float
         On the monotonic clock.
+    ahead : int
+        Requests that ran or waited then.
     answer : Future of Answer
     """
 
     given: str | Row
     cancellation: Cancellation
     arrived: float = field(default_factory=time.monotonic)
+    ahead: int = 0
     answer: "Future[Answer]" = field(default_factory=Future)
 
     def __post_init__(self) -> None:
@@ -133,6 +137,7 @@ class Service:
         job.answer.add_done_callback(lambda future: then(future.result()))
         with self._counting:
             is_full = self._open >= self.limits.parallel + self.limits.queue or self.is_ending
+            job.ahead = self._open
             self._open += not is_full
         if is_full:
             words = "is ending" if self.is_ending else f"is busy: {self._open} requests are open; try again later"
@@ -179,7 +184,8 @@ class Service:
             LOG.exception("a request failed")
             return failure(given, Outcome.FAILED, f"defect in alloc or a plugin: {type(error).__name__}: {error}")
         notes = {"notes": list(result.notes)} if result.notes else {}
-        return Answer(Outcome.SOLVED, {**_head(given), "waited_ms": 1000 * waited_s, "result": document, **notes})
+        queue = {"ahead": job.ahead, "waited_ms": 1000 * waited_s}
+        return Answer(Outcome.SOLVED, {**_head(given), **queue, "result": document, **notes})
 
     def _solve(self, request: SolveRequest, job: Job) -> Result:
         """Run the method for what is left of the time since the request arrived."""
@@ -191,7 +197,7 @@ class Service:
         return solve(
             request.instance,
             method,
-            time_limit_s=left_s,
+            time_limit_s=left_s - bounds_s(left_s),  # the bounds come after the run
             threads=max(1, threads),
             stop=job.cancellation,
             handle_signals=False,

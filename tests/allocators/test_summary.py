@@ -1,10 +1,12 @@
 """The summary of a result."""
 
+import numpy as np
 import pytest
 
 from alloc.allocators import solve
 from alloc.allocators.summary import bottleneck_lines, rounded_up, summary
 from alloc.problems import Instance
+from alloc.problems.generate import paper
 
 
 @pytest.mark.parametrize(
@@ -95,3 +97,15 @@ def test_the_headline_says_what_nobody_can_do(sites, text):
         communication_range=[9, 9],
     )
     assert summary(solve(instance, "greedy", handle_signals=False)).splitlines()[0].endswith(f": {text}")
+
+
+@pytest.mark.parametrize("scenario", [1, 4])
+def test_what_is_printed_is_short(scenario: int) -> None:
+    """A result is printed in fewer than 15 lines, whatever its size and its unserved tasks, an instance in one."""
+    instance = paper(scenario, seed=1)
+    lonely = Instance(ability=np.ones(40), workload=np.ones(60))
+    for one in (instance, lonely):
+        printed = str(solve(one, "greedy", time_limit_s=1)).splitlines()
+        assert len(printed) < 15
+        assert max(map(len, printed)) < 250
+        assert len(repr(one).splitlines()) == 1

@@ -24,7 +24,7 @@ STATES = 2000
 MAX_TASKS = 2000
 """Tasks above which neither side is used, for its memory."""
 
-SLICE_S = 0.02
+SLICE_S = 0.01
 """Time of each side in one call of `PrimalDual.run`."""
 
 MAX_LEAD_S = 0.1
@@ -130,7 +130,7 @@ class PrimalDual:
         return self._pairs if self._dual is None else np.sort(self._pairs[self._dual.kept])
 
     def run(self, progress: float, pool: Pool | None) -> Allocation | None:
-        """Work on both sides for some 20 ms each; return a plan if a better one was found.
+        """Work on both sides for some 10 ms each; return a plan if a better one was found.
 
         Parameters
         ----------

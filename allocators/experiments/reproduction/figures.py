@@ -1,6 +1,7 @@
 """Figures 2 to 6 in the paper's form: makespan over iterations in each scenario, and battery left at the end."""
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,8 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-COLOURS = dict(zip(PAPER_METHODS, SERIES, strict=False))
-STYLES = dict(zip(PAPER_METHODS, ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1))), strict=True))
+COLOURS = dict(zip(PAPER_METHODS, (SERIES[number] for number in (0, 1, 2, 5, 4)), strict=True))
+STYLES = dict(zip(PAPER_METHODS, ("-", "--", "-.", (0, (8, 2)), (0, (5, 1, 1, 1, 1, 1))), strict=True))
 MARKS = dict(zip(OTHERS, "os^vD", strict=True))
 OPTIMUM = "#e377c2"
 """Pink, as in the paper."""
@@ -33,7 +34,7 @@ def draw_all(learned: Sequence[Learned], solved: Sequence[Solved], folder: Path)
     kept = latest_length(learned)
     for scenario in ITERATIONS:
         rows, beside = of_scenario(kept, scenario), of_scenario(solved, scenario)
-        drawn(lambda r=rows, b=beside, s=scenario: _convergence(r, b, s), str(folder / f"figure-{scenario + 1}.png"))
+        drawn(partial(_convergence, rows, beside, scenario), str(folder / f"figure-{scenario + 1}.png"))
     drawn(lambda: _batteries(kept), str(folder / "figure-6.png"))
 
 
@@ -55,10 +56,9 @@ def _convergence(rows: Sequence[Learned], solved: Sequence[Solved], scenario: in
             right.plot(number, np.median(found), MARKS[method], color="0.25")
     _frame(left, right, rows, scenario)
     sizes = SCENARIOS[scenario]
-    count = len({row.run for row in rows})
-    figure.suptitle(
-        f"{sizes.agents} agents and {sizes.tasks} tasks, {counted(count, 'run')}: median and quartiles", fontsize=11
-    )
+    counts = {len(runs_of(rows, method)) for method in PAPER_METHODS} - {0}
+    extent = counted(max(counts), "run") if len(counts) == 1 else f"{min(counts)} to {max(counts)} runs"
+    figure.suptitle(f"{sizes.agents} agents and {sizes.tasks} tasks, {extent}: median and quartiles", fontsize=11)
     return figure
 
 
@@ -95,8 +95,9 @@ def _batteries(rows: Sequence[Learned]) -> "Figure":
             axes.fill_between([x - width / 2, x + width / 2], low - 0.4, high + 0.4, color="0.3", alpha=0.45, lw=0)
             if last:
                 label = method.upper() if not place else None
-                spread = np.std(last, ddof=1) if len(last) > 1 else 0.0
-                axes.bar(x, np.mean(last), width * 0.9, color=COLOURS[method], label=label, yerr=spread, zorder=0)
+                mean = np.mean(last)
+                ends = [[mean - min(last)], [max(last) - mean]]
+                axes.bar(x, mean, width * 0.9, color=COLOURS[method], label=label, yerr=ends, zorder=0)
     axes.fill_between([], [], [], color="0.3", alpha=0.45, label="in the paper")
     axes.set_xticks(
         range(len(ITERATIONS)), [f"{SCENARIOS[k].agents} agents, {SCENARIOS[k].tasks} tasks" for k in ITERATIONS]

@@ -4,9 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from alloc.allocators.experiments.reproduction.claims import CLAIMS, NOT, UNKNOWN, Data, told
+from alloc.allocators.experiments.reproduction.claims import CLAIMS
+from alloc.allocators.experiments.reproduction.findings import NOT, UNKNOWN, Data, told
 from alloc.allocators.experiments.reproduction.prose import ASSUMED, ASSUMPTIONS, FIGURES, HEAD, PROCEDURE, SEEDS
 from alloc.allocators.experiments.reproduction.protocol import (
+    DECISIONS,
     OTHERS,
     PAPER_BATTERY,
     PAPER_METHODS,
@@ -30,6 +32,10 @@ GAIN = 0.01
 """p-value, corrected by Holm's procedure, below which the population is said to bring something."""
 
 
+DECISIVE = 10
+"""Runs below which not even the same sign in all of them is below `GAIN`, after Holm over four tests."""
+
+
 def page(learned: Sequence[Learned], solved: Sequence[Solved], environments: Sequence[dict[str, str]]) -> str:
     """Return the page in Markdown."""
     rows = latest_length(learned)
@@ -43,9 +49,9 @@ def page(learned: Sequence[Learned], solved: Sequence[Solved], environments: Seq
         FIGURES,
         *(_figure(scenario) for scenario in SCENARIOS),
         "![Battery left](reproduction/figure-6.png)",
+        "Bars are means, lines the least and the most of the runs; grey is what the paper has.",
         "## Equal decisions",
-        _tests(rows),
-        _population(rows),
+        *(part for length in _lengths(learned) for part in _budget(learned, length)),
         "## The four scenarios",
         _scenarios(rows),
         "Battery is that of the episode, where every hop is flown; a mean over the runs, as are hops per agent.",
@@ -59,6 +65,17 @@ def page(learned: Sequence[Learned], solved: Sequence[Solved], environments: Seq
         _environments(environments),
     ]
     return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def _lengths(rows: Sequence[Learned]) -> list[int]:
+    """Return the numbers of iterations of which there are runs, the most first."""
+    return sorted({row.iterations for row in rows}, reverse=True)
+
+
+def _budget(learned: Sequence[Learned], length: int) -> tuple[str, ...]:
+    """Return title, table and finding of all runs with so many iterations."""
+    rows = [row for row in learned if row.iterations == length]
+    return f"### {length} iterations, {DECISIONS * length:,} decisions", _tests(rows), _population(rows)
 
 
 def _extent(rows: Sequence[Learned], solved: Sequence[Solved]) -> str:
@@ -169,7 +186,9 @@ def _population(rows: Sequence[Learned]) -> str:
     figures = "; ".join(f"{name} {told(one, '+.4f')}" for name, one in known.items())
     if gains:
         return f"**The population brings something** ({', '.join(gains)}; p < {GAIN} after Holm): {figures}."
-    return f"**Nothing is shown to come of the population** (no p < {GAIN} after Holm): {figures or 'no runs'}."
+    few = max((one.runs for one in known.values()), default=0) < DECISIVE
+    why = f"fewer than {DECISIVE} runs cannot show it" if few else f"no p < {GAIN} after Holm"
+    return f"**Nothing is shown to come of the population** ({why}): {figures or 'no runs'}."
 
 
 def _scenarios(rows: Sequence[Learned]) -> str:

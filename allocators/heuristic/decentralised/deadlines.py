@@ -10,8 +10,8 @@ from alloc.allocators.heuristic.decentralised.auction_rounds import ROUNDS, Mark
 from alloc.problems import Allocation, Objective
 from alloc.problems.instance import FloatArray
 
-EVALUATIONS_PER_SLICE = 20_000_000
-"""Evaluations of an agent by a task between two checks of the clock; about 40 ms."""
+EVALUATIONS_PER_SLICE = 2_000_000
+"""Evaluations of an agent by a task between two checks of the clock; a few milliseconds."""
 
 CLOSE = 1e-6
 """Relative excess over the lower bound at which a deadline is early enough."""

@@ -34,14 +34,14 @@ def centre(area: FloatArray, cell: int) -> tuple[float, float, float]:
 @compiled_in_place
 def notice(area: FloatArray, sensing: float, x: float, y: float, hour: float, seen: FloatArray) -> None:
     """Note that all within the sensing radius of a place was seen at an hour; `seen` has one hour for each cell."""
-    wide, deep = (area[1, 0] - area[0, 0]) / CELLS, (area[1, 1] - area[0, 1]) / CELLS
-    for row in range(CELLS):
-        dy = area[0, 1] + (row + 0.5) * deep - y
-        if dy * dy <= sensing * sensing:
-            for column in range(CELLS):
-                dx = area[0, 0] + (column + 0.5) * wide - x
-                if dx * dx + dy * dy <= sensing * sensing:
-                    seen[row * CELLS + column] = max(seen[row * CELLS + column], hour)
+    left, low = area[0, 0], area[0, 1]
+    wide, deep = (area[1, 0] - left) / CELLS, (area[1, 1] - low) / CELLS
+    reach = sensing * sensing
+    for cell in range(CELLS * CELLS):
+        dx = left + (cell % CELLS + 0.5) * wide - x
+        dy = low + (cell // CELLS + 0.5) * deep - y
+        if (dx * dx + dy * dy <= reach) & (seen[cell] < hour):
+            seen[cell] = hour
 
 
 @compiled_in_place

@@ -27,28 +27,15 @@
     TASKS_PER_AGENT,
     KNOWN_AGENTS,
     WORK_AHEAD,
-    APART,
-    NEARER,
-    FARNESS,
-    SHARE_AHEAD,
-    GAIN_AHEAD,
-    OTHERS_PER_AGENT,
-) = range(32)
+) = range(26)
 """Hours of travel, until it is done with the agent and without; whether it is the last order, and work goes on there;
 others there or coming, none; the agent's ability and its hours for the work; whether others end before it arrives; age
 of what is known; share of the time that would be work; other work near by; hours gained; priority; hours before the
 deadline, which it misses; growth; energy; agents without a task that are nearer; whether the option is to look around,
-or to stay; how long a place was not seen; of the whole situation: known tasks per agent, agents, work of all. Then what
-does not change with the density of tasks and agents: how far the next task is that nobody does, share of agents that
-are nearer, travel beside the mean of all tasks; and products: share and gain with the work ahead, as what is good
-while there is much to do is not what is good at the end, and others with the tasks per agent."""
+or to stay; how long a place was not seen; and of the whole situation: known tasks per agent, agents, work of all."""
 
-FEATURES = 32
-FEATURE_SET = "missions/2"
-
-FIRST_FEATURES = 26
-FIRST_FEATURE_SET = "missions/1"
-"""Those of earlier policies, the first of these."""
+FEATURES = 26
+FEATURE_SET = "missions/1"
 
 FIRST_WEIGHTS = {
     TRAVEL: -3.0,

@@ -4,7 +4,6 @@ import numpy as np
 
 from alloc.allocators.learned.missions import feature_names as names
 from alloc.allocators.learned.missions import situation as known
-from alloc.allocators.learned.missions.densities import NOT_AS_FAR, fill_densities
 from alloc.allocators.learned.missions.network_arrays import Singles
 from alloc.allocators.learned.missions.situation import Situation
 from alloc.allocators.missions.layout import NOBODY
@@ -147,7 +146,6 @@ def fill_options(situation: Situation, look: FloatArray, options: Singles, choic
         else:
             option[names.STAYS] = 1
     fill_whole(situation, choice, tasks, options[:count])
-    fill_densities(situation, choice, tasks, options[:count])
     return count
 
 
@@ -177,11 +175,11 @@ def fill_task(situation: Situation, j: int, option: Singles, idle: int) -> None:
     option[names.SHARE] = max(option[names.SHARE], np.float32(0))
     option[names.GAIN] = squashed(max(0.0, without - with_me) / scale)
     deadline = task[known.DEADLINE, j]
-    option[names.SLACK] = min(1.0, max(-1.0, (deadline - with_me) / scale))
+    option[names.SLACK] = min(max(-1.0, (deadline - with_me) / scale), 1.0)
     option[names.MISSES] = with_me > deadline
     option[names.GROWTH] = squashed(task[known.GROWTH, j] / own[known.ABILITY])
     energy = own[known.ENERGY_PER_DISTANCE] * distance
-    option[names.ENERGY] = min(1.0, energy / own[known.BATTERY]) if energy > 0 else 0.0
+    option[names.ENERGY] = min(energy / own[known.BATTERY], 1.0) if energy > 0 else 0.0
     option[names.RIVALS] = squashed(rivals(situation, j, distance, idle) / 3.0)
 
 
@@ -193,7 +191,7 @@ def rivals(situation: Situation, j: int, distance: float, idle: int) -> float:
     for place in range(idle):
         i = situation.coming.idle[place]
         dx, dy, dz = other[known.OTHER_X, i] - x, other[known.OTHER_Y, i] - y, other[known.OTHER_Z, i] - z
-        found += dx * dx + dy * dy + dz * dz < distance * distance * NOT_AS_FAR
+        found += dx * dx + dy * dy + dz * dz < distance * distance
     return found
 
 
@@ -230,6 +228,6 @@ def fill_whole(situation: Situation, choice: IntArray, tasks: int, options: Sing
         option[names.KNOWN_AGENTS] = squashed((agents - 1) / 5.0)
         option[names.WORK_AHEAD] = squashed(work / ability / time_scale(own))
         if row < tasks:
-            option[names.STRENGTH] = min(3.0, own[known.ABILITY] * agents / ability - 1)
+            option[names.STRENGTH] = min(own[known.ABILITY] * agents / ability - 1, 3.0)
             own_priority = situation.task[known.PRIORITY, choice[row]]
             option[names.PRIORITY] = own_priority / (own_priority + priority) - 0.5 if priority > 0 else 0.0

@@ -6,20 +6,16 @@ from importlib.metadata import version
 from pathlib import Path
 
 from safetensors.torch import load, save
-from torch.nn.functional import pad
 
 from alloc.allocators.learned.files.policy_file import sorted_metadata
 from alloc.allocators.learned.files.policy_header import read_header
-from alloc.allocators.learned.missions.feature_names import FEATURE_SET, FEATURES, FIRST_FEATURE_SET, FIRST_FEATURES
+from alloc.allocators.learned.missions.feature_names import FEATURE_SET, FEATURES
 from alloc.allocators.learned.missions.network import MissionNetwork
 from alloc.allocators.learned.missions.network_arrays import HIDDEN
 from alloc.problems import InputError
 from alloc.problems.formats import read_bytes, write_bytes_atomically
 
 POLICY_FORMAT = "alloc-mission-policy/1"
-
-FROM_FEATURES = ("inner.weight", "skip.weight")
-"""Weights of features, a column for each; 0 for those that an earlier policy does not know."""
 
 SHIPPED = Path(__file__).parents[1] / "files" / "policies" / "missions.safetensors"
 SHIPPED_PPO = SHIPPED.with_name("missions-ppo.safetensors")
@@ -61,17 +57,13 @@ def load_network(path: Path | str | None = None) -> MissionNetwork:
     """
     path = SHIPPED if path is None else path
     source, metadata = str(path), read_header(path)
-    is_early = metadata.get("features") == FIRST_FEATURE_SET
-    for key, expected in _expected(FIRST_FEATURE_SET, FIRST_FEATURES).items() if is_early else _expected().items():
+    for key, expected in _expected().items():
         if metadata.get(key) != expected:
             hint = "train anew with alloc train gappo --missions"
             raise InputError(f"is {metadata.get(key)!r}, missions need {expected!r}; {hint}", key, source)
     tensors = load(read_bytes(path))
     if not all(bool(tensor.isfinite().all()) for tensor in tensors.values()):
         raise InputError("weights are not finite; train anew", "", source)
-    if is_early:
-        missing = FEATURES - FIRST_FEATURES
-        tensors |= {name: pad(tensors[name], (0, missing)) for name in FROM_FEATURES if name in tensors}
     network = MissionNetwork()
     try:
         network.load_state_dict(tensors)
@@ -81,5 +73,5 @@ def load_network(path: Path | str | None = None) -> MissionNetwork:
     return network.eval().requires_grad_(False)
 
 
-def _expected(feature_set: str = FEATURE_SET, features: int = FEATURES) -> dict[str, str]:
-    return {"format": POLICY_FORMAT, "features": feature_set, "size": json.dumps([features, HIDDEN])}
+def _expected() -> dict[str, str]:
+    return {"format": POLICY_FORMAT, "features": FEATURE_SET, "size": json.dumps([FEATURES, HIDDEN])}

@@ -1,4 +1,4 @@
-"""Missions led by samples of the network, with a record of each decision, in compiled loops."""
+"""Missions led by samples of the network in compiled loops, with a record of each decision."""
 
 import math
 from typing import NamedTuple
@@ -100,7 +100,7 @@ def missed_cost(state: MissionArrays, ideal: float) -> float:
 def sample(room: Room, count: int, key: int) -> tuple[int, float]:
     """Return an option that is drawn by the softmax of the scores, and the logarithm of its probability."""
     highest, chosen = -np.inf, 0
-    largest = room.scores[:count].max()
+    largest = room.scores[np.argmax(room.scores[:count])]
     total = 0.0
     for row in range(count):
         total += math.exp(room.scores[row] - largest)
@@ -148,7 +148,9 @@ def rollout(state: MissionArrays, room: Room, weights: MissionWeights, seed: int
                 drawn += 1
                 k = record.length[0]
                 if k < len(record.choices):
-                    record.options[k, :count] = room.options[:count, :FEATURES]
+                    for row in range(count):
+                        for feature in range(FEATURES):
+                            record.options[k, row, feature] = room.options[row, feature]
                     record.choices[k], record.action[k], record.agent[k] = count, option, number
                     record.log_probability[k], record.hour[k] = log_probability, head.hour
                     record.cost[k] = record.total[0] + missed

@@ -9,8 +9,8 @@ from alloc.allocators.missions.motion import battery_of, can_fly, distance_betwe
 from alloc.allocators.runtime.compiled import compiled_in_place
 from alloc.problems.fields import BoolArray, FloatArray, IntArray
 
-MEMORY = 2.0
-"""Hours after which what was heard of others no longer counts."""
+MEMORY = 20
+"""Radio periods after which what was heard of others no longer counts, whatever the unit of time."""
 
 
 class Coming(NamedTuple):
@@ -123,7 +123,7 @@ def fill_tasks(state: MissionArrays, number: int, task: FloatArray, can: BoolArr
     head, agent = state.head[0], state.agents[number]
     here, battery = place_of(agent, head.hour), battery_of(agent, head.hour)
     hours, left, allowed = state.task_hour[agent.known], state.task_left[agent.known], state.allowed[number]
-    for j in range(len(hours)):
+    for j in range(len(can)):
         can[j] = hours[j] >= 0 and left[j] >= 0
         if can[j]:
             facts = state.tasks[j]
@@ -142,8 +142,8 @@ def fill_others(state: MissionArrays, number: int, other: FloatArray, target: In
     """Fill in what an agent knows of others."""
     head, row = state.head[0], state.agents[number].known
     hours, known, task_hours = state.agent_hour[row], state.agent_report[row], state.task_hour[row]
-    for i in range(len(hours)):
-        counts[i] = i != number and hours[i] >= 0 and head.hour - hours[i] <= MEMORY
+    for i in range(len(counts)):
+        counts[i] = i != number and hours[i] >= 0 and head.hour - hours[i] <= MEMORY * head.period
         if not counts[i]:
             continue
         report, agent = state.reports[known[i]], state.agents[i]

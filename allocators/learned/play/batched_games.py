@@ -17,8 +17,8 @@ from alloc.allocators.learned.play.rollout import Best, play
 from alloc.problems import Instance
 from alloc.problems.game import Board, make_board
 
-SLICE = 200_000
-"""Pairs times rounds that are played between two looks at the clock, some 20 to 100 ms."""
+SLICE = 50_000
+"""Pairs times rounds that are played between two looks at the clock, some 5 to 25 ms."""
 
 
 class Games(NamedTuple):

@@ -16,7 +16,7 @@ def draw(area: FloatArray, axis: int, number: int, key: int, drawn: IntArray) ->
     """Return a coordinate at random."""
     drawn[number] += 1
     chance = fraction(keyed(keyed(key, number + 1), drawn[number]))
-    return area[0, axis] + (area[1, axis] - area[0, axis]) * chance
+    return float(area[0, axis] + (area[1, axis] - area[0, axis]) * chance)
 
 
 @compiled_in_place

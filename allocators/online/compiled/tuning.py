@@ -111,7 +111,7 @@ def tune(
         strategy.update([_Candidate(row, cost) for row, cost in zip(rows, costs, strict=True)])
         mean = np.maximum(np.exp(strategy.centroid), lows)
         if state is not None:
-            np.savez(state, **state_of(strategy))
+            np.savez(state, **state_of(strategy))  # type: ignore[arg-type]  # not `allow_pickle`
         is_due = (generation + 1) % VALIDATED_EVERY == 0 or generation + 1 == generations
         found = _cost(policy, mean, validation) if is_due else None
         parameters = dict(zip(names, mean.tolist(), strict=True))

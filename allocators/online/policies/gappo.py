@@ -17,10 +17,11 @@ from alloc.allocators.learned.missions.policy_file import SHIPPED, SHIPPED_PPO, 
 from alloc.allocators.learned.missions.situation import MEMORY, Situation
 from alloc.allocators.learned.missions.talking import is_to_send
 from alloc.allocators.missions.layout import NOBODY
+from alloc.allocators.missions.motion import distance_between
 from alloc.allocators.online.contract import AgentDecider, Briefing, Policy, PolicyInfo
 from alloc.problems.missions.simulation.reports import AgentReport, Message, TaskReport, View
 from alloc.problems.missions.simulation.state import ACTIVE, STAY, AgentStatus, Order, TaskStatus
-from alloc.problems.vocabulary import Knowledge
+from alloc.problems.vocabulary import GEOGRAPHIC, MANHATTAN, Knowledge
 
 REMEMBERED = ("seen", "goal", "decided", "tasks", "periods", "saved", "counted", "news")
 """What a decider keeps from decision to decision; all else is scratch."""
@@ -38,7 +39,7 @@ class NetworkParameters(CheckedParameters):
         Radio periods that an agent saves up for each message; one message is kept back for when its order changes.
     """
 
-    periods: int = bounded(1, low=1)
+    periods: int = bounded(12, low=1)
 
 
 class NetworkPolicy(Policy):
@@ -121,7 +122,7 @@ class _NetworkDecider(AgentDecider):
             return None
         room.decided[0], room.tasks[0] = view.hour, len(tasks)
         room = self._with_room(len(view.agents), len(tasks) + 1)
-        _fill(view, room.situation, tasks, self._span)
+        _fill(view, room.situation, tasks, self._span, MEMORY * self._period)
         count = consider(room, self._area, self._sensing, self._seed, self._number, 0, self._weights)
         choice = int(room.choice[np.argmax(room.scores[:count])])
         note_choice(room, 0, choice)
@@ -155,10 +156,10 @@ def _compile_loops(weights: MissionWeights) -> None:
     consider(room, area, 1.0, 0, 0, 0, weights)
     note_choice(room, 0, WAIT)
     is_to_send(room.periods, room.saved, room.counted, room.news, 0, 1)
-    centre(area, 0)
+    distance_between(False, centre(area, 0), NOWHERE)
 
 
-def _fill(view: View, situation: Situation, tasks: list[TaskReport], span: float) -> None:
+def _fill(view: View, situation: Situation, tasks: list[TaskReport], span: float, memory: float) -> None:
     """Fill in what an agent knows; tasks are the open ones, behind which one stands for all that are over."""
     own = view.own
     index = {task.facts.id: j for j, task in enumerate(tasks)}
@@ -180,14 +181,22 @@ def _fill(view: View, situation: Situation, tasks: list[TaskReport], span: float
     for j, task in enumerate(tasks):
         known = task.facts
         situation.can[j] = view.refusal(own, task) is None
-        numbers = (task.left, task.hour, known.priority, known.deadline, known.growth, view.distance(own, task))
+        numbers = (task.left, task.hour, known.priority, known.deadline, known.growth, _distance(view, task))
         situation.task[:, j] = (*(known.place.position or NOWHERE), *numbers)
     for i, (name, report) in enumerate(view.agents.items()):
-        is_recent = name != view.id and view.hour - report.hour <= MEMORY and report.status in ACTIVE
+        is_recent = name != view.id and view.hour - report.hour <= memory and report.status in ACTIVE
         situation.counts[i] = is_recent
         if is_recent:
             situation.target[i] = _target(view, report, index)
             situation.other[:, i] = (_arrival(view, report), report.facts.ability, *(report.place.position or NOWHERE))
+
+
+def _distance(view: View, task: TaskReport) -> float:
+    """Return how far off a task is, rounded as in the compiled simulation, where others at one place are as near."""
+    here, there = view.own.place.position, task.facts.place.position
+    if here is None or there is None or view.has_table or view.metric == GEOGRAPHIC:
+        return view.distance(view.own, task)
+    return distance_between(view.metric == MANHATTAN, here, there)
 
 
 def _target(view: View, report: AgentReport, index: dict[str, int]) -> int:

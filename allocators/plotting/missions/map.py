@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from alloc.allocators.plan.palette import SERIES
 from alloc.allocators.plan.places import Places, places, two_axes
-from alloc.allocators.plotting.colours import MOVE, SERIES
+from alloc.allocators.plotting.colours import MOVE
 from alloc.allocators.plotting.labels import place_labels
 from alloc.allocators.plotting.missions.states import CANCELLED, DONE, MISSED, TASK_COLOURS, task_states
 from alloc.allocators.plotting.sites import plain_text

@@ -85,6 +85,16 @@ def test_a_client_that_leaves_cancels_its_run(service, client):
     until(lambda: service.open_requests == 0)
 
 
+def test_a_client_that_leaves_within_its_body_is_no_fault(service, client, caplog):
+    """A body that ends too early is given up, without a traceback in the log."""
+    host, port = service.address.removeprefix("http://").split(":")
+    with socket.create_connection((host, int(port))) as raw:
+        raw.sendall(b"POST /solve HTTP/1.1\r\nHost: x\r\nContent-Length: 100\r\n\r\n{")
+    assert client.post("/solve", json={"instance": EASY}).status_code == 200
+    assert 'alloc_requests_total{outcome="cancelled"}' in client.get("/metrics").text
+    assert caplog.records == []
+
+
 def test_load_is_answered_in_time(service, client):
     """Eight clients with deadlines of 50 ms, some of whose requests are bad, all have answers; the queue empties."""
     before = threading.active_count()

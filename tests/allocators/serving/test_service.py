@@ -97,13 +97,10 @@ def test_a_full_queue_turns_requests_away(service):
 
 def test_a_deadline_counts_from_the_arrival(service):
     """A request that has waited its time away is given its first plan, and not its time anew."""
-    first = service.submit({**LONG, "limit_ms": 400})
-    began = time.monotonic()
-    second = service.submit({**LONG, "limit_ms": 400})
-    result = second.answer.result(30).document["result"]
-    assert first.answer.result(30).document["result"]["runtime_s"] >= 0.3
-    assert result["runtime_s"] < 0.3 or time.monotonic() - began > 2  # unless the machine is very busy
-    assert result["status"] == "feasible"
+    first, second = (service.submit({**LONG, "limit_ms": 1000}) for _ in range(2))
+    runtimes = [job.answer.result(30).document["result"]["runtime_s"] for job in (first, second)]
+    assert runtimes[0] > 0.5
+    assert runtimes[1] < 0.3
 
 
 def test_the_end_gives_open_requests_their_best(service):

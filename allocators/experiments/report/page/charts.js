@@ -4,35 +4,42 @@
 const isDark = () => document.documentElement.classList.contains("dark");
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 const DASHES = [[1, 0], [6, 3], [2, 2], [8, 3, 2, 3]];
+const SHAPES = ["circle", "square", "triangle-up", "cross"];
 const OUTCOMES = {
   solved: "#009e73", refused: "#999999", failed: "#d55e00", exited: "#cc79a7", killed: "#8c564b", hung: "#e69f00",
   "out of memory": "#0072b2", "missing package": "#56b4e9",
 };
 
+const ON_DARK = { "#000000": "#e8eaed", "#0072b2": "#2a8fd6" }; // what could hardly be seen there
 function colourOf(page, method) {
   const colour = page.colours[method % page.colours.length];
-  return colour === "#000000" && isDark() ? "#e8eaed" : colour;
+  return (isDark() && ON_DARK[colour]) || colour;
 }
-const dashOf = (page, method) => DASHES[Math.floor(method / page.colours.length) % DASHES.length];
+const turnOf = (page, method, kinds) => kinds[Math.floor(method / page.colours.length) % kinds.length];
 
 function config() {
   const [ink, soft, line] = [css("--ink"), css("--soft"), css("--line")];
-  const axis = { labelColor: soft, titleColor: ink, gridColor: line, gridOpacity: 0.6, domainColor: line, tickColor: line,
-    titleFontWeight: 500, titleFontSize: 12, labelFontSize: 11, labelLimit: 150, labelOverlap: true };
-  const legend = { labelColor: ink, labelFontSize: 12, labelLimit: 190, title: null, orient: "bottom", symbolStrokeWidth: 2.5 };
+  const axis = { labelColor: soft, titleColor: ink, gridColor: line, gridOpacity: 0.4, domainColor: line, tickColor: line,
+    titleFontWeight: 500, titleFontSize: 12, labelFontSize: 11, labelLimit: 150, labelOverlap: "greedy", labelSeparation: 8 };
+  const legend = { labelColor: ink, labelFontSize: 12, title: null, orient: "bottom", symbolStrokeWidth: 2.5, symbolOpacity: 1 };
   return { background: "transparent", font: "system-ui, sans-serif", view: { stroke: null }, axis, legend, text: { color: ink } };
 }
 
+// as many columns as there is room for the longest name
+function legendOf(names, width) {
+  const longest = Math.min(Math.max(...names.map((name) => 7.2 * name.length), 40), 230);
+  return { columns: Math.max(1, Math.floor((width - 70) / (longest + 34))), labelLimit: longest };
+}
+// a name for each row of a bar chart
+const rowNames = (width) => ({ labelOverlap: false, labelLimit: Math.min(230, width * 0.35) });
+
 // colours and dashes of the methods that are shown, the same in all charts
-function byMethod(page, methods, width) {
+function byMethod(page, methods, width, more = {}) {
   const domain = methods.map((method) => page.labels[method]);
-  const legend = { columns: Math.max(1, Math.floor(width / 170)) };
+  const legend = { ...legendOf(domain, width), ...more };
   const scale = { domain, range: methods.map((method) => colourOf(page, method)) };
-  const dash = { domain, range: methods.map((method) => dashOf(page, method)) };
-  return {
-    color: { field: "method", type: "nominal", scale, legend },
-    strokeDash: { field: "method", type: "nominal", scale: dash, legend: methods.some((one) => one >= page.colours.length) ? legend : null },
-  };
+  const other = (range) => ({ field: "method", type: "nominal", scale: { domain, range: methods.map((one) => turnOf(page, one, range)) }, legend });
+  return { color: { field: "method", type: "nominal", scale, legend }, strokeDash: other(DASHES), shape: other(SHAPES) };
 }
 
 const flat = (page, entries, row) =>
@@ -43,8 +50,8 @@ const highest = (values, share) => {
   const known = values.filter((value) => value !== null).sort((a, b) => a - b);
   return known[Math.min(known.length - 1, Math.floor(share * known.length))];
 };
-const seconds = { scale: { type: "log" }, axis: { format: "~g", tickCount: 6 } };
-const horizontal = (count) => ({ step: count > 12 ? 18 : 26 });
+const seconds = { scale: { type: "log", nice: false }, axis: { format: "~g", tickCount: 6 } };
+const horizontal = (count) => count * (count > 12 ? 18 : 26);
 
 function profiles(page, group, methods, width) {
   const entries = group.series.profiles.filter((one) => methods.includes(one.method));
@@ -69,15 +76,15 @@ function targets(page, group, methods, width) {
 function distance(page, group, methods, width) {
   const entries = group.series.time.filter((one) => methods.includes(one.method) && one.middle.some((y) => y !== null));
   if (!entries.length) return "There is nothing to draw: no run has a trace with a makespan.";
-  const { color, strokeDash } = byMethod(page, methods, width);
+  const { color, strokeDash } = byMethod(page, methods, width, { symbolType: "stroke" });
   const values = flat(page, entries, (entry, i) => ({ low: entry.low[i], middle: entry.middle[i], high: entry.high[i] }))
     .filter((row) => row.middle !== null);
-  const most = Math.max(highest(values.map((row) => row.high), 0.98) || 0, 1e-6);
+  const most = Math.max(highest(values.map((row) => row.high), 0.98) || 0, 0.01);
   const y = { scale: { type: "sqrt", domain: [0, most], clamp: true }, axis: { ...percent(1), tickCount: 6 } };
   const x = quantitative("x", "time (s)", seconds);
   return { data: { values }, layer: [
     { mark: { type: "area", interpolate: "step-after", opacity: 0.15 },
-      encoding: { x, y: quantitative("low", "T above the best known", y), y2: { field: "high" }, color: { ...color, legend: null } } },
+      encoding: { x, y: quantitative("low", "T above the best known", y), y2: { field: "high" }, color } },
     { mark: { type: "line", interpolate: "step-after", strokeWidth: 2, tooltip: true },
       encoding: { x, y: quantitative("middle", "T above the best known", y), color, strokeDash } }] };
 }
@@ -85,18 +92,24 @@ function distance(page, group, methods, width) {
 function tradeoff(page, group, methods, width) {
   const entries = group.series.tradeoff.filter((one) => methods.includes(one.method));
   if (!entries.length) return "There is nothing to draw: no method has both a makespan and an energy above 0.";
-  const { color } = byMethod(page, methods, width);
+  const { color, shape } = byMethod(page, methods, width);
   const values = flat(page, entries, (entry, i) => ({ x: entry.x[i] - 1, y: entry.y[i] - 1, instance: page.instances.name[entry.instance[i]] }));
   const medians = entries.map((one) => ({ method: page.labels[one.method], x: one.x_median - 1, y: one.y_median - 1 }));
-  const scale = (name) => ({ type: "sqrt", domain: [0, Math.max(highest(values.map((row) => row[name]), 0.98), 1e-6) * 1.05], clamp: true });
+  const scale = (name) => ({ type: "sqrt", domain: [0, Math.max(highest(values.map((row) => row[name]), 0.98), 0.01) * 1.05], clamp: true });
   const x = quantitative("x", "T above the least", { scale: scale("x"), axis: { ...percent(1), tickCount: 6 } });
   const y = quantitative("y", "energy above the least", { scale: scale("y"), axis: { ...percent(1), tickCount: 6 } });
   const tooltip = [{ field: "instance", type: "nominal" }, { field: "method", type: "nominal" },
     { field: "x", type: "quantitative", format: ".2%", title: "T above" }, { field: "y", type: "quantitative", format: ".2%", title: "energy above" }];
   return { layer: [
-    { data: { values }, mark: { type: "point", filled: true, size: 28, opacity: 0.45 }, encoding: { x, y, color, tooltip } },
+    { data: { values }, mark: { type: "point", filled: true, size: 28, opacity: 0.45 }, encoding: { x, y, color, shape, tooltip } },
     { data: { values: medians }, mark: { type: "point", shape: "diamond", filled: true, size: 190, stroke: css("--paper"), strokeWidth: 1.5, opacity: 1 },
       encoding: { x, y, color, tooltip: tooltip.slice(1) } }] };
+}
+
+function thinned(group, methods) {
+  const entries = group.series.tradeoff.filter((one) => methods.includes(one.method));
+  const [drawn, all] = [(one) => one.x.length, (one) => one.points].map((get) => entries.reduce((sum, one) => sum + get(one), 0));
+  return drawn < all ? `Drawn are ${drawn.toLocaleString("en")} of ${counted(all, "point")}.` : "";
 }
 
 const MEASURES = { runtime_s: "time (s)", gap: "gap to the best bound", ratio: "T over the best method's", memory_mb: "memory (MiB)" };
@@ -104,7 +117,7 @@ function scaling(page, group, methods, width, measure) {
   const values = group.series.scaling.filter((one) => one.measure === measure && methods.includes(one.method))
     .map((one) => ({ ...one, method: page.labels[one.method] })).filter((one) => measure === "gap" || measure === "ratio" || one.high > 0);
   if (!values.length) return `There is nothing to draw: no method has a figure for ${MEASURES[measure]}.`;
-  const { color, strokeDash } = byMethod(page, methods, width);
+  const { color, strokeDash } = byMethod(page, methods, width, { symbolType: "stroke" });
   const isLog = measure === "runtime_s" || measure === "memory_mb";
   const sizes = new Set(values.map((one) => one.agents));
   const x = quantitative("agents", "agents", { scale: { type: "log", padding: 12, nice: sizes.size < 2 }, axis: { format: "~s", tickCount: 6 } });
@@ -119,11 +132,11 @@ function scaling(page, group, methods, width, measure) {
     { mark: { type: "point", filled: true, size: 45, opacity: 1 }, encoding: { x, y: { ...quantitative("middle", y.title), ...y }, color, tooltip } }] };
 }
 
-function gaps(page, group, methods) {
+function gaps(page, group, methods, width) {
   const values = group.series.gaps.filter((one) => methods.includes(one.method)).map((one) => ({ ...one, method: page.labels[one.method], bounds: `${one.instances} of ${one.of}` }));
   if (!values.length) return "There is nothing to draw: no run proved a bound on the makespan of an instance that was served.";
   const sort = methods.map((method) => page.labels[method]);
-  const y = { field: "method", type: "nominal", title: null, sort, axis: { labelLimit: 150 } };
+  const y = { field: "method", type: "nominal", title: null, sort, axis: rowNames(width) };
   const scale = { domain: sort, range: methods.map((method) => colourOf(page, method)) };
   const color = { field: "method", type: "nominal", scale, legend: null };
   const x = (field) => quantitative(field, "gap to the best bound", { axis: { ...percent(2), tickCount: 6 } });
@@ -142,16 +155,16 @@ function outcomes(page, group, methods, width) {
   const domain = Object.keys(OUTCOMES).filter((outcome) => values.some((one) => one.outcome === outcome));
   const range = domain.map((outcome) => OUTCOMES[outcome]);
   return { data: { values }, height: horizontal(methods.length), mark: { type: "bar", tooltip: true }, encoding: {
-    y: { field: "method", type: "nominal", title: null, sort: methods.map((method) => page.labels[method]) },
+    y: { field: "method", type: "nominal", title: null, sort: methods.map((method) => page.labels[method]), axis: rowNames(width) },
     x: quantitative("runs", "share of runs", { stack: "normalize", axis: { format: ".0%" } }),
-    color: { field: "outcome", type: "nominal", scale: { domain, range }, legend: { columns: Math.max(1, Math.floor(width / 150)) } },
+    color: { field: "outcome", type: "nominal", scale: { domain, range }, legend: legendOf(domain, 0.62 * width) },
     tooltip: ["method", "outcome", "runs"].map((field) => ({ field, type: "nominal" })) } };
 }
 
-function differences(page, rows) {
+function differences(page, rows, width) {
   const values = rows.map((one) => ({ ...one, method: page.labels[one.method] }));
   const scale = { domain: values.map((one) => one.method), range: rows.map((one) => colourOf(page, one.method)) };
-  const y = { field: "method", type: "nominal", title: null, sort: null };
+  const y = { field: "method", type: "nominal", title: null, sort: null, axis: rowNames(width) };
   const color = { field: "method", type: "nominal", scale, legend: null };
   const x = (field) => quantitative(field, `difference of ${rows[0].score === "makespan" ? "T" : "energy"}, with 95 % interval`,
     { axis: { format: "+.2~%", tickCount: 6 } });
@@ -169,7 +182,7 @@ const CHARTS = [
     note: "A target is the best known T of an instance, or 1 % or 5 % more. Share of all targets that runs have reached by then." },
   { id: "distance", title: "Convergence", draw: distance,
     note: "T found by then, above the best known of the instance: median over runs, and the middle half of them as a band." },
-  { id: "tradeoff", title: "Makespan against energy", draw: tradeoff,
+  { id: "tradeoff", title: "Makespan against energy", draw: tradeoff, more: thinned,
     note: "Each point is a method on an instance, above the least of any method there; diamonds are medians. The furthest 2 % are drawn at the edge." },
   { id: "scaling", title: "Scaling", draw: scaling, measures: MEASURES,
     note: "Against the number of agents: median over instances and the middle half of them." },

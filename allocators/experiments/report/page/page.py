@@ -16,7 +16,7 @@ from alloc.allocators.experiments.report.page.series import series
 from alloc.allocators.experiments.report.page.source import Archive, Progress, read_stores
 from alloc.allocators.experiments.report.page.summary import Entry, conditions, methods, notes, paired
 from alloc.allocators.experiments.store.outcome import Outcome
-from alloc.allocators.plotting.colours import SERIES
+from alloc.allocators.plan.palette import SERIES
 from alloc.problems import InputError
 from alloc.problems.formats import check_writable, write_text_atomically
 from alloc.problems.formats.files import PathLike, is_stream, named
@@ -32,6 +32,12 @@ FIGURES = ("makespan", "served_makespan", "lower_bound", "gap", "energy", "runti
 """Fields of an ending that are columns of the table of runs."""
 
 SUFFIX = ".html"
+
+PARTS = ("report.html.jinja", "report.css", "charts.js", "tables.js", "map.js", "instance.js", "report.js")
+"""Files beside this module: the frame, the style, and the scripts in the order in which they run."""
+
+GREY = "#999999"
+"""The eighth colour of methods, as the palette has no other that can be seen on white."""
 
 
 def check_page(path: PathLike) -> None:
@@ -105,7 +111,7 @@ def _contents(
         "stores": [one_line(named(path)) for path in archive.paths],
         "made": time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime()),
         "version": version("alloc-mrta"),
-        "colours": SERIES,
+        "colours": (*SERIES, GREY),
         "labels": layout.labels,
         "instances": {
             "name": layout.names,
@@ -181,10 +187,7 @@ def _rendered(heading: str, data: dict[str, str]) -> str:
     from jinja2 import Environment, StrictUndefined
 
     own = files(__package__)
-    parts = {
-        name: (own / name).read_text(encoding="utf-8") for name in ("report.css", "report.js", "charts.js", "map.js")
-    }
-    template = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    ).from_string((own / "report.html.jinja").read_text(encoding="utf-8"))
-    return template.render(title=heading, data={**libraries(), **data}, parts=parts)
+    template, style, *scripts = ((own / name).read_text(encoding="utf-8") for name in PARTS)
+    frame = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    values = {"title": heading, "data": {**libraries(), **data}, "style": style, "scripts": scripts}
+    return str(frame.from_string(template).render(values))

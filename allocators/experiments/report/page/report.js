@@ -1,10 +1,10 @@
 "use strict";
-// The page: what is chosen, its tables, and what is drawn when. All that was stored goes in as text, never as HTML.
+// The page: what is chosen, and what is drawn when. All that was stored goes in as text, never as HTML.
 
 const byId = (id) => document.getElementById(id);
 const state = { group: 0, off: new Set(), instance: -1, plan: -1, measure: "runtime_s", against: -1 };
-let page, runs, DataTable, turn = 0;
-const tables = new Map();
+const SOON = 20000; // runs up to which their table is made at once; more of them wait until one looks at it
+let page, runs, turn = 0;
 
 async function unpack(id) {
   const bytes = Uint8Array.from(atob(byId(`data-${id}`).textContent), (letter) => letter.charCodeAt(0));
@@ -23,68 +23,19 @@ function add(parent, name, text = "", attributes = {}) {
 const group = () => page.groups[state.group];
 const shown = () => group().methods.map((one) => one.method).filter((method) => !state.off.has(method));
 const figure = (value, digits = 5) => (value === null || value === undefined ? "-" : String(Number(value.toPrecision(digits))));
-const share = (value, digits = 3) => (value === null || value === undefined ? "-" : `${Number((100 * value).toPrecision(digits))} %`);
+const share = (value, digits = 3) => (value === null || value === undefined ? "-" : Math.abs(value) < 5e-7 ? "0 %" : `${Number((100 * value).toPrecision(digits))} %`);
 const signed = (value) => (value === null ? "-" : `${value > 0 ? "+" : ""}${share(value)}`);
+const chance = (value) => (value !== null && value < 1e-3 ? value.toExponential(1) : figure(value, 2));
 const counted = (count, noun) => `${count.toLocaleString("en")} ${noun}${count === 1 ? "" : "s"}`;
 const escaped = (text) => String(text).replace(/[&<>"']/g, (letter) => `&#${letter.charCodeAt(0)};`);
 const when = (seconds) => new Date(1000 * seconds).toISOString().slice(0, 16).replace("T", " ");
 
-// tables
-const text = (title, get) => ({ title, get, isText: true, show: (value) => value });
-const number = (title, get, show = figure) => ({ title, get, show });
-
-// rows are whatever `get` of the columns takes; nothing is last in either direction
-function makeTable(element, columns, rows, { order = [], paging = false, filters = false, pick = null } = {}) {
-  if (tables.has(element)) tables.get(element).destroy();
-  element.replaceChildren();
-  const head = add(element, "thead");
-  const titles = add(head, "tr");
-  columns.forEach((column) => add(titles, "th", column.title, { class: column.isText ? "text" : "" }));
-  const fields = filters ? add(head, "tr") : null;
-  if (fields) columns.forEach((column) => add(add(fields, "td"), "input", "", { type: "search", "aria-label": `filter ${column.title}` }));
-  const table = new DataTable(element, {
-    data: rows.map((row) => [row]), order, paging, pageLength: 25, deferRender: true, autoWidth: false, searching: true, info: paging, titleRow: 0,
-    layout: { topStart: null, topEnd: null, bottomStart: paging ? ["info", "pageLength"] : null, bottomEnd: paging ? "paging" : null },
-    columns: columns.map((column) => ({ className: column.isText ? "text" : "", type: column.isText ? "string" : "figure",
-      data: ([row], kind) => {
-        const value = column.get(row);
-        return kind === "display" ? escaped(column.show(value)) : column.isText ? value : value ?? null;
-      } })),
-  });
-  if (fields) [...fields.querySelectorAll("input")].forEach((input, i) => {
-    let timer;
-    input.onclick = (event) => event.stopPropagation();
-    input.oninput = () => { clearTimeout(timer); timer = setTimeout(() => filter(table, i, columns[i], input.value.trim()), 150); };
-  });
-  if (pick) element.tBodies[0].onclick = (event) => {
-    const data = table.row(event.target.closest("tr")).data();
-    if (data) pick(data[0]);
-  };
-  element.classList.toggle("pickable", Boolean(pick));
-  tables.set(element, table);
-  return table;
-}
-const TESTS = { "<": (a, b) => a < b, "<=": (a, b) => a <= b, ">": (a, b) => a > b, ">=": (a, b) => a >= b, "=": (a, b) => a === b };
-function filter(table, index, column, wanted) {
-  const found = /^(<=|>=|<|>|=)\s*(-?[\d.]+(?:e-?\d+)?)\s*(%?)$/i.exec(wanted);
-  const limit = found && Number(found[2]) / (found[3] ? 100 : 1);
-  const passes = (value) => {
-    if (found && !column.isText) return value !== null && value !== undefined && TESTS[found[1]](value, limit);
-    if (wanted.toLowerCase() === "none" && !column.isText) return value === null || value === undefined;
-    return String(column.show(value)).toLowerCase().includes(wanted.toLowerCase());
-  };
-  table.search.fixed(`column ${index}`, wanted ? (_, [row]) => passes(column.get(row)) : null).draw();
-}
-function orderFigures() {
-  const missing = (value) => value === null || Number.isNaN(value);
-  const order = (sign) => (a, b) => (missing(a) || missing(b) ? missing(a) - missing(b) : sign * (a - b));
-  DataTable.ext.type.order["figure-asc"] = order(1);
-  DataTable.ext.type.order["figure-desc"] = order(-1);
-}
-
 // charts
-const embed = (element, spec) => vegaEmbed(element, { $schema: "https://vega.github.io/schema/vega-lite/v6.json", config: config(), ...spec },
-  { renderer: "svg", actions: { export: true, source: false, compiled: false, editor: false }, tooltip: { theme: isDark() ? "dark" : "light" } });
+async function embed(element, spec) {
+  element.drawn?.finalize(); // it would go on to listen for another size of the window
+  element.drawn = await vegaEmbed(element, { config: config(), ...spec }, { mode: "vega-lite", renderer: "svg", actions: { export: true, source: false, compiled: false, editor: false }, tooltip: { theme: isDark() ? "dark" : "light" } });
+  return element.drawn;
+}
 async function draw(element, spec) {
   if (typeof spec === "string") {
     element.replaceChildren();
@@ -108,6 +59,7 @@ async function drawCharts() {
   const mine = ++turn;
   for (const chart of CHARTS) {
     const element = byId(`chart-${chart.id}`).querySelector(".chart");
+    if (chart.more) byId(`chart-${chart.id}`).querySelector("span").textContent = `${chart.note} ${chart.more(group(), shown())}`;
     await draw(element, chart.draw(page, group(), shown(), element.clientWidth, state.measure));
     await new Promise((done) => setTimeout(done));
     if (turn !== mine) return;
@@ -155,10 +107,10 @@ function tellMethods() {
   group().notes.forEach((note) => add(byId("notes"), "li", note));
   const rows = group().methods.filter((one) => !state.off.has(one.method));
   const columns = [text("method", (one) => page.labels[one.method]), number("runs", (one) => one.runs), number("solved", (one) => one.solved, share),
-    number("proven optimal", (one) => one.proven), number("instances", (one) => one.instances), number("served", (one) => one.served),
+    number("proven", (one) => one.proven), number("instances", (one) => one.instances), number("served", (one) => one.served),
     number("best on", (one) => one.best), number("T / best", (one) => one.ratio), number("T", (one) => one.makespan), number("gap", (one) => one.gap, share),
     number("energy", (one) => one.energy), number("time (s)", (one) => one.runtime_s, (value) => figure(value, 3)),
-    number("most memory (MiB)", (one) => one.memory_mb, (value) => figure(value, 3))];
+    number("memory (MiB)", (one) => one.memory_mb, (value) => figure(value, 3))];
   if (rows.some((one) => one.picked)) columns.push(text("ran", (one) => one.picked));
   makeTable(byId("summary"), columns, rows);
 }
@@ -182,94 +134,14 @@ function tellPaired() {
     const rows = group().paired.filter((one) => one.score === score && one.against === state.against && !state.off.has(one.method));
     if (!rows.length) continue;
     const name = score === "makespan" ? "T" : "energy";
-    makeTable(add(add(place, "div", "", { class: "table" }), "table"), [text(`${name} against ${page.labels[state.against]}`, (one) => page.labels[one.method]),
+    makeTable(add(add(place, "div", "", { class: "table" }), "table"), [text(`${name} of`, (one) => page.labels[one.method]),
       number("less", (one) => one.better), number("equal", (one) => one.equal), number("more", (one) => one.worse),
       number("difference", (one) => one.mean, signed), number("from", (one) => one.low, signed), number("to", (one) => one.high, signed),
-      number("p", (one) => one.p, (value) => figure(value, 2)), number("p (Holm)", (one) => one.p_holm, (value) => figure(value, 2)),
+      number("p", (one) => one.p, chance), number("p (Holm)", (one) => one.p_holm, chance),
       number("instances", (one) => one.instances), number("left out", (one) => one.left_out), text("", (one) => (one.small ? "small sample" : ""))], rows);
-    if (rows.some((one) => one.low !== null)) draw(add(place, "div", "", { class: "chart" }), differences(page, rows.filter((one) => one.low !== null)));
+    const known = rows.filter((one) => one.low !== null);
+    if (known.length) draw(add(place, "div", "", { class: "chart" }), differences(page, known, place.clientWidth));
   }
-}
-
-// an instance
-async function showInstance(index) {
-  state.instance = index;
-  const { name, agents, tasks, chunk } = page.instances;
-  byId("find").value = name[index];
-  const detail = chunk[index] < 0 ? { traces: [], runs: 0 } : JSON.parse(await unpack(`detail-${chunk[index]}`))[index];
-  const map = detail.map;
-  const plans = map ? map.plans.filter((plan) => plan.group === state.group && !state.off.has(plan.method)) : [];
-  let about = `${name[index]}: ${counted(agents[index], "agent")}, ${counted(tasks[index], "task")}.`;
-  if (chunk[index] < 0) about += " Its map and traces are left out, to keep the page small; those of other instances are there.";
-  if (map && map.agents > map.agent.id.length) about += ` Thinned: the map shows ${counted(map.agent.id.length, "agent")}, evenly chosen.`;
-  if (map && map.tasks > map.task.id.length) about += ` Thinned: it shows the ${counted(map.task.id.length, "task")} with the largest workload.`;
-  if (detail.runs > 200) about += " Curves are of 200 of its runs.";
-  byId("size").textContent = about;
-  if (!plans.some((plan) => plan.method === state.plan)) state.plan = plans.length ? plans[0].method : -1;
-  byId("plans").replaceChildren();
-  for (const plan of plans) {
-    const figures = `T ${figure(plan.makespan, 4)}, energy ${figure(plan.energy, 4)}${plan.unserved ? `, ${plan.unserved} unserved` : ""}, seed ${plan.seed}`;
-    const chip = add(byId("plans"), "button", "", { type: "button", "aria-pressed": plan.method === state.plan });
-    add(chip, "i", "", { style: `background: ${colourOf(page, plan.method)}; border-color: ${colourOf(page, plan.method)}` });
-    chip.append(`${page.labels[plan.method]}: ${figures}`);
-    chip.onclick = () => { state.plan = plan.method; showInstance(index); };
-  }
-  await showPlan(map, plans.find((plan) => plan.method === state.plan));
-  await showTraces(detail.traces);
-}
-const caption = (id, title, note) => {
-  const place = byId(id).querySelector("figcaption");
-  place.replaceChildren();
-  add(place, "b", title);
-  place.append(note);
-};
-async function showPlan(map, plan) {
-  const chart = byId("place").querySelector(".chart");
-  const [width, height] = [Math.max(chart.clientWidth - 75, 180), window.innerWidth < 760 ? 320 : 420];
-  caption("place", plan ? `Plan of ${page.labels[plan.method]}` : "Map", plan
-    ? "Sites by workload (area) and time done; orange rings are unserved. Squares are starts, hollow where all stay idle. Drag to move, turn the wheel to zoom."
-    : "Sites by workload (area); squares are starts. Drag to move, turn the wheel to zoom.");
-  const [laid, zoom] = map ? await drawMap(chart, map, plan, width, height) : [null, null];
-  byId("zoom").hidden = !zoom;
-  byId("groups").hidden = !plan;
-  if (!zoom) await draw(chart, map ? "There is no map: the instance has no positions." : "There is no map: the store has no content of this instance, as it was made before alloc kept that, or it is left out here.");
-  else if (!plan) add(chart, "p", "No plan is kept under these conditions: no run was solved, or they were made before alloc kept plans.", { class: "none" });
-  for (const [id, factor] of [["in", 1 / 1.6], ["out", 1.6], ["fit", 0]]) byId(id).onclick = () => zoom(factor);
-  if (!plan) return;
-  makeTable(byId("groups").querySelector("table"), [text("task", (task) => task.id), number("workload", (task) => task.work), number("done at", (task) => task.done),
-    number("ability", (task) => task.ability), number("agents", (task) => task.count), text("who", (task) => listed(task.agents, task.count) || "-")],
-  laid.tasks, { paging: laid.tasks.length > 25 });
-}
-async function showTraces(traces) {
-  const own = traces.filter((one) => one.group === state.group && !state.off.has(one.method) && one.steps.length);
-  const chart = byId("trace").querySelector(".chart");
-  caption("trace", "What each run found when", "Makespan of the best plan so far, a line for each run.");
-  if (!own.length) return draw(chart, "There is nothing to draw: no run has a trace with a makespan.");
-  const end = Math.max(...own.map((one) => one.steps[one.steps.length - 2])) + 2;
-  const values = own.flatMap((one) => {
-    const points = one.steps.flatMap((step, i) => (i % 2 ? [] : [{ x: step, y: one.steps[i + 1] }]));
-    points.push({ x: end, y: points[points.length - 1].y });
-    return points.map(({ x, y }) => ({ x: 1e-3 * 10 ** (x / 20), y, method: page.labels[one.method], seed: one.seed, run: `${one.method} ${one.seed}` }));
-  });
-  const methods = [...new Set(own.map((one) => one.method))];
-  const { color, strokeDash } = byMethod(page, methods, chart.clientWidth);
-  return draw(chart, { height: 340, data: { values }, mark: { type: "line", interpolate: "step-after", strokeWidth: 1.5, opacity: 0.8, tooltip: true },
-    encoding: { x: quantitative("x", "time (s)", seconds), y: quantitative("y", "T", { scale: { zero: false } }), color, strokeDash, detail: { field: "run" } } });
-}
-function layInstances() {
-  const numbers = new Map(page.instances.name.map((name, i) => [name, i]));
-  byId("find").onfocus = () => {
-    byId("find").select();
-    if (!byId("names").children.length) page.instances.name.slice(0, 3000).forEach((name) => add(byId("names"), "option", "", { value: name }));
-  };
-  byId("find").onchange = () => {
-    const wanted = byId("find").value.trim();
-    const index = numbers.get(wanted) ?? page.instances.name.findIndex((name) => name.toLowerCase().includes(wanted.toLowerCase()));
-    if (index >= 0) showInstance(index);
-  };
-  const total = page.instances.name.length;
-  byId("before").onclick = () => showInstance((state.instance + total - 1) % total);
-  byId("after").onclick = () => showInstance((state.instance + 1) % total);
 }
 
 // runs
@@ -363,6 +235,7 @@ async function main() {
   if (!page.groups.length) {
     byId("about").textContent = `${page.stores.join(", ")}; written ${page.made} by alloc ${page.version}`;
     byId("problem").hidden = false;
+    document.querySelector("nav").hidden = true;
     byId("problem").textContent = "There are no runs: none has ended yet. `alloc compare ... --store` makes some.";
     return;
   }
@@ -374,15 +247,20 @@ async function main() {
   tellAll();
   layFigures();
   layInstances();
-  new IntersectionObserver((entries, observer) => {
+  await load("library-vega");
+  await update(true);
+  if (page.groups.reduce((sum, one) => sum + one.conditions.runs, 0) <= SOON) await tellRuns();
+  else new IntersectionObserver((entries, observer) => {
     if (!entries.some((entry) => entry.isIntersecting)) return;
     observer.disconnect();
     tellRuns();
   }, { rootMargin: "300px" }).observe(byId("runs"));
-  await load("library-vega");
-  await update(true);
-  window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { setTheme(); update(false); });
-  document.documentElement.dataset.ready = "yes";
+  window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+    if (window.matchMedia("print").matches) return; // paper is light, and is printed before charts could be drawn again
+    setTheme();
+    update(false);
+  });
+  document.documentElement.dataset.ready = Math.round(performance.now()); // milliseconds until all is drawn
 }
 main().catch((error) => {
   byId("problem").hidden = false;

@@ -60,11 +60,12 @@ def _over_time(group: Group) -> list[Entry]:
     steps = [moment(point[0]) for one in ended for point in one.trace]
     if not steps:
         return []
-    first, last = max(min(steps) - 1, 0), max(*steps, *(moment(one.runtime_s or 0.0) for one in ended))
+    last = max(max(steps) + 2, *(moment(one.runtime_s or 0.0) for one in ended))
+    first, last = max(min(steps) - 1, 0), min(last, len(EDGES_S) - 1)
     times = EDGES_S[first : last + 1]
     reached = targets_reached(common, times)
     best = [_best([one for runs in common.values() for one in runs[n]]) for n in range(len(group.common))]
-    found = []
+    found: list[Entry] = []
     for method, (label, runs) in zip(group.methods, common.items(), strict=True):
         table = np.array(
             [
@@ -156,12 +157,13 @@ def _bins(agents: NDArray[np.float64]) -> NDArray[np.intp]:
     if len(sizes) <= MOST_SIZES:
         return np.searchsorted(sizes, agents)
     low, high = np.log(max(sizes[0], 1.0)), np.log(sizes[-1])
-    return np.floor((np.log(np.maximum(agents, 1.0)) - low) / (high - low) * (MOST_SIZES - 1e-9)).astype(np.intp)
+    place = (np.log(np.maximum(agents, 1.0)) - low) / (high - low)
+    return np.asarray(np.floor(place * (MOST_SIZES - 1e-9)), dtype=np.intp)
 
 
 def _gaps(group: Group) -> list[Entry]:
     """Return quantiles of the gap to the best bound of each method, and on how many instances there is one."""
-    found = []
+    found: list[Entry] = []
     for method, runs in zip(group.methods, group.endings.values(), strict=True):
         values = scores(runs, "gap")
         known = values[np.isfinite(values)]

@@ -73,7 +73,9 @@ def methods(group: Group) -> list[Entry]:
                 "energy": _finite(_mean(scores(runs, "energy"))),
                 "runtime_s": _finite(_mean(scores(runs, "runtime_s"))),
                 "memory_mb": max(one.memory_mb for one in ended),
-                "picked": ", ".join(sorted({one.picked for one in ended if one.picked and one.picked != label})),
+                "picked": ", ".join(
+                    sorted({one.picked for one in ended if one.picked and label.partition("[")[0] == "auto"})
+                ),
             }
         )
     return rows

@@ -3,17 +3,21 @@
 import shutil
 from pathlib import Path
 
+from alloc.allocators.experiments.reproduction import figures
+
 DOCS = Path(__file__).parents[4] / "docs" / "reproduction"
 
 
-def test_a_page_from_rows_alone(alloc):
-    """With --page nothing is run: the page and the figures come from the rows in the folder."""
+def test_a_page_from_rows_alone(alloc, monkeypatch):
+    """With --page nothing is run: the page comes from the rows in the folder, and figures go beside them."""
+    drawn = []
+    monkeypatch.setattr(figures, "draw_all", lambda learned, solved, folder: drawn.append(folder))
     shutil.copytree(DOCS, "here/reproduction", ignore=shutil.ignore_patterns("*.png"))
     ran = alloc("reproduce", "here", "--page")
     assert (ran.code, ran.out) == (0, "")
     assert ran.err.startswith("here/reproduction.md: ")
     assert Path("here/reproduction.md").read_bytes() == DOCS.with_suffix(".md").read_bytes()
-    assert Path("here/reproduction/figure-6.png").exists()
+    assert drawn == [Path("here/reproduction")]
 
 
 def test_a_short_run(alloc):

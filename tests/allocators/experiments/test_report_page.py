@@ -1,0 +1,234 @@
+"""The page of a report: what is in it, in numbers, and that nothing stored becomes HTML or script."""
+
+import base64
+import gzip
+import json
+import re
+import sqlite3
+
+import numpy as np
+import pytest
+from stored_runs import ANGRY, fill
+
+from alloc.allocators import report_html
+from alloc.allocators.experiments.report.page import details as details_module
+from alloc.allocators.experiments.report.page import libraries
+from alloc.allocators.experiments.report.page import summary as summary_module
+from alloc.allocators.experiments.report.page.groups import laid_out
+from alloc.allocators.experiments.report.page.page import check_page
+from alloc.allocators.experiments.report.page.series import series
+from alloc.allocators.experiments.report.page.source import EDGES_S, read_stores, thinned
+from alloc.allocators.experiments.statistics import differences, profiles, targets_reached
+from alloc.allocators.experiments.store.outcome import Ending, Outcome
+from alloc.allocators.experiments.store.store import Store
+from alloc.problems import InputError, MissingPackageError
+
+
+@pytest.fixture(autouse=True)
+def without_libraries(monkeypatch):
+    """Bundling the libraries takes seconds, and no test here looks at them."""
+    monkeypatch.setattr("alloc.allocators.experiments.report.page.page.libraries", lambda: {"library-vega": ""})
+
+
+@pytest.fixture
+def store(tmp_path):
+    fill(tmp_path / "runs.db")
+    return tmp_path / "runs.db"
+
+
+def data_of(page):
+    """Return all data of a page, by the ids of its elements."""
+    found = re.findall(r'id="data-([^"]+)">([^<]+)</script>', page.read_text())
+    return {name: json.loads(gzip.decompress(base64.b64decode(text))) for name, text in found if text}
+
+
+def written(store, tmp_path, **options):
+    report_html([store], tmp_path / "report.html", **options)
+    return data_of(tmp_path / "report.html")
+
+
+def test_the_page_tells_what_was_run_and_how_it_ended(store, tmp_path):
+    """Conditions, methods with their parameters, means, outcomes, and the statistics that `differences` gives."""
+    main = written(store, tmp_path)["main"]
+    (group,) = main["groups"]
+    told = group["conditions"]
+    assert (told["objective"], told["time_limit_s"], told["runs"], told["instances"]) == ("makespan-energy", 1.0, 24, 4)
+    assert (told["revision"], told["machine"]) == ("abc+", told["machine"])
+    assert main["labels"] == ["greedy", "ga[population=4]", "hedonic"]
+    rows = {main["labels"][row["method"]]: row for row in group["methods"]}
+    assert rows["greedy"]["makespan"] == 1.0
+    assert rows["ga[population=4]"]["ratio"] == 1.5
+    assert (rows["ga[population=4]"]["served"], rows["ga[population=4]"]["instances"]) == (3, 4)
+    assert rows["ga[population=4]"]["outcomes"] == {"solved": 7, "failed": 1}
+    assert rows["greedy"]["gap"] == 0.2  # against the best bound of any method
+    layout = laid_out(read_stores([store]))
+    expected = differences(layout.groups[0].endings)[0]
+    (one,) = [row for row in group["paired"] if (row["method"], row["against"], row["score"]) == (1, 0, "makespan")]
+    assert (one["mean"], one["better"], one["left_out"]) == (expected.mean, expected.better, expected.left_out)
+    assert one["p_holm"] == float(f"{expected.p_holm:.6g}")
+
+
+def test_every_method_is_compared_with_one_where_every_pair_is_too_many(store, tmp_path, monkeypatch):
+    """The first method is the reference, or the one that is asked for; an unknown one is an error that names all."""
+    found = written(store, tmp_path)["main"]["groups"][0]["paired"]
+    assert {row["against"] for row in found} == {0, 1}  # the third one solved nothing
+    monkeypatch.setattr(summary_module, "MOST_PAIRED", 0)
+    assert {row["against"] for row in written(store, tmp_path)["main"]["groups"][0]["paired"]} == {0}
+    asked = written(store, tmp_path, against="ga[population=4]")["main"]["groups"][0]["paired"]
+    assert {row["against"] for row in asked} == {1}
+    with pytest.raises(InputError, match=r"against: 'x' is not among the methods greedy, ga\[population=4\]"):
+        report_html([store], tmp_path / "report.html", against="x")
+
+
+def test_nothing_stored_is_html_or_script(store, tmp_path):
+    """Names and tracebacks with tags stand in the compressed data alone; the title is escaped."""
+    data = written(store, tmp_path, title=f"All {ANGRY}")
+    text = (tmp_path / "report.html").read_text()
+    assert ANGRY in data["main"]["instances"]["name"]
+    assert ANGRY in data["main"]["failures"][1]["details"]
+    assert ANGRY not in text
+    assert text.count("</script>") == text.count("<script")
+    assert "<title>All &lt;/script&gt;" in text
+
+
+def test_runs_are_columns_and_know_their_failures(store, tmp_path):
+    """Each run has its figures at the same place of all columns; a failure that repeats is there once."""
+    data = written(store, tmp_path)
+    runs, failures = data["runs"], data["main"]["failures"]
+    assert {len(column) for column in runs.values()} == {24}
+    (failed,) = [place for place, outcome in enumerate(runs["outcome"]) if outcome == "failed"]
+    assert (runs["makespan"][failed], failures[runs["failure"][failed]]["reason"]) == (None, "ValueError: no")
+    refused = [place for place, outcome in enumerate(runs["outcome"]) if outcome == "refused"]
+    assert len({runs["failure"][place] for place in refused}) == 1
+    assert [one["runs"] for one in failures] == [8, 1]
+
+
+def test_maps_hold_places_groups_and_plans(store, tmp_path):
+    """Places come back to three digits; of each method there is the best plan, with its groups and times."""
+    data = written(store, tmp_path)
+    main, detail = data["main"], data["detail-0"]
+    number = main["instances"]["name"].index("i1")
+    shown = detail[str(number)]["map"]
+    places = np.array(shown["origin"]) + shown["unit"] * np.array(shown["task"]["place"])
+    np.testing.assert_allclose(places, [[0, 0], [3, 1]], atol=1e-3)
+    assert shown["agent"]["id"] == ["a1", "a2", "a3"]
+    plan = next(one for one in shown["plans"] if one["method"] == 0)
+    assert (plan["of"], plan["count"], plan["ability"], plan["done"]) == ([0, 0, 1], [2, 1], [3.0, 3.0], [1.0, 1.0])
+    worst = next(one for one in shown["plans"] if one["method"] == 1)
+    assert (worst["done"][1], worst["count"]) == (None, [3, 0])
+    trace = detail[str(number)]["traces"][0]["steps"]
+    assert [EDGES_S[trace[0]] >= 0.5, trace[1], len(trace)] == [True, 1.0, 2]
+
+
+def test_large_instances_are_thinned_and_small_rooms_leave_some_out(store, tmp_path, monkeypatch):
+    """Beyond so many agents and tasks a map has a part of them; without room, instances have no map at all."""
+    for limit in ("MOST_AGENTS", "MOST_TASKS"):
+        monkeypatch.setattr(details_module, limit, 1)
+    shown = written(store, tmp_path)["detail-0"]["0"]["map"]
+    assert (len(shown["agent"]["id"]), len(shown["task"]["id"]), shown["agents"], shown["tasks"]) == (1, 1, 3, 2)
+    assert set(shown["plans"][0]["of"]) <= {-2, -1, 0}
+    monkeypatch.setattr(details_module, "CHUNK", 1)
+    monkeypatch.setattr("alloc.allocators.experiments.report.page.page.DETAIL_BYTES", 0)
+    monkeypatch.setattr("alloc.allocators.experiments.report.page.page.DETAIL_BYTES_A_RUN", 0)
+    assert sorted(written(store, tmp_path)["main"]["instances"]["chunk"]) == [-1, -1, -1, 0]
+
+
+def test_thinned_traces_reach_the_same_targets():
+    """At every moment that a page draws, a thinned trace has what the whole one has, and it is far shorter."""
+    rng = np.random.default_rng(1)
+    endings = {}
+    for label in "ab":
+        times = np.sort(10 ** rng.uniform(-4, 1.5, 500))
+        makespans = np.sort(rng.uniform(1, 1.1, 500))[::-1]
+        trace = tuple((time, makespan, 1.0, None) for time, makespan in zip(times, makespans, strict=True))
+        endings[label] = [[Ending(outcome=Outcome.SOLVED, makespan=makespans[-1], trace=trace)]]
+    short = {
+        label: [[Ending(outcome=Outcome.SOLVED, makespan=one.makespan, trace=thinned(one.trace))]]
+        for label, [[one]] in endings.items()
+    }
+    assert len(short["a"][0][0].trace) < 110
+    assert targets_reached(short, EDGES_S) == targets_reached(endings, EDGES_S)
+
+
+def test_series_are_those_of_the_statistics(store):
+    """Profiles are those of `profiles`; quantiles of curves, gaps and sizes are of the runs; points are instances."""
+    layout = laid_out(read_stores([store]))
+    (group,) = layout.groups
+    found = series(layout, group)
+    shares = profiles(group.endings_in_common, found["profiles"][1]["x"])
+    assert found["profiles"][1]["y"] == shares["ga[population=4]"]
+    curve = found["time"][1]
+    assert curve["middle"][-1] == pytest.approx(0.5)
+    assert curve["middle"][0] is None
+    assert [one["x"] for one in found["tradeoff"]] == [[1.0] * 4, [1.5] * 3]
+    assert [one["middle"] for one in found["gaps"]] == pytest.approx([0.2, 1 - 0.8 / 1.5])
+    sizes = {one["measure"]: one for one in found["scaling"] if one["method"] == 0}
+    assert sizes["runtime_s"]["agents"] == pytest.approx(3)
+    assert sizes["runtime_s"]["middle"] == 0.5
+
+
+def test_runs_under_other_conditions_are_told_apart(store, tmp_path):
+    """Another budget is another group; a plugin's version is part of its method; the same run twice counts once."""
+    fill(tmp_path / "more.db", time_limit_s=2.0)
+    report_html([store, tmp_path / "more.db", store], tmp_path / "report.html")
+    main = data_of(tmp_path / "report.html")["main"]
+    assert sorted(one["conditions"]["time_limit_s"] for one in main["groups"]) == [1.0, 2.0]
+    assert [one["conditions"]["runs"] for one in main["groups"]] == [24, 24]
+    with sqlite3.connect(store) as edited:
+        edited.execute("UPDATE runs SET version = version || ' + plug 1' WHERE method = 'hedonic' AND seed = 0")
+        edited.execute("UPDATE runs SET version = version || ' + plug 2' WHERE method = 'hedonic' AND seed = 1")
+    found = written(store, tmp_path)["main"]
+    assert len(found["groups"]) == 1
+    assert sorted(found["labels"]) == ["ga[population=4]", "greedy", "hedonic (plug 1)", "hedonic (plug 2)"]
+
+
+def test_what_there_is_little_of_is_told(tmp_path):
+    """No runs, one run, one method, only failures and no bounds: the page is written, and notes say what is missing."""
+    Store(tmp_path / "runs.db").close()
+    assert written(tmp_path / "runs.db", tmp_path)["main"]["groups"] == []
+    (tmp_path / "none.db").write_bytes(b"")
+    assert written(tmp_path / "none.db", tmp_path)["main"]["groups"] == []
+    cases = {
+        "Only one method": {"methods": ["greedy"]},
+        "Small sample: 1 instance in common": {"instances": 1},
+        "No run was solved": {"methods": ["hedonic"]},
+        "No run proved a bound": {"methods": ["greedy"], "bound": None},
+    }
+    for number, (words, options) in enumerate(cases.items()):
+        fill(tmp_path / f"{number}.db", **options)
+        (group,) = written(tmp_path / f"{number}.db", tmp_path)["main"]["groups"]
+        assert any(note.startswith(words) for note in group["notes"]), (words, group["notes"])
+
+
+def test_a_store_of_the_first_version_has_no_maps(store, tmp_path):
+    """It is read as it is, and is not changed; what it lacks is left out."""
+    with sqlite3.connect(store) as older:
+        older.executescript(
+            "DROP TABLE plans; DROP TABLE contents; ALTER TABLE runs DROP COLUMN revision; PRAGMA user_version = 1"
+        )
+    data = written(store, tmp_path)
+    assert "map" not in data["detail-0"]["0"]
+    assert data["main"]["groups"][0]["conditions"]["revision"] == ""
+    assert sqlite3.connect(store).execute("PRAGMA user_version").fetchone() == (1,)
+
+
+def test_what_cannot_be_read_or_written_is_an_error(store, tmp_path, monkeypatch):
+    """A missing store, another suffix, and a missing package are errors of one line; no page is left behind."""
+    with pytest.raises(InputError, match=r"no\.db: cannot be opened"):
+        report_html([tmp_path / "no.db"], tmp_path / "report.html")
+    assert not (tmp_path / "no.db").exists()
+    with pytest.raises(InputError, match=r"must end in \.html"):
+        report_html([store], tmp_path / "report.pdf")
+    with pytest.raises(InputError, match="stores: must name a store"):
+        report_html([], tmp_path / "report.html")
+    monkeypatch.setattr(libraries, "find_spec", lambda name: None)
+    with pytest.raises(MissingPackageError, match=r"Jinja2 and vl-convert-python and itables.*alloc-mrta\[report\]"):
+        check_page(tmp_path / "report.html")
+    assert [path.name for path in tmp_path.iterdir() if path.suffix == ".html"] == []
+
+
+def test_progress_is_told(store, tmp_path):
+    """Whoever waits for a long report hears how far it is."""
+    said = []
+    report_html([store], tmp_path / "report.html", progress=said.append)
+    assert said == ["statistics of 1 of 1 conditions", "4 of 4 instances"]
