@@ -25,6 +25,7 @@ from alloc.allocators.experiments.store.outcome import Ending, Outcome
 from alloc.allocators.experiments.store.store import Store
 from alloc.allocators.experiments.stored import planned
 from alloc.cli.commands.experiments.sources import gather
+from alloc.cli.options import BETWEEN_SETTINGS, values
 from alloc.problems import paper_like
 
 EQUAL, ALIKE = 1e-9, 1e-4
@@ -74,7 +75,8 @@ EXPERIMENTS = {
     "unseen": Experiment(UNSEEN, LEARNED, (2.0,), 10),
     "local-search": Experiment(PAPER, ("local-search",), (0.1, 1.0), 100),
     "large": Experiment(tuple(LARGE), ("local-search", *LEARNED), (10.0,), 10),
-    "exact": Experiment(PAPER, ("cpsat", "milp"), (10.0,), 100, objective="makespan"),
+    "exact": Experiment(PAPER, ("cpsat", "milp", "cpsat[descent=false]", "milp[descent=false]", "milp[plain=true]"),
+                        (10.0,), 100, objective="makespan"),
     "ga": Experiment(PAPER, ("ga",), (10.0,), 20, objective="makespan"),
     "all": Experiment((*PAPER, UNSEEN[0], UNSEEN[2], UNSEEN[7], UNSEEN[8]), ("greedy", "local-search", "ga", "hedonic",
                       "auction", "lp-round", "cpsat", "milp", *LEARNED, *RIVALS), (0.03, 0.3, 3.0), 3),
@@ -141,7 +143,7 @@ def columns(endings: Sequence[Ending | None], bests: Sequence[Best], firsts: int
 
 def lines(experiment: Experiment, store: Store, seeds: int, workers: int | None) -> Iterator[list[str]]:
     """Make the runs that the store has not yet, and yield a line per family, limit and method."""
-    variants = {method: (method, {}) for method in experiment.methods}
+    variants = {label: parsed(label) for label in experiment.methods}
     for family in experiment.families:
         own = LARGE.get(family)
         instances = [own(seed) for seed in range(seeds)] if own else gather([f"{family}:0-{seeds - 1}"])
@@ -161,6 +163,12 @@ def lines(experiment: Experiment, store: Store, seeds: int, workers: int | None)
             for label, ends in found.items():
                 firsts = sum(one == best < WORST for one, best in zip(scores[label], least, strict=True))
                 yield [family, label, f"{limit:g}", *columns(ends, bests, firsts)]
+
+
+def parsed(label: str) -> tuple[str, dict[str, object]]:
+    """Return the name and the parameters of a method that is written as on a command line."""
+    name, bracket, settings = label.removesuffix("]").partition("[")
+    return name, values(BETWEEN_SETTINGS.split(settings)) if bracket else {}
 
 
 def main() -> None:

@@ -1,14 +1,12 @@
-"""Models as one would state them without further thought, and published programs, as methods of `alloc compare`.
+r"""Published programs as methods of `alloc compare`.
 
     export PYTHONPATH=tests/benchmarks:FOLDER    # with peers-1.0.dist-info and, for pygrape, pyGRAPE.py
-    alloc compare paper-1:0-4 'covering[agents=9,tasks=3,ability_max=20]:0-4' --methods cpsat,naive-cvxpy,naive-cpsat,prtpy \
-        --time-limit 3 --store peers.db --report peers.md
+    alloc compare paper-1:0-4 'covering[agents=9,tasks=3,ability_max=20]:0-4' --time-limit 3 \
+        --methods cpsat,'milp[plain=true]','cpsat[plain=true]',prtpy --store peers.db --report peers.md
 
-`naive-cvxpy` and `naive-cpsat` decide every pair of agent and task (e_ij), first for the makespan and then, in what time
-is left, for the energy at it; `prtpy` is its integer programme for the weighted largest smallest sum (pip install
-alloc-mrta[bench]); `pygrape` is github.com/inmo-jang/pyGRAPE, in which agents hear each other up to
-`communication_radius`.
-"""  # noqa: E501
+`prtpy` is its integer programme for the weighted largest smallest sum (pip install alloc-mrta[bench]); `pygrape` is
+github.com/inmo-jang/pyGRAPE, in which agents hear each other up to `communication_radius`.
+"""
 
 import sys
 import types
@@ -19,98 +17,13 @@ import numpy as np
 
 from alloc.allocators import Allocator, Method, Proposal, Search
 from alloc.allocators.contract.parameters import CheckedParameters, bounded
-from alloc.problems import Allocation, Objective, RefusedError
-
-
-def stages(search: Search) -> int:
-    """Return how many programmes are solved: one for the makespan, and where it counts one for the energy."""
-    return 2 if search.objective is Objective.MAKESPAN_ENERGY else 1
+from alloc.problems import Allocation, RefusedError
 
 
 def refuse_ranges(search: Search) -> None:
     """Refuse an instance in which an agent cannot take every task."""
     if not search.instance.reach.is_complete:
         raise RefusedError("ranges are beyond it")
-
-
-class NaiveCvxpy(Allocator):
-    """Maximise 1 / T over every e_ij, then fly least at that T."""
-
-    method = Method(name="naive-cvxpy", summary="every e_ij by cvxpy and HiGHS", requires=("cvxpy", "highspy"))
-
-    def allocate(self, search: Search) -> Proposal:
-        """Solve both programmes, as far as the time goes."""
-        import cvxpy as cp
-
-        instance = search.instance
-        e, pace = cp.Variable((instance.n, instance.m), boolean=True), cp.Variable()
-        reach = instance.reach.mask[instance.reach.origin].astype(float)
-        rules = [cp.sum(e, axis=1) <= 1, e <= reach]
-        goals = [(cp.Maximize(pace), instance.ability @ e >= pace * instance.workload)]
-        has_work = instance.workload > 0
-        for stage in range(stages(search)):
-            goal, rule = goals[stage]
-            if search.remaining_s <= 0:
-                break
-            problem = cp.Problem(goal, [*rules, rule])
-            try:
-                problem.solve(solver=cp.HIGHS, highs_options={"time_limit": search.remaining_s, "threads": 1})
-            except cp.error.SolverError:
-                break
-            if e.value is None or problem.status not in ("optimal", "optimal_inaccurate", "user_limit"):
-                break
-            whole = np.round(e.value)
-            group = instance.ability @ whole
-            if (group[has_work] <= 0).any():
-                break  # at a limit without an incumbent cvxpy gives zeros
-            search.submit(Allocation(np.where(whole.any(axis=1), whole.argmax(axis=1), -1)))
-            best = float((group[has_work] / instance.workload[has_work]).min())
-            distance = instance.reach.distance[instance.reach.origin]
-            enough = instance.workload * best * (1 - 1e-9)
-            goals.append((cp.Minimize(cp.sum(cp.multiply(distance, e))), instance.ability @ e >= enough))
-        return Proposal()
-
-
-class NaiveCpsat(Allocator):
-    """Do the same by CP-SAT; abilities and workloads are scaled to whole numbers."""
-
-    method = Method(name="naive-cpsat", summary="every e_ij by CP-SAT", requires=("ortools",))
-
-    def allocate(self, search: Search) -> Proposal:
-        """Solve both programmes, as far as the time goes."""
-        from ortools.sat.python import cp_model
-
-        instance = search.instance
-        whole = (instance.ability == np.round(instance.ability)).all() and (instance.workload % 1 == 0).all()
-        scale, fine = 1 if whole else 10**4, 10**6
-        ability = np.round(instance.ability * scale).astype(int).tolist()
-        work = np.round(instance.workload * scale).astype(int).tolist()
-        mask, distance = (table[instance.reach.origin] for table in (instance.reach.mask, instance.reach.distance))
-        model = cp_model.CpModel()
-        e = {(i, j): model.new_bool_var("") for i, j in np.argwhere(mask).tolist()}
-        for i in range(instance.n):
-            model.add_at_most_one(e[i, j] for j in np.flatnonzero(mask[i]).tolist())
-        pace = model.new_int_var(0, int(fine * sum(ability) / max(1, min(h for h in work if h > 0))) + 1, "")
-        for j, h in enumerate(work):
-            if h > 0:
-                model.add(fine * sum(ability[i] * e[i, j] for i in np.flatnonzero(mask[:, j]).tolist()) >= h * pace)
-        model.maximize(pace)
-        for _ in range(stages(search)):
-            solver = cp_model.CpSolver()
-            if search.remaining_s <= 0:
-                break
-            solver.parameters.max_time_in_seconds = search.remaining_s
-            solver.parameters.num_workers = search.threads
-            if solver.solve(model) not in (cp_model.OPTIMAL, cp_model.FEASIBLE):
-                break
-            plan = np.full(instance.n, -1)
-            for (i, j), variable in e.items():
-                if solver.value(variable):
-                    plan[i] = j
-            search.submit(Allocation(plan))
-            model.add(pace >= solver.value(pace))
-            model.minimize(sum(int(10**6 * distance[pair]) * variable for pair, variable in e.items()))
-        return Proposal()
 
 
 class Prtpy(Allocator):
