@@ -1,29 +1,25 @@
 """Decorators for functions that numba compiles to machine code, at their first call or from its cache."""
 
 from collections.abc import Callable
-from typing import Literal, TypedDict, TypeVar, Unpack, cast
+from typing import TypeVar, cast
 
 import numba
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
 
-class _Options(TypedDict, total=False):
-    """Options of `numba.njit`; `fastmath` is for code that needs no particular order of floating-point operations."""
+_LOOSELY = {"error_model": "numpy", "fastmath": {"contract", "reassoc", "arcp", "nsz", "afn"}}
 
-    error_model: Literal["numpy"]
-    fastmath: set[str]
-    _nrt: bool
+_IN_PLACE = {"_nrt": False}
+"""Not among the options that numba documents: no references are counted, and no arrays can be made."""
 
 
-_LOOSELY: _Options = {"error_model": "numpy", "fastmath": {"contract", "reassoc", "arcp", "nsz", "afn"}}
-
-
-def _cached(function: Function, **options: Unpack[_Options]) -> Function:
+def _cached(function: Function, **options: object) -> Function:
+    njit = cast(Callable[..., Callable[[Function], Function]], numba.njit)
     try:
-        return cast(Function, numba.njit(cache=True, nogil=True, **options)(function))
+        return njit(cache=True, nogil=True, **options)(function)
     except RuntimeError:  # no folder for the cache
-        return cast(Function, numba.njit(nogil=True, **options)(function))
+        return njit(nogil=True, **options)(function)
 
 
 def compiled(function: Function) -> Function:
@@ -41,7 +37,7 @@ def compiled_in_place(function: Function) -> Function:
     Who uses an array is then not counted. That matters where many small functions pass on many arrays: in missions,
     counting took more than half of the time.
     """
-    return _cached(function, _nrt=False)
+    return _cached(function, **_IN_PLACE)
 
 
 def compiled_loosely(function: Function) -> Function:
@@ -54,7 +50,7 @@ def compiled_loosely(function: Function) -> Function:
 
 def compiled_loosely_in_place(function: Function) -> Function:
     """Compile `function` as both `compiled_loosely` and `compiled_in_place` do."""
-    return _cached(function, _nrt=False, **_LOOSELY)
+    return _cached(function, **_IN_PLACE, **_LOOSELY)
 
 
 def inlined(function: Function) -> Function:

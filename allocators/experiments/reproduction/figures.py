@@ -10,7 +10,7 @@ import numpy as np
 from alloc.allocators.experiments.reproduction.protocol import ITERATIONS, OTHERS, PAPER_BATTERY, PAPER_METHODS
 from alloc.allocators.experiments.reproduction.rows import Learned, Solved
 from alloc.allocators.experiments.reproduction.summary import latest_length, of_scenario, runs_of
-from alloc.allocators.plotting.colours import SERIES
+from alloc.allocators.plan.palette import SERIES
 from alloc.allocators.plotting.style import drawn, new_figure
 from alloc.problems.generate.paper_scenarios import SCENARIOS
 from alloc.problems.text import counted

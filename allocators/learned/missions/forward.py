@@ -53,7 +53,7 @@ def score(
 
 @compiled_loosely_in_place
 def add_context(
-    token: Singles, count: int, largest: float, weights: MissionWeights, pooled: Singles, attention: Singles
+    token: Singles, count: int, largest: np.float32, weights: MissionWeights, pooled: Singles, attention: Singles
 ) -> None:
     """Fill the pooled token and what it adds to each option, the two rows of `pooled`."""
     pooled[0, :] = F(0)
