@@ -135,7 +135,7 @@ def columns(endings: Sequence[Ending | None], bests: Sequence[Best], firsts: int
         f"{beyond.mean():.2%}", f"{beyond.max():.2%}", f"{ratio.mean():.3f}",
         f"{ratio[is_least].mean():.3f}" if is_least.any() else "-",
         str(sum(one.unserved or 0 for one, _ in solved)), str(len(endings) - len(solved)),
-        f"{np.mean([point[1] or np.nan for point in points]):.4f}" if points else "-",
+        f"{np.mean(first):.4f}" if (first := [point[1] for point in points if point[1]]) else "-",
         f"{1000 * np.median([point[0] for point in points]):.1f}" if points else "-",
         f"{np.mean([one.runtime_s for one, _ in solved]):.3f}", str(firsts),
     ]  # fmt: skip
