@@ -249,6 +249,7 @@ async function main() {
   layInstances();
   await load("library-vega");
   await update(true);
+  document.documentElement.dataset.ready = Math.round(performance.now()); // milliseconds until all is drawn but the table of runs
   if (page.groups.reduce((sum, one) => sum + one.conditions.runs, 0) <= SOON) await tellRuns();
   else new IntersectionObserver((entries, observer) => {
     if (!entries.some((entry) => entry.isIntersecting)) return;
@@ -260,7 +261,6 @@ async function main() {
     setTheme();
     update(false);
   });
-  document.documentElement.dataset.ready = Math.round(performance.now()); // milliseconds until all is drawn
 }
 main().catch((error) => {
   byId("problem").hidden = false;
