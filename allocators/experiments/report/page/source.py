@@ -1,10 +1,11 @@
 """What stores hold, read for a page: all runs, with traces no finer than a page draws them."""
 
+import json
 import math
 import os
 import sqlite3
 from bisect import bisect_left
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, field, fields, replace
 from urllib.request import pathname2url
@@ -119,10 +120,17 @@ def _records(connection: sqlite3.Connection) -> Iterator[tuple[str, Record]]:
     has = {row[1] for row in connection.execute("PRAGMA table_info(runs)")}
     usual = {one.name: "NULL" if one.default is None else "''" for kind in (Run, Ending) for one in fields(kind)}
     columns = ", ".join(name if name in has else f"{usual[name]} AS {name}" for name in ("key", *RUN, *ENDING))
-    for row in connection.execute(f"SELECT {columns} FROM runs"):
-        key, record = record_of(row)
+    measures = "measures" if "measures" in has else "NULL"
+    for *row, measured in connection.execute(f"SELECT {columns}, {measures} FROM runs"):
+        key, record = record_of(tuple(row))
         ending = replace(record.ending, trace=thinned(record.ending.trace))
-        yield key, Record(record.run, ending)
+        yield key, Record(record.run, ending if measured is None else _of_mission(ending, json.loads(measured)))
+
+
+def _of_mission(ending: Ending, measures: Mapping[str, float | None]) -> Ending:
+    """Return how a policy ended in a mission, with the time in which all tasks were done in place of the makespan."""
+    time = measures.get("mission_time")
+    return replace(ending, makespan=time, served_makespan=time, lower_bound=measures.get("mission_time_lower_bound"))
 
 
 def _has_plans(connection: sqlite3.Connection) -> bool:

@@ -145,7 +145,7 @@ def notes(group: Group) -> list[str]:
     if all(one.outcome is not Outcome.SOLVED for one in ended):
         found.append("No run was solved: there are no scores to draw. See the failures below.")
     elif all(one.makespan is None for one in ended):
-        found.append("No run has a makespan: all left tasks unserved, or are of policies in missions.")
+        found.append("No run has a makespan: all left tasks undone.")
     elif all(one.lower_bound is None for one in ended):
         found.append("No run proved a bound on the makespan: there are no gaps to a bound.")
     return found
