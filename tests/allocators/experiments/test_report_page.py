@@ -182,6 +182,20 @@ def test_runs_under_other_conditions_are_told_apart(store, tmp_path):
     assert sorted(found["labels"]) == ["ga[population=4]", "greedy", "hedonic (plug 1)", "hedonic (plug 2)"]
 
 
+def test_the_time_of_a_mission_stands_for_the_makespan(store, tmp_path):
+    """Runs of policies have measures as JSON; where a mission was not done there is no time."""
+    with sqlite3.connect(store) as edited:
+        if "measures" not in {row[1] for row in edited.execute("PRAGMA table_info(runs)")}:
+            edited.execute("ALTER TABLE runs ADD COLUMN measures TEXT")
+        edited.execute("""UPDATE runs SET makespan = NULL, measures = '{"mission_time": null}'""")
+        done = '{"mission_time": 5.0, "mission_time_lower_bound": 4.0}'
+        edited.execute("UPDATE runs SET measures = ? WHERE method = 'greedy'", (done,))
+    main = written(store, tmp_path)["main"]
+    rows = {main["labels"][row["method"]]: row for row in main["groups"][0]["methods"]}
+    assert (rows["greedy"]["makespan"], rows["greedy"]["gap"]) == (5.0, 0.2)
+    assert rows["ga[population=4]"]["makespan"] is None
+
+
 def test_what_there_is_little_of_is_told(tmp_path):
     """No runs, one run, one method, only failures and no bounds: the page is written, and notes say what is missing."""
     Store(tmp_path / "runs.db").close()

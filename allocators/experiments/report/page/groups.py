@@ -3,11 +3,12 @@
 import json
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 from alloc.allocators.experiments.report.page.source import Archive, Known
 from alloc.allocators.experiments.store.key import Run
 from alloc.allocators.experiments.store.outcome import Ending
+from alloc.allocators.experiments.store.store import CONDITIONS
 from alloc.allocators.experiments.stored import Endings
 from alloc.problems.text import one_line, short_names
 
@@ -109,8 +110,8 @@ def laid_out(archive: Archive) -> Layout:
 
 def _conditions(run: Run) -> Conditions:
     """Return what is the same for all that is compared; the versions of plugins belong to their methods."""
-    limits = (run.time_limit_s, run.iterations, run.target_gap)
-    return (run.objective, *limits, run.threads, run.version.partition(" + ")[0], run.machine)
+    own = {**asdict(run), "version": run.version.partition(" + ")[0]}
+    return tuple(own[name] for name in CONDITIONS)
 
 
 def _variant(run: Run) -> tuple[str, str, str]:

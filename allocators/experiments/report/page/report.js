@@ -80,10 +80,10 @@ function tellAll() {
   const of = (get) => (index) => get(page.groups[index].conditions);
   const limit = (one) => [one.time_limit_s === null ? "" : `${one.time_limit_s} s`, one.iterations === null ? "" : counted(one.iterations, "iteration"),
     one.target_gap === null ? "" : `gap ${share(one.target_gap)}`].filter(Boolean).join(", ") || "none";
-  page.groups.forEach((one, i) => add(byId("group"), "option", `${one.conditions.objective}, ${limit(one.conditions)}, ${one.conditions.version}, ${counted(one.conditions.runs, "run")}`, { value: i }));
+  page.groups.forEach((one, i) => add(byId("group"), "option", `${[one.conditions.objective, ...one.conditions.others].join(", ")}, ${limit(one.conditions)}, ${one.conditions.version}, ${counted(one.conditions.runs, "run")}`, { value: i }));
   byId("group").onchange = () => choose(Number(byId("group").value));
   byId("pick").hidden = page.groups.length < 2;
-  makeTable(byId("conditions"), [text("objective", of((one) => one.objective)), text("budget", of(limit)), number("threads", of((one) => one.threads)),
+  makeTable(byId("conditions"), [text("objective", of((one) => [one.objective, ...one.others].join(", "))), text("budget", of(limit)), number("threads", of((one) => one.threads)),
     number("runs", of((one) => one.runs)), number("instances", of((one) => one.instances)), text("version", of((one) => one.version)),
     text("commit", of((one) => one.revision.replace(/[0-9a-f]{40}/g, (hash) => hash.slice(0, 10)) || "-")), text("machine", of((one) => one.machine)),
     text("from (UTC)", of((one) => one.from)), text("to", of((one) => one.to))],
@@ -249,6 +249,7 @@ async function main() {
   layInstances();
   await load("library-vega");
   await update(true);
+  document.documentElement.dataset.ready = Math.round(performance.now()); // milliseconds until all is drawn but the table of runs
   if (page.groups.reduce((sum, one) => sum + one.conditions.runs, 0) <= SOON) await tellRuns();
   else new IntersectionObserver((entries, observer) => {
     if (!entries.some((entry) => entry.isIntersecting)) return;
@@ -260,7 +261,6 @@ async function main() {
     setTheme();
     update(false);
   });
-  document.documentElement.dataset.ready = Math.round(performance.now()); // milliseconds until all is drawn
 }
 main().catch((error) => {
   byId("problem").hidden = false;

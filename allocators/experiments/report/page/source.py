@@ -1,26 +1,25 @@
 """What stores hold, read for a page: all runs, with traces no finer than a page draws them."""
 
+import json
 import math
 import os
 import sqlite3
 from bisect import bisect_left
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from urllib.request import pathname2url
 
 from alloc.allocators.contract.tolerance import relative_gap
 from alloc.allocators.experiments.store.errors import BUSY_S, explained
-from alloc.allocators.experiments.store.outcome import TracePoints
+from alloc.allocators.experiments.store.key import Run
+from alloc.allocators.experiments.store.outcome import Ending, TracePoints
 from alloc.allocators.experiments.store.schema import checked_version
 from alloc.allocators.experiments.store.store import ENDING, RUN, Record, record_of
 from alloc.problems.formats.files import PathLike, named
 
 EDGES_S = tuple(1e-3 * 10 ** (step / 20) for step in range(256))
 """Moments, 20 a decade, at which a page tells what a run had found: shares and quantiles at these are exact."""
-
-WITH_PLANS = 2
-"""Version of stores from which on they have plans and the content of instances."""
 
 EVERY = 1000
 """Runs between two calls that tell how far the reading is."""
@@ -66,7 +65,7 @@ class Archive:
     def _blobs(self, query: str, wanted: Sequence[str]) -> Iterator[tuple[str, bytes]]:
         with ExitStack() as stack:
             opened = [(stack.enter_context(_opened(path)), named(path)) for path in self.paths]
-            able = [one for one in opened if checked_version(*one) >= WITH_PLANS]
+            able = [one for one in opened if _has_plans(one[0])]
             for key in wanted:
                 for connection, name in able:
                     with explained(name):
@@ -119,11 +118,24 @@ def _against(record: Record, bound: float | None) -> Record:
 
 def _records(connection: sqlite3.Connection) -> Iterator[tuple[str, Record]]:
     has = {row[1] for row in connection.execute("PRAGMA table_info(runs)")}
-    columns = ", ".join(name if name in has else f"'' AS {name}" for name in ("key", *RUN, *ENDING))
-    for row in connection.execute(f"SELECT {columns} FROM runs"):
-        key, record = record_of(row)
+    usual = {one.name: "NULL" if one.default is None else "''" for kind in (Run, Ending) for one in fields(kind)}
+    columns = ", ".join(name if name in has else f"{usual[name]} AS {name}" for name in ("key", *RUN, *ENDING))
+    measures = "measures" if "measures" in has else "NULL"
+    for *row, measured in connection.execute(f"SELECT {columns}, {measures} FROM runs"):
+        key, record = record_of(tuple(row))
         ending = replace(record.ending, trace=thinned(record.ending.trace))
-        yield key, Record(record.run, ending)
+        yield key, Record(record.run, ending if measured is None else _of_mission(ending, json.loads(measured)))
+
+
+def _of_mission(ending: Ending, measures: Mapping[str, float | None]) -> Ending:
+    """Return how a policy ended in a mission, with the time in which all tasks were done in place of the makespan."""
+    time = measures.get("mission_time")
+    return replace(ending, makespan=time, served_makespan=time, lower_bound=measures.get("mission_time_lower_bound"))
+
+
+def _has_plans(connection: sqlite3.Connection) -> bool:
+    """Return whether a store is of a version that has plans and the content of instances."""
+    return connection.execute("SELECT 1 FROM sqlite_master WHERE name = 'plans'").fetchone() is not None
 
 
 @contextmanager

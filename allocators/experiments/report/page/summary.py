@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from alloc.allocators.experiments.report.page.groups import Group, Layout
 from alloc.allocators.experiments.statistics import LEAST, SMALL, differences, scores
 from alloc.allocators.experiments.store.outcome import Ending, Outcome
+from alloc.allocators.experiments.store.store import CONDITIONS
 from alloc.allocators.experiments.stored import Endings, doubts
 from alloc.problems.text import counted
 
@@ -19,21 +20,21 @@ Entry = dict[str, object]
 MOST_PAIRED = 100_000
 """Pairs of methods times instances up to which every method is compared with every other: intervals take time."""
 
+NAMED = ("objective", "time_limit_s", "iterations", "target_gap", "threads", "version", "machine")
+"""Conditions that have their own columns on a page."""
+
 SCORES = ("makespan", "energy")
 
 
 def conditions(group: Group) -> Entry:
     """Return under which conditions the runs of a group were made, and when, for a row of a table."""
-    run, ended = group.run, _flat(group.endings)
+    ended = _flat(group.endings)
+    told = {name: value for name, value in asdict(group.run).items() if name in CONDITIONS}
     return {
-        "objective": run.objective,
-        "time_limit_s": run.time_limit_s,
-        "iterations": run.iterations,
-        "target_gap": run.target_gap,
-        "threads": run.threads,
-        "version": run.version.partition(" + ")[0],
+        **told,
+        "version": group.run.version.partition(" + ")[0],
+        "others": [f"{name} {value}" for name, value in told.items() if name not in NAMED and value not in (None, "")],
         "revision": ", ".join(sorted({one.revision for one in ended if one.revision})),
-        "machine": run.machine,
         "runs": len(ended),
         "instances": len(group.instances),
         "from": _date(min(one.started_at for one in ended)),
@@ -143,6 +144,8 @@ def notes(group: Group) -> list[str]:
     ended = _flat(group.endings)
     if all(one.outcome is not Outcome.SOLVED for one in ended):
         found.append("No run was solved: there are no scores to draw. See the failures below.")
+    elif all(one.makespan is None for one in ended):
+        found.append("No run has a makespan: all left tasks undone.")
     elif all(one.lower_bound is None for one in ended):
         found.append("No run proved a bound on the makespan: there are no gaps to a bound.")
     return found
