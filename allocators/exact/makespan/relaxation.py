@@ -12,12 +12,11 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-from scipy.optimize import OptimizeResult, linprog
 from scipy.sparse import csr_array, hstack, vstack
 
 from alloc.allocators.exact.demand import Demand
 from alloc.allocators.exact.model import Model
-from alloc.allocators.runtime.interrupts import run_native
+from alloc.allocators.runtime.linear_programme import minimise
 from alloc.problems.instance import FloatArray
 
 MAX_PAIRS = 400_000
@@ -82,16 +81,10 @@ def _dual_prices(demand: Demand, seconds: float, should_stop: Callable[[], bool]
     least = csr_array(np.ones((tasks, 1)))
     matrix = vstack([hstack([-share, least]), hstack([used, csr_array((classes, 1))])])
     limits = np.concatenate([np.zeros(tasks), demand.count])
-    bounds = np.column_stack([np.zeros(pairs + 1), np.append(demand.max_count, np.inf)])
+    upper = np.append(demand.max_count, np.inf)
     cost = np.append(np.zeros(pairs), -1.0)
-
-    def work() -> OptimizeResult:
-        return linprog(cost, matrix, limits, bounds=bounds, method="highs", options={"time_limit": seconds})
-
-    answer = run_native(work, should_stop, lambda: None)
-    if answer is None or answer.status != 0:
-        return None
-    return np.asarray(np.maximum(0.0, -answer.ineqlin.marginals[:tasks])) / demand.need
+    answer = minimise(cost, matrix, limits, should_stop=should_stop, upper=upper, seconds=seconds)
+    return None if answer is None else answer.multiplier[:tasks] / demand.need
 
 
 def _largest(model: Model, low: float, high: float, is_excluded: Callable[[Demand], bool]) -> float:

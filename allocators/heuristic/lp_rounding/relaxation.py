@@ -1,14 +1,11 @@
 """The linear relaxation of allocation: fractions of agents per class and task, by HiGHS."""
 
-import math
-
 import numpy as np
-from scipy.optimize import OptimizeResult, linprog
 from scipy.sparse import csr_array, hstack, vstack
 
 from alloc.allocators.contract.search import Search
 from alloc.allocators.heuristic.lp_rounding.rounding import round_fractions
-from alloc.allocators.runtime.interrupts import run_native
+from alloc.allocators.runtime.linear_programme import Optimum, minimise
 from alloc.problems import Allocation, Instance, agent_classes, serve_all
 from alloc.problems.bounds import scale_to_one, typical_distance
 from alloc.problems.instance import FloatArray
@@ -63,7 +60,7 @@ class Relaxation:
             )
             limits = np.concatenate([np.zeros(self._n_tasks), self.classes.count])
             answer = _minimise(search, np.append(np.zeros(len(self.task)), -1.0), matrix, limits, self.time_share)
-            completed = 0.0 if answer is None else float(-answer.fun)
+            completed = 0.0 if answer is None else -answer.value
             if completed <= 0:
                 return None  # some task is out of reach, or there was no time
             if completed >= 1 - SAFETY:
@@ -99,15 +96,8 @@ class Relaxation:
 
 def _minimise(
     search: Search, cost: FloatArray, matrix: csr_array, limits: FloatArray, time_share: float
-) -> OptimizeResult | None:
+) -> Optimum | None:
     """Minimise ``cost @ x`` subject to ``matrix @ x <= limits`` and x >= 0; None if there was no answer in time."""
-    seconds = time_share * search.remaining_s
-    options = {} if seconds == math.inf else {"time_limit": seconds}
-
-    def work() -> OptimizeResult:
-        return linprog(cost, matrix, limits, method="highs", options=options)
-
     reproducible = search.budget.time_limit_s is None and search.budget.iterations is not None
     should_stop = (lambda: search.interrupted) if reproducible else search.should_stop
-    answer = run_native(work, should_stop, lambda: None)
-    return answer if answer is not None and answer.status == 0 else None
+    return minimise(cost, matrix, limits, should_stop=should_stop, seconds=time_share * search.remaining_s)
