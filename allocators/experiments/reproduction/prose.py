@@ -39,7 +39,7 @@ ASSUMED: tuple[tuple[str, str], ...] = (
     (
         "iteration",
         "200 decisions of agents, and the updates that belong to them; 300 iterations are 60,000 decisions. "
-        "Scenario 1 is shown up to its 200",
+        "Scenario 1 is shown up to its 200, where step sizes have not come down yet",
     ),
     (
         "games that are learned from",
