@@ -117,7 +117,7 @@ def look_around(state: MissionArrays, number: int, key: int, drawn: IntArray) ->
 
 @compiled
 def lead(state: MissionArrays, room: Room, parameters: FloatArray, seed: int, drawn: IntArray) -> None:
-    """Let the utility lead all agents until the mission is over."""
+    """Let the utility lead all agents until their mission is over."""
     head, key = state.head[0], keyed(first_key(EXPLORING), seed)
     while True:
         wanted = advance(state)

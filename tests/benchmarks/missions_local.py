@@ -85,7 +85,7 @@ ROWS = {
 
 @compiled
 def lead_nearest(state: MissionArrays, room: Room, seed: int, drawn: IntArray) -> None:
-    """Let each agent go to the nearest task until that is over, as `Nearest` does."""
+    """Let each agent go to the nearest task until it is over, as `Nearest` does."""
     head, key = state.head[0], keyed(first_key(EXPLORING), seed)
     while True:
         wanted = advance(state)
