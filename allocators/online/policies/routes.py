@@ -97,13 +97,14 @@ class RoutePlanner(FleetDecider):
         self._count += 1
         until = None if self._time_limit_s is None else began + self._time_limit_s
         seed = (self._seed * 1_000_003 + self._count) % 2**31
-        routes, lengths = improved(described, self._routes, iterations, seed, until, self._given_up)
+        routes, lengths, untried = improved(described, self._routes, iterations, seed, until, self._given_up)
         names = [task.facts.id for task in described.tasks]
         self._routes = {
             agent.facts.id: [names[j] for j in routes[i, : lengths[i]].tolist()]
             for i, agent in enumerate(described.agents)
         }
-        self._given_up = set(names).difference(*self._routes.values())
+        tried = {name for name, is_untried in zip(names, untried.tolist(), strict=True) if not is_untried}
+        self._given_up = tried.difference(*self._routes.values())
         return dict(self._orders(view, described, first_tasks(described.situation, routes, lengths)))
 
     def _orders(self, view: View, described: Described, first: Ints) -> list[tuple[str, Order]]:

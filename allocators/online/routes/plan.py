@@ -1,5 +1,6 @@
 """Plans of routes from plans in force: set up, improved until the time is up, read."""
 
+import math
 import time
 from collections.abc import Mapping, Sequence, Set
 
@@ -9,10 +10,13 @@ from alloc.allocators.online.routes.describe import Described
 from alloc.allocators.online.routes.evaluation import play
 from alloc.allocators.online.routes.record import Schedule, new_schedule
 from alloc.allocators.online.routes.search import improve
-from alloc.allocators.online.routes.situation import AGENT, EUCLIDEAN, EVENT, TASK, Ints, Situation, records
+from alloc.allocators.online.routes.situation import AGENT, EUCLIDEAN, EVENT, TASK, Bools, Ints, Situation, records
 
 PORTION, PORTION_S = 8, 0.001
 """Changes before the first look at the clock, and seconds between two looks that are aimed at."""
+
+MOST_GROWTH, CAUTION = 4.0, 0.5
+"""By how much more tasks are put in at once than before at the most, and part of what there seems to be time for."""
 
 TOLERATED = 0.05
 """By what share a plan may be worse than the best one at first; it shrinks to none."""
@@ -25,8 +29,11 @@ def improved(
     seed: int,
     until: float | None,
     given_up: Set[str] = frozenset(),
-) -> tuple[Ints, Ints]:
+) -> tuple[Ints, Ints, Bools]:
     """Return routes that begin with those in force.
+
+    Where time is limited, new tasks are put in by and by, those near an agent first, so that no more are put in than
+    there is time for; where it is not, all at once, which makes better plans.
 
     Parameters
     ----------
@@ -43,8 +50,9 @@ def improved(
 
     Returns
     -------
-    tuple of ndarray
-        Tasks of each agent, shape (n, c), and how many there are, shape (n,).
+    routes, lengths, untried : ndarray
+        Tasks of each agent, shape (n, c), how many there are, shape (n,), and which tasks there was no time for, shape
+        (m,).
     """
     situation = described.situation
     n, m = situation.start_distance.shape
@@ -58,28 +66,36 @@ def improved(
     pair = _new_schedules(situation, routes)
     fresh = np.array([task.facts.id not in given_up for task in described.tasks])
     fresh[[j for i in range(n) for j in routes[i, : lengths[i]].tolist()]] = False
+    waiting = np.argsort(situation.start_distance.min(axis=0), kind="stable")
+    waiting = waiting[fresh[waiting]]
     done, began = 0, time.perf_counter()
     portion, hour = iterations if until is None else PORTION, began
-    while fresh.any() or done < iterations:
+    size = len(waiting) if until is None else max(PORTION, n)
+    while len(waiting) or done < iterations:
         share = 0.0 if until is None else min(1.0, (hour - began) / max(1e-9, until - began))
         tolerated = TOLERATED * (1 - share), 0.0 if until is None else TOLERATED * (1 - share)
-        portion = min(portion, iterations - done)
-        improve(
-            situation,
-            pair,
-            described.nearest,
-            (routes, lengths),
-            portion,
-            (seed + 7919 * done) % 2**31,
-            fresh,
-            tolerated,
-        )
         fresh[:] = False
-        done, last, hour = done + portion, hour, time.perf_counter()
+        fresh[waiting[:size]] = True
+        is_last = len(waiting) <= size
+        portion = min(portion, iterations - done) if is_last else 0
+        plan, number = (routes, lengths), (seed + 7919 * (done + len(waiting[size:]))) % 2**31
+        improve(situation, pair, described.nearest, plan, portion, number, fresh, tolerated)
+        waiting, done, last, hour = waiting[size:], done + portion, hour, time.perf_counter()
         if until is not None and hour >= until:
             break
-        portion *= 2 if hour - last < PORTION_S else 1
-    return routes, lengths
+        if until is not None and not is_last:
+            size = _next_size(size, hour - last, until - hour)
+            portion = PORTION
+        else:
+            portion *= 2 if hour - last < PORTION_S else 1
+    fresh[:] = False
+    fresh[waiting] = True
+    return routes, lengths, fresh
+
+
+def _next_size(size: int, seconds: float, left: float) -> int:
+    """Return how many tasks to put in next, when some took so many seconds; twice as many take four times as long."""
+    return max(1, int(size * min(MOST_GROWTH, CAUTION * math.sqrt(left / max(seconds, 1e-9)))))
 
 
 def first_tasks(situation: Situation, routes: Ints, lengths: Ints) -> Ints:

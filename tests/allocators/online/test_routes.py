@@ -78,7 +78,7 @@ def test_the_search_finds_the_best_plan(family, seed):
     count = len(known.tasks)
     every = [route for size in range(count + 1) for route in permutations(range(count), size)]
     best = min(worth(known, plan)[0] for plan in product(every, repeat=len(known.agents)))
-    routes, lengths = improved(known, {}, 2000, 0, None)
+    routes, lengths, _ = improved(known, {}, 2000, 0, None)
     found = [routes[i, : lengths[i]].tolist() for i in range(len(known.agents))]
     assert worth(known, found)[0] <= best + 1e-6
 
