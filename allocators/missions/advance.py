@@ -1,4 +1,4 @@
-"""From event to event, compiled: see `alloc.problems.missions.simulation.simulation`."""
+"""A mission from event to event, compiled: see `alloc.problems.missions.simulation.simulation`."""
 
 from collections.abc import Sequence
 

@@ -10,6 +10,7 @@ from alloc.allocators.missions.knowledge import Numbers, length
 from alloc.allocators.missions.layout import IDLE, NOBODY, WORKING, Agent, Head, MissionArrays
 from alloc.allocators.missions.motion import distance_between, place_of
 from alloc.allocators.runtime.compiled import compiled_in_place
+from alloc.problems.distances.reach import TOLERANCE
 from alloc.problems.fields import BoolArray, FloatArray, IntArray
 from alloc.problems.missions.simulation.reports import BYTES_OF_AGENT, BYTES_OF_MESSAGE, BYTES_OF_TASK
 
@@ -27,7 +28,7 @@ def is_silent(state: MissionArrays, number: int) -> bool:
                 return True
             continue
         here = place_of(state.agents[number], head.hour)
-        if distance_between(head.is_manhattan, here, (event.x, event.y, event.z)) <= event.radius:
+        if distance_between(head.is_manhattan, here, (event.x, event.y, event.z)) <= event.radius + TOLERANCE:
             return True
     return False
 
@@ -105,7 +106,7 @@ def find_near(
     at_x, at_y, at_z = places[0], places[1], places[2]
     x, y, z = at_x[sender], at_y[sender], at_z[sender]
     for number in range(len(is_near)):
-        far = length(is_manhattan, at_x[number] - x, at_y[number] - y, at_z[number] - z) > radius
+        far = length(is_manhattan, at_x[number] - x, at_y[number] - y, at_z[number] - z) > radius + TOLERANCE
         is_near[number] = visible[number] & (not far)
 
 

@@ -22,6 +22,7 @@ from alloc.allocators.missions.layout import (
 )
 from alloc.allocators.missions.motion import battery_of, place_of, work_left
 from alloc.allocators.runtime.compiled import compiled_in_place, inlined
+from alloc.problems.distances.reach import TOLERANCE
 from alloc.problems.fields import BoolArray, FloatArray
 
 Numbers = NDArray[np.int32]
@@ -86,7 +87,7 @@ def see_tasks(
 ) -> None:
     """Take notice of the tasks that agents see."""
     at_x, at_y, at_z = sites[0], sites[1], sites[2]
-    sensing, hour, is_manhattan = head.sensing, head.hour, head.is_manhattan
+    sensing, hour, is_manhattan = head.sensing + TOLERANCE, head.hour, head.is_manhattan
     for number in range(len(looks)):
         if looks[number]:
             x, y, z = places[0, number], places[1, number], places[2, number]
@@ -109,7 +110,7 @@ def see_agents(
 ) -> None:
     """Take notice of the agents that agents see."""
     at_x, at_y, at_z = places[0], places[1], places[2]
-    sensing, hour, is_manhattan = head.sensing, head.hour, head.is_manhattan
+    sensing, hour, is_manhattan = head.sensing + TOLERANCE, head.hour, head.is_manhattan
     for number in range(len(looks)):
         if looks[number]:
             x, y, z = at_x[number], at_y[number], at_z[number]

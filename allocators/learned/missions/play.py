@@ -1,4 +1,4 @@
-"""Missions led by the network of `gappo`, from event to event in compiled loops."""
+"""Missions led by the network of `gappo`, event by event, in compiled loops."""
 
 from typing import NamedTuple
 

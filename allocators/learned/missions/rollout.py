@@ -1,4 +1,4 @@
-"""Missions led by samples of the network in compiled loops, with a record of each decision."""
+"""Missions led by samples of the network in compiled loops, each decision recorded."""
 
 import math
 from typing import NamedTuple

@@ -5,6 +5,7 @@ from typing import Protocol
 
 import numpy as np
 
+from alloc.problems.distances.reach import TOLERANCE
 from alloc.problems.fields import BoolArray
 from alloc.problems.missions.simulation.motion import place_at
 from alloc.problems.missions.simulation.places import Position
@@ -100,7 +101,7 @@ class LocalAwareness:
                 found[tasks[column].facts.id] = finds[column]
 
     def _near(self, places: list[Position | None], goals: list[Position | None]) -> BoolArray:
-        return self._state.distances.table(places, goals) <= self._radius
+        return self._state.distances.table(places, goals) <= self._radius + TOLERANCE
 
     def hear(self, agent: AgentState, message: Message) -> None:
         """Let an agent take over what is newer in a message than what it knows."""

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from alloc.problems.distances.reach import TOLERANCE
 from alloc.problems.fields import BoolArray
 from alloc.problems.missions.chance import BURST, LOSS, uniform
 from alloc.problems.missions.events import Event
@@ -50,14 +51,14 @@ class Channel:
         assert event.radius is not None
         x, y, z = event.center
         place = place_at(self._state, agent)
-        return self._state.distances.by_metric(place.position, (x, y, z)) <= event.radius
+        return self._state.distances.by_metric(place.position, (x, y, z)) <= event.radius + TOLERANCE
 
     def open(self) -> None:
         """Take notice of who is where, before the messages of an hour are sent."""
         self._agents = [agent for agent in self._state.agents if agent.status in ACTIVE]
         self._row = {agent.index: row for row, agent in enumerate(self._agents)}
         places = [place_at(self._state, agent).position for agent in self._agents]
-        self._near = self._state.distances.table(places, places) <= self._radio.radius
+        self._near = self._state.distances.table(places, places) <= self._radio.radius + TOLERANCE
 
     def hearers(self, sender: AgentState, number: int) -> list[AgentState]:
         """Return who will hear message `number` of an agent that sends now.
