@@ -52,7 +52,7 @@ def _bound_below_plan(search: Search, seconds: float) -> float | None:
     pairs = count_classes(instance, by_place=False) * instance.m
     if pairs > min(LP_SIZE_LIMIT, LP_PAIRS_PER_SECOND * seconds):
         end = time.monotonic() + seconds
-        if not _are_neighbours_at_hand(instance.reach, seconds):
+        if not _has_few_neighbours(instance.reach, seconds_for_bounds(search)) or instance.reach.neighbours is None:
             return None
         from alloc.allocators.exact.makespan.task_prices import bound_by_task_prices  # loads numba
 
@@ -65,12 +65,12 @@ def _bound_below_plan(search: Search, seconds: float) -> float | None:
     return relaxed_lower_bound(model, low, makespan, seconds, stopped)[0]
 
 
-def _are_neighbours_at_hand(reach: Reach, seconds: float) -> bool:
-    """Whether reach is short, and the pairs within it have been gathered or can be in time."""
-    if reach.has_table or reach.is_complete:
-        return False
-    is_quick = "neighbours" in vars(reach) or estimated_pairs(reach) <= GATHERED_PER_SECOND * seconds
-    return is_quick and reach.neighbours is not None
+def _has_few_neighbours(reach: Reach, seconds: float) -> bool:
+    """Whether reach is short, and the pairs within it can be gathered in so many seconds.
+
+    Pairs that a method has gathered already do not count for it: what is proven must not depend on what ran before.
+    """
+    return not (reach.has_table or reach.is_complete) and estimated_pairs(reach) <= GATHERED_PER_SECOND * seconds
 
 
 def bounds_after(search: Search, proposal: Proposal) -> float | None:

@@ -1,4 +1,4 @@
-"""The cheapest group for a task by lists of states, for weights of any size, such as reals in fine steps; compiled.
+"""The cheapest group for a task by lists of states, for weights of any size and for reals; compiled.
 
 Agents are sorted by price per weight, and a group that takes them in this order until the need is met is the first
 state. Around the last agent taken, one after the other is left open: each state may do without the next agent before,
@@ -16,14 +16,14 @@ from typing import NamedTuple
 import numpy as np
 
 from alloc.allocators.exact.knapsack import WholeArray, order_of
-from alloc.allocators.runtime.compiled import compiled
+from alloc.allocators.runtime.compiled import compiled, inlined
 from alloc.problems.instance import FloatArray
 
 MAX_STATES = 100_000
-"""States of one knapsack after which it ends with the bound of the linear relaxation."""
+"""States of one knapsack after which it ends with a bound by their linear relaxations."""
 
 CHEAPER = 0.5
-"""By how much a group must be cheaper, prices being whole: less than 1, more than the rounding of relaxations."""
+"""By how much a group must be cheaper where prices are whole: less than 1, more than the rounding of relaxations."""
 
 
 class States(NamedTuple):
@@ -31,14 +31,13 @@ class States(NamedTuple):
 
     Attributes
     ----------
-    weight : ndarray of int64, shape (s,)
-    cost : ndarray, shape (s,)
+    weight, cost : ndarray, shape (s,)
     parent, changed : ndarray of int64, shape (s,)
     live, next_live : ndarray of int64, shape (s,)
         States that are still of interest, by falling weight and cost.
     """
 
-    weight: WholeArray
+    weight: FloatArray
     cost: FloatArray
     parent: WholeArray
     changed: WholeArray
@@ -49,14 +48,14 @@ class States(NamedTuple):
 @compiled
 def room_for_states(size: int) -> States:
     """Return space for so many states."""
-    whole = np.empty((5, size), dtype=np.int64)
-    return States(whole[0], np.empty(size), whole[1], whole[2], whole[3], whole[4])
+    real, whole = np.empty((2, size)), np.empty((4, size), dtype=np.int64)
+    return States(real[0], real[1], whole[0], whole[1], whole[2], whole[3])
 
 
 @compiled
 def extend(
-    states: States, live: int, used: int, item: int, weight: int, price: float, need: int, best: int,
-    before: float, after: float,
+    states: States, live: int, used: int, item: int, weight: float, price: float, need: float, best: int,
+    before: float, after: float, cheaper: float,
 ) -> tuple[int, int, int]:  # fmt: skip
     """Give every live state the choice to change an item; return how many live and are used, and the best group.
 
@@ -66,12 +65,14 @@ def extend(
         How many states live, and how many have been written.
     item : int
         The agent that is left open now.
-    weight, price : int and float
+    weight, price : float
         What the change adds; negative where the agent is left.
     best : int
         The cheapest state that meets `need`.
     before, after : float
         Prices per weight of the agents that are left open next.
+    cheaper : float
+        By how much a group must be cheaper than the best to be of interest.
     """
     kept, p, q = 0, 0, 0
     least = np.inf
@@ -90,9 +91,8 @@ def extend(
         if cost >= least:
             continue
         spare = total - need
-        relaxed = cost - spare * before if spare >= 0 else cost - spare * after
         is_better = spare >= 0 and cost < states.cost[best]
-        if relaxed > states.cost[best] - CHEAPER and not is_better:
+        if relax_state(cost, spare, before, after) > states.cost[best] - cheaper and not is_better:
             continue
         least = cost
         if not unchanged:
@@ -106,30 +106,41 @@ def extend(
     return kept, used, best
 
 
+@inlined
+def relax_state(cost: float, spare: float, before: float, after: float) -> float:
+    """Return the cost of the linear relaxation, given what a state has beyond the need and the next prices per weight."""
+    return cost - spare * before if spare >= 0 else cost - spare * after
+
+
 @compiled
 def cheapest_by_states(
-    weight: WholeArray, price: FloatArray, copies: WholeArray, need: int, states: States, group: WholeArray
-) -> float:
+    weight: FloatArray, price: FloatArray, copies: WholeArray, need: float, cheaper: float, states: States,
+    group: WholeArray, excess: FloatArray,
+) -> float:  # fmt: skip
     """Return the cost of the cheapest group of weight `need` or more; ``inf`` if there is none.
 
     Parameters
     ----------
-    weight : ndarray of int64, shape (k,)
-        What one agent of each class adds, > 0; all together less than 2^62.
+    weight : ndarray, shape (k,)
+        What one agent of each class adds, > 0. Where they are whole, sums up to the need and one more agent are exact.
     price : ndarray, shape (k,)
-        Whole numbers >= 0; all together less than 2^50.
+        >= 0.
     copies : ndarray of int64, shape (k,)
-    need : int
+    need : float
         > 0.
+    cheaper : float
+        `CHEAPER` where prices are whole, all together less than 2^50; else 0.
     states : States
         Space to work in. Where it does not suffice, the cost is a lower bound on that of the cheapest group.
     group : ndarray of int64, shape (k,)
         Gets the agents of each class in the cheapest group that was found.
+    excess : ndarray, shape (k,) or (0,)
+        Gets lower bounds on how much dearer the best group with an agent of the class is.
     """
     ratio = price / weight
     order = order_of(ratio)
     agent = np.repeat(order, copies[order])
-    total, paid, taken = 0, 0.0, 0
+    total, paid, taken = 0.0, 0.0, 0
     group[:] = 0
     while total < need:
         if taken == len(agent):
@@ -140,27 +151,35 @@ def cheapest_by_states(
     rate = ratio[agent[taken - 1]]
     relaxed = paid - (total - need) * rate
     states.weight[0], states.cost[0], states.parent[0], states.live[0] = total, paid, -1, 0
-    live, used, best, low, high = 1, 1, 0, taken, taken
+    live, used, best, low, high, bound = 1, 1, 0, taken, taken, np.inf
     while live > 0 and (low > 0 or high < len(agent)):
         for is_after in range(2):
             if low == 0 if is_after == 0 else high == len(agent):
                 continue
+            before = ratio[agent[low - 1]] if low > 0 else 0.0
+            after = ratio[agent[high]] if high < len(agent) else np.inf
             if used + live > len(states.weight):
-                write_group(states, best, agent, taken, group)
-                bound: float = np.floor(relaxed - CHEAPER)
-                return bound
+                for q in range(live):
+                    state = states.live[q]
+                    bound = min(bound, relax_state(states.cost[state], states.weight[state] - need, before, after))
+                live = 0
+                break
             item = high if is_after else low - 1
             low, high = low - (1 - is_after), high + is_after
-            k, sign = agent[item], 2 * is_after - 1
-            if relaxed + sign * (price[k] - rate * weight[k]) > states.cost[best] - CHEAPER:
+            k, sign = agent[item], 2.0 * is_after - 1.0
+            if relaxed + sign * (price[k] - rate * weight[k]) > states.cost[best] - cheaper:
                 continue
             before = ratio[agent[low - 1]] if low > 0 else 0.0
             after = ratio[agent[high]] if high < len(agent) else np.inf
             live, used, best = extend(
-                states, live, used, item, sign * weight[k], sign * price[k], need, best, before, after
+                states, live, used, item, sign * weight[k], sign * price[k], need, best, before, after, cheaper
             )
     write_group(states, best, agent, taken, group)
     cost: float = states.cost[best]
+    if bound < cost:
+        cost = np.floor(bound - cheaper) if cheaper > 0 else bound
+    for k in range(len(excess)):
+        excess[k] = max(price[k] - rate * weight[k], 0.0) - (cost - relaxed)
     return cost
 
 

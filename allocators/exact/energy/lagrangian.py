@@ -44,8 +44,9 @@ class StepRule:
     decay: float
 
 
-ALONE, CLUSTERED = StepRule(0.75, 20, 0.7), StepRule(0.95, 60, 0.8)
-"""Before and after the clusters are added: more prices need longer memory and more patience."""
+BRIEF, LASTING = StepRule(0.75, 20, 0.7), StepRule(0.99, 60, 0.8)
+"""Until the clusters are added, and from then on or where there are none: long memory and patience get farther in the
+end."""
 
 FIRST_STEP_PRICED = 0.1
 """First step from prices of the linear programme, which are nearly the best already."""
@@ -53,7 +54,7 @@ FIRST_STEP_PRICED = 0.1
 COMPARE_EVERY = 10
 """Rounds between two that look for pairs to drop, where that takes long."""
 
-CONVERGED_STEP = 0.02
+CONVERGED_STEP = 0.005
 """Steps shorter than this, where 1 is the step that would reach the plan's cost, hardly raise the bound."""
 
 MAX_LINKS = 5_000_000
@@ -189,7 +190,7 @@ class LagrangianBound:
 
     @property
     def _step_rule(self) -> StepRule:
-        return ALONE if self._clusters is None else CLUSTERED
+        return BRIEF if self._clusters is None and self._member is not None else LASTING
 
     def _note(self, value: float) -> None:
         """Keep the best bound; shorten steps where it has not risen for long."""

@@ -3,9 +3,9 @@
 import numpy as np
 
 from alloc.allocators.exact.energy.energy_model import EnergyModel
-from alloc.allocators.exact.energy.knapsack_floats import cheapest_in_floats
 from alloc.allocators.exact.knapsack import WholeArray, fill_table, read_group
 from alloc.allocators.exact.knapsack_core import cheapest_by_core
+from alloc.allocators.exact.knapsack_states import MAX_STATES, cheapest_by_states, room_for_states
 from alloc.allocators.runtime.compiled import compiled
 from alloc.problems.instance import FloatArray
 
@@ -52,10 +52,10 @@ def solve_in_floats(
     excess: FloatArray,
 ) -> float:
     """Do the work of `solve_subproblems` where weights and needs are floats."""
-    total = 0.0
+    total, states = 0.0, room_for_states(MAX_STATES)
     for j in range(len(need)):
         a, b = first[j], first[j + 1]
-        cost = cheapest_in_floats(weight[a:b], price[a:b], copies[a:b], need[j], group[a:b], excess[a:b])
+        cost = cheapest_by_states(weight[a:b], price[a:b], copies[a:b], need[j], 0.0, states, group[a:b], excess[a:b])
         if not np.isfinite(cost):
             return np.inf
         total += cost

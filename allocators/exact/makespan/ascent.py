@@ -14,7 +14,7 @@ doi:10.1007/BFb0120697.
 import numpy as np
 
 from alloc.allocators.exact.knapsack import WholeArray
-from alloc.allocators.exact.knapsack_states import MAX_STATES, cheapest_by_states, room_for_states
+from alloc.allocators.exact.knapsack_states import CHEAPER, MAX_STATES, cheapest_by_states, room_for_states
 from alloc.allocators.exact.makespan.configuration import PRICE_SUM
 from alloc.allocators.exact.model import Model
 from alloc.allocators.runtime.compiled import compiled
@@ -130,31 +130,35 @@ class ConfigurationAscent:
         self._price = price / total if total > 0 else self._best_price
 
 
-def _in_steps(model: Model, time: float) -> tuple[WholeArray, WholeArray]:
-    """Return weights, shape (t, k), and needs, shape (t,), such that what is impossible so is impossible indeed."""
+def _in_steps(model: Model, time: float) -> tuple[FloatArray, FloatArray]:
+    """Return weights, shape (t, k), and needs, shape (t,), such that what is impossible so is impossible indeed.
+
+    They are whole numbers of which floats hold exactly the sums of all that a task has a use for.
+    """
     weight, need = model.uncapped(time)
     with np.errstate(over="ignore"):  # an agent may bring far more than a task needs
         steps = np.minimum(np.ceil(weight / (need / GRID)), GRID)
-    return np.ascontiguousarray(steps.T.astype(np.int64)), np.full(len(need), GRID, dtype=np.int64)
+    return np.ascontiguousarray(steps.T), np.full(len(need), float(GRID))
 
 
 @compiled
 def cheapest_groups(
-    weight: WholeArray, price: FloatArray, count: WholeArray, need: WholeArray, used: FloatArray
+    weight: FloatArray, price: FloatArray, count: WholeArray, need: FloatArray, used: FloatArray
 ) -> FloatArray:
     """Return the cost of the cheapest group of each task, shape (t,), and add their agents of each class to `used`.
 
     Parameters
     ----------
-    weight : ndarray of int64, shape (t, k)
+    weight : ndarray, shape (t, k)
+        Whole numbers, as those of `need`.
     price : ndarray, shape (k,)
         Whole numbers >= 0.
     count : ndarray of int64, shape (k,)
-    need : ndarray of int64, shape (t,)
+    need : ndarray, shape (t,)
     used : ndarray, shape (k,)
     """
     costs, classes, states = np.empty(len(need)), len(price), room_for_states(MAX_STATES)
-    some, these, cost = np.empty(classes, dtype=np.int64), np.empty(classes, dtype=np.int64), np.empty(classes)
+    some, these, cost = np.empty(classes, dtype=np.int64), np.empty(classes), np.empty(classes)
     copies, group = np.empty(classes, dtype=np.int64), np.empty(classes, dtype=np.int64)
     for j in range(len(need)):
         size = 0
@@ -162,7 +166,9 @@ def cheapest_groups(
             if weight[j, k] > 0:
                 some[size], these[size], cost[size], copies[size] = k, weight[j, k], price[k], count[k]
                 size += 1
-        costs[j] = cheapest_by_states(these[:size], cost[:size], copies[:size], need[j], states, group[:size])
+        costs[j] = cheapest_by_states(
+            these[:size], cost[:size], copies[:size], need[j], CHEAPER, states, group[:size], used[:0]
+        )
         for q in range(size):
             used[some[q]] += group[q]
     return costs
@@ -170,5 +176,5 @@ def cheapest_groups(
 
 def compile_loops() -> None:
     """Compile the loop, or read it from the cache, so that no run waits for it."""
-    ones = np.ones(2, dtype=np.int64)
-    cheapest_groups(np.ones((1, 2), dtype=np.int64), np.ones(2), ones, ones[:1], np.zeros(2))
+    ones = np.ones(2)
+    cheapest_groups(np.ones((1, 2)), ones, np.ones(2, dtype=np.int64), ones[:1], np.zeros(2))

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from alloc.allocators.exact.knapsack import cheapest_group, fill_table, read_group
 from alloc.allocators.exact.knapsack_core import cheapest_by_core
-from alloc.allocators.exact.knapsack_states import MAX_STATES, cheapest_by_states, room_for_states
+from alloc.allocators.exact.knapsack_states import CHEAPER, MAX_STATES, cheapest_by_states, room_for_states
 
 classes = st.lists(st.tuples(st.integers(1, 7), st.integers(-2, 9), st.integers(0, 3)), min_size=1, max_size=4)
 
@@ -16,6 +16,14 @@ def arrays(rows):
     """Weights, prices and copies as the kernels take them."""
     weight, price, copies = (np.array(column, dtype=np.int64) for column in zip(*rows, strict=True))
     return weight, price / 4, copies
+
+
+def by_states(weight, price, copies, need, cheaper, group, *, size=MAX_STATES, excess=()):
+    """What lists of states find, with space for so many of them."""
+    weight, states = weight.astype(float), room_for_states(size)
+    return cheapest_by_states(
+        weight, price, copies, float(need), cheaper, states, group, np.asarray(excess, dtype=float)
+    )
 
 
 def by_trying(weight, price, copies, need, enough):
@@ -93,7 +101,7 @@ def test_states_have_the_cheapest_group(seed, classes, scale):
     weight, copies = rng.integers(1, 40, classes), rng.integers(1, 4, classes)
     price = rng.integers(0, 500, classes).astype(float)
     need, group = int(rng.integers(1, 2 + weight @ copies)), np.zeros(classes, dtype=np.int64)
-    cost = cheapest_by_states(weight * scale, price, copies, need * scale, room_for_states(MAX_STATES), group)
+    cost = by_states(weight * scale, price, copies, need * scale, CHEAPER, group)
     assert cost == cheapest_group(weight, price, copies, need, -1)[0]
     if np.isfinite(cost):
         assert group @ price == cost
@@ -102,12 +110,35 @@ def test_states_have_the_cheapest_group(seed, classes, scale):
         assert (group <= copies).all()
 
 
-@given(st.integers(0, 2**32), st.integers(2, 6))
-def test_without_room_for_states_the_cost_is_a_bound(seed, size):
+@given(st.integers(0, 2**32), st.integers(2, 6), st.sampled_from([0.0, CHEAPER]))
+def test_without_room_for_states_the_cost_is_a_bound(seed, size, cheaper):
     """Where states do not fit, no group is cheaper than the cost returned, and the group is one that meets the need."""
     rng = np.random.default_rng(seed)
     weight, price, copies = rng.integers(5, 40, 30), rng.integers(1, 500, 30).astype(float), np.ones(30, dtype=np.int64)
     need, group = int(weight.sum() // 2), np.zeros(30, dtype=np.int64)
-    cost = cheapest_by_states(weight, price, copies, need, room_for_states(size), group)
-    assert cost <= cheapest_group(weight, price, copies, need, -1)[0] <= group @ price
+    cost = by_states(weight, price, copies, need, cheaper, group, size=size)
+    assert cost <= cheapest_group(weight, price, copies, need, -1)[0] + 1e-9 <= group @ price + 1e-8
     assert group @ weight >= need
+
+
+float_classes = st.lists(
+    st.tuples(st.integers(1, 40), st.integers(0, 30), st.integers(1, 3), st.floats(0.9, 1.1)), min_size=1, max_size=6
+)
+
+
+@given(float_classes, st.integers(1, 160))
+def test_states_of_reals_have_the_cheapest_group(rows, need):
+    """With weights that are no integers, cost, group and the bounds on the excess agree with all groups written out."""
+    whole, price, copies, factor = (np.array(column) for column in zip(*rows, strict=True))
+    weight, price, copies, need = whole * factor / 40, price / 20, copies.astype(np.int64), need / 40
+    group, excess = np.zeros(len(rows), dtype=np.int64), np.zeros(len(rows))
+    cost = by_states(weight, price, copies, need, 0.0, group, excess=excess)
+    assert cost == pytest.approx(by_trying(weight, price, copies, need, np.inf))
+    if np.isfinite(cost):
+        assert group @ weight >= need
+        assert ((group >= 0) & (group <= copies)).all()
+        assert group @ price == pytest.approx(cost)
+        for k in range(len(rows)):
+            others = copies - (np.arange(len(rows)) == k)
+            with_one = by_trying(weight, price, others, need - weight[k], np.inf) + price[k]
+            assert cost + excess[k] <= with_one + 1e-9

@@ -47,3 +47,19 @@ def test_a_plan_gets_the_bound_where_a_linear_programme_is_too_large():
     search.submit(greedy(instance))
     raise_makespan_bound(search, time.monotonic() + 60.0)
     assert search.lower_bound > 1.01 * makespan_lower_bound(instance)
+
+
+@pytest.mark.parametrize("gathered", [False, True])
+def test_the_bound_does_not_depend_on_what_has_been_gathered_before(gathered, monkeypatch):
+    """Where pairs within reach are too many to be gathered in time, there is no bound, even if they are at hand."""
+    monkeypatch.setattr("alloc.allocators.bounds.GATHERED_PER_SECOND", 1)
+    monkeypatch.setattr("alloc.allocators.bounds.LP_SIZE_LIMIT", 1)
+    monkeypatch.setattr("alloc.problems.distances.reach.TABLE_LIMIT", 1)
+    instance = Instance(ability=[1, 1, 1, np.pi], workload=[4, 5, 3], allowed_tasks=[*[[0, 1]] * 3, [2]])
+    search = Search(instance, Objective.MAKESPAN, Budget())
+    search.submit(greedy(instance))
+    before = search.lower_bound
+    if gathered:
+        assert instance.reach.neighbours is not None
+    raise_makespan_bound(search, time.monotonic() + 60.0)
+    assert search.lower_bound == before
