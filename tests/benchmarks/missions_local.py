@@ -1,6 +1,6 @@
 """Policies with local knowledge on missions that no training, tuning or validation saw: `gappo` against each other one.
 
-    python tests/benchmarks/missions_local.py --csv docs/missions.csv
+    python tests/benchmarks/missions_local.py --csv docs/missions/missions.csv
     python tests/benchmarks/missions_local.py --csv new.csv --missions 5 --rows "20/40;10/40" --first-seed 4000000000
 
 Half of the missions of a row are of the family `steady`, half of `failures`; all policies meet the same. They run in
