@@ -104,7 +104,7 @@ CLAIMS = (
     Claim(
         "4.1",
         "advantages become increasingly apparent as the task scale expands",
-        "mean lead over the nearest rival",
+        "mean final T less the nearest rival's",
         scale,
     ),
     Claim(

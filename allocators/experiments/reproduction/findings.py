@@ -142,7 +142,9 @@ def scale(data: Data) -> Finding:
         rows = of_scenario(data.learned, scenario)
         found = [one for rival in RIVALS if (one := effect(rows, "gappo", rival, final("makespan"))) is not None]
         leads += [max(found, key=lambda one: one.mean)] if found else []
-    text = ", ".join(f"{lead.mean:+.3f}" for lead in leads) + " to the nearest rival in scenarios 1 to 4"
+    text = (
+        ", ".join(f"{lead.mean:+.3f}" for lead in leads) + " hours, `gappo` less the nearest rival, in scenarios 1 to 4"
+    )
     if len(leads) < len(SCENARIOS) or min(lead.runs for lead in leads) < ENOUGH:
         return text if leads else "no runs", TOO_FEW
     grows = all(lead.mean < min(0.0, leads[0].mean) for lead in leads[1:])

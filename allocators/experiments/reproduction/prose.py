@@ -26,7 +26,8 @@ PROCEDURE = """## How it is measured
   bids; the members of a population play in turn. Differences are paired by run, as all methods of a run have the
   same first weights, with BCa bootstrap intervals of 95 % and Wilcoxon's signed-rank test; p is corrected by Holm's
   procedure over all tests of a table, or of a claim. *Holds* wants p < 0.05 against every rival,
-  *does not hold* eight runs at least, as fewer could not show the opposite.
+  *does not hold* eight runs at least, as fewer could not show the opposite. Intervals of fewer than ten
+  runs say little.
 - **Scenarios**: each run has an instance of its own of each, the policy plays one greedy game there. T is infinite
   while a task has no agent; means are of the others.
 - **Decisions** are those of agents in the games that are learned from, of all members of a population together.
