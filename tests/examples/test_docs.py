@@ -135,7 +135,6 @@ RUN = [path for path, text in TEXTS.items() if any(map(runs, blocks(text)))]
 SHOWN = [(path, line) for path, text in TEXTS.items() for line in shown(text)]
 WITHOUT_CODE = {
     "docs/benchmarks/index.md",
-    "docs/benchmarks/learned_methods.md",
     "docs/developing/architecture.md",
     "docs/glossary.md",
     "docs/paper/paper.md",
