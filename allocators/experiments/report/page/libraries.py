@@ -27,6 +27,6 @@ def libraries() -> dict[str, str]:
     assert spec is not None
     assert spec.origin is not None
     folder = Path(spec.origin).parent / "html"
-    parts = {"vega": vl_convert.javascript_bundle()}
+    parts = {"vega": vl_convert.javascript_bundle("window.vegaEmbed = vegaEmbed;")}
     parts |= {name: (folder / f"dt_bundle.{name}").read_text(encoding="utf-8") for name in ("js", "css")}
     return {f"library-{name}": compressed(text) for name, text in parts.items()}
