@@ -14,6 +14,7 @@ ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "docs"))
 
 import make_commands  # noqa: E402  (beside this file, which is no package)
+import make_notebooks  # noqa: E402
 
 PAGES_OUTSIDE = ("CONTRIBUTING.md", "CHANGELOG.md", "LICENSE", "CITATION.cff")
 EXAMPLES = (".csv", ".ipynb", ".json", ".md", ".py", ".toml", ".txt", ".yaml")
@@ -27,11 +28,15 @@ EXTERNAL = re.compile(
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
-    """Add the page of all options, and files of the repository that stand outside docs/."""
+    """Add the page of all options, files of the repository that stand outside docs/, and notebooks as pages."""
     files.append(File.generated(config, "use/commands.md", content=make_commands.page()))
     examples = [path for path in (ROOT / "examples").rglob("*") if path.suffix in EXAMPLES and is_kept(path)]
     for path in [*(ROOT / name for name in PAGES_OUTSIDE), *examples]:
         files.append(File.generated(config, path.relative_to(ROOT).as_posix(), abs_src_path=str(path)))
+    for path in (ROOT / "examples" / "notebooks").glob("*.ipynb"):
+        text, pictures = make_notebooks.page(path)
+        for name, content in {f"{path.stem}.md": text, **pictures}.items():
+            files.append(File.generated(config, f"examples/notebooks/{name}", content=content))
     return files
 
 
@@ -57,7 +62,8 @@ def site_links(markdown: str, source: str) -> str:
     source : str
         Its place in the site.
     """
-    place = source if (ROOT / source).is_file() else f"docs/{source}"
+    is_made = source.startswith("examples/notebooks/")
+    place = source if is_made or (ROOT / source).is_file() else f"docs/{source}"
 
     def lead(match: re.Match[str]) -> str:
         label, target = match[1], posixpath.normpath(posixpath.join(posixpath.dirname(place), match[2]))
@@ -65,6 +71,8 @@ def site_links(markdown: str, source: str) -> str:
             label = title(ROOT / target)
         if (ROOT / target).is_dir():
             target = f"{target}/README.md" if (ROOT / target / "README.md").is_file() else "examples/README.md"
+        if not is_made:
+            target = re.sub(r"\.ipynb$", ".md", target)
         found = posixpath.relpath(target.removeprefix("docs/"), posixpath.dirname(source) or ".")
         return f"[{label}]({found}{match[3] or ''})"
 
