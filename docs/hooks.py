@@ -21,6 +21,11 @@ EXAMPLES = (".csv", ".ipynb", ".json", ".md", ".py", ".toml", ".txt", ".yaml")
 """Suffixes of the files in examples/ that pages may link to."""
 
 LINK = re.compile(r"\[([^\[\]]*)\]\(([^)\s#:]+)(#[^)\s]*)?\)")
+CODE = re.compile(r"(^```.*?^```$|^ {4}[^\n]*$|^#[^\n]*$)", re.MULTILINE | re.DOTALL)
+"""Blocks of code, and headings."""
+
+REFERENCE = "reference.md"
+
 EXTERNAL = re.compile(
     r"<(?:script|img|iframe|source)\b[^>]*?\bsrc=[\"']?https?:|<link\b(?![^>]*\bcanonical)[^>]*?\bhref=[\"']?https?:"
 )
@@ -49,7 +54,8 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
     """Lead links where their targets stand in the site, and colour commands, which have no prompt, as a shell's."""
     if page.is_homepage:
         page.meta["hide"] = ["navigation"]  # it would have a single entry
-    return site_links(markdown, page.file.src_uri).replace("```console\n", "```bash\n")
+    text = site_links(markdown, page.file.src_uri).replace("```console\n", "```bash\n")
+    return reference_links(text, page.file.src_uri, (ROOT / "docs" / REFERENCE).read_text(encoding="utf-8"))
 
 
 def site_links(markdown: str, source: str) -> str:
@@ -81,8 +87,23 @@ def site_links(markdown: str, source: str) -> str:
 
 def title(path: Path) -> str:
     """Return the heading of a page, or the name of another file."""
-    heading = re.match(r"# (.+)", path.read_text(encoding="utf-8")) if path.suffix == ".md" else None
+    is_page = path.suffix == ".md" and path.is_file()  # mkdocs tells of links that lead nowhere
+    heading = re.match(r"# (.+)", path.read_text(encoding="utf-8")) if is_page else None
     return heading[1] if heading else path.name
+
+
+def reference_links(markdown: str, source: str, reference: str) -> str:
+    """Return the text of a page in which classes of the Python reference are links to their entries.
+
+    In the reference itself functions are, too; elsewhere their names are often those of commands.
+    """
+    is_reference = source == REFERENCE
+    names = re.findall(r"^### (\w+)$" if is_reference else r"^### ([A-Z][a-z]\w+)$", reference, re.MULTILINE)
+    page = "" if is_reference else posixpath.relpath(REFERENCE, posixpath.dirname(source) or ".")
+    name = re.compile(rf"(?<![`\[\w])`({'|'.join(names)})`(?![`\]])")
+    parts = CODE.split(markdown)
+    parts[::2] = [name.sub(lambda match: f"[{match[0]}]({page}#{match[1].lower()})", part) for part in parts[::2]]
+    return "".join(parts)
 
 
 def on_post_build(config: MkDocsConfig) -> None:

@@ -125,6 +125,24 @@ def test_links_out_of_docs_lead_into_the_site(hooks: ModuleType) -> None:
 
 
 @pytest.mark.needs("mkdocs")
+def test_classes_are_links_to_the_reference(hooks: ModuleType) -> None:
+    """Their names in sentences are; those in code, headings and links are not, nor are functions on other pages."""
+    reference = "### Search\n\n### solve\n"
+    for text in (
+        "```python\n`Search`\n```",
+        "    a `Search`",
+        "# `Search`",
+        "[`Search`](x.md)",
+        "`solve`",
+        "`Searches`",
+    ):
+        assert hooks.reference_links(text, "use/a.md", reference) == text
+    page = hooks.reference_links("# `Search`\n\na `Search`.", "use/a.md", reference)
+    assert page == "# `Search`\n\na [`Search`](../reference.md#search)."
+    assert hooks.reference_links("a `solve`.", "reference.md", reference) == "a [`solve`](#solve)."
+
+
+@pytest.mark.needs("mkdocs")
 def test_what_loads_from_the_network_is_noticed(hooks: ModuleType) -> None:
     """Scripts, styles and pictures of other hosts are; files of the site and links for readers are not."""
     for text in (
