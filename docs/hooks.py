@@ -14,12 +14,18 @@ ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "docs"))
 
 import make_commands  # noqa: E402  (beside this file, which is no package)
+import make_notebooks  # noqa: E402
 
 PAGES_OUTSIDE = ("CONTRIBUTING.md", "CHANGELOG.md", "LICENSE", "CITATION.cff")
 EXAMPLES = (".csv", ".ipynb", ".json", ".md", ".py", ".toml", ".txt", ".yaml")
 """Suffixes of the files in examples/ that pages may link to."""
 
 LINK = re.compile(r"\[([^\[\]]*)\]\(([^)\s#:]+)(#[^)\s]*)?\)")
+CODE = re.compile(r"(^```.*?^```$|^ {4}[^\n]*$|^#[^\n]*$)", re.MULTILINE | re.DOTALL)
+"""Blocks of code, and headings."""
+
+REFERENCE = "reference.md"
+
 EXTERNAL = re.compile(
     r"<(?:script|img|iframe|source)\b[^>]*?\bsrc=[\"']?https?:|<link\b(?![^>]*\bcanonical)[^>]*?\bhref=[\"']?https?:"
 )
@@ -27,11 +33,15 @@ EXTERNAL = re.compile(
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
-    """Add the page of all options, and files of the repository that stand outside docs/."""
+    """Add the page of all options, files of the repository that stand outside docs/, and notebooks as pages."""
     files.append(File.generated(config, "use/commands.md", content=make_commands.page()))
     examples = [path for path in (ROOT / "examples").rglob("*") if path.suffix in EXAMPLES and is_kept(path)]
     for path in [*(ROOT / name for name in PAGES_OUTSIDE), *examples]:
         files.append(File.generated(config, path.relative_to(ROOT).as_posix(), abs_src_path=str(path)))
+    for path in (ROOT / "examples" / "notebooks").glob("*.ipynb"):
+        text, pictures = make_notebooks.page(path)
+        for name, content in {f"{path.stem}.md": text, **pictures}.items():
+            files.append(File.generated(config, f"examples/notebooks/{name}", content=content))
     return files
 
 
@@ -44,7 +54,8 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
     """Lead links where their targets stand in the site, and colour commands, which have no prompt, as a shell's."""
     if page.is_homepage:
         page.meta["hide"] = ["navigation"]  # it would have a single entry
-    return site_links(markdown, page.file.src_uri).replace("```console\n", "```bash\n")
+    text = site_links(markdown, page.file.src_uri).replace("```console\n", "```bash\n")
+    return reference_links(text, page.file.src_uri, (ROOT / "docs" / REFERENCE).read_text(encoding="utf-8"))
 
 
 def site_links(markdown: str, source: str) -> str:
@@ -57,7 +68,8 @@ def site_links(markdown: str, source: str) -> str:
     source : str
         Its place in the site.
     """
-    place = source if (ROOT / source).is_file() else f"docs/{source}"
+    is_made = source.startswith("examples/notebooks/")
+    place = source if is_made or (ROOT / source).is_file() else f"docs/{source}"
 
     def lead(match: re.Match[str]) -> str:
         label, target = match[1], posixpath.normpath(posixpath.join(posixpath.dirname(place), match[2]))
@@ -65,6 +77,8 @@ def site_links(markdown: str, source: str) -> str:
             label = title(ROOT / target)
         if (ROOT / target).is_dir():
             target = f"{target}/README.md" if (ROOT / target / "README.md").is_file() else "examples/README.md"
+        if not is_made:
+            target = re.sub(r"\.ipynb$", ".md", target)
         found = posixpath.relpath(target.removeprefix("docs/"), posixpath.dirname(source) or ".")
         return f"[{label}]({found}{match[3] or ''})"
 
@@ -73,8 +87,23 @@ def site_links(markdown: str, source: str) -> str:
 
 def title(path: Path) -> str:
     """Return the heading of a page, or the name of another file."""
-    heading = re.match(r"# (.+)", path.read_text(encoding="utf-8")) if path.suffix == ".md" else None
+    is_page = path.suffix == ".md" and path.is_file()  # mkdocs tells of links that lead nowhere
+    heading = re.match(r"# (.+)", path.read_text(encoding="utf-8")) if is_page else None
     return heading[1] if heading else path.name
+
+
+def reference_links(markdown: str, source: str, reference: str) -> str:
+    """Return the text of a page in which classes of the Python reference are links to their entries.
+
+    In the reference itself functions are, too; elsewhere their names are often those of commands.
+    """
+    is_reference = source == REFERENCE
+    names = re.findall(r"^### (\w+)$" if is_reference else r"^### ([A-Z][a-z]\w+)$", reference, re.MULTILINE)
+    page = "" if is_reference else posixpath.relpath(REFERENCE, posixpath.dirname(source) or ".")
+    name = re.compile(rf"(?<![`\[\w])`({'|'.join(names)})`(?![`\]])")
+    parts = CODE.split(markdown)
+    parts[::2] = [name.sub(lambda match: f"[{match[0]}]({page}#{match[1].lower()})", part) for part in parts[::2]]
+    return "".join(parts)
 
 
 def on_post_build(config: MkDocsConfig) -> None:

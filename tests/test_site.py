@@ -1,6 +1,7 @@
 """The site of the documents: all pages are in it, links lead somewhere there, and nothing is loaded from elsewhere."""
 
 import importlib.util
+import json
 import re
 import sys
 from pathlib import Path
@@ -35,10 +36,14 @@ def hooks(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
 
 def test_every_page_is_in_the_navigation() -> None:
     """Each page of docs/ is named once in mkdocs.yml, and each that is named is there or is made."""
+    made = {
+        "use/commands.md",
+        *(f"examples/notebooks/{path.stem}.md" for path in ROOT.glob("examples/notebooks/*.ipynb")),
+    }
     named = re.findall(r": ([\w/.-]+\.md)$", (ROOT / "mkdocs.yml").read_text("utf-8"), re.MULTILINE)
     pages = {path.relative_to(DOCS).as_posix() for path in DOCS.rglob("*.md")}
     assert len(named) == len(set(named))
-    assert set(named) == pages | {"use/commands.md", "examples/README.md", "CONTRIBUTING.md", "CHANGELOG.md"}
+    assert set(named) == pages | made | {"examples/README.md", "CONTRIBUTING.md", "CHANGELOG.md"}
 
 
 @pytest.mark.parametrize("path", [*DOCS.rglob("*.md"), ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md"], ids=str)
@@ -88,6 +93,27 @@ def test_the_picture_of_the_layers_has_every_package() -> None:
     assert [name for name in folders if f"{name}/" not in picture] == []
 
 
+def test_a_notebook_becomes_a_page(tmp_path: Path) -> None:
+    """Text stays, code and what it printed are fenced, and a picture is a file of its own beside the page."""
+    png = {"output_type": "execute_result", "data": {"image/png": ["aGk=\n"], "text/plain": ["<Image>"]}}
+    said = {"output_type": "stream", "text": ["1\n", "2\n"]}
+    cells = [
+        {"cell_type": "markdown", "source": ["# Title\n", "Words"]},
+        {"cell_type": "code", "source": ["print(1)\n", "print(2)"], "outputs": [said, png]},
+    ]
+    path = tmp_path / "a.ipynb"
+    path.write_text(json.dumps({"cells": cells}))
+    text, pictures = loaded("make_notebooks").page(path)
+    assert pictures == {"a-1.png": b"hi"}
+    assert text.split("\n\n") == [
+        "# Title",
+        "[The notebook itself](a.ipynb).\nWords",
+        "```python\nprint(1)\nprint(2)\n```",
+        "```text\n1\n2\n```",
+        "![Output of the cell above](a-1.png)\n",
+    ]
+
+
 @pytest.mark.needs("mkdocs")
 def test_links_out_of_docs_lead_into_the_site(hooks: ModuleType) -> None:
     """Files beside docs/ stand beside its pages in the site, and a label that is a file's name becomes its title."""
@@ -96,6 +122,24 @@ def test_links_out_of_docs_lead_into_the_site(hooks: ModuleType) -> None:
     assert hooks.site_links("[a](docs/glossary.md#x)", "CONTRIBUTING.md") == "[a](glossary.md#x)"
     assert hooks.site_links("[cli.md](cli.md)", "use/embedding.md") == "[The command line](cli.md)"
     assert hooks.site_links("[h](https://example.org/a.md)", "index.md") == "[h](https://example.org/a.md)"
+
+
+@pytest.mark.needs("mkdocs")
+def test_classes_are_links_to_the_reference(hooks: ModuleType) -> None:
+    """Their names in sentences are; those in code, headings and links are not, nor are functions on other pages."""
+    reference = "### Search\n\n### solve\n"
+    for text in (
+        "```python\n`Search`\n```",
+        "    a `Search`",
+        "# `Search`",
+        "[`Search`](x.md)",
+        "`solve`",
+        "`Searches`",
+    ):
+        assert hooks.reference_links(text, "use/a.md", reference) == text
+    page = hooks.reference_links("# `Search`\n\na `Search`.", "use/a.md", reference)
+    assert page == "# `Search`\n\na [`Search`](../reference.md#search)."
+    assert hooks.reference_links("a `solve`.", "reference.md", reference) == "a [`solve`](#solve)."
 
 
 @pytest.mark.needs("mkdocs")

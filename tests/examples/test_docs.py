@@ -94,16 +94,16 @@ def fault(line):
 
 
 def run_document(text, name, folder):
-    """Run all blocks of a document in order, in one namespace and one folder."""
-    namespace, is_first = {"__name__": "document"}, True
+    """Run all blocks of a document in order, in one namespace and one folder; the first of README as a user does."""
+    namespace, by_shell = {"__name__": "document"}, name == "README.md"
     for block in filter(runs, blocks(text)):
         if block.language == "python":
             exec(compile("\n" * (block.line - 1) + block.code, name, "exec"), namespace)
         else:
             for command in commands(block.code):
-                code, errors = run_by_shell(command, folder) if is_first or SHELL.search(command) else run_here(command)
+                code, errors = run_by_shell(command, folder) if by_shell or SHELL.search(command) else run_here(command)
                 assert code == 0, f"{name}:{block.line}: {command}\n{errors}"
-                is_first = False
+                by_shell = False
 
 
 def run_by_shell(command, folder):

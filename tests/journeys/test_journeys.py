@@ -22,6 +22,7 @@ MOST_LINES = 15
 SCRIPTS = Path(sys.executable).parent
 
 
+@pytest.mark.timeout(400)
 @pytest.mark.parametrize("name", JOURNEYS)
 def test_journey(name: str, tmp_path: Path) -> None:
     """Every command of the script works, and every file has what it must have."""

@@ -1,0 +1,49 @@
+"""Makes pages of the notebooks, as they were executed; `hooks.py` puts them into the site."""
+
+import base64
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TypedDict
+
+
+class Cell(TypedDict):
+    """A cell, as the file has it."""
+
+    cell_type: str
+    source: list[str]
+    outputs: list[dict[str, object]]
+
+
+def page(path: Path) -> tuple[str, dict[str, bytes]]:
+    """Return a notebook as Markdown, and its pictures by the names that the page has for them."""
+    pictures: dict[str, bytes] = {}
+    parts: list[str] = []
+    for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]:
+        if cell["cell_type"] == "markdown":
+            parts.append("".join(cell["source"]))
+            continue
+        parts.append(fenced("python", "".join(cell["source"])))
+        parts += outputs(cell, path.stem, pictures)
+    heading, _, rest = "\n\n".join(parts).partition("\n")
+    return f"{heading}\n\n[The notebook itself]({path.name}).\n{rest}\n", pictures
+
+
+def outputs(cell: Cell, stem: str, pictures: dict[str, bytes]) -> Iterator[str]:
+    """Yield what a cell printed or returned; pictures are added to `pictures`."""
+    for output in cell["outputs"]:
+        data = output.get("data", {})
+        assert isinstance(data, dict)
+        if "image/png" in data:
+            name = f"{stem}-{len(pictures) + 1}.png"
+            pictures[name] = base64.b64decode("".join(data["image/png"]))
+            yield f"![Output of the cell above]({name})"
+        else:
+            text = output.get("text") or data.get("text/plain") or []
+            assert isinstance(text, list)
+            yield fenced("text", "".join(text))
+
+
+def fenced(language: str, text: str) -> str:
+    """Return text between fences."""
+    return f"```{language}\n{text.rstrip()}\n```"
