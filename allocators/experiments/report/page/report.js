@@ -73,8 +73,9 @@ function tellAll() {
   const failed = all.reduce((sum, one) => sum + one.runs - (one.outcomes.solved || 0), 0);
   const total = all.reduce((sum, one) => sum + one.runs, 0);
   const cards = { runs: total, instances: page.instances.name.length, methods: page.labels.length, conditions: page.groups.length, "runs not solved": failed };
-  const hours = page.groups.reduce((sum, one) => sum + one.conditions.cpu_s, 0) / 3600;
-  for (const [name, value] of [...Object.entries(cards).map(([key, count]) => [key, count.toLocaleString("en")]), ["processor hours", figure(hours, 3)]])
+  const seconds = page.groups.reduce((sum, one) => sum + one.conditions.cpu_s, 0);
+  const [unit, length] = seconds < 3600 ? ["seconds", 1] : ["hours", 3600];
+  for (const [name, value] of [...Object.entries(cards).map(([key, count]) => [key, count.toLocaleString("en")]), [`processor ${unit}`, figure(seconds / length, 3)]])
     add(add(byId("cards"), "div", name), "b", value);
   byId("cards").querySelectorAll("div").forEach((card) => card.prepend(card.lastChild));
   const of = (get) => (index) => get(page.groups[index].conditions);
