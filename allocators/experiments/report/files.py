@@ -1,11 +1,10 @@
 """A report as a file; the suffix of its name decides what it holds."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from alloc.allocators.experiments.compare import Row
 from alloc.allocators.experiments.report.runs import require_pyarrow, runs_csv, runs_parquet
-from alloc.allocators.experiments.report.tables import Table, report_tables
+from alloc.allocators.experiments.report.tables import Table
 from alloc.allocators.experiments.stored import Comparison, Endings
 from alloc.problems import InputError
 from alloc.problems.formats import check_writable, write_bytes_atomically
@@ -32,7 +31,9 @@ def check_report(path: PathLike) -> None:
     check_writable(path)
 
 
-def write_report(path: PathLike, comparison: Comparison, endings: Endings, rows: Sequence[Row]) -> None:
+def write_report(
+    path: PathLike, comparison: Comparison, endings: Endings, tables: Callable[[], Sequence[Table]]
+) -> None:
     """Write a report, whole or not at all.
 
     Parameters
@@ -42,8 +43,8 @@ def write_report(path: PathLike, comparison: Comparison, endings: Endings, rows:
     comparison : Comparison
     endings : mapping
         How its runs ended.
-    rows : sequence of Row
-        Those of the comparison, with the gaps that are to be told.
+    tables : callable
+        Makes the tables, such as `report_tables` and `mission_tables`, where they are asked for.
 
     Raises
     ------
@@ -60,7 +61,7 @@ def write_report(path: PathLike, comparison: Comparison, endings: Endings, rows:
         content = runs_csv(comparison, endings).encode()
     else:
         render = markdown if suffix == ".md" else latex
-        content = render(report_tables(comparison, endings, rows)).encode()
+        content = render(tables()).encode()
     write_bytes_atomically(path, content)
 
 

@@ -1,50 +1,28 @@
-"""A report on policies in missions: tables for people, all runs with their measures for programs."""
+"""What a report on policies in missions tells people."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
 from alloc.allocators.experiments.differences import Interval, PolicyDifference, paired_differences
 from alloc.allocators.experiments.policies import PolicyRow
-from alloc.allocators.experiments.report.files import check_report, latex, markdown
-from alloc.allocators.experiments.report.runs import runs_csv, runs_parquet
 from alloc.allocators.experiments.report.tables import Table
 from alloc.allocators.experiments.stored import Comparison, Endings, doubts
 from alloc.allocators.experiments.sweep import mean
-from alloc.problems.formats import write_bytes_atomically
-from alloc.problems.formats.files import PathLike
 from alloc.problems.text import counted, number, percent
 
 
-def write_mission_report(path: PathLike, comparison: Comparison, endings: Endings, rows: Sequence[PolicyRow]) -> None:
-    """Write a report, whole or not at all; see `write_report`.
+def mission_tables(comparison: Comparison, endings: Endings, rows: Sequence[PolicyRow]) -> list[Table]:
+    """Return a table of policies, and tables of how they differ.
 
     Parameters
     ----------
-    path : str or path
     comparison : Comparison
         Of policies.
     endings : mapping
         How its runs ended.
     rows : sequence of PolicyRow
         Those of the comparison.
-
-    Raises
-    ------
-    InputError
-        If the name has no known suffix, or the file cannot be written.
-    MissingPackageError
-        If pyarrow is needed and not installed.
     """
-    check_report(path)
-    suffix = Path(path).suffix.lower()
-    if suffix == ".parquet":
-        content = runs_parquet(comparison, endings)
-    elif suffix == ".csv":
-        content = runs_csv(comparison, endings).encode()
-    else:
-        tables = [_policies(comparison, endings, rows), *difference_tables(paired_differences(rows))]
-        content = (markdown if suffix == ".md" else latex)(tables).encode()
-    write_bytes_atomically(path, content)
+    return [_policies(comparison, endings, rows), *difference_tables(paired_differences(rows))]
 
 
 def _policies(comparison: Comparison, endings: Endings, rows: Sequence[PolicyRow]) -> Table:

@@ -4,6 +4,7 @@ import contextlib
 import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 from alloc.cli.commands.experiments.options import Keeping
@@ -106,7 +107,8 @@ def _in_store(
 ) -> _Found:
     """Make the runs that the store has not yet, write the reports, and return the rows of all."""
     from alloc.allocators import load_policy
-    from alloc.allocators.experiments.report.missions import write_mission_report
+    from alloc.allocators.experiments.report.files import write_report
+    from alloc.allocators.experiments.report.missions import mission_tables
     from alloc.allocators.experiments.stored_missions import planned_missions, policy_rows
     from alloc.problems import MissingPackageError
 
@@ -124,7 +126,7 @@ def _in_store(
     kept = make_missing(keeping, plan)
     rows = policy_rows(kept.comparison, kept.endings)
     for file in keeping.reports:
-        write_mission_report(file, kept.comparison, kept.endings, rows)
+        write_report(file, kept.comparison, kept.endings, partial(mission_tables, kept.comparison, kept.endings, rows))
     return _Found(rows, kept.is_complete, kept.notes)
 
 

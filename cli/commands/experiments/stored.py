@@ -5,6 +5,7 @@ import sys
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 from alloc.cli.commands.experiments.options import Engine, Keeping
@@ -126,13 +127,14 @@ def compare_in_store(
 def conclude(keeping: Keeping, kept: Kept, rows: "list[Row]", *, quiet: bool) -> int:
     """Print how methods differ, unless `quiet`, and the notes, write the reports, and return the exit code."""
     from alloc.allocators.experiments.report.files import write_report
+    from alloc.allocators.experiments.report.tables import report_tables
 
     if not quiet and len(kept.endings) > 1:
         _tell_differences(kept)
     for one in kept.notes:
         note(one)
     for file in keeping.reports:
-        write_report(file, kept.comparison, kept.endings, rows)
+        write_report(file, kept.comparison, kept.endings, partial(report_tables, kept.comparison, kept.endings, rows))
     is_served = any(row.runs for row in rows) and not any(row.unserved for row in rows)
     return 0 if kept.is_complete and is_served else 1
 
