@@ -15,6 +15,7 @@ from alloc.problems.fields import BoolArray, FloatArray
 from alloc.problems.missions.chance import BURST, LOSS, PACE
 from alloc.problems.missions.events import Event, EventKind
 from alloc.problems.missions.mission import Mission
+from alloc.problems.missions.radio import Radio
 from alloc.problems.missions.simulation.agenda import Turn
 from alloc.problems.missions.simulation.measures import DecisionTimes, MissionResult, measured
 from alloc.problems.missions.simulation.simulation import Simulation
@@ -23,7 +24,7 @@ from alloc.problems.vocabulary import GEOGRAPHIC, MANHATTAN, Knowledge
 
 Records = NDArray[np.void]
 
-MOST_KNOWN = 50_000_000
+MOST_KNOWN = 300_000_000
 """Pairs of who knows and what is known up to which a mission is simulated."""
 
 
@@ -51,7 +52,7 @@ def pack(mission: Mission, knowledge: Knowledge | str | None = None) -> MissionA
     known = mission.knowledge if knowledge is None else Knowledge(knowledge)
     n, m = instance.n, instance.m
     wide_n, wide_m = (max(LEAST_COLUMNS, -(-count // COLUMNS) * COLUMNS) for count in (n, m))
-    rows, slots = (n, int(mission.radio.delay // mission.radio.period) + 2) if known is Knowledge.LOCAL else (1, 0)
+    rows, slots = (n, _on_the_air(mission.radio)) if known is Knowledge.LOCAL else (1, 0)
     if (rows + slots * n) * (n + m) > MOST_KNOWN:
         raise RefusedError(f"{n} agents and {m} tasks are too many for the compiled simulation with local knowledge")
     agents, tasks, events = _agents(mission, known), _tasks(mission), _events(mission)
@@ -93,6 +94,11 @@ def pack(mission: Mission, knowledge: Knowledge | str | None = None) -> MissionA
         "changed_tasks": np.zeros(m, np.intp),
     }
     return MissionArrays(**{name: _by_attribute(part) for name, part in parts.items()})  # type: ignore[arg-type]
+
+
+def _on_the_air(radio: Radio) -> int:
+    """Return how many messages of an agent are on the air at once at the most."""
+    return 1 if radio.delay == 0 else int(radio.delay // radio.period) + 2
 
 
 def begun(packed: MissionArrays, seed: int = 0) -> MissionArrays:
