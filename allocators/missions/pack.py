@@ -24,7 +24,7 @@ from alloc.problems.vocabulary import GEOGRAPHIC, MANHATTAN, Knowledge
 
 Records = NDArray[np.void]
 
-MOST_KNOWN = 300_000_000
+MOST_KNOWN = 50_000_000
 """Pairs of who knows and what is known up to which a mission is simulated."""
 
 
