@@ -1,6 +1,6 @@
 """How long compiled missions take as agents grow: local knowledge, short radios, a failure for every five agents.
 
-    python tests/benchmarks/missions_growth.py --agents 500 1000 2000 --plot docs/missions_scale.png
+    python tests/benchmarks/missions_growth.py --agents 500 1000 2000 --plot docs/missions/missions_scale.png
 
 Radii shrink so that an agent has about as many neighbours in each mission. Seconds are of a processor. Exponents are
 those of the power law from one row to the next.
