@@ -20,7 +20,7 @@ from alloc.problems.formats.schemas import SCHEMAS, schema
 from .test_malformed_json import DOCUMENTS
 
 ROOT = Path(__file__).parents[3]
-TEXTS = {path: path.read_text("utf-8") for path in [*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")]}
+TEXTS = {path: path.read_text("utf-8") for path in [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")]}
 EXAMPLES = sorted((ROOT / "examples").rglob("*.json"))
 
 BEYOND = ("used twice", "there is no", "Unicode", "in smaller units", "must be finite", "id of an agent and of a task")
