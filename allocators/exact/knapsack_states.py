@@ -108,7 +108,7 @@ def extend(
 
 @inlined
 def relax_state(cost: float, spare: float, before: float, after: float) -> float:
-    """Return the cost of the relaxation: `spare` is what a state has beyond the need, the others prices per weight."""
+    """Return the cost of the linear relaxation by what a state has to spare and the next prices per weight."""
     return cost - spare * before if spare >= 0 else cost - spare * after
 
 

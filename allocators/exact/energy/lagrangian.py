@@ -44,9 +44,9 @@ class StepRule:
     decay: float
 
 
-BRIEF, LASTING = StepRule(0.75, 20, 0.7), StepRule(0.99, 60, 0.8)
-"""Until the clusters are added, and from then on or where there are none: long memory and patience get farther in the
-end."""
+BRIEF, CLUSTERED, LASTING = StepRule(0.75, 20, 0.7), StepRule(0.95, 60, 0.8), StepRule(0.99, 60, 0.8)
+"""Until the clusters are added, with them, and where there are none: more prices, and more time, need longer memory and
+more patience."""
 
 FIRST_STEP_PRICED = 0.1
 """First step from prices of the linear programme, which are nearly the best already."""
@@ -54,8 +54,9 @@ FIRST_STEP_PRICED = 0.1
 COMPARE_EVERY = 10
 """Rounds between two that look for pairs to drop, where that takes long."""
 
-CONVERGED_STEP = 0.005
-"""Steps shorter than this, where 1 is the step that would reach the plan's cost, hardly raise the bound."""
+CONVERGED_STEP, CONVERGED_ALONE = 0.02, 0.005
+"""Steps shorter than this, where 1 is the step that would reach the plan's cost, hardly raise the bound: with clusters,
+after which a solver does better, and without."""
 
 MAX_LINKS = 5_000_000
 """Clusters times pairs of class and task above which there are no clusters."""
@@ -123,7 +124,9 @@ class LagrangianBound:
     @property
     def converged(self) -> bool:
         """Whether steps have become so short that the bound hardly rises any more."""
-        return self._step < CONVERGED_STEP and (self._clusters is not None or self._member is None)
+        if self._member is None:
+            return self._step < CONVERGED_ALONE
+        return self._step < CONVERGED_STEP and self._clusters is not None
 
     @property
     def is_rising_slowly(self) -> bool:
@@ -190,7 +193,9 @@ class LagrangianBound:
 
     @property
     def _step_rule(self) -> StepRule:
-        return BRIEF if self._clusters is None and self._member is not None else LASTING
+        if self._member is None:
+            return LASTING
+        return BRIEF if self._clusters is None else CLUSTERED
 
     def _note(self, value: float) -> None:
         """Keep the best bound; shorten steps where it has not risen for long."""
