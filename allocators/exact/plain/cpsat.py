@@ -68,12 +68,11 @@ class PlainCpSat:
         weight, need = _up(programme.rate * ability), _down(programme.need / programme.scale * ability)
         steps = RATIO_STEPS if programme.is_free else 1
         ratio = model.new_int_var(0, RATIO_STEPS, "") if programme.is_free else 1
-        for row, least in enumerate(need.tolist()):
-            pairs = np.flatnonzero(programme.row == row)
+        for pairs, least in zip(_grouped(programme.row, len(need)), need.tolist(), strict=True):
             done = cp_model.LinearExpr.weighted_sum([x[p] for p in pairs], (weight[pairs] * steps).tolist())
             model.add(done >= least * ratio)
-        for agent in programme.used:
-            model.add_at_most_one([x[p] for p in np.flatnonzero(programme.kind == agent)])
+        for pairs in _grouped(programme.kind, len(programme.groups.ability)):
+            model.add_at_most_one([x[p] for p in pairs])
         scale = 1.0
         if programme.is_free:
             model.maximize(ratio)
@@ -81,6 +80,12 @@ class PlainCpSat:
             scale = _scale(float(programme.energy.sum()), COST_BITS)
             model.minimize(cp_model.LinearExpr.weighted_sum(x, _down(programme.energy * scale).tolist()))
         return model, scale
+
+
+def _grouped(numbers: IntArray, count: int) -> list[IntArray]:
+    """Return the places of each number below `count`, in ascending order."""
+    places = np.argsort(numbers, kind="stable")
+    return np.split(places, np.searchsorted(numbers[places], np.arange(1, count)))
 
 
 def _chosen(solution: Iterable[int], pairs: int) -> IntArray:

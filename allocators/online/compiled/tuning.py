@@ -6,12 +6,14 @@ Hansen and Ostermeier (2001), doi:10.1162/106365601750190398, as in DEAP (Fortin
 """
 
 import dataclasses
-from collections.abc import Iterator
+import io
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from deap import base, cma
+from numpy.typing import NDArray
 
 from alloc.allocators.learned.missions.training.curriculum import PackedMission
 from alloc.allocators.learned.missions.training.evolution import restore, state_of
@@ -22,6 +24,8 @@ from alloc.allocators.online.compiled.run import rank_of
 from alloc.allocators.online.registry import load_policy
 from alloc.problems.errors import InputError
 from alloc.problems.fields import FloatArray
+from alloc.problems.formats import write_bytes_atomically
+from alloc.problems.formats.files import named
 
 STEP = 0.5
 """Initial standard deviation of the logarithm of a parameter."""
@@ -88,7 +92,7 @@ def tune(
     seed : int
         Of all random numbers.
     state : Path, optional
-        File from which an interrupted tuning goes on.
+        File (.npz) from which an interrupted tuning of the same policy and seed goes on.
     setting : MissionTrainingParameters, optional
         Candidates, missions and validations, those of `gappo` by default.
     """
@@ -101,7 +105,11 @@ def tune(
     validation = setting.curriculum.validation(setting.validations)
     strategy = cma.Strategy(centroid=first, sigma=STEP, lambda_=setting.candidates)
     if state is not None and state.exists():
-        restore(strategy, np.load(state))
+        with np.load(state) as archive:
+            kept = dict(archive)
+        if (str(kept["policy"]), int(kept["seed"])) != (policy, seed):
+            raise InputError("is of another policy or seed; name another file", source=named(state))
+        restore(strategy, kept)
     for generation in range(strategy.update_count, generations):
         rng = np.random.default_rng((seed, generation))
         missions = setting.curriculum.draw(rng, setting.missions, generation / generations)
@@ -111,11 +119,17 @@ def tune(
         strategy.update([_Candidate(row, cost) for row, cost in zip(rows, costs, strict=True)])
         mean = np.maximum(np.exp(strategy.centroid), lows)
         if state is not None:
-            np.savez(state, **state_of(strategy))  # type: ignore[arg-type]  # not `allow_pickle`
+            _write(state, {**state_of(strategy), "policy": np.array(policy), "seed": np.array(seed)})
         is_due = (generation + 1) % VALIDATED_EVERY == 0 or generation + 1 == generations
         found = _cost(policy, mean, validation) if is_due else None
         parameters = dict(zip(names, mean.tolist(), strict=True))
         yield Tuned(generation + 1, parameters, found, (generation + 1) * setting.candidates * setting.missions)
+
+
+def _write(path: Path, arrays: Mapping[str, NDArray[np.generic]]) -> None:
+    buffer = io.BytesIO()
+    np.savez(buffer, allow_pickle=False, **arrays)
+    write_bytes_atomically(path, buffer.getvalue())
 
 
 def _cost(policy: str, parameters: FloatArray, missions: list[tuple[PackedMission, int]]) -> float:

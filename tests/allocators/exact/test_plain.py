@@ -32,6 +32,7 @@ def test_time_limit_ends_the_solver(name):
     """The plain model of a large instance is far from solved in 0.1 s, and the run ends then."""
     result = solve(paper_like(300, 30, 1200, seed=1), load(name, plain=True), time_limit_s=0.1)
     assert result.stop_reason is StopReason.TIME_LIMIT
+    assert result.runtime_s < 5
     assert result.parameters == {"plain": True}
 
 
