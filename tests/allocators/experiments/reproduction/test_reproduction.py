@@ -24,6 +24,7 @@ from alloc.allocators.experiments.reproduction.findings import (
     traditional,
 )
 from alloc.allocators.experiments.reproduction.folder import Folder
+from alloc.allocators.experiments.reproduction.page import page
 from alloc.allocators.experiments.reproduction.protocol import OTHERS, PAPER_METHODS, SCENARIOS, TESTS, Job, planned
 from alloc.allocators.experiments.reproduction.rows import Learned, Solved, append, begin, read
 from alloc.allocators.experiments.reproduction.summary import effect, final, fluctuation, reached, runs_of
@@ -163,6 +164,27 @@ def test_infinite_makespans_count_on_both_sides() -> None:
     assert described(1.0, math.inf, 90.0, runs=8)[:2] == [HOLDS, TOO_FEW]
     assert described(1.0, math.nan, 90.0, runs=8)[:2] == [HOLDS, TOO_FEW]
     assert described(math.inf, 1.0, 90.0, runs=8)[:2] == [NOT, TOO_FEW]
+
+
+@pytest.mark.parametrize(
+    ("rivals", "runs", "words"),
+    [
+        ({"ppo": 1.2}, 12, "What the population brings is not measured"),
+        ({"ppo": 1.2, "gappo-single": 1.0}, 12, "Nothing is shown to come of the population** (no p"),
+        ({"ppo": 1.0, "gappo-single": 1.2}, 9, "The population brings something** (final T, best"),
+        ({"ppo": 1.0, "gappo-single": 1.2}, 8, "Nothing is shown to come of the population** (fewer than 9 runs"),
+    ],
+)
+def test_the_population_is_judged_by_a_single_member(rivals: dict[str, float], runs: int, words: str) -> None:
+    """Being ahead of PPO, which differs in more, says nothing about the population; it is told beside the finding."""
+    rows = []
+    for run in range(runs):
+        for method, makespan in {"gappo": 1.0, **rivals}.items():
+            last = makespan + 0.001 * run * (makespan > 1)
+            rows += [replace(ROW, method=method, run=run, makespan=last, drawn=last)]
+    text = page(rows, [], [])
+    assert f"**{words}" in text
+    assert "Against `ppo`, which differs in more than the population: final T" in text
 
 
 @pytest.mark.slow
