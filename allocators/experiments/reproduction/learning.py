@@ -21,6 +21,7 @@ from alloc.allocators.experiments.reproduction.protocol import (
     TUNED,
     VARIANTS,
     Job,
+    judged,
 )
 from alloc.allocators.experiments.reproduction.rows import Learned
 from alloc.allocators.learned.algorithms.genes import GeneticPpo
@@ -74,7 +75,7 @@ def learn(job: Job) -> list[Learned]:
         spent = (0, 0, 0.0)
         for point in (point for point in POINTS if point <= job.iterations):
             spent = _trained(learner, job, point, spent)
-            wanted = (key for key in boards if key == TESTS or point <= ITERATIONS[key])
+            wanted = (key for key in boards if point in judged(key, job.iterations))
             rows += [_row(job, learner, key, boards[key], point, spent) for key in wanted]
     return rows
 

@@ -1,6 +1,7 @@
 """The paper's experiments made anew: rows that outlive crashes, and a page that is made from them alone."""
 
 import math
+import os
 import shutil
 import threading
 from dataclasses import replace
@@ -25,7 +26,15 @@ from alloc.allocators.experiments.reproduction.findings import (
 )
 from alloc.allocators.experiments.reproduction.folder import Folder
 from alloc.allocators.experiments.reproduction.page import page
-from alloc.allocators.experiments.reproduction.protocol import OTHERS, PAPER_METHODS, SCENARIOS, TESTS, Job, planned
+from alloc.allocators.experiments.reproduction.protocol import (
+    OTHERS,
+    PAPER_METHODS,
+    SCENARIOS,
+    TESTS,
+    Job,
+    expected,
+    planned,
+)
 from alloc.allocators.experiments.reproduction.rows import Learned, Solved, append, begin, read
 from alloc.allocators.experiments.reproduction.summary import effect, final, fluctuation, reached, runs_of
 from alloc.allocators.parallel.serial import SerialEngine
@@ -42,6 +51,14 @@ def history(method: str, run: int, *makespans: float, scenario: int = TESTS) -> 
     return [
         replace(ROW, method=method, run=run, scenario=scenario, iteration=100 * number, makespan=makespan)
         for number, makespan in enumerate(makespans)
+    ]
+
+
+def rows_of(job: Job) -> list[Learned]:
+    """All rows of a run, made without training."""
+    return [
+        replace(ROW, method=job.method, run=job.run, scenario=scenario, iteration=iteration)
+        for scenario, iteration in sorted(expected(job))
     ]
 
 
@@ -70,7 +87,7 @@ def test_only_what_is_missing_is_made(tmp_path: Path, monkeypatch: pytest.Monkey
 
     def make_run(data: Path, job: Job) -> None:
         made.append(job)
-        append(data / "learning.csv", [replace(ROW, method=job.method, run=job.run)])
+        append(data / "learning.csv", rows_of(job))
         if len(made) == 3:
             stop.set()
 
@@ -82,6 +99,34 @@ def test_only_what_is_missing_is_made(tmp_path: Path, monkeypatch: pytest.Monkey
     assert place.make(jobs, SerialEngine())
     assert made == jobs
     assert len(place.environments) == 1
+
+
+@pytest.mark.parametrize("lost", [1, 2, 9, 60])
+def test_a_torn_run_is_made_again(tmp_path: Path, lost: int) -> None:
+    """A run cut short, within a line or at its end, is not read and is missing; what is appended then is whole."""
+    place, jobs = Folder(tmp_path), [Job(0, "gappo"), Job(1, "gappo"), Job(2, "gappo")]
+    place.data.mkdir()
+    path = place.data / "learning.csv"
+    begin(path, Learned)
+    append(path, rows_of(jobs[0]))
+    append(path, rows_of(jobs[1]))
+    text = path.read_bytes()
+    path.write_bytes(text[: text[:-1].rindex(b"\n") + 1] if lost == 60 else text[:-lost])
+    assert place.missing(jobs) == jobs[1:]
+    append(path, rows_of(jobs[2]))
+    assert place.missing(jobs) == [jobs[1]]
+    assert str(place.learned) == str(rows_of(jobs[0]) + rows_of(jobs[2]))
+    append(path, rows_of(jobs[1]))
+    assert place.missing(jobs) == []
+    assert len(place.learned) == 3 * len(expected(jobs[0]))
+
+
+def test_rows_that_do_not_fit_on_the_disk_are_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the system writes but a part of the rows, the run does not count as made."""
+    write = os.write
+    monkeypatch.setattr(os, "write", lambda handle, data: write(handle, data[:20]))
+    with pytest.raises(OSError, match="only a part of the rows"):
+        append(tmp_path / "rows.csv", [ROW])
 
 
 def test_figures_and_page_are_made_from_rows(tmp_path: Path) -> None:
@@ -194,6 +239,9 @@ def test_every_method_makes_its_rows(tmp_path: Path, monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(learning, "DECISIONS", 10)
     monkeypatch.setattr(learning, "_boards", lambda run: {TESTS: small, 4: small})
     monkeypatch.setattr(others, "SCENARIOS", (1,))
+    monkeypatch.setattr(
+        module, "expected", lambda job: {(TESTS, 0), (4, 0), (TESTS, 5), (4, 5)} if job.learns else {(1, 0)}
+    )
     jobs = [Job(0, method, iterations=5, time_limit_s=0.05) for method in (*PAPER_METHODS, *OTHERS)]
     place = Folder(tmp_path)
     place.make(jobs, SerialEngine())
