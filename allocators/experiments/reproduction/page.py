@@ -25,6 +25,7 @@ from alloc.allocators.experiments.reproduction.summary import (
     of_scenario,
     reached,
     runs_of,
+    solved_to_the_bound,
 )
 from alloc.allocators.experiments.statistics import holm, interval
 from alloc.problems.text import counted
@@ -51,6 +52,7 @@ def page(learned: Sequence[Learned], solved: Sequence[Solved], environments: Seq
         _claims(data),
         "## Figures",
         FIGURES,
+        _optimum(data),
         *(_figure(scenario) for scenario in SCENARIOS),
         "![Battery left](reproduction/figure-6.png)",
         "Bars are means, lines the least and the most of the runs; grey is what the paper has.",
@@ -117,6 +119,18 @@ def _claims(data: Data) -> str:
 
 def _figure(scenario: int) -> str:
     return f"![Makespan over iterations, scenario {scenario}](reproduction/figure-{scenario + 1}.png)"
+
+
+def _optimum(data: Data) -> str:
+    """Say for how many instances the bound is the optimum."""
+    met, total = solved_to_the_bound(data.learned, data.solved)
+    if not total:
+        return ""
+    if met == total:
+        return f"A plan as long as the bound is known for all {counted(total, 'instance')}, so that it is the optimum."
+    return (
+        f"A plan as long as the bound, which makes it the optimum, is known for {met} of {counted(total, 'instance')}."
+    )
 
 
 def _mean(values: Sequence[float], form: str) -> str:

@@ -14,9 +14,8 @@ from rows that lie beside the page.
 
 Ctrl-C keeps the runs that have ended, and the same command goes on from there."""
 
-FIGURES = """As in the paper, with the optimum as a pink dotted line: it is proven for every instance, as no plan
-can be shorter than total load over total ability, and one of that length is known. The panel on the right has what
-methods that learn nothing reach on the same instances."""
+FIGURES = """As in the paper, with the proven lower bound of the makespan as a pink dotted line, a median over the
+instances. The panel on the right has what methods that learn nothing reach on the same instances."""
 
 PROCEDURE = """## How it is measured
 - **Length**: schedules of step sizes end with the run, so that short runs are no beginnings of long ones. Claims and

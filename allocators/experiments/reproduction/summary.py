@@ -6,10 +6,14 @@ from typing import TypeVar
 
 import numpy as np
 
+from alloc.allocators.experiments.reproduction.protocol import TESTS
 from alloc.allocators.experiments.reproduction.rows import Learned, Solved
 from alloc.allocators.experiments.statistics import interval, signed_rank
 
 Row = TypeVar("Row", Learned, Solved)
+
+OPTIMAL = 1 + 1e-4
+"""Makespan over the proven bound up to which it counts as the optimum."""
 
 Runs = list[list[Learned]]
 """Rows of each run, in the order of their iterations."""
@@ -32,6 +36,21 @@ class Effect:
     low: float | None
     high: float | None
     p: float | None
+
+
+def is_optimal(row: Learned | Solved) -> bool:
+    """Return whether the makespan is that of the proven bound."""
+    return row.makespan <= row.lower_bound * OPTIMAL
+
+
+def solved_to_the_bound(learned: Sequence[Learned], solved: Sequence[Solved]) -> tuple[int, int]:
+    """Return of how many instances of the scenarios a plan as long as the proven bound is known, and of how many all.
+
+    The bound of these instances is the optimum.
+    """
+    rows = [row for row in (*learned, *solved) if row.scenario != TESTS]
+    met = {(row.scenario, row.run) for row in rows if is_optimal(row)}
+    return len(met), len({(row.scenario, row.run) for row in rows})
 
 
 def of_scenario(rows: Sequence[Row], scenario: int) -> list[Row]:

@@ -21,6 +21,7 @@ from alloc.allocators.experiments.reproduction.findings import (
     battery,
     least_energy,
     optimal,
+    proven,
     sizes,
     traditional,
 )
@@ -38,7 +39,7 @@ from alloc.allocators.experiments.reproduction.protocol import (
 from alloc.allocators.experiments.reproduction.rows import Learned, Solved, append, begin, read
 from alloc.allocators.experiments.reproduction.summary import effect, final, fluctuation, reached, runs_of
 from alloc.allocators.parallel.serial import SerialEngine
-from alloc.problems import InputError
+from alloc.problems import InputError, makespan_lower_bound
 from alloc.problems.generate.paper_scenarios import paper_like
 
 DOCS = Path(__file__).parents[4] / "docs"
@@ -211,6 +212,28 @@ def test_infinite_makespans_count_on_both_sides() -> None:
     assert described(math.inf, 1.0, 90.0, runs=8)[:2] == [NOT, TOO_FEW]
 
 
+def test_what_is_proven_comes_from_the_rows() -> None:
+    """The page calls the bound the optimum where a plan of that length is known, and says for how many it is."""
+    learned = [*history("gappo", 0, 2.0, 1.2, scenario=1), *history("gappo", 0, 2.0, 1.2, scenario=2)]
+    bounded = [replace(row, lower_bound=1.1) for row in learned]
+    short = [replace(SOLVED, makespan=1.1, lower_bound=1.1)]
+    assert "makes it the optimum, is known for 1 of 2 instances" in page(bounded, short, [])
+    short += [replace(SOLVED, scenario=2, makespan=1.1, lower_bound=1.1)]
+    assert "known for all 2 instances, so that it is the optimum" in page(bounded, short, [])
+    assert proven(Data(bounded, short)) == ("2 of 2 instances have a plan as long as the proven bound, 1.1 h", UNKNOWN)
+    assert optimal(Data([replace(row, makespan=1.1) for row in bounded], []))[0].startswith("scenario 1: 1 of 1; ")
+
+
+def test_makespans_are_in_hours_over_the_proven_bound() -> None:
+    """Each game is judged against the bound of its own instance, whatever that is."""
+    instances = [paper_like(8, 3, 24, 1), paper_like(8, 3, 30, 1)]
+    judged = learning._judged(instances)
+    assert judged.bound.tolist() == [makespan_lower_bound(instance) for instance in instances]
+    need = judged.board.need[:, :-1].sum(1) / judged.board.ability.sum(1) * judged.bound
+    totals = [float(instance.workload.sum() / instance.ability.sum()) for instance in instances]
+    assert need.tolist() == pytest.approx(totals)
+
+
 @pytest.mark.parametrize(
     ("rivals", "runs", "words"),
     [
@@ -235,9 +258,9 @@ def test_the_population_is_judged_by_a_single_member(rivals: dict[str, float], r
 @pytest.mark.slow
 def test_every_method_makes_its_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A short run of each method, learned and not, is judged at each point; a training is repeated to the same rows."""
-    small = learning._board([paper_like(8, 3, 24, 1)])
+    small = learning._judged([paper_like(8, 3, 24, 1)])
     monkeypatch.setattr(learning, "DECISIONS", 10)
-    monkeypatch.setattr(learning, "_boards", lambda run: {TESTS: small, 4: small})
+    monkeypatch.setattr(learning, "_judged_by", lambda run: {TESTS: small, 4: small})
     monkeypatch.setattr(others, "SCENARIOS", (1,))
     monkeypatch.setattr(
         module, "expected", lambda job: {(TESTS, 0), (4, 0), (TESTS, 5), (4, 5)} if job.learns else {(1, 0)}
