@@ -48,12 +48,15 @@ Finding = tuple[str, str]
 
 
 def told(one: Effect | None, form: str = "+.3f") -> str:
-    """Return an effect with its interval in words."""
+    """Return an effect with its interval in words, and how many runs are left out of it."""
     if one is None:
         return "no runs"
+    left_out = f", {one.left_out} left out" if one.left_out else ""
+    if not one.runs:
+        return "no runs" + left_out
     if one.low is None or one.high is None:
-        return f"{one.mean:{form}} ({counted(one.runs, 'run')})"
-    return f"{one.mean:{form}} [{one.low:{form}}, {one.high:{form}}], {counted(one.runs, 'run')}"
+        return f"{one.mean:{form}} ({counted(one.runs, 'run')}{left_out})"
+    return f"{one.mean:{form}} [{one.low:{form}}, {one.high:{form}}], {counted(one.runs, 'run')}{left_out}"
 
 
 def against_all(data: Data, scenario: int, figure: Callable[[list[Learned]], float], sign: int, form: str) -> Finding:
@@ -169,7 +172,8 @@ def scale(data: Data) -> Finding:
     leads: list[Effect] = []
     for scenario in SCENARIOS:
         rows = of_scenario(data.learned, scenario)
-        found = [one for rival in RIVALS if (one := effect(rows, "gappo", rival, final("makespan"))) is not None]
+        every_rival = [effect(rows, "gappo", rival, final("makespan")) for rival in RIVALS]
+        found = [one for one in every_rival if one is not None and one.runs]
         leads += [max(found, key=lambda one: one.mean)] if found else []
     text = (
         ", ".join(f"{lead.mean:+.3f}" for lead in leads) + " hours, `gappo` less the nearest rival, in scenarios 1 to 4"

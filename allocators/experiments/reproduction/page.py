@@ -111,8 +111,9 @@ def _claims(data: Data) -> str:
         verdicts.append(verdict)
         lines.append([claim.where, f"“{claim.words}”", claim.test, found, f"**{verdict}**"])
     fail, unknown = (sum(one.startswith(kind) for one in verdicts) for kind in (NOT, UNKNOWN))
+    held = len(verdicts) - fail - unknown
     total = (
-        f"Of {len(verdicts)} claims {len(verdicts) - fail - unknown} hold, {fail} do not, {unknown} cannot be checked."
+        f"Of {len(verdicts)} claims, those that hold: {held}, that do not: {fail}, that cannot be checked: {unknown}."
     )
     return f"{total}\n\n" + _table(["where", "the paper", "our test", "effect", "verdict"], lines, left=5)
 
@@ -134,13 +135,14 @@ def _optimum(data: Data) -> str:
 
 
 def _mean(values: Sequence[float], form: str) -> str:
-    """Return a mean with its interval."""
+    """Return the mean of the finite values with its interval, and how many are left out of it."""
     finite = np.array([value for value in values if np.isfinite(value)])
+    left_out = f", {len(values) - len(finite)} left out" if len(finite) < len(values) else ""
     if not len(finite):
-        return "-"
+        return "-" + left_out
     low, high = interval(finite)
     between = "" if low is None or high is None else f" [{low:{form}}, {high:{form}}]"
-    return f"{finite.mean():{form}}{between}"
+    return f"{finite.mean():{form}}{between}{left_out}"
 
 
 def _tests(rows: Sequence[Learned]) -> str:

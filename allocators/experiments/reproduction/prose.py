@@ -32,7 +32,8 @@ PROCEDURE = """## How it is measured
   scenario. Two claims are about every run (*consistently* optimal, and T below 1.1 in scenarios 2 to 4): a single run
   refutes them, and *holds* wants eight in each scenario.
 - **Scenarios**: each run has an instance of its own of each, the policy plays one greedy game there. T is infinite
-  while a task has no agent; means are of the others, medians of all.
+  while a task has no agent; means and differences are of the others, with the
+  number of those left out, medians of all.
 - **Decisions** are those of agents in the games that are learned from, of all members of a population together.
   GAPPO compares its members by these same games, so that no others are spent on it."""
 

@@ -161,6 +161,18 @@ def test_effects_by_hand() -> None:
     assert fluctuation(first) == 0
 
 
+def test_runs_without_the_figure_are_told() -> None:
+    """Runs with an infinite makespan on one side are left out of means and differences, and said to be."""
+    rows = [row for run in range(4) for row in history("gappo", run, 1.0)]
+    rows += [row for run, last in enumerate((1.2, 1.2, 1.2, math.inf)) for row in history("ppo", run, last)]
+    rows += history("a2c", 0, math.inf)
+    text, verdict = CLAIMS[0].find(Data(rows, []))
+    assert text == "a2c no runs, 1 left out; ppo -0.200 [-0.200, -0.200], 3 runs, 1 left out"
+    assert verdict == TOO_FEW
+    table = next(line for line in page(rows, [], []).splitlines() if line.startswith("| `ppo` | 4 |"))
+    assert "1.200 [1.200, 1.200], 1 left out" in table
+
+
 def verdicts(ours: float, theirs: float, runs: int) -> list[str]:
     """Verdicts where `gappo` ends at one makespan and all rivals at another."""
     rows = []
@@ -217,7 +229,7 @@ def test_what_is_proven_comes_from_the_rows() -> None:
     learned = [*history("gappo", 0, 2.0, 1.2, scenario=1), *history("gappo", 0, 2.0, 1.2, scenario=2)]
     bounded = [replace(row, lower_bound=1.1) for row in learned]
     short = [replace(SOLVED, makespan=1.1, lower_bound=1.1)]
-    assert "makes it the optimum, is known for 1 of 2 instances" in page(bounded, short, [])
+    assert "then the optimum, is known for 1 of 2 instances" in page(bounded, short, [])
     short += [replace(SOLVED, scenario=2, makespan=1.1, lower_bound=1.1)]
     assert "known for all 2 instances, so that it is the optimum" in page(bounded, short, [])
     assert proven(Data(bounded, short)) == ("2 of 2 instances have a plan as long as the proven bound, 1.1 h", UNKNOWN)
