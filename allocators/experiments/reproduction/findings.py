@@ -101,7 +101,10 @@ def traditional(data: Data) -> Finding:
         found = {name: [_infinite_without(row.makespan) for row in rows if row.method == name] for name in OTHERS}
         theirs = {name: float(np.median(values)) for name, values in found.items() if values}
         compared += [
-            (min(len(ours), len(found[name])), not (ours and name in theirs) or np.median(ours) <= theirs[name] + 1e-4)
+            (
+                min(len(ours), len(found[name])),
+                not (ours and name in theirs) or float(np.median(ours)) <= theirs[name] + 1e-4,
+            )
             for name in OTHERS
         ]
         if ours and theirs:
@@ -159,7 +162,8 @@ def proven(data: Data) -> Finding:
     met, total = solved_to_the_bound(data.learned, data.solved)
     if not total:
         return "no runs", UNKNOWN
-    bounds = [row.lower_bound for row in (*data.learned, *data.solved) if row.scenario != TESTS]
+    rows: list[Learned | Solved] = [*data.learned, *data.solved]
+    bounds = [row.lower_bound for row in rows if row.scenario != TESTS]
     low, high = min(bounds), max(bounds)
     text = f"{met} of {total} instances have a plan as long as the proven bound, "
     text += f"{low:g} h" if low == high else f"{low:g} to {high:g} h"

@@ -127,11 +127,8 @@ def _optimum(data: Data) -> str:
     met, total = solved_to_the_bound(data.learned, data.solved)
     if not total:
         return ""
-    if met == total:
-        return f"A plan as long as the bound is known for all {counted(total, 'instance')}, so that it is the optimum."
-    return (
-        f"A plan as long as the bound, which makes it the optimum, is known for {met} of {counted(total, 'instance')}."
-    )
+    which = f"all {counted(total, 'instance')}" if met == total else f"{met} of {counted(total, 'instance')}"
+    return f"A plan as long as the bound, which proves it the optimum, is known for {which}."
 
 
 def _mean(values: Sequence[float], form: str) -> str:

@@ -52,7 +52,8 @@ def solved_to_the_bound(learned: Sequence[Learned], solved: Sequence[Solved]) ->
 
     The bound of these instances is the optimum.
     """
-    rows = [row for row in (*learned, *solved) if row.scenario != TESTS]
+    rows: list[Learned | Solved] = [*learned, *solved]
+    rows = [row for row in rows if row.scenario != TESTS]
     met = {(row.scenario, row.run) for row in rows if is_optimal(row)}
     return len(met), len({(row.scenario, row.run) for row in rows})
 

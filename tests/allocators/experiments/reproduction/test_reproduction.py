@@ -229,9 +229,9 @@ def test_what_is_proven_comes_from_the_rows() -> None:
     learned = [*history("gappo", 0, 2.0, 1.2, scenario=1), *history("gappo", 0, 2.0, 1.2, scenario=2)]
     bounded = [replace(row, lower_bound=1.1) for row in learned]
     short = [replace(SOLVED, makespan=1.1, lower_bound=1.1)]
-    assert "then the optimum, is known for 1 of 2 instances" in page(bounded, short, [])
+    assert "proves it the optimum, is known for 1 of 2 instances" in page(bounded, short, [])
     short += [replace(SOLVED, scenario=2, makespan=1.1, lower_bound=1.1)]
-    assert "known for all 2 instances, so that it is the optimum" in page(bounded, short, [])
+    assert "proves it the optimum, is known for all 2 instances" in page(bounded, short, [])
     assert proven(Data(bounded, short)) == ("2 of 2 instances have a plan as long as the proven bound, 1.1 h", UNKNOWN)
     assert optimal(Data([replace(row, makespan=1.1) for row in bounded], []))[0].startswith("scenario 1: 1 of 1; ")
 
