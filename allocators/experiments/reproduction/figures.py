@@ -9,7 +9,7 @@ import numpy as np
 
 from alloc.allocators.experiments.reproduction.protocol import ITERATIONS, OTHERS, PAPER_BATTERY, PAPER_METHODS
 from alloc.allocators.experiments.reproduction.rows import Learned, Solved
-from alloc.allocators.experiments.reproduction.summary import latest_length, of_scenario, runs_of
+from alloc.allocators.experiments.reproduction.summary import latest_length, of_scenario, runs_of, solved_to_the_bound
 from alloc.allocators.plan.palette import SERIES
 from alloc.allocators.plotting.style import drawn, new_figure
 from alloc.problems.generate.paper_scenarios import SCENARIOS
@@ -54,7 +54,7 @@ def _convergence(rows: Sequence[Learned], solved: Sequence[Solved], scenario: in
         found = [row.makespan for row in solved if row.method == method and np.isfinite(row.makespan)]
         if found:
             right.plot(number, np.median(found), MARKS[method], color="0.25")
-    _frame(left, right, rows, scenario)
+    _frame(left, right, rows, solved)
     sizes = SCENARIOS[scenario]
     counts = {len(runs_of(rows, method)) for method in PAPER_METHODS} - {0}
     extent = counted(max(counts), "run") if len(counts) == 1 else f"{min(counts)} to {max(counts)} runs"
@@ -62,10 +62,12 @@ def _convergence(rows: Sequence[Learned], solved: Sequence[Solved], scenario: in
     return figure
 
 
-def _frame(left: "Axes", right: "Axes", rows: Sequence[Learned], scenario: int) -> None:
-    optimum = max(row.lower_bound for row in rows)
+def _frame(left: "Axes", right: "Axes", rows: Sequence[Learned], solved: Sequence[Solved]) -> None:
+    bound = float(np.median([row.lower_bound for row in rows]))
+    met, total = solved_to_the_bound(rows, solved)
+    label = "proven optimum" if met == total else "proven lower bound"
     for axes in (left, right):
-        axes.axhline(optimum, color=OPTIMUM, linestyle=":", linewidth=1.8, label="proven optimum")
+        axes.axhline(bound, color=OPTIMUM, linestyle=":", linewidth=1.8, label=label)
         axes.grid(color="0.92", linewidth=0.6)
         axes.spines[["top", "right"]].set_visible(False)
     left.set_yscale("log")
@@ -73,7 +75,7 @@ def _frame(left: "Axes", right: "Axes", rows: Sequence[Learned], scenario: int) 
     left.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
     left.minorticks_off()
     left.set_ylim(0.985, HIGHEST * 1.02)
-    left.set_xlim(0, min(ITERATIONS[scenario], rows[0].iterations))
+    left.set_xlim(0, min(ITERATIONS[rows[0].scenario], rows[0].iterations))
     left.set_xlabel("iteration")
     left.set_ylabel("maximum completion time (h)")
     left.legend(frameon=False, fontsize=9)

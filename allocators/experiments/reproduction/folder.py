@@ -6,8 +6,8 @@ from functools import partial
 from pathlib import Path
 
 from alloc.allocators.experiments.reproduction.manifest import note_environment, read_manifest
-from alloc.allocators.experiments.reproduction.protocol import Job
-from alloc.allocators.experiments.reproduction.rows import Learned, Solved, append, begin, read
+from alloc.allocators.experiments.reproduction.protocol import Job, expected
+from alloc.allocators.experiments.reproduction.rows import Learned, Row, Solved, append, begin, read
 from alloc.allocators.parallel.engine import Engine, never_stop
 from alloc.problems import InputError
 from alloc.problems.formats import write_bytes_atomically
@@ -39,12 +39,20 @@ class Folder:
     @property
     def learned(self) -> list[Learned]:
         """Rows of the methods that learn."""
-        return read(self.data / "learning.csv", Learned)
+        return whole_runs(
+            read(self.data / "learning.csv", Learned),
+            lambda row: Job(row.run, row.method, iterations=row.iterations),
+            lambda row: (row.scenario, row.iteration),
+        )
 
     @property
     def solved(self) -> list[Solved]:
         """Rows of the others."""
-        return read(self.data / "others.csv", Solved)
+        return whole_runs(
+            read(self.data / "others.csv", Solved),
+            lambda row: Job(row.run, row.method, time_limit_s=row.time_limit_s),
+            lambda row: (row.scenario, 0),
+        )
 
     @property
     def environments(self) -> list[dict[str, str]]:
@@ -52,7 +60,7 @@ class Folder:
         return read_manifest(self.data / "manifest.json")
 
     def missing(self, jobs: Sequence[Job]) -> list[Job]:
-        """Return those jobs whose rows the folder does not have."""
+        """Return those jobs of whose rows the folder does not have all."""
         learned = {(row.run, row.method, row.iterations) for row in self.learned}
         solved = {(row.run, row.method, row.time_limit_s) for row in self.solved}
         return [
@@ -114,6 +122,16 @@ class Folder:
         if not learned:
             raise InputError("holds no runs of methods that learn; make some first", source=str(self.data))
         return page(learned, self.solved, self.environments)
+
+
+def whole_runs(
+    rows: Sequence[Row], job_of: Callable[[Row], Job], place_of: Callable[[Row], tuple[int, int]]
+) -> list[Row]:
+    """Return the rows of those runs that have all of theirs, each once: a run torn by a crash is made again."""
+    runs: dict[Job, dict[tuple[int, int], Row]] = {}
+    for row in rows:
+        runs.setdefault(job_of(row), {})[place_of(row)] = row
+    return [row for job, own in runs.items() if expected(job) <= own.keys() for row in own.values()]
 
 
 def make_run(data: Path, job: Job) -> None:

@@ -21,6 +21,7 @@ from alloc.allocators.experiments.reproduction.protocol import (
     TUNED,
     VARIANTS,
     Job,
+    judged,
 )
 from alloc.allocators.experiments.reproduction.rows import Learned
 from alloc.allocators.learned.algorithms.genes import GeneticPpo
@@ -29,10 +30,10 @@ from alloc.allocators.learned.algorithms.registry import method_parameters, new_
 from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize
 from alloc.allocators.learned.play.action_sampling import sample_actions
 from alloc.allocators.learned.play.rollout import position
-from alloc.allocators.learned.training.curriculum import Curriculum, reference_board
+from alloc.allocators.learned.training.curriculum import Curriculum
 from alloc.allocators.runtime.torch_state import plain_torch, torch_threads
-from alloc.problems import Instance
-from alloc.problems.game import PLANNING, Board, apply_moves, battery_left, relative_makespan, reset, step
+from alloc.problems import Instance, makespan_lower_bound
+from alloc.problems.game import PLANNING, Board, apply_moves, battery_left, make_board, relative_makespan, reset, step
 from alloc.problems.generate import paper
 
 GAMES = Curriculum(
@@ -53,6 +54,14 @@ ROUNDS = 60
 
 
 @dataclass(frozen=True)
+class _Judged:
+    """Games by which a policy is judged, and the proven bound of each, the target of its board: hours, shape (B,)."""
+
+    board: Board
+    bound: torch.Tensor
+
+
+@dataclass(frozen=True)
 class _Played:
     """Figures of each game of a board, arrays of shape (B,); makespans are relative, infinite with a task unserved."""
 
@@ -66,16 +75,16 @@ class _Played:
 def learn(job: Job) -> list[Learned]:
     """Train a method from nothing, and return its rows: at every point on the test games and the run's instances."""
     method, changes = VARIANTS[job.method]
-    boards = _boards(job.run)
+    games = _judged_by(job.run)
     with plain_torch(), torch_threads(1):
         parameters = method_parameters(method, {**TUNED[method], **changes})
         learner = new_learner(method, NetworkSize(), parameters, job.run)
-        rows = [_row(job, learner, scenario, board, 0, (0, 0, 0.0)) for scenario, board in boards.items()]
+        rows = [_row(job, learner, scenario, own, 0, (0, 0, 0.0)) for scenario, own in games.items()]
         spent = (0, 0, 0.0)
         for point in (point for point in POINTS if point <= job.iterations):
             spent = _trained(learner, job, point, spent)
-            wanted = (key for key in boards if key == TESTS or point <= ITERATIONS[key])
-            rows += [_row(job, learner, key, boards[key], point, spent) for key in wanted]
+            wanted = (key for key in games if point in judged(key, job.iterations))
+            rows += [_row(job, learner, key, games[key], point, spent) for key in wanted]
     return rows
 
 
@@ -93,25 +102,26 @@ def _trained(learner: Learner, job: Job, point: int, spent: tuple[int, int, floa
 
 
 @cache
-def _test_board() -> Board:
-    return _board([paper(1, TEST_SEED + number) for number in range(TEST_GAMES)])
+def _test_games() -> _Judged:
+    return _judged([paper(1, TEST_SEED + number) for number in range(TEST_GAMES)])
 
 
-def _boards(run: int) -> Mapping[int, Board]:
+def _judged_by(run: int) -> Mapping[int, _Judged]:
     """Return the test games, and a run's instance of each scenario, by their numbers in the rows."""
-    own = {scenario: _board([paper(scenario, INSTANCE_SEED + run)]) for scenario in ITERATIONS}
-    return {TESTS: _test_board(), **own}
+    own = {scenario: _judged([paper(scenario, INSTANCE_SEED + run)]) for scenario in ITERATIONS}
+    return {TESTS: _test_games(), **own}
 
 
-def _board(instances: list[Instance]) -> Board:
-    return reference_board(instances, [ENERGY_WEIGHT] * len(instances), np.random.default_rng(0))
+def _judged(instances: list[Instance]) -> _Judged:
+    bounds = [makespan_lower_bound(instance) for instance in instances]
+    board = make_board(instances, bounds, [ENERGY_WEIGHT] * len(instances), np.random.default_rng(0))
+    return _Judged(board, torch.tensor(bounds, dtype=torch.double))
 
 
 def _row(
-    job: Job, learner: Learner, scenario: int, board: Board, iteration: int, spent: tuple[int, int, float]
+    job: Job, learner: Learner, scenario: int, games: _Judged, iteration: int, spent: tuple[int, int, float]
 ) -> Learned:
-    played = _play(learner.policy, board)
-    bound = 1.0  # total load over total ability, in hours, of all scenarios
+    played = _play(learner.policy, games.board)
     is_last = scenario == TESTS and iteration == job.iterations
     return Learned(
         method=job.method,
@@ -121,26 +131,26 @@ def _row(
         scenario=scenario,
         decisions=spent[0],
         evaluations=spent[1],
-        makespan=bound * float(played.makespan.median()),
-        lower_bound=bound,
+        makespan=float((games.bound * played.makespan).median()),
+        lower_bound=float(games.bound.median()),
         unserved=float(played.unserved.mean()),
         battery=100 * float(played.battery.mean()),
         hops=float(played.hops.mean()),
         distance=float(played.distance.mean()),
-        drawn=_best_of_drawn(learner, board, job.run) if is_last else float("nan"),
+        drawn=_best_of_drawn(learner, games, job.run) if is_last else float("nan"),
         seconds=spent[2],
     )
 
 
-def _best_of_drawn(learner: Learner, board: Board, seed: int) -> float:
+def _best_of_drawn(learner: Learner, games: _Judged, seed: int) -> float:
     """Return the best makespan of `DRAWN` games with drawn bids on each instance, the mean over the instances.
 
     Members of a population play in turn.
     """
     policies = learner.policies() if isinstance(learner, GeneticPpo) else [learner.policy]
     generator = torch.Generator().manual_seed(seed)
-    found = [_play(policies[number % len(policies)], board, generator).makespan for number in range(DRAWN)]
-    return float(torch.stack(found).amin(0).mean())
+    found = [_play(policies[number % len(policies)], games.board, generator).makespan for number in range(DRAWN)]
+    return float((games.bound * torch.stack(found).amin(0)).mean())
 
 
 @torch.no_grad()

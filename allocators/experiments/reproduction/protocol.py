@@ -109,6 +109,19 @@ class Job:
         return self.method in VARIANTS
 
 
+def judged(scenario: int, iterations: int) -> list[int]:
+    """Return after which iterations of a training its policy is judged on a scenario, or on the test games."""
+    most = iterations if scenario == TESTS else min(iterations, ITERATIONS[scenario])
+    return [0, *(point for point in POINTS if point <= most)]
+
+
+def expected(job: Job) -> set[tuple[int, int]]:
+    """Return scenario and iteration of each row of a run; a method that learns nothing has no iterations but 0."""
+    if not job.learns:
+        return {(scenario, 0) for scenario in SCENARIOS}
+    return {(scenario, point) for scenario in (TESTS, *SCENARIOS) for point in judged(scenario, job.iterations)}
+
+
 def planned(runs: int, methods: tuple[str, ...], iterations: int, time_limit_s: float) -> list[Job]:
     """Return all jobs: all methods of a run before the next run, so that a part of them compares all alike."""
     return [Job(run, method, iterations, time_limit_s) for run in range(runs) for method in methods]

@@ -1,6 +1,7 @@
 """Rows of runs that have ended, in files of comma-separated values to which whole runs are appended."""
 
 import csv
+import errno
 import io
 import os
 from collections.abc import Sequence
@@ -87,14 +88,27 @@ Row = TypeVar("Row", Learned, Solved)
 
 
 def append(path: Path, rows: Sequence[Learned] | Sequence[Solved]) -> None:
-    """Append the rows of a run in one piece, so that several processes may do so, and none is torn by another."""
+    """Append the rows of a run in one piece, so that several processes may do so, and none is torn by another.
+
+    A line that a crash has torn is first ended by more commas than any row has, so that it is not read as a row.
+
+    Raises
+    ------
+    OSError
+        If not all of them could be written.
+    """
     text = io.StringIO()
-    table = csv.DictWriter(text, [field.name for field in fields(rows[0])], lineterminator="\n")
+    names = [field.name for field in fields(rows[0])]
+    table = csv.DictWriter(text, names, lineterminator="\n")
     for row in rows:
         table.writerow({name: f"{v:.6g}" if isinstance(v, float) else v for name, v in asdict(row).items()})
-    handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+    handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
     try:
-        os.write(handle, text.getvalue().encode())
+        size = os.fstat(handle).st_size
+        is_torn = size > 0 and os.pread(handle, 1, size - 1) != b"\n"
+        data = ("," * len(names) + "\n" if is_torn else "").encode() + text.getvalue().encode()
+        if os.write(handle, data) < len(data):
+            raise OSError(errno.ENOSPC, "only a part of the rows of a run could be written", str(path))
         os.fsync(handle)
     finally:
         os.close(handle)

@@ -6,10 +6,14 @@ from typing import TypeVar
 
 import numpy as np
 
+from alloc.allocators.experiments.reproduction.protocol import TESTS
 from alloc.allocators.experiments.reproduction.rows import Learned, Solved
 from alloc.allocators.experiments.statistics import interval, signed_rank
 
 Row = TypeVar("Row", Learned, Solved)
+
+OPTIMAL = 1 + 1e-4
+"""Makespan over the proven bound up to which it counts as the optimum."""
 
 Runs = list[list[Learned]]
 """Rows of each run, in the order of their iterations."""
@@ -23,8 +27,11 @@ class Effect:
     ----------
     runs : int
     mean : float
+        nan without a run.
     low, high, p : float or None
         None for fewer than three runs.
+    left_out : int
+        Further runs, in which the figure is not finite for one of the two.
     """
 
     runs: int
@@ -32,6 +39,23 @@ class Effect:
     low: float | None
     high: float | None
     p: float | None
+    left_out: int = 0
+
+
+def is_optimal(row: Learned | Solved) -> bool:
+    """Return whether the makespan is that of the proven bound."""
+    return row.makespan <= row.lower_bound * OPTIMAL
+
+
+def solved_to_the_bound(learned: Sequence[Learned], solved: Sequence[Solved]) -> tuple[int, int]:
+    """Return of how many instances of the scenarios a plan as long as the proven bound is known, and of how many all.
+
+    The bound of these instances is the optimum.
+    """
+    rows: list[Learned | Solved] = [*learned, *solved]
+    rows = [row for row in rows if row.scenario != TESTS]
+    met = {(row.scenario, row.run) for row in rows if is_optimal(row)}
+    return len(met), len({(row.scenario, row.run) for row in rows})
 
 
 def of_scenario(rows: Sequence[Row], scenario: int) -> list[Row]:
@@ -57,16 +81,16 @@ def runs_of(rows: Sequence[Learned], method: str) -> Runs:
 def effect(rows: Sequence[Learned], method: str, other: str, figure: Callable[[list[Learned]], float]) -> Effect | None:
     """Return by how much a figure of a run differs between two methods, paired by run; None without a common run.
 
-    Runs in which it is not finite for one of the two are left out.
+    Runs in which it is not finite for one of the two are left out, and counted.
     """
     ours, theirs = ({run[0].run: figure(run) for run in runs_of(rows, name)} for name in (method, other))
     pairs = [(ours[run], theirs[run]) for run in sorted(ours.keys() & theirs.keys())]
     values = np.array([one - two for one, two in pairs if np.isfinite(one) and np.isfinite(two)])
     values[np.abs(values) < 1e-9] = 0.0
-    if not len(values):
+    if not pairs:
         return None
-    low, high = interval(values)
-    return Effect(len(values), float(values.mean()), low, high, signed_rank(values))
+    mean = float(values.mean()) if len(values) else float("nan")
+    return Effect(len(values), mean, *interval(values), signed_rank(values), len(pairs) - len(values))
 
 
 def final(name: str) -> Callable[[list[Learned]], float]:

@@ -1,6 +1,7 @@
 """The paper's experiments made anew: rows that outlive crashes, and a page that is made from them alone."""
 
 import math
+import os
 import shutil
 import threading
 from dataclasses import replace
@@ -11,13 +12,34 @@ import pytest
 from alloc.allocators.experiments.reproduction import folder as module
 from alloc.allocators.experiments.reproduction import learning, others
 from alloc.allocators.experiments.reproduction.claims import CLAIMS
-from alloc.allocators.experiments.reproduction.findings import HOLDS, NOT, UNKNOWN, Data
+from alloc.allocators.experiments.reproduction.findings import (
+    HOLDS,
+    NOT,
+    TOO_FEW,
+    UNKNOWN,
+    Data,
+    battery,
+    least_energy,
+    optimal,
+    proven,
+    sizes,
+    traditional,
+)
 from alloc.allocators.experiments.reproduction.folder import Folder
-from alloc.allocators.experiments.reproduction.protocol import OTHERS, PAPER_METHODS, TESTS, Job, planned
+from alloc.allocators.experiments.reproduction.page import page
+from alloc.allocators.experiments.reproduction.protocol import (
+    OTHERS,
+    PAPER_METHODS,
+    SCENARIOS,
+    TESTS,
+    Job,
+    expected,
+    planned,
+)
 from alloc.allocators.experiments.reproduction.rows import Learned, Solved, append, begin, read
 from alloc.allocators.experiments.reproduction.summary import effect, final, fluctuation, reached, runs_of
 from alloc.allocators.parallel.serial import SerialEngine
-from alloc.problems import InputError
+from alloc.problems import InputError, makespan_lower_bound
 from alloc.problems.generate.paper_scenarios import paper_like
 
 DOCS = Path(__file__).parents[4] / "docs"
@@ -30,6 +52,14 @@ def history(method: str, run: int, *makespans: float, scenario: int = TESTS) -> 
     return [
         replace(ROW, method=method, run=run, scenario=scenario, iteration=100 * number, makespan=makespan)
         for number, makespan in enumerate(makespans)
+    ]
+
+
+def rows_of(job: Job) -> list[Learned]:
+    """All rows of a run, made without training."""
+    return [
+        replace(ROW, method=job.method, run=job.run, scenario=scenario, iteration=iteration)
+        for scenario, iteration in sorted(expected(job))
     ]
 
 
@@ -58,7 +88,7 @@ def test_only_what_is_missing_is_made(tmp_path: Path, monkeypatch: pytest.Monkey
 
     def make_run(data: Path, job: Job) -> None:
         made.append(job)
-        append(data / "learning.csv", [replace(ROW, method=job.method, run=job.run)])
+        append(data / "learning.csv", rows_of(job))
         if len(made) == 3:
             stop.set()
 
@@ -70,6 +100,34 @@ def test_only_what_is_missing_is_made(tmp_path: Path, monkeypatch: pytest.Monkey
     assert place.make(jobs, SerialEngine())
     assert made == jobs
     assert len(place.environments) == 1
+
+
+@pytest.mark.parametrize("lost", [1, 2, 9, 60])
+def test_a_torn_run_is_made_again(tmp_path: Path, lost: int) -> None:
+    """A run cut short, within a line or at its end, is not read and is missing; what is appended then is whole."""
+    place, jobs = Folder(tmp_path), [Job(0, "gappo"), Job(1, "gappo"), Job(2, "gappo")]
+    place.data.mkdir()
+    path = place.data / "learning.csv"
+    begin(path, Learned)
+    append(path, rows_of(jobs[0]))
+    append(path, rows_of(jobs[1]))
+    text = path.read_bytes()
+    path.write_bytes(text[: text[:-1].rindex(b"\n") + 1] if lost == 60 else text[:-lost])
+    assert place.missing(jobs) == jobs[1:]
+    append(path, rows_of(jobs[2]))
+    assert place.missing(jobs) == [jobs[1]]
+    assert str(place.learned) == str(rows_of(jobs[0]) + rows_of(jobs[2]))
+    append(path, rows_of(jobs[1]))
+    assert place.missing(jobs) == []
+    assert len(place.learned) == 3 * len(expected(jobs[0]))
+
+
+def test_rows_that_do_not_fit_on_the_disk_are_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the system writes but a part of the rows, the run does not count as made."""
+    write = os.write
+    monkeypatch.setattr(os, "write", lambda handle, data: write(handle, data[:20]))
+    with pytest.raises(OSError, match="only a part of the rows"):
+        append(tmp_path / "rows.csv", [ROW])
 
 
 def test_figures_and_page_are_made_from_rows(tmp_path: Path) -> None:
@@ -103,6 +161,18 @@ def test_effects_by_hand() -> None:
     assert fluctuation(first) == 0
 
 
+def test_runs_without_the_figure_are_told() -> None:
+    """Runs with an infinite makespan on one side are left out of means and differences, and said to be."""
+    rows = [row for run in range(4) for row in history("gappo", run, 1.0)]
+    rows += [row for run, last in enumerate((1.2, 1.2, 1.2, math.inf)) for row in history("ppo", run, last)]
+    rows += history("a2c", 0, math.inf)
+    text, verdict = CLAIMS[0].find(Data(rows, []))
+    assert text == "a2c no runs, 1 left out; ppo -0.200 [-0.200, -0.200], 3 runs, 1 left out"
+    assert verdict == TOO_FEW
+    table = next(line for line in page(rows, [], []).splitlines() if line.startswith("| `ppo` | 4 |"))
+    assert "1.200 [1.200, 1.200], 1 left out" in table
+
+
 def verdicts(ours: float, theirs: float, runs: int) -> list[str]:
     """Verdicts where `gappo` ends at one makespan and all rivals at another."""
     rows = []
@@ -120,13 +190,93 @@ def test_verdicts_follow_the_rows() -> None:
     assert verdicts(1.0, 1.1, runs=5)[0].startswith(UNKNOWN)
 
 
+SOLVED = Solved("greedy", 0, 1, 1.0, "optimal", 1.0, 1.0, 0, 80.0, 0.1)
+
+
+def described(ours: float, theirs: float, left: float, runs: int) -> list[str]:
+    """Verdicts of `DESCRIBED` where `gappo` and its rivals end so in all scenarios; plans of rivals leave 80 %."""
+    learned, solved = [], []
+    for run in range(runs):
+        for scenario in SCENARIOS:
+            for name in PAPER_METHODS:
+                rows = history(name, run, 2.0, ours, scenario=scenario)
+                learned += [replace(row, battery=left if name == "gappo" else 55.0, distance=0.0) for row in rows]
+            solved += [replace(SOLVED, method=name, run=run, scenario=scenario, makespan=theirs) for name in OTHERS]
+    return [find(Data(learned, solved))[1] for find in DESCRIBED]
+
+
+DESCRIBED = (traditional, least_energy, battery, optimal, sizes)
+
+
+def test_descriptive_claims_want_eight_runs() -> None:
+    """Means and medians decide with eight runs and not with seven; a claim on every run is refuted by one run."""
+    assert described(1.0, 1.2, 90.0, runs=8) == [HOLDS] * 5
+    assert described(1.0, 1.2, 90.0, runs=7) == [TOO_FEW] * 5
+    assert described(1.2, 1.0, 50.0, runs=8) == [NOT, HOLDS, NOT, NOT, NOT]
+    assert described(1.2, 1.0, 50.0, runs=7) == [TOO_FEW] * 3 + [NOT] * 2
+    assert described(1.2, 1.0, 50.0, runs=0) == [TOO_FEW] * 5
+
+
+def test_infinite_makespans_count_on_both_sides() -> None:
+    """Whoever leaves tasks unserved is behind in the median, and its energy is not compared."""
+    assert described(1.0, math.inf, 90.0, runs=8)[:2] == [HOLDS, TOO_FEW]
+    assert described(1.0, math.nan, 90.0, runs=8)[:2] == [HOLDS, TOO_FEW]
+    assert described(math.inf, 1.0, 90.0, runs=8)[:2] == [NOT, TOO_FEW]
+
+
+def test_what_is_proven_comes_from_the_rows() -> None:
+    """The page calls the bound the optimum where a plan of that length is known, and says for how many it is."""
+    learned = [*history("gappo", 0, 2.0, 1.2, scenario=1), *history("gappo", 0, 2.0, 1.2, scenario=2)]
+    bounded = [replace(row, lower_bound=1.1) for row in learned]
+    short = [replace(SOLVED, makespan=1.1, lower_bound=1.1)]
+    assert "proves it the optimum, is known for 1 of 2 instances" in page(bounded, short, [])
+    short += [replace(SOLVED, scenario=2, makespan=1.1, lower_bound=1.1)]
+    assert "proves it the optimum, is known for all 2 instances" in page(bounded, short, [])
+    assert proven(Data(bounded, short)) == ("2 of 2 instances have a plan as long as the proven bound, 1.1 h", UNKNOWN)
+    assert optimal(Data([replace(row, makespan=1.1) for row in bounded], []))[0].startswith("scenario 1: 1 of 1; ")
+
+
+def test_makespans_are_in_hours_over_the_proven_bound() -> None:
+    """Each game is judged against the bound of its own instance, whatever that is."""
+    instances = [paper_like(8, 3, 24, 1), paper_like(8, 3, 30, 1)]
+    judged = learning._judged(instances)
+    assert judged.bound.tolist() == [makespan_lower_bound(instance) for instance in instances]
+    need = judged.board.need[:, :-1].sum(1) / judged.board.ability.sum(1) * judged.bound
+    totals = [float(instance.workload.sum() / instance.ability.sum()) for instance in instances]
+    assert need.tolist() == pytest.approx(totals)
+
+
+@pytest.mark.parametrize(
+    ("rivals", "runs", "words"),
+    [
+        ({"ppo": 1.2}, 12, "What the population brings is not measured"),
+        ({"ppo": 1.2, "gappo-single": 1.0}, 12, "Nothing is shown to come of the population** (no p"),
+        ({"ppo": 1.0, "gappo-single": 1.2}, 9, "The population brings something** (final T, best"),
+        ({"ppo": 1.0, "gappo-single": 1.2}, 8, "Nothing is shown to come of the population** (fewer than 9 runs"),
+    ],
+)
+def test_the_population_is_judged_by_a_single_member(rivals: dict[str, float], runs: int, words: str) -> None:
+    """Being ahead of PPO, which differs in more, says nothing about the population; it is told beside the finding."""
+    rows = []
+    for run in range(runs):
+        for method, makespan in {"gappo": 1.0, **rivals}.items():
+            last = makespan + 0.001 * run * (makespan > 1)
+            rows += [replace(ROW, method=method, run=run, makespan=last, drawn=last)]
+    text = page(rows, [], [])
+    assert f"**{words}" in text
+    assert "Against `ppo`, which differs in more than the population: final T" in text
+
+
 @pytest.mark.slow
 def test_every_method_makes_its_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A short run of each method, learned and not, is judged at each point; a training is repeated to the same rows."""
-    small = learning._board([paper_like(8, 3, 24, 1)])
+    small = learning._judged([paper_like(8, 3, 24, 1)])
     monkeypatch.setattr(learning, "DECISIONS", 10)
-    monkeypatch.setattr(learning, "_boards", lambda run: {TESTS: small, 4: small})
+    monkeypatch.setattr(learning, "_judged_by", lambda run: {TESTS: small, 4: small})
     monkeypatch.setattr(others, "SCENARIOS", (1,))
+    monkeypatch.setattr(
+        module, "expected", lambda job: {(TESTS, 0), (4, 0), (TESTS, 5), (4, 5)} if job.learns else {(1, 0)}
+    )
     jobs = [Job(0, method, iterations=5, time_limit_s=0.05) for method in (*PAPER_METHODS, *OTHERS)]
     place = Folder(tmp_path)
     place.make(jobs, SerialEngine())
