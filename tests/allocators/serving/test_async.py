@@ -46,6 +46,16 @@ def test_improvements_are_told_in_the_loop() -> None:
         asyncio.run(solve_async(HARD, "local-search", objective="makespan-energy", on_improvement=enough))
 
 
+def test_an_exception_from_the_last_improvement_is_not_lost() -> None:
+    """A run that has ended when its only improvement is told still raises what the callback did."""
+
+    def enough(_: object) -> None:
+        raise KeyError("enough")
+
+    with pytest.raises(KeyError, match="enough"):
+        asyncio.run(solve_async(HARD, "greedy", iterations=1, on_improvement=enough))
+
+
 def test_event_ends_a_run_with_an_answer() -> None:
     """A stop event is no cancellation: the best allocation so far comes back."""
     stop = threading.Event()
