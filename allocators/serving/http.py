@@ -53,6 +53,7 @@ def build_app(service: Service, *, most_bytes: int = 4_000_000) -> FastAPI:
         with metrics.timed() as timed:
             body = await _body_of(request, most_bytes)
             if body is None:
+                timed.outcome = Outcome.CANCELLED
                 return Response()  # to nobody
             if isinstance(body, HTTPStatus):
                 timed.outcome = Outcome.INPUT
@@ -61,8 +62,9 @@ def build_app(service: Service, *, most_bytes: int = 4_000_000) -> FastAPI:
                 )
                 return _response(answer, body)
             answer = await _answer(service, request, body)
+            response = _response(answer, STATUS[answer.outcome])
             timed.outcome = answer.outcome
-            return _response(answer, STATUS[answer.outcome])
+            return response
 
     @app.get("/health")
     async def health() -> JSONResponse:

@@ -16,7 +16,7 @@ from alloc.allocators.parallel.processors import available_threads
 from alloc.allocators.registry import load
 from alloc.allocators.result import Result
 from alloc.allocators.runtime.interrupts import Cancellation, RunCancelledError
-from alloc.allocators.serving.request import ANSWER_FORMAT, ServiceLimits, SolveRequest, integral
+from alloc.allocators.serving.request import ANSWER_FORMAT, ServiceLimits, SolveRequest, identity
 from alloc.allocators.solve import solve
 from alloc.problems import InputError, RefusedError
 from alloc.problems.formats.json_columns import Row
@@ -229,6 +229,9 @@ def failure(given: str | Row, outcome: Outcome, message: str) -> Answer:
 
 
 def _head(given: str | Row) -> Row:
-    """Return the fields that every answer has: the id is that of the request."""
-    identity = integral(given.get("id")) if isinstance(given, dict) else None
-    return {"format": ANSWER_FORMAT, "id": identity if isinstance(identity, str | float | int) else None}
+    """Return the fields that every answer has: the id is that of the request, if it has a valid one."""
+    try:
+        known = identity(given.get("id"), "id") if isinstance(given, dict) else None
+    except InputError:
+        known = None
+    return {"format": ANSWER_FORMAT, "id": known}

@@ -57,6 +57,8 @@ def test_statuses(client):
     assert client.post("/solve", content=b"{").status_code == 400
     assert client.post("/solve", content=b"\xff").status_code == 400
     assert client.post("/solve", json={"instance": {**EASY, "agents": [{}] * 101}}).status_code == 400
+    endless = client.post("/solve", content=b'{"id": NaN, "instance": {}}')
+    assert (endless.status_code, endless.json()["id"]) == (400, None)
     fast = {"agents": [{"id": "a", "ability": 2, "speed": 1}], "tasks": EASY["tasks"]}
     assert client.post("/solve", json={"instance": fast, "method": "ga"}).status_code == 422
     large = client.post("/solve", content=b" " * 20_001)

@@ -69,6 +69,12 @@ def test_answer_has_the_result_of_solve(service):
         ({"instance": EASY, "method": "gappo", "parameters": {"policy": "/etc/passwd"}}, "input", "cannot be chosen"),
         ({"instance": EASY, "method": "gappo", "parameters": {"device": "cuda"}}, "input", "cannot be chosen"),
         ({"instance": EASY, "method": "ga", "parameters": {"population": 10**7}}, "input", "at most 10000"),
+        ({"instance": EASY, "id": [1]}, "input", "id: must be a string, or a number from -9007199254740991"),
+        ({"instance": EASY, "id": True}, "input", "id: must be a string"),
+        ({"instance": EASY, "id": 2**53 + 1}, "input", "id: must be a string"),
+        ({"instance": EASY, "seed": 2**53 + 1}, "input", "seed: must be a whole number from 0 to 9007199254740991"),
+        ('{"id": NaN, "instance": {}}', "input", "id: must be a string"),
+        ('{"id": -1e999, "instance": {}}', "input", "id: must be a string"),
         ({"instance": EASY, "start": {"b": "t"}, "method": "ga"}, "input", "start"),
         ({"instance": FLYING, "method": "ga"}, "refused", "speeds"),
     ],
@@ -80,6 +86,7 @@ def test_bad_requests_are_answered_by_one_line(service, request_, kind, words):
     answer = service.submit(request_).answer.result(30)
     assert answer.outcome == kind
     assert words in answer.document["error"]["message"]
+    assert json.loads(answer.text)["id"] is None
     assert answered(service, {"instance": EASY}).outcome is Outcome.SOLVED
 
 
@@ -160,6 +167,18 @@ def test_lines_are_answered_as_they_end():
     assert sorted(map(str, kinds[2:])) == sorted(
         map(str, [(None, "input"), (None, "input"), (None, "input"), ("long", "cancelled")])
     )
+
+
+def test_ids_that_json_lacks_are_answered_over_lines(service):
+    """An id that is no finite number is wrong input, answered without an id; a large whole one comes back exactly."""
+    written = []
+    lines = RequestLines(service, lambda line: written.append(json.loads(line)))
+    lines.take('{"id": NaN, "cancel": 1}')
+    lines.take('{"id": 1, "cancel": NaN}')
+    lines.take(json.dumps({"instance": EASY}).replace("{", '{"id": 1e999, ', 1))
+    assert [(one["id"], one["error"]["kind"]) for one in written] == [(None, "input"), (1, "input"), (None, "input")]
+    assert [faults(one) for one in written] == [[]] * 3
+    assert answered(service, {"id": 2**53 - 1, "instance": EASY}).document["id"] == 2**53 - 1
 
 
 def test_instances_come_back_as_they_went(service):
