@@ -21,8 +21,9 @@ COUNTS = ("iterations", "seed", "threads")
 
 FIELDS = ("format", "id", "instance", "method", "parameters", "limit_ms", *ARGUMENTS, *COUNTS)
 
-LOCAL_PARAMETERS = ("policy", "device")
-"""Parameters that name files or hardware, which strangers do not choose."""
+LOCAL_PARAMETERS = ("policy", "device", "plain")
+"""Parameters of built-in methods that strangers do not choose: they name files or hardware, or ask for a model of any
+size, whose time is not limited."""
 
 LARGEST_WHOLE = 2**53 - 1
 """Largest whole number that every reader of JSON has exactly, as numbers are floats there."""
@@ -46,7 +47,7 @@ class ServiceLimits(CheckedParameters):
     queue : int
         Requests that wait for one of them to end; further ones are turned away.
     strangers : bool
-        Whether requests come from elsewhere, so that they choose no files, no devices and no large parameters.
+        Whether requests come from elsewhere, so that they set no `LOCAL_PARAMETERS` and no large parameters.
     """
 
     agents: int = bounded(2_000, low=1)

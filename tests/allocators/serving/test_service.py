@@ -68,6 +68,7 @@ def test_answer_has_the_result_of_solve(service):
         ({"instance": EASY, "parameters": {"pop": 1}}, "input", "are for a method that is named"),
         ({"instance": EASY, "method": "gappo", "parameters": {"policy": "/etc/passwd"}}, "input", "cannot be chosen"),
         ({"instance": EASY, "method": "gappo", "parameters": {"device": "cuda"}}, "input", "cannot be chosen"),
+        ({"instance": EASY, "method": "milp", "parameters": {"plain": True}}, "input", "parameters.plain: cannot be"),
         ({"instance": EASY, "method": "ga", "parameters": {"population": 10**7}}, "input", "at most 10000"),
         ({"instance": EASY, "id": [1]}, "input", "id: must be a string, or a number from -9007199254740991"),
         ({"instance": EASY, "id": True}, "input", "id: must be a string"),
