@@ -155,10 +155,13 @@ class Service:
         self._pool.shutdown()
 
     def _answer(self, job: Job) -> None:
-        answer = self._answered(job)
-        with self._counting:
-            self._open -= 1
-        job.answer.set_result(answer)
+        answer = failure(job.given, Outcome.FAILED, "defect in alloc or a plugin")
+        try:
+            answer = self._answered(job)
+        finally:
+            with self._counting:
+                self._open -= 1
+            job.answer.set_result(answer)
 
     def _answered(self, job: Job) -> Answer:
         """Return the answer; whatever fails is one, too."""
@@ -180,7 +183,7 @@ class Service:
             return failure(given, Outcome.REFUSED, str(error))
         except MemoryError:
             return failure(given, Outcome.FAILED, "there is not enough memory for this")
-        except Exception as error:
+        except BaseException as error:  # such as SystemExit from a plugin, which ends nothing in this thread
             LOG.exception("a request failed")
             return failure(given, Outcome.FAILED, f"defect in alloc or a plugin: {type(error).__name__}: {error}")
         notes = {"notes": list(result.notes)} if result.notes else {}

@@ -120,15 +120,18 @@ def test_the_end_gives_open_requests_their_best(service):
     assert service.submit(LONG).answer.result(0).outcome is Outcome.BUSY
 
 
-def test_defects_are_answers_too(service, monkeypatch):
-    """An unforeseen exception is answered as failed, and logged with its traceback."""
+@pytest.mark.parametrize("kind", [ZeroDivisionError, SystemExit])
+def test_defects_are_answers_too(service, monkeypatch, caplog, kind):
+    """An unforeseen exception, an exit too, is answered as failed and logged with its traceback; nothing stays open."""
 
     def fail(*_: object, **__: object) -> None:
-        raise ZeroDivisionError("by nothing")
+        raise kind("by nothing")
 
     monkeypatch.setattr("alloc.allocators.serving.service.solve", fail)
     answer = answered(service, {"instance": EASY})
     assert (answer.outcome, "by nothing" in answer.document["error"]["message"]) == (Outcome.FAILED, True)
+    assert [record.exc_info[0] for record in caplog.records] == [kind]
+    assert service.open_requests == 0
 
 
 def test_methods_of_the_operator_have_their_parameters():
