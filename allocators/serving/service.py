@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from enum import StrEnum
+from weakref import WeakValueDictionary
 
 from alloc.allocators.bounds import bounds_s
 from alloc.allocators.contract.base import Allocator
@@ -102,7 +103,8 @@ class Service:
         self.limits = limits
         self._own = {name: load(name, **settings) for name, settings in (methods or {}).items()}
         self._others: OrderedDict[str, Allocator] = OrderedDict()
-        self._loading = threading.Lock()
+        self._looking = threading.Lock()
+        self._loading: WeakValueDictionary[str, threading.Lock] = WeakValueDictionary()
         self._threads = max(1, available_threads() // limits.parallel)
         self._ending = threading.Event()
         self._counting = threading.Lock()
@@ -217,13 +219,18 @@ class Service:
         if not parameters and name in self._own:
             return self._own[name]
         key = f"{name} {sorted(parameters.items())}"
-        with self._loading:
-            if key not in self._others:
-                self._others[key] = load(name, parameters)
+        with self._looking:
+            loading = self._loading.setdefault(key, threading.Lock())
+        with loading:  # of this method only: loading takes seconds, for which others are not held up
+            method = self._others.get(key)
+            if method is None:
+                method = load(name, parameters)
+            with self._looking:
+                self._others[key] = method
+                self._others.move_to_end(key)
                 if len(self._others) > MOST_METHODS:
                     self._others.popitem(last=False)
-            self._others.move_to_end(key)
-            return self._others[key]
+        return method
 
 
 def failure(given: str | Row, outcome: Outcome, message: str) -> Answer:

@@ -7,7 +7,7 @@ import time
 import pytest
 from schema_checks import faults
 
-from alloc.allocators import solve
+from alloc.allocators import Allocator, load, solve
 from alloc.allocators.serving.lines import RequestLines
 from alloc.allocators.serving.request import ServiceLimits
 from alloc.allocators.serving.service import Answer, Outcome, Service
@@ -132,6 +132,33 @@ def test_defects_are_answers_too(service, monkeypatch, caplog, kind):
     assert (answer.outcome, "by nothing" in answer.document["error"]["message"]) == (Outcome.FAILED, True)
     assert [record.exc_info[0] for record in caplog.records] == [kind]
     assert service.open_requests == 0
+
+
+def test_loading_a_method_holds_up_no_other(monkeypatch):
+    """While one method is loaded, once for both requests of it, those for a method that is loaded are answered."""
+    begun, loaded, names = threading.Event(), threading.Event(), []
+
+    def slowly(name: str, parameters: dict) -> Allocator:
+        names.append(name)
+        if name == "ga":
+            begun.set()
+            assert loaded.wait(30)
+        return load(name, parameters)
+
+    monkeypatch.setattr("alloc.allocators.serving.service.load", slowly)
+    service = Service(ServiceLimits(parallel=3))
+    try:
+        assert answered(service, {"instance": EASY, "method": "greedy"}).outcome is Outcome.SOLVED
+        slow = [service.submit({"instance": EASY, "method": "ga", "iterations": 1}) for _ in range(2)]
+        assert begun.wait(30)
+        assert answered(service, {"instance": EASY, "method": "greedy"}).outcome is Outcome.SOLVED
+        assert not any(job.answer.done() for job in slow)
+        loaded.set()
+        assert [job.answer.result(30).outcome for job in slow] == [Outcome.SOLVED] * 2
+        assert names == ["greedy", "ga"]
+    finally:
+        loaded.set()
+        service.close()
 
 
 def test_methods_of_the_operator_have_their_parameters():
