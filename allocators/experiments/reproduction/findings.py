@@ -9,7 +9,6 @@ from alloc.allocators.experiments.reproduction.protocol import OTHERS, PAPER_BAT
 from alloc.allocators.experiments.reproduction.rows import Learned, Solved
 from alloc.allocators.experiments.reproduction.summary import (
     Effect,
-    Runs,
     effect,
     final,
     of_scenario,
@@ -76,80 +75,54 @@ def _listed(known: dict[str, Effect], form: str) -> str:
     return "; ".join(f"{rival} {told(one, form)}" for rival, one in known.items()) or "no runs"
 
 
-def described(compared: Sequence[tuple[int, bool]]) -> str:
-    """Return the verdict of a claim that is decided by means or medians, without a test.
-
-    Parameters
-    ----------
-    compared : sequence of (int, bool)
-        Of each comparison the fewest runs of the two sides, and whether it comes out as claimed.
-    """
-    if any(runs >= ENOUGH and not as_claimed for runs, as_claimed in compared):
-        return NOT
-    return HOLDS if compared and all(runs >= ENOUGH for runs, _ in compared) else TOO_FEW
-
-
 def traditional(data: Data) -> Finding:
     """Compare with methods that learn nothing, by the median makespan in each scenario."""
-    parts, compared = [], []
+    parts, worse = [], False
     for scenario in SCENARIOS:
         ours = [run[-1].makespan for run in runs_of(of_scenario(data.learned, scenario), "gappo")]
         rows = of_scenario(data.solved, scenario)
-        found = {name: [_infinite_without(row.makespan) for row in rows if row.method == name] for name in OTHERS}
-        theirs = {name: float(np.median(values)) for name, values in found.items() if values}
-        compared += [
-            (min(len(ours), len(found[name])), not (ours and name in theirs) or np.median(ours) <= theirs[name] + 1e-4)
+        theirs = {
+            name: float(np.median(found))
             for name in OTHERS
-        ]
-        if ours and theirs:
-            best = min(theirs.values())
-            parts.append(f"scenario {scenario}: {np.median(ours):.3f}, the best of the others {best:.3f}")
-    return "; ".join(parts) or "no runs", described(compared)
-
-
-def _infinite_without(makespan: float) -> float:
-    """Return a makespan, infinite where a method found no plan, as for a policy that leaves a task unserved."""
-    return float("inf") if np.isnan(makespan) else makespan
+            if (found := [row.makespan for row in rows if row.method == name and np.isfinite(row.makespan)])
+        }
+        if not ours or not theirs:
+            continue
+        best = min(theirs.values())
+        worse |= float(np.median(ours)) > best + 1e-4
+        parts.append(f"scenario {scenario}: {np.median(ours):.3f}, the best of the others {best:.3f}")
+    return "; ".join(parts) or "no runs", (NOT if worse else HOLDS) if parts else UNKNOWN
 
 
 def least_energy(data: Data) -> Finding:
-    """Compare the battery left by plans, flown directly, with that of methods that learn nothing.
-
-    Plans that leave a task unserved are left out on both sides, as agents that stay save energy.
-    """
-    parts, compared = [], []
+    """Compare the battery left by plans, flown directly, with that of methods that learn nothing."""
+    parts, less = [], False
     for scenario in SCENARIOS:
         runs = runs_of(of_scenario(data.learned, scenario), "gappo")
-        distances = [run[-1].distance for run in runs if np.isfinite(run[-1].makespan)]
-        rows = [row for row in of_scenario(data.solved, scenario) if np.isfinite(row.makespan + row.battery)]
-        found = {name: [row.battery for row in rows if row.method == name] for name in OTHERS}
-        means = {name: float(np.mean(values)) for name, values in found.items() if values}
+        known = [row for row in of_scenario(data.solved, scenario) if np.isfinite(row.battery)]
+        means = [float(np.mean([row.battery for row in known if row.method == name])) for name in _methods(known)]
+        if not runs or not means:
+            continue
         per_distance = 100 * ENERGY_PER_DISTANCE / PAPER_SCENARIOS[scenario].battery
-        ours = 100 - per_distance * float(np.mean(distances)) if distances else float("inf")
-        compared += [
-            (min(len(distances), len(found[name])), name not in means or ours >= means[name] - 0.1) for name in OTHERS
-        ]
-        if distances and means:
-            parts.append(f"scenario {scenario}: {ours:.1f} %, the best of the others {max(means.values()):.1f} %")
-    return "; ".join(parts) or "no runs", described(compared)
+        ours = 100 - per_distance * float(np.mean([run[-1].distance for run in runs]))
+        less |= ours < max(means) - 0.1
+        parts.append(f"scenario {scenario}: {ours:.1f} %, the best of the others {max(means):.1f} %")
+    return "; ".join(parts) or "no runs", (NOT if less else HOLDS) if parts else UNKNOWN
+
+
+def _methods(rows: Sequence[Solved]) -> list[str]:
+    return [name for name in OTHERS if any(row.method == name for row in rows)]
 
 
 def optimal(data: Data) -> Finding:
-    """Count the runs of `gappo` that end at the optimum; one that does not refutes "consistently"."""
-    ended = [runs_of(of_scenario(data.learned, scenario), "gappo") for scenario in SCENARIOS]
-    hits = [sum(run[-1].makespan <= OPTIMAL for run in runs) for runs in ended]
-    text = "; ".join(
-        f"scenario {scenario}: {hit} of {len(runs)}"
-        for scenario, hit, runs in zip(SCENARIOS, hits, ended, strict=True)
-    )
-    return text, every(sum(map(len, ended)) - sum(hits), ended)
-
-
-def every(exceptions: int, ended: Sequence[Runs]) -> str:
-    """Return the verdict of a claim on every run: one exception refutes it, and enough runs in each scenario hold."""
-    if exceptions:
-        return NOT
-    return HOLDS if min(map(len, ended)) >= ENOUGH else TOO_FEW
+    """Count the runs of `gappo` that end at the optimum."""
+    parts, everywhere = [], True
+    for scenario in SCENARIOS:
+        runs = runs_of(of_scenario(data.learned, scenario), "gappo")
+        hits = sum(run[-1].makespan <= OPTIMAL for run in runs)
+        everywhere &= hits == len(runs) > 0
+        parts.append(f"scenario {scenario}: {hits} of {len(runs)}")
+    return "; ".join(parts), HOLDS if everywhere else NOT
 
 
 def proven(data: Data) -> Finding:
@@ -180,25 +153,24 @@ def scale(data: Data) -> Finding:
 
 def battery(data: Data) -> Finding:
     """Compare the battery left after the episode with the paper's figures."""
-    parts, compared = [], []
+    parts, alike = [], True
     for scenario in SCENARIOS:
         rows = of_scenario(data.learned, scenario)
-        left = {name: [run[-1].battery for run in runs_of(rows, name)] for name in PAPER_METHODS}
-        means = {name: float(np.mean(values)) for name, values in left.items() if values}
+        means = {
+            name: float(np.mean([run[-1].battery for run in runs]))
+            for name in PAPER_METHODS
+            if (runs := runs_of(rows, name))
+        }
         rivals = [means[name] for name in RIVALS if name in means]
+        if "gappo" not in means or not rivals:
+            continue
         low, high = PAPER_BATTERY["others"][scenario]
-        compared += [
-            (min(len(left["gappo"]), len(left[name])), means["gappo"] > means[name] <= high + 5)
-            if "gappo" in means and name in means
-            else (0, True)
-            for name in RIVALS
-        ]
-        if "gappo" in means and rivals:
-            parts.append(
-                f"scenario {scenario}: {means['gappo']:.1f} %, others {min(rivals):.1f} to {max(rivals):.1f} % "
-                f"(paper {PAPER_BATTERY['gappo'][scenario][0]:.1f}, others {low} to {high})"
-            )
-    return "; ".join(parts) or "no runs", described(compared)
+        alike &= max(rivals) <= high + 5 and means["gappo"] > max(rivals)
+        parts.append(
+            f"scenario {scenario}: {means['gappo']:.1f} %, others {min(rivals):.1f} to {max(rivals):.1f} % "
+            f"(paper {PAPER_BATTERY['gappo'][scenario][0]:.1f}, others {low} to {high})"
+        )
+    return "; ".join(parts) or "no runs", (HOLDS if alike else NOT) if parts else UNKNOWN
 
 
 def population(data: Data) -> Finding:
@@ -211,14 +183,14 @@ def population(data: Data) -> Finding:
 
 def sizes(data: Data) -> Finding:
     """Tell the worst makespan on instances far larger than those that were learned from."""
-    ended = [runs_of(of_scenario(data.learned, scenario), "gappo") for scenario in SCENARIOS[1:]]
-    makespans = [run[-1].makespan for runs in ended for run in runs]
-    if not makespans:
-        return "no runs", TOO_FEW
-    served = sum(np.isfinite(makespans))
-    text = f"trained with at most 50 agents; with 300 and 500 all tasks served in {served} of {len(makespans)}, "
-    text += f"T at worst {max(makespans):.3f}"
-    return text, every(sum(makespan >= 1.1 for makespan in makespans), ended)
+    rows = [run[-1] for k in SCENARIOS[1:] for run in runs_of(of_scenario(data.learned, k), "gappo")]
+    if not rows:
+        return "no runs", UNKNOWN
+    worst = max(row.makespan for row in rows)
+    served = sum(np.isfinite(row.makespan) for row in rows)
+    text = f"trained with at most 50 agents; with 300 and 500 all tasks served in {served} of {len(rows)}, "
+    text += f"T at worst {worst:.3f}"
+    return text, HOLDS if worst < 1.1 else NOT
 
 
 def unchecked(reason: str) -> Callable[[Data], Finding]:

@@ -28,12 +28,8 @@ PROCEDURE = """## How it is measured
   procedure over all tests of a table, or of a claim. *Holds* wants p < 0.05 against every rival,
   *does not hold* eight runs at least, as fewer could not show the opposite. Intervals of fewer than ten
   runs say little.
-- **Descriptive claims** have no test: the two comparisons with methods that learn nothing, and figure 6, are decided by
-  means or medians, and want eight runs of both sides for either verdict; *holds* wants them of every rival in every
-  scenario. Two claims are about every run (*consistently* optimal, and T below 1.1 in scenarios 2 to 4): a single run
-  refutes them, and *holds* wants eight in each scenario.
 - **Scenarios**: each run has an instance of its own of each, the policy plays one greedy game there. T is infinite
-  while a task has no agent; means are of the others, medians of all.
+  while a task has no agent; means are of the others.
 - **Decisions** are those of agents in the games that are learned from, of all members of a population together.
   GAPPO compares its members by these same games, so that no others are spent on it."""
 

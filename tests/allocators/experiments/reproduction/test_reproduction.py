@@ -11,20 +11,9 @@ import pytest
 from alloc.allocators.experiments.reproduction import folder as module
 from alloc.allocators.experiments.reproduction import learning, others
 from alloc.allocators.experiments.reproduction.claims import CLAIMS
-from alloc.allocators.experiments.reproduction.findings import (
-    HOLDS,
-    NOT,
-    TOO_FEW,
-    UNKNOWN,
-    Data,
-    battery,
-    least_energy,
-    optimal,
-    sizes,
-    traditional,
-)
+from alloc.allocators.experiments.reproduction.findings import HOLDS, NOT, UNKNOWN, Data
 from alloc.allocators.experiments.reproduction.folder import Folder
-from alloc.allocators.experiments.reproduction.protocol import OTHERS, PAPER_METHODS, SCENARIOS, TESTS, Job, planned
+from alloc.allocators.experiments.reproduction.protocol import OTHERS, PAPER_METHODS, TESTS, Job, planned
 from alloc.allocators.experiments.reproduction.rows import Learned, Solved, append, begin, read
 from alloc.allocators.experiments.reproduction.summary import effect, final, fluctuation, reached, runs_of
 from alloc.allocators.parallel.serial import SerialEngine
@@ -129,40 +118,6 @@ def test_verdicts_follow_the_rows() -> None:
     assert verdicts(1.0, 1.1, runs=12)[0] == HOLDS
     assert verdicts(1.3, 1.1, runs=12)[0].startswith(NOT)
     assert verdicts(1.0, 1.1, runs=5)[0].startswith(UNKNOWN)
-
-
-SOLVED = Solved("greedy", 0, 1, 1.0, "optimal", 1.0, 1.0, 0, 80.0, 0.1)
-
-
-def described(ours: float, theirs: float, left: float, runs: int) -> list[str]:
-    """Verdicts of `DESCRIBED` where `gappo` and its rivals end so in all scenarios; plans of rivals leave 80 %."""
-    learned, solved = [], []
-    for run in range(runs):
-        for scenario in SCENARIOS:
-            for name in PAPER_METHODS:
-                rows = history(name, run, 2.0, ours, scenario=scenario)
-                learned += [replace(row, battery=left if name == "gappo" else 55.0, distance=0.0) for row in rows]
-            solved += [replace(SOLVED, method=name, run=run, scenario=scenario, makespan=theirs) for name in OTHERS]
-    return [find(Data(learned, solved))[1] for find in DESCRIBED]
-
-
-DESCRIBED = (traditional, least_energy, battery, optimal, sizes)
-
-
-def test_descriptive_claims_want_eight_runs() -> None:
-    """Means and medians decide with eight runs and not with seven; a claim on every run is refuted by one run."""
-    assert described(1.0, 1.2, 90.0, runs=8) == [HOLDS] * 5
-    assert described(1.0, 1.2, 90.0, runs=7) == [TOO_FEW] * 5
-    assert described(1.2, 1.0, 50.0, runs=8) == [NOT, HOLDS, NOT, NOT, NOT]
-    assert described(1.2, 1.0, 50.0, runs=7) == [TOO_FEW] * 3 + [NOT] * 2
-    assert described(1.2, 1.0, 50.0, runs=0) == [TOO_FEW] * 5
-
-
-def test_infinite_makespans_count_on_both_sides() -> None:
-    """Whoever leaves tasks unserved is behind in the median, and its energy is not compared."""
-    assert described(1.0, math.inf, 90.0, runs=8)[:2] == [HOLDS, TOO_FEW]
-    assert described(1.0, math.nan, 90.0, runs=8)[:2] == [HOLDS, TOO_FEW]
-    assert described(math.inf, 1.0, 90.0, runs=8)[:2] == [NOT, TOO_FEW]
 
 
 @pytest.mark.slow
