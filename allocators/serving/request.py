@@ -94,7 +94,9 @@ class SolveRequest:
             raise InputError(f"must be {REQUEST_FORMAT}, got {shown(row['format'])}", "format")
         if row.get("id") is not None:
             identity(row["id"], "id")
-        counts = {name: whole(integral(row[name]), name, 0, LARGEST_WHOLE) for name in COUNTS if row.get(name) is not None}
+        counts = {
+            name: whole(integral(row[name]), name, 0, LARGEST_WHOLE) for name in COUNTS if row.get(name) is not None
+        }
         given = {name: row[name] for name in ARGUMENTS if row.get(name) is not None}
         limit_ms = limits.limit_ms if row.get("limit_ms") is None else row["limit_ms"]
         return cls(

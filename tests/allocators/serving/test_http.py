@@ -55,7 +55,8 @@ def test_statuses(client):
     solved = client.post("/solve", json={"id": 1, "instance": EASY})
     assert (solved.status_code, solved.json()["id"], solved.json()["result"]["makespan"]) == (200, 1, 2.0)
     assert client.post("/solve", content=b"{").status_code == 400
-    assert client.post("/solve", content=b"\xff").status_code == 400
+    binary = client.post("/solve", content=b"\xff")
+    assert (binary.status_code, binary.json()["error"]["message"]) == (400, "body: is not UTF-8 text")
     assert client.post("/solve", json={"instance": {**EASY, "agents": [{}] * 101}}).status_code == 400
     endless = client.post("/solve", content=b'{"id": NaN, "instance": {}}')
     assert (endless.status_code, endless.json()["id"]) == (400, None)
@@ -63,6 +64,7 @@ def test_statuses(client):
     assert client.post("/solve", json={"instance": fast, "method": "ga"}).status_code == 422
     large = client.post("/solve", content=b" " * 20_001)
     assert (large.status_code, large.headers["connection"]) == (413, "close")
+    assert "at most 20000 bytes" in large.json()["error"]["message"]
     assert client.post("/nothing").status_code == 404
 
 
