@@ -9,6 +9,7 @@ from collections import Counter
 
 import httpx
 import pytest
+import uvicorn
 
 from alloc.allocators.serving.http import build_app
 from alloc.allocators.serving.request import ServiceLimits
@@ -16,8 +17,6 @@ from alloc.allocators.serving.server import Server
 from alloc.allocators.serving.service import Service
 from alloc.problems import paper_like
 from alloc.problems.formats import to_document
-
-uvicorn = pytest.importorskip("uvicorn")
 
 EASY = {"agents": [{"id": "a", "ability": 2}], "tasks": [{"id": "t", "workload": 4}]}
 LONG = {
