@@ -118,7 +118,10 @@ class Parameterised(ABC):
     @classmethod
     def default_parameters(cls) -> dict[str, object]:
         """Return the default of each parameter, by name; nothing where there are none."""
-        return {} if cls.parameters_type is None else dict(vars(cls.parameters_type()))
+        if cls.parameters_type is None:
+            return {}
+        defaults = cls.parameters_type()
+        return {field.name: getattr(defaults, field.name) for field in dataclasses.fields(defaults)}
 
     def changed_parameters(self) -> dict[str, object]:
         """Return the parameters that differ from their defaults, by name."""

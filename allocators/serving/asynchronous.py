@@ -102,13 +102,16 @@ async def solve_async(
     thread = threading.Thread(target=work, name=THREAD_NAME, daemon=True)
     thread.start()
     try:
-        return await asyncio.shield(done)
+        result = await asyncio.shield(done)
     except BaseException as error:
         cancellation.set()
         await _ended(done)
         raise (failures or [error])[0] from None
     finally:
         thread.join()
+    if failures:  # of the last improvement, told when the run had ended already
+        raise failures[0]
+    return result
 
 
 async def _ended(done: "asyncio.Future[Result]") -> None:

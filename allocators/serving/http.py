@@ -53,16 +53,17 @@ def build_app(service: Service, *, most_bytes: int = 4_000_000) -> FastAPI:
         with metrics.timed() as timed:
             body = await _body_of(request, most_bytes)
             if body is None:
+                timed.outcome = Outcome.CANCELLED
                 return Response()  # to nobody
             if isinstance(body, HTTPStatus):
                 timed.outcome = Outcome.INPUT
-                answer = failure(
-                    "", Outcome.INPUT, f"body: {body.phrase}; at most {most_bytes} bytes within {BODY_S:g} s"
-                )
-                return _response(answer, body)
+                limits = f"{body.phrase}; at most {most_bytes} bytes within {BODY_S:g} s"
+                words = "is not UTF-8 text" if body is HTTPStatus.BAD_REQUEST else limits
+                return _response(failure("", Outcome.INPUT, f"body: {words}"), body)
             answer = await _answer(service, request, body)
+            response = _response(answer, STATUS[answer.outcome])
             timed.outcome = answer.outcome
-            return _response(answer, STATUS[answer.outcome])
+            return response
 
     @app.get("/health")
     async def health() -> JSONResponse:

@@ -3,7 +3,7 @@
 import threading
 from collections.abc import Callable
 
-from alloc.allocators.serving.request import integral
+from alloc.allocators.serving.request import identity
 from alloc.allocators.serving.service import Answer, Job, Outcome, Service, failure
 from alloc.problems import InputError
 from alloc.problems.formats.json_columns import Row
@@ -34,7 +34,6 @@ class RequestLines:
         except InputError as error:
             self._write(failure(line, Outcome.INPUT, str(error)))
             return
-        row["id"] = integral(row.get("id"))
         try:
             if "cancel" in row:
                 self._cancel(row)
@@ -44,7 +43,7 @@ class RequestLines:
             self._write(failure(row, Outcome.INPUT, str(error)))
 
     def _begin(self, row: Row) -> None:
-        key = _identity(row["id"], "id")
+        key = identity(row.get("id"), "id")
         with self._listing:
             if key in self._open:
                 raise InputError(f"{key!r} is that of another request that is not answered yet", "id")
@@ -63,7 +62,7 @@ class RequestLines:
 
     def _cancel(self, row: Row) -> None:
         """Cancel a request, whose answer says so; one that is unknown, or answered already, is an error."""
-        key = _identity(integral(row["cancel"]), "cancel")
+        key = identity(row["cancel"], "cancel")
         with self._listing:
             job = self._open.get(key)
         if job is None:
@@ -73,9 +72,3 @@ class RequestLines:
     def _write(self, answer: Answer) -> None:
         with self._writing:
             self._write_line(answer.text)
-
-
-def _identity(value: object, place: str) -> str | float:
-    if isinstance(value, bool) or not isinstance(value, str | int | float):
-        raise InputError("must be a string or a number, another one for each request", place)
-    return value

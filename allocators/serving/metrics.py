@@ -1,5 +1,6 @@
 """Counts and times of a service, for Prometheus."""
 
+import asyncio
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,7 +17,7 @@ BUCKETS_S = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0
 class Timed:
     """A request that is being answered, and what became of it."""
 
-    outcome: Outcome = Outcome.CANCELLED
+    outcome: Outcome = Outcome.FAILED
 
 
 class Metrics:
@@ -44,6 +45,9 @@ class Metrics:
         timed, begin = Timed(), time.monotonic()
         try:
             yield timed
+        except asyncio.CancelledError:
+            timed.outcome = Outcome.CANCELLED
+            raise
         finally:
             self._requests.labels(timed.outcome).inc()
             self._seconds.observe(time.monotonic() - begin)

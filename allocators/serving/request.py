@@ -21,8 +21,12 @@ COUNTS = ("iterations", "seed", "threads")
 
 FIELDS = ("format", "id", "instance", "method", "parameters", "limit_ms", *ARGUMENTS, *COUNTS)
 
-LOCAL_PARAMETERS = ("policy", "device")
-"""Parameters that name files or hardware, which strangers do not choose."""
+LOCAL_PARAMETERS = ("policy", "device", "plain")
+"""Parameters of built-in methods that strangers do not choose: they name files or hardware, or ask for a model of any
+size, whose time is not limited."""
+
+LARGEST_WHOLE = 2**53 - 1
+"""Largest whole number that every reader of JSON has exactly, as numbers are floats there."""
 
 LARGEST_PARAMETER = 10_000
 """Largest whole number that a stranger sets a parameter to: more could take all memory."""
@@ -43,7 +47,7 @@ class ServiceLimits(CheckedParameters):
     queue : int
         Requests that wait for one of them to end; further ones are turned away.
     strangers : bool
-        Whether requests come from elsewhere, so that they choose no files, no devices and no large parameters.
+        Whether requests come from elsewhere, so that they set no `LOCAL_PARAMETERS` and no large parameters.
     """
 
     agents: int = bounded(2_000, low=1)
@@ -88,7 +92,11 @@ class SolveRequest:
         require_known(row, FIELDS, "")
         if row.get("format", REQUEST_FORMAT) != REQUEST_FORMAT:
             raise InputError(f"must be {REQUEST_FORMAT}, got {shown(row['format'])}", "format")
-        counts = {name: whole(integral(row[name]), name) for name in COUNTS if row.get(name) is not None}
+        if row.get("id") is not None:
+            identity(row["id"], "id")
+        counts = {
+            name: whole(integral(row[name]), name, 0, LARGEST_WHOLE) for name in COUNTS if row.get(name) is not None
+        }
         given = {name: row[name] for name in ARGUMENTS if row.get(name) is not None}
         limit_ms = limits.limit_ms if row.get("limit_ms") is None else row["limit_ms"]
         return cls(
@@ -98,6 +106,22 @@ class SolveRequest:
             limit_s=real(limit_ms, "limit_ms", high=limits.limit_ms) / 1000,
             arguments={**given, **counts},
         )
+
+
+def identity(value: object, place: str) -> str | float:
+    """Return the id of a request as its answer repeats it.
+
+    Raises
+    ------
+    InputError
+        If it is neither a string nor a number that comes back unaltered.
+    """
+    if isinstance(value, str):
+        return value
+    if isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= LARGEST_WHOLE:  # no NaN
+        return int(value) if value == int(value) else value
+    words = f"must be a string, or a number from -{LARGEST_WHOLE} to {LARGEST_WHOLE}, another one for each request"
+    raise InputError(words, place)
 
 
 def integral(value: object) -> object:

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from enum import StrEnum
+from weakref import WeakValueDictionary
 
 from alloc.allocators.bounds import bounds_s
 from alloc.allocators.contract.base import Allocator
@@ -16,7 +17,7 @@ from alloc.allocators.parallel.processors import available_threads
 from alloc.allocators.registry import load
 from alloc.allocators.result import Result
 from alloc.allocators.runtime.interrupts import Cancellation, RunCancelledError
-from alloc.allocators.serving.request import ANSWER_FORMAT, ServiceLimits, SolveRequest, integral
+from alloc.allocators.serving.request import ANSWER_FORMAT, ServiceLimits, SolveRequest, identity
 from alloc.allocators.solve import solve
 from alloc.problems import InputError, RefusedError
 from alloc.problems.formats.json_columns import Row
@@ -102,7 +103,8 @@ class Service:
         self.limits = limits
         self._own = {name: load(name, **settings) for name, settings in (methods or {}).items()}
         self._others: OrderedDict[str, Allocator] = OrderedDict()
-        self._loading = threading.Lock()
+        self._looking = threading.Lock()
+        self._loading: WeakValueDictionary[str, threading.Lock] = WeakValueDictionary()
         self._threads = max(1, available_threads() // limits.parallel)
         self._ending = threading.Event()
         self._counting = threading.Lock()
@@ -155,10 +157,13 @@ class Service:
         self._pool.shutdown()
 
     def _answer(self, job: Job) -> None:
-        answer = self._answered(job)
-        with self._counting:
-            self._open -= 1
-        job.answer.set_result(answer)
+        answer = failure(job.given, Outcome.FAILED, "defect in alloc or a plugin")
+        try:
+            answer = self._answered(job)
+        finally:
+            with self._counting:
+                self._open -= 1
+            job.answer.set_result(answer)
 
     def _answered(self, job: Job) -> Answer:
         """Return the answer; whatever fails is one, too."""
@@ -180,7 +185,7 @@ class Service:
             return failure(given, Outcome.REFUSED, str(error))
         except MemoryError:
             return failure(given, Outcome.FAILED, "there is not enough memory for this")
-        except Exception as error:
+        except BaseException as error:  # such as SystemExit from a plugin, which ends nothing in this thread
             LOG.exception("a request failed")
             return failure(given, Outcome.FAILED, f"defect in alloc or a plugin: {type(error).__name__}: {error}")
         notes = {"notes": list(result.notes)} if result.notes else {}
@@ -214,13 +219,18 @@ class Service:
         if not parameters and name in self._own:
             return self._own[name]
         key = f"{name} {sorted(parameters.items())}"
-        with self._loading:
-            if key not in self._others:
-                self._others[key] = load(name, parameters)
+        with self._looking:
+            loading = self._loading.setdefault(key, threading.Lock())
+        with loading:  # of this method only: loading takes seconds, for which others are not held up
+            method = self._others.get(key)
+            if method is None:
+                method = load(name, parameters)
+            with self._looking:
+                self._others[key] = method
+                self._others.move_to_end(key)
                 if len(self._others) > MOST_METHODS:
                     self._others.popitem(last=False)
-            self._others.move_to_end(key)
-            return self._others[key]
+        return method
 
 
 def failure(given: str | Row, outcome: Outcome, message: str) -> Answer:
@@ -229,6 +239,9 @@ def failure(given: str | Row, outcome: Outcome, message: str) -> Answer:
 
 
 def _head(given: str | Row) -> Row:
-    """Return the fields that every answer has: the id is that of the request."""
-    identity = integral(given.get("id")) if isinstance(given, dict) else None
-    return {"format": ANSWER_FORMAT, "id": identity if isinstance(identity, str | float | int) else None}
+    """Return the fields that every answer has: the id is that of the request, if it has a valid one."""
+    try:
+        known = identity(given.get("id"), "id") if isinstance(given, dict) else None
+    except InputError:
+        known = None
+    return {"format": ANSWER_FORMAT, "id": known}

@@ -1,4 +1,4 @@
-"""validate, convert and methods."""
+"""validate, convert, methods, and what serve refuses."""
 
 from pathlib import Path
 
@@ -130,3 +130,10 @@ def test_methods_are_prepared_once_for_all(alloc, monkeypatch):
     assert (ran.code, ran.out) == (0, "")
     assert {"greedy", "cpsat", "local-search", "gappo", "the tree of greedy", "policy gappo"} <= set(loaded)
     assert "plugin 'broken'" in ran.err
+
+
+def test_serve_loads_each_method_once(alloc):
+    """A method with two sets of parameters is refused, since requests that name it could mean either."""
+    ran = alloc("serve", "--stdio", "--load", "ga[population=8],ga")
+    assert ran.code == 2
+    assert "names ga twice" in ran.err

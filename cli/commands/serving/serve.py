@@ -76,8 +76,7 @@ def serve_command(
         queue=queue,
         strangers=not stdio,
     )
-    methods = {} if load is None else {name: given or {} for name, given in options.listed(load, "--load").values()}
-    service = Service(limits, methods)
+    service = Service(limits, {} if load is None else _methods(load))
     if stdio:
         serve_lines(service)
     else:
@@ -107,6 +106,16 @@ def serve_http(service: "Service", host: str, port: int, most_bytes: int) -> Non
         message = f"needs {error.name}; install with: pip install 'alloc-mrta[serve]'"
         raise MissingPackageError(message, "--http") from error
     run_server(service, host, port, most_bytes, lambda address: say(f"listening on {address}"))
+
+
+def _methods(text: str) -> dict[str, dict[str, object]]:
+    """Return the parameters of each method that is to be loaded."""
+    methods: dict[str, dict[str, object]] = {}
+    for name, given in options.listed(text, "--load").values():
+        if name in methods:
+            raise typer.BadParameter(f"names {name} twice, with other parameters; give it once", param_hint="'--load'")
+        methods[name] = given or {}
+    return methods
 
 
 def _address(text: str) -> tuple[str, int]:

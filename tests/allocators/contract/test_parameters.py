@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from alloc.allocators.contract.parameters import CheckedParameters, bounded, with_settings
+from alloc.allocators.contract.parameters import CheckedParameters, Parameterised, bounded, with_settings
 from alloc.problems import InputError
 
 
@@ -23,6 +23,25 @@ def test_defaults_and_replacements():
     """Settings replace fields of the parameters given, and of the defaults where there are none."""
     assert with_settings(Sample, None, {}) == Sample()
     assert with_settings(Sample, Sample(size=4), {"name": "b"}) == Sample(size=4, name="b")
+
+
+def test_defaults_of_a_class_with_slots():
+    """Parameters without a dictionary of their own tell their defaults, and what differs from them."""
+
+    @dataclass(frozen=True, slots=True)
+    class Slotted:
+        size: int = 3
+        name: str = "a"
+
+    class Sized(Parameterised):
+        parameters_type = Slotted
+
+        @classmethod
+        def _title(cls) -> str:
+            return "method 'sized'"
+
+    assert Sized.default_parameters() == {"size": 3, "name": "a"}
+    assert Sized(size=4).changed_parameters() == {"size": 4}
 
 
 def test_values_become_pythons_own():

@@ -9,6 +9,7 @@ from collections import Counter
 
 import httpx
 import pytest
+import uvicorn
 
 from alloc.allocators.serving.http import build_app
 from alloc.allocators.serving.request import ServiceLimits
@@ -16,8 +17,6 @@ from alloc.allocators.serving.server import Server
 from alloc.allocators.serving.service import Service
 from alloc.problems import paper_like
 from alloc.problems.formats import to_document
-
-uvicorn = pytest.importorskip("uvicorn")
 
 EASY = {"agents": [{"id": "a", "ability": 2}], "tasks": [{"id": "t", "workload": 4}]}
 LONG = {
@@ -55,12 +54,16 @@ def test_statuses(client):
     solved = client.post("/solve", json={"id": 1, "instance": EASY})
     assert (solved.status_code, solved.json()["id"], solved.json()["result"]["makespan"]) == (200, 1, 2.0)
     assert client.post("/solve", content=b"{").status_code == 400
-    assert client.post("/solve", content=b"\xff").status_code == 400
+    binary = client.post("/solve", content=b"\xff")
+    assert (binary.status_code, binary.json()["error"]["message"]) == (400, "body: is not UTF-8 text")
     assert client.post("/solve", json={"instance": {**EASY, "agents": [{}] * 101}}).status_code == 400
+    endless = client.post("/solve", content=b'{"id": NaN, "instance": {}}')
+    assert (endless.status_code, endless.json()["id"]) == (400, None)
     fast = {"agents": [{"id": "a", "ability": 2, "speed": 1}], "tasks": EASY["tasks"]}
     assert client.post("/solve", json={"instance": fast, "method": "ga"}).status_code == 422
     large = client.post("/solve", content=b" " * 20_001)
     assert (large.status_code, large.headers["connection"]) == (413, "close")
+    assert "at most 20000 bytes" in large.json()["error"]["message"]
     assert client.post("/nothing").status_code == 404
 
 

@@ -7,7 +7,7 @@ import time
 import pytest
 from schema_checks import faults
 
-from alloc.allocators import solve
+from alloc.allocators import Allocator, load, solve
 from alloc.allocators.serving.lines import RequestLines
 from alloc.allocators.serving.request import ServiceLimits
 from alloc.allocators.serving.service import Answer, Outcome, Service
@@ -68,7 +68,14 @@ def test_answer_has_the_result_of_solve(service):
         ({"instance": EASY, "parameters": {"pop": 1}}, "input", "are for a method that is named"),
         ({"instance": EASY, "method": "gappo", "parameters": {"policy": "/etc/passwd"}}, "input", "cannot be chosen"),
         ({"instance": EASY, "method": "gappo", "parameters": {"device": "cuda"}}, "input", "cannot be chosen"),
+        ({"instance": EASY, "method": "milp", "parameters": {"plain": True}}, "input", "parameters.plain: cannot be"),
         ({"instance": EASY, "method": "ga", "parameters": {"population": 10**7}}, "input", "at most 10000"),
+        ({"instance": EASY, "id": [1]}, "input", "id: must be a string, or a number from -9007199254740991"),
+        ({"instance": EASY, "id": True}, "input", "id: must be a string"),
+        ({"instance": EASY, "id": 2**53 + 1}, "input", "id: must be a string"),
+        ({"instance": EASY, "seed": 2**53 + 1}, "input", "seed: must be a whole number from 0 to 9007199254740991"),
+        ('{"id": NaN, "instance": {}}', "input", "id: must be a string"),
+        ('{"id": -1e999, "instance": {}}', "input", "id: must be a string"),
         ({"instance": EASY, "start": {"b": "t"}, "method": "ga"}, "input", "start"),
         ({"instance": FLYING, "method": "ga"}, "refused", "speeds"),
     ],
@@ -80,6 +87,7 @@ def test_bad_requests_are_answered_by_one_line(service, request_, kind, words):
     answer = service.submit(request_).answer.result(30)
     assert answer.outcome == kind
     assert words in answer.document["error"]["message"]
+    assert json.loads(answer.text)["id"] is None
     assert answered(service, {"instance": EASY}).outcome is Outcome.SOLVED
 
 
@@ -112,15 +120,45 @@ def test_the_end_gives_open_requests_their_best(service):
     assert service.submit(LONG).answer.result(0).outcome is Outcome.BUSY
 
 
-def test_defects_are_answers_too(service, monkeypatch):
-    """An unforeseen exception is answered as failed, and logged with its traceback."""
+@pytest.mark.parametrize("kind", [ZeroDivisionError, SystemExit])
+def test_defects_are_answers_too(service, monkeypatch, caplog, kind):
+    """An unforeseen exception, an exit too, is answered as failed and logged with its traceback; nothing stays open."""
 
     def fail(*_: object, **__: object) -> None:
-        raise ZeroDivisionError("by nothing")
+        raise kind("by nothing")
 
     monkeypatch.setattr("alloc.allocators.serving.service.solve", fail)
     answer = answered(service, {"instance": EASY})
     assert (answer.outcome, "by nothing" in answer.document["error"]["message"]) == (Outcome.FAILED, True)
+    assert [record.exc_info[0] for record in caplog.records] == [kind]
+    assert service.open_requests == 0
+
+
+def test_loading_a_method_holds_up_no_other(monkeypatch):
+    """While one method is loaded, once for both requests of it, those for a method that is loaded are answered."""
+    begun, loaded, names = threading.Event(), threading.Event(), []
+
+    def slowly(name: str, parameters: dict) -> Allocator:
+        names.append(name)
+        if name == "ga":
+            begun.set()
+            assert loaded.wait(30)
+        return load(name, parameters)
+
+    monkeypatch.setattr("alloc.allocators.serving.service.load", slowly)
+    service = Service(ServiceLimits(parallel=3))
+    try:
+        assert answered(service, {"instance": EASY, "method": "greedy"}).outcome is Outcome.SOLVED
+        slow = [service.submit({"instance": EASY, "method": "ga", "iterations": 1}) for _ in range(2)]
+        assert begun.wait(30)
+        assert answered(service, {"instance": EASY, "method": "greedy"}).outcome is Outcome.SOLVED
+        assert not any(job.answer.done() for job in slow)
+        loaded.set()
+        assert [job.answer.result(30).outcome for job in slow] == [Outcome.SOLVED] * 2
+        assert names == ["greedy", "ga"]
+    finally:
+        loaded.set()
+        service.close()
 
 
 def test_methods_of_the_operator_have_their_parameters():
@@ -160,6 +198,18 @@ def test_lines_are_answered_as_they_end():
     assert sorted(map(str, kinds[2:])) == sorted(
         map(str, [(None, "input"), (None, "input"), (None, "input"), ("long", "cancelled")])
     )
+
+
+def test_ids_that_json_lacks_are_answered_over_lines(service):
+    """An id that is no finite number is wrong input, answered without an id; a large whole one comes back exactly."""
+    written = []
+    lines = RequestLines(service, lambda line: written.append(json.loads(line)))
+    lines.take('{"id": NaN, "cancel": 1}')
+    lines.take('{"id": 1, "cancel": NaN}')
+    lines.take(json.dumps({"instance": EASY}).replace("{", '{"id": 1e999, ', 1))
+    assert [(one["id"], one["error"]["kind"]) for one in written] == [(None, "input"), (1, "input"), (None, "input")]
+    assert [faults(one) for one in written] == [[]] * 3
+    assert answered(service, {"id": 2**53 - 1, "instance": EASY}).document["id"] == 2**53 - 1
 
 
 def test_instances_come_back_as_they_went(service):
