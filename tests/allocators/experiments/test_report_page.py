@@ -3,8 +3,12 @@
 import base64
 import gzip
 import json
+import os
 import re
 import sqlite3
+import tempfile
+from contextlib import closing
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -246,3 +250,38 @@ def test_progress_is_told(store, tmp_path):
     said = []
     report_html([store], tmp_path / "report.html", progress=said.append)
     assert said == ["statistics of 1 of 1 conditions", "4 of 4 instances"]
+
+
+@pytest.fixture
+def foreign_folder():
+    """A folder of somebody else, read by a user without rights to write it, as which this process acts meanwhile."""
+    with tempfile.TemporaryDirectory() as name:
+        folder, own = Path(name), os.geteuid()
+        fill(folder / "runs.db", methods=["greedy"])
+        writer = sqlite3.connect(folder / "runs.db")
+        with closing(writer):
+            yield folder, writer, lambda: (folder.chmod(0o555), os.seteuid(own or NOBODY))
+            os.seteuid(own)
+            folder.chmod(0o755)
+
+
+NOBODY = 65534
+
+
+@pytest.mark.skipif(not hasattr(os, "seteuid"), reason="users and their rights are those of POSIX")
+def test_a_store_in_a_folder_that_is_read_only_is_read_unless_somebody_writes_it(foreign_folder):
+    """Runs in the log of a writer are seen where SQLite lets them be; a log alone is an error of one line."""
+    folder, writer, become_another = foreign_folder
+    writer.execute("UPDATE runs SET makespan = 7.0")
+    writer.commit()
+    become_another()
+    assert {record.ending.makespan for record in read_stores([folder / "runs.db"]).records.values()} == {7.0}
+    os.seteuid(os.getuid())
+    folder.chmod(0o755)
+    for part in ("", "-wal"):
+        (folder / f"copy.db{part}").write_bytes((folder / f"runs.db{part}").read_bytes())
+    writer.close()
+    become_another()
+    assert {record.ending.makespan for record in read_stores([folder / "runs.db"]).records.values()} == {7.0}
+    with pytest.raises(InputError, match=r"copy\.db: is being written, .*copy\.db-wal shows, .* read-only here"):
+        read_stores([folder / "copy.db"])

@@ -16,6 +16,7 @@ from alloc.allocators.experiments.store.key import Run
 from alloc.allocators.experiments.store.outcome import Ending, TracePoints
 from alloc.allocators.experiments.store.schema import checked_version
 from alloc.allocators.experiments.store.store import ENDING, RUN, Record, record_of
+from alloc.problems import InputError
 from alloc.problems.formats.files import PathLike, named
 
 EDGES_S = tuple(1e-3 * 10 ** (step / 20) for step in range(256))
@@ -140,13 +141,50 @@ def _has_plans(connection: sqlite3.Connection) -> bool:
 
 @contextmanager
 def _opened(path: PathLike) -> Iterator[sqlite3.Connection]:
-    """Open a store for reading; a file in a folder that is read-only cannot be written by others meanwhile."""
-    place = os.path.abspath(os.fspath(path))
-    mode = "mode=ro" if os.access(os.path.dirname(place), os.W_OK) else "immutable=1"
+    """Open a store for reading, while others may write it."""
     with explained(named(path)):
-        opened = sqlite3.connect(f"file:{pathname2url(place)}?{mode}", uri=True, timeout=BUSY_S)
+        opened = _connected(os.path.abspath(os.fspath(path)), named(path))
     with closing(opened) as connection, explained(named(path)):
         yield connection
+
+
+def _connected(place: str, name: str) -> sqlite3.Connection:
+    """Return a connection that only reads.
+
+    In a folder that may not be written, SQLite cannot make the files by which readers and writers find each other.
+    There a store is read without them, which is right only while nobody writes it: a log beside it shows that somebody
+    does, or was ended while writing. Who begins to write later is not noticed.
+
+    Raises
+    ------
+    InputError
+        If there is such a log.
+    """
+    try:
+        return _tried(place, "mode=ro")
+    except sqlite3.OperationalError as error:
+        kind = str(getattr(error, "sqlite_errorname", ""))
+        if not kind.startswith(("SQLITE_READONLY", "SQLITE_CANTOPEN")) or not os.path.exists(place):
+            raise
+    for log in (f"{place}-wal", f"{place}-journal"):
+        if os.path.exists(log) and os.path.getsize(log):
+            raise InputError(
+                f"is being written, or was when its writer was ended, which {os.path.basename(log)} shows, and its"
+                " folder is read-only here; read it when the comparison has ended, or make the folder writable",
+                source=name,
+            )
+    return _tried(place, "immutable=1")
+
+
+def _tried(place: str, mode: str) -> sqlite3.Connection:
+    """Return a connection by which something was read: a file is not looked at before."""
+    connection = sqlite3.connect(f"file:{pathname2url(place)}?{mode}", uri=True, timeout=BUSY_S)
+    try:
+        connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
+    except sqlite3.Error:
+        connection.close()
+        raise
+    return connection
 
 
 def moment(time_s: float) -> int:
