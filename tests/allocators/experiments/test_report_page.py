@@ -24,8 +24,9 @@ from alloc.allocators.experiments.report.page.series import series
 from alloc.allocators.experiments.report.page.source import EDGES_S, read_stores, thinned
 from alloc.allocators.experiments.statistics import differences, profiles, targets_reached
 from alloc.allocators.experiments.store.outcome import Ending, Outcome
+from alloc.allocators.experiments.store.plan import packed, unpacked
 from alloc.allocators.experiments.store.store import Store
-from alloc.problems import InputError, MissingPackageError
+from alloc.problems import Allocation, InputError, MissingPackageError
 
 
 @pytest.fixture(autouse=True)
@@ -184,6 +185,20 @@ def test_runs_under_other_conditions_are_told_apart(store, tmp_path):
     found = written(store, tmp_path)["main"]
     assert len(found["groups"]) == 1
     assert sorted(found["labels"]) == ["ga[population=4]", "greedy", "hedonic (plug 1)", "hedonic (plug 2)"]
+
+
+def test_the_plan_of_a_run_is_of_the_store_that_its_record_is_of(tmp_path):
+    """Of a run in two stores the one that ended last counts, with its own plan, whichever store is named first."""
+    stores = [tmp_path / "early.db", tmp_path / "late.db"]
+    for store in stores:
+        fill(store, instances=1, methods=["greedy"])
+    with sqlite3.connect(stores[1]) as edited:
+        edited.execute("UPDATE runs SET finished_at = finished_at + 1")
+        edited.execute("UPDATE plans SET plan = ?", (packed(Allocation([-1, 1, 0])),))
+    for order in (stores, stores[::-1]):
+        archive = read_stores(order)
+        plans = archive.plans(list(archive.records))
+        assert [unpacked(plan).task_of_agent.tolist() for plan in plans.values()] == [[-1, 1, 0]] * 2
 
 
 def test_the_time_of_a_mission_stands_for_the_makespan(store, tmp_path):

@@ -49,26 +49,33 @@ class Archive:
         Runs by key, in the order in which they began. Of a run in several stores, what ended last.
     instances : dict
         By the hash of their content.
+    origins : dict
+        Of each run, which of the paths its record is of.
     """
 
     paths: Sequence[PathLike]
     records: dict[str, Record] = field(default_factory=dict)
     instances: dict[str, Known] = field(default_factory=dict)
+    origins: dict[str, int] = field(default_factory=dict)
 
     def contents(self, wanted: Sequence[str]) -> Iterator[tuple[str, bytes]]:
         """Yield the hash and the .npz of each instance that is wanted and kept, in the order that is wanted."""
         yield from self._blobs("SELECT content FROM contents WHERE instance = ?", wanted)
 
     def plans(self, wanted: Sequence[str]) -> dict[str, bytes]:
-        """Return the plans that are kept of these runs, packed, by key."""
-        return dict(self._blobs("SELECT plan FROM plans WHERE key = ?", wanted))
+        """Return the plans that are kept of these runs, packed, by key; each from the store that its record is of."""
+        return dict(self._blobs("SELECT plan FROM plans WHERE key = ?", wanted, self.origins))
 
-    def _blobs(self, query: str, wanted: Sequence[str]) -> Iterator[tuple[str, bytes]]:
+    def _blobs(
+        self, query: str, wanted: Sequence[str], origins: Mapping[str, int] | None = None
+    ) -> Iterator[tuple[str, bytes]]:
+        """Yield what a query finds of each key in the store that it is of, without `origins` in the first that has it."""
         with ExitStack() as stack:
             opened = [(stack.enter_context(_opened(path)), named(path)) for path in self.paths]
-            able = [one for one in opened if _has_plans(one[0])]
+            able = {number: one for number, one in enumerate(opened) if _has_plans(one[0])}
             for key in wanted:
-                for connection, name in able:
+                for number in able if origins is None else able.keys() & {origins[key]}:
+                    connection, name = able[number]
                     with explained(name):
                         row = connection.execute(query, (key,)).fetchone()
                     if row is not None:
@@ -86,7 +93,8 @@ def read_stores(paths: Sequence[PathLike], progress: Progress = lambda words: No
     """
     found: dict[str, Record] = {}
     instances: dict[str, Known] = {}
-    for path in paths:
+    origins: dict[str, int] = {}
+    for number, path in enumerate(paths):
         with _opened(path) as connection:
             if checked_version(connection, named(path)) == 0:  # an empty file: no run has begun
                 continue
@@ -94,11 +102,11 @@ def read_stores(paths: Sequence[PathLike], progress: Progress = lambda words: No
                 instances[known] = Known(*about)
             for key, record in _records(connection):
                 if key not in found or found[key].ending.finished_at < record.ending.finished_at:
-                    found[key] = record
+                    found[key], origins[key] = record, number
                 if len(found) % EVERY == 0:
                     progress(f"{len(found)} runs read")
     order = sorted(found, key=lambda key: found[key].ending.started_at)
-    return Archive(paths, _with_shared_bounds({key: found[key] for key in order}), instances)
+    return Archive(paths, _with_shared_bounds({key: found[key] for key in order}), instances, origins)
 
 
 def _with_shared_bounds(records: dict[str, Record]) -> dict[str, Record]:
