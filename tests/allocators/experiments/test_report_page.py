@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from stored_runs import ANGRY, fill
+from stored_runs import ANGRY, MACHINE, fill
 
 from alloc.allocators import report_html
 from alloc.allocators.experiments.report.page import details as details_module
@@ -58,7 +58,7 @@ def test_the_page_tells_what_was_run_and_how_it_ended(store, tmp_path):
     (group,) = main["groups"]
     told = group["conditions"]
     assert (told["objective"], told["time_limit_s"], told["runs"], told["instances"]) == ("makespan-energy", 1.0, 24, 4)
-    assert (told["revision"], told["machine"]) == ("abc+", told["machine"])
+    assert (told["revision"], told["machine"]) == ("abc+", MACHINE)
     assert main["labels"] == ["greedy", "ga[population=4]", "hedonic"]
     rows = {main["labels"][row["method"]]: row for row in group["methods"]}
     assert rows["greedy"]["makespan"] == 1.0
@@ -71,6 +71,26 @@ def test_the_page_tells_what_was_run_and_how_it_ended(store, tmp_path):
     (one,) = [row for row in group["paired"] if (row["method"], row["against"], row["score"]) == (1, 0, "makespan")]
     assert (one["mean"], one["better"], one["left_out"]) == (expected.mean, expected.better, expected.left_out)
     assert one["p_holm"] == float(f"{expected.p_holm:.6g}")
+
+
+def test_means_are_of_the_instances_that_every_method_served(store, tmp_path):
+    """A method that fails where others need long gains nothing by it; without a common instance there are no means."""
+    of = "WHERE method = 'greedy' AND instance {} (SELECT instance FROM instances WHERE name = 'i3')"
+    with sqlite3.connect(store) as edited:
+        edited.execute("UPDATE runs SET makespan = 100.0, energy = 100.0, runtime_s = 100.0 " + of.format("IN"))
+    (group,) = written(store, tmp_path)["main"]["groups"]
+    greedy, ga, hedonic = group["methods"]  # ga fails on i3
+    assert (greedy["served"], ga["served"]) == (4, 3)
+    figures = ("makespan", "ratio", "gap", "energy", "runtime_s")
+    assert [greedy[name] for name in figures] == [1.0, 1.0, 0.2, 2.0, 0.5]
+    assert [ga[name] for name in figures] == [1.5, 1.5, pytest.approx(1 - 0.8 / 1.5, rel=1e-5), 3.0, 0.5]
+    assert [hedonic[name] for name in figures] == [None] * 5
+    assert any(note.startswith("Means are of the 3 of 4 instances") for note in group["notes"])
+    with sqlite3.connect(store) as edited:
+        edited.execute("UPDATE runs SET makespan = NULL " + of.format("NOT IN"))
+    (group,) = written(store, tmp_path)["main"]["groups"]
+    assert [row["makespan"] for row in group["methods"]] == [None] * 3
+    assert any(note.startswith("No instance was served by every method") for note in group["notes"])
 
 
 def test_every_method_is_compared_with_one_where_every_pair_is_too_many(store, tmp_path, monkeypatch):

@@ -69,7 +69,7 @@ class Archive:
     def _blobs(
         self, query: str, wanted: Sequence[str], origins: Mapping[str, int] | None = None
     ) -> Iterator[tuple[str, bytes]]:
-        """Yield what a query finds of each key in the store that it is of, without `origins` in the first that has it."""
+        """Yield what a query finds of each key in the store that it is of; without `origins`, in the first with it."""
         with ExitStack() as stack:
             opened = [(stack.enter_context(_opened(path)), named(path)) for path in self.paths]
             able = {number: one for number, one in enumerate(opened) if _has_plans(one[0])}
