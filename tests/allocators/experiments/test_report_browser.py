@@ -72,6 +72,10 @@ SCRIPT = """<script>(async () => {
     await until(() => String(ticks()) === String(whole));
     found.sites = byId("place").querySelectorAll(".mark-symbol path").length;
     found.groups = [...byId("groups").querySelectorAll("tbody tr")].map((row) => row.lastChild.textContent);
+    const kept = tables.size;
+    byId("paired").querySelectorAll(".chart").forEach((chart) => { chart.drawn.finalize = () => { found.finalized = true; }; });
+    tellPaired();
+    found.more = tables.size - kept;
     const real = unpack;
     unpack = async (id) => { unpack = real; await new Promise((done) => setTimeout(done, 500)); return real(id); };
     await Promise.all([showInstance(0), showInstance(1)]);
@@ -120,6 +124,7 @@ def test_the_page_sorts_filters_and_zooms(folder, tmp_path):
     assert found["sites"] >= 4
     assert found["groups"] == ["a1, a2", "a3"]
     assert found["traceback"] == f"Traceback\n{ANGRY}"
+    assert (found["more"], found["finalized"]) == (0, True)  # tables and charts that are made anew replace others
     assert found["latest"] == [1, "i1"]  # though what the first one waited for came later
     assert found["dialog"]
 
