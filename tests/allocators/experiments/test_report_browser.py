@@ -73,7 +73,8 @@ SCRIPT = """<script>(async () => {
     found.sites = byId("place").querySelectorAll(".mark-symbol path").length;
     found.groups = [...byId("groups").querySelectorAll("tbody tr")].map((row) => row.lastChild.textContent);
     const kept = tables.size;
-    byId("paired").querySelectorAll(".chart").forEach((chart) => { chart.drawn.finalize = () => { found.finalized = true; }; });
+    const note = () => { found.finalized = true; };
+    byId("paired").querySelectorAll(".chart").forEach((chart) => { chart.drawn.finalize = note; });
     tellPaired();
     found.more = tables.size - kept;
     const real = unpack;
