@@ -15,7 +15,7 @@ from alloc.allocators.experiments.isolation.serve import Figures, Order
 from alloc.allocators.experiments.isolation.worker import Limits, Worker
 from alloc.allocators.experiments.store.key import this_machine
 from alloc.allocators.experiments.store.outcome import Outcome
-from alloc.allocators.parallel.engine import POLL_S
+from alloc.allocators.parallel.engine import POLL_S, EngineError
 from alloc.allocators.parallel.ray import MAX_ATTEMPTS, RayEngine
 
 OTHERS_S = 0.3
@@ -105,13 +105,22 @@ class _Remote(Handle):
         self._task = self._function.remote(pickle.dumps(order), limits, self._threads, is_timed=self._is_timed)
 
     def figures(self) -> Figures | None:
-        """See `Handle.figures`."""
+        """See `Handle.figures`.
+
+        Raises
+        ------
+        EngineError
+            If the cluster is lost, or a machine cannot make runs, as where a plugin is missing: no method is at fault.
+        """
+        errors = self._ray.exceptions
         try:
             if not self._ray.wait([self._task], timeout=0)[0]:
                 return None
             figures: Figures = self._ray.get(self._task)
-        except (self._ray.exceptions.RayError, OSError) as error:
-            figures = {"outcome": Outcome.KILLED, "reason": f"Ray gave it up: {' '.join(str(error).split())[:300]}"}
+        except (errors.WorkerCrashedError, errors.OutOfMemoryError) as error:
+            figures = {"outcome": Outcome.KILLED, "reason": f"Ray gave it up: {_reason(error)}"}
+        except (errors.RayError, OSError) as error:
+            raise EngineError(f"Ray gave a run up: {_reason(error)}") from error
         self._task = None
         return figures
 
@@ -120,6 +129,10 @@ class _Remote(Handle):
         if self._task is not None:
             with contextlib.suppress(Exception):  # the connection may be what has failed
                 self._ray.cancel(self._task, force=True)
+
+
+def _reason(error: Exception) -> str:
+    return " ".join(str(error).split())[-300:] or type(error).__name__
 
 
 def _kind() -> str:
@@ -146,13 +159,16 @@ def make_run(order: bytes, limits: Limits, threads: int, *, is_timed: bool) -> F
     while is_timed and CAN_PIN and not cores.numbers:
         cores = take(threads) or cores
         time.sleep(0.0 if cores.numbers else OTHERS_S)
-    began, worker = time.monotonic(), Worker(cores, threads)
+    began = time.monotonic()
     try:
-        worker.send(pickle.loads(order), limits)
-        while (figures := worker.figures()) is None:
-            connection.wait(worker.handles, POLL_S)
+        worker = Worker(cores, threads)
+        try:
+            worker.send(pickle.loads(order), limits)
+            while (figures := worker.figures()) is None:
+                connection.wait(worker.handles, POLL_S)
+        finally:
+            worker.end()
     finally:
-        worker.end()
         cores.free()
     own = {"wall_s": time.monotonic() - began, "memory_limit_mb": limits.memory_mb, "host": socket.gethostname()}
     return {**figures, **own, "cores": ",".join(map(str, cores.numbers))}

@@ -13,6 +13,8 @@ from alloc.problems import Allocation, Instance
 ANGRY = '</script><img src=x onerror="document.body.textContent=1"><b>'
 """What must never be anything but text."""
 
+MACHINE = "a processor, 4 of them, Linux"
+
 TRACE = ((0.25, None, 3.0, None), (0.5, 1.0, 2.0, 0.8))
 
 METHODS = {"greedy": ("greedy", {}), "ga": ("ga", {"population": 4}), "hedonic": ("hedonic", {})}
@@ -53,7 +55,7 @@ def fill(
     wanted = {label: METHODS[label] for label in methods or METHODS}
     with Store(path) as store:
         budget = Budget(time_limit_s)
-        plan = planned(store, problems, wanted, [0, 1], objective="makespan-energy", budget=budget)
+        plan = planned(store, problems, wanted, [0, 1], objective="makespan-energy", budget=budget, machine=MACHINE)
         for begin, ((number, label, seed), job) in enumerate(plan.jobs.items()):
             assert store.claim([job.run.key]).key == job.run.key
             allocation = Allocation([0, 0, 1] if label == "greedy" else [0, 0, 0])

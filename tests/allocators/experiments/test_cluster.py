@@ -7,10 +7,17 @@ import sys
 import time
 from collections import Counter
 from pathlib import Path
+from types import SimpleNamespace
 
 import evil_methods
 import pytest
 from ray_cluster import kill_at_work, ray_cluster
+
+from alloc.allocators.experiments.isolation.cluster import _Remote
+from alloc.allocators.experiments.isolation.worker import Limits
+from alloc.allocators.parallel.engine import EngineError
+
+ray = pytest.importorskip("ray")
 
 # Ray leaves the processes that it starts, and their logs, to the garbage collector
 pytestmark = [
@@ -60,3 +67,25 @@ def ended(path):
             return store.execute("SELECT count(*) FROM runs").fetchone()[0]
     except sqlite3.OperationalError:  # not there yet
         return 0
+
+
+@pytest.mark.parametrize(("error", "outcome"), [("WorkerCrashedError", "killed"), ("LocalRayletDiedError", None)])
+def test_only_what_a_run_did_is_held_against_its_method(error, outcome):
+    """A worker that crashed is an outcome; the loss of the cluster, or an error of our own there, ends the command."""
+
+    def get(task):
+        raise getattr(ray.exceptions, error)
+
+    fake = SimpleNamespace(
+        exceptions=ray.exceptions,
+        wait=lambda tasks, timeout: (tasks, []),
+        get=get,
+        remote=lambda **options: lambda function: SimpleNamespace(remote=lambda *order, **more: object()),
+    )
+    handle = _Remote(fake, 1, is_timed=False)
+    handle.send(None, Limits(1.0, 1.0))
+    if outcome is None:
+        with pytest.raises(EngineError, match="Ray gave a run up"):
+            handle.figures()
+    else:
+        assert handle.figures()["outcome"] == outcome

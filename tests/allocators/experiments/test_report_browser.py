@@ -72,6 +72,15 @@ SCRIPT = """<script>(async () => {
     await until(() => String(ticks()) === String(whole));
     found.sites = byId("place").querySelectorAll(".mark-symbol path").length;
     found.groups = [...byId("groups").querySelectorAll("tbody tr")].map((row) => row.lastChild.textContent);
+    const kept = tables.size;
+    const note = () => { found.finalized = true; };
+    byId("paired").querySelectorAll(".chart").forEach((chart) => { chart.drawn.finalize = note; });
+    tellPaired();
+    found.more = tables.size - kept;
+    const real = unpack;
+    unpack = async (id) => { unpack = real; await new Promise((done) => setTimeout(done, 500)); return real(id); };
+    await Promise.all([showInstance(0), showInstance(1)]);
+    found.latest = [state.instance, byId("size").textContent.split(":")[0]];
     byId("failed").querySelectorAll("details").forEach((one) => { one.open = true; });
     await until(() => byId("failed").querySelector("pre"));
     found.traceback = byId("failed").querySelector("pre").textContent;
@@ -116,6 +125,8 @@ def test_the_page_sorts_filters_and_zooms(folder, tmp_path):
     assert found["sites"] >= 4
     assert found["groups"] == ["a1, a2", "a3"]
     assert found["traceback"] == f"Traceback\n{ANGRY}"
+    assert (found["more"], found["finalized"]) == (0, True)  # tables and charts that are made anew replace others
+    assert found["latest"] == [1, "i1"]  # though what the first one waited for came later
     assert found["dialog"]
 
 

@@ -3,12 +3,16 @@
 import base64
 import gzip
 import json
+import os
 import re
 import sqlite3
+import tempfile
+from contextlib import closing
+from pathlib import Path
 
 import numpy as np
 import pytest
-from stored_runs import ANGRY, fill
+from stored_runs import ANGRY, MACHINE, fill
 
 from alloc.allocators import report_html
 from alloc.allocators.experiments.report.page import details as details_module
@@ -20,8 +24,9 @@ from alloc.allocators.experiments.report.page.series import series
 from alloc.allocators.experiments.report.page.source import EDGES_S, read_stores, thinned
 from alloc.allocators.experiments.statistics import differences, profiles, targets_reached
 from alloc.allocators.experiments.store.outcome import Ending, Outcome
+from alloc.allocators.experiments.store.plan import packed, unpacked
 from alloc.allocators.experiments.store.store import Store
-from alloc.problems import InputError, MissingPackageError
+from alloc.problems import Allocation, InputError, MissingPackageError
 
 
 @pytest.fixture(autouse=True)
@@ -53,7 +58,7 @@ def test_the_page_tells_what_was_run_and_how_it_ended(store, tmp_path):
     (group,) = main["groups"]
     told = group["conditions"]
     assert (told["objective"], told["time_limit_s"], told["runs"], told["instances"]) == ("makespan-energy", 1.0, 24, 4)
-    assert (told["revision"], told["machine"]) == ("abc+", told["machine"])
+    assert (told["revision"], told["machine"]) == ("abc+", MACHINE)
     assert main["labels"] == ["greedy", "ga[population=4]", "hedonic"]
     rows = {main["labels"][row["method"]]: row for row in group["methods"]}
     assert rows["greedy"]["makespan"] == 1.0
@@ -66,6 +71,26 @@ def test_the_page_tells_what_was_run_and_how_it_ended(store, tmp_path):
     (one,) = [row for row in group["paired"] if (row["method"], row["against"], row["score"]) == (1, 0, "makespan")]
     assert (one["mean"], one["better"], one["left_out"]) == (expected.mean, expected.better, expected.left_out)
     assert one["p_holm"] == float(f"{expected.p_holm:.6g}")
+
+
+def test_means_are_of_the_instances_that_every_method_served(store, tmp_path):
+    """A method that fails where others need long gains nothing by it; without a common instance there are no means."""
+    of = "WHERE method = 'greedy' AND instance {} (SELECT instance FROM instances WHERE name = 'i3')"
+    with sqlite3.connect(store) as edited:
+        edited.execute("UPDATE runs SET makespan = 100.0, energy = 100.0, runtime_s = 100.0 " + of.format("IN"))
+    (group,) = written(store, tmp_path)["main"]["groups"]
+    greedy, ga, hedonic = group["methods"]  # ga fails on i3
+    assert (greedy["served"], ga["served"]) == (4, 3)
+    figures = ("makespan", "ratio", "gap", "energy", "runtime_s")
+    assert [greedy[name] for name in figures] == [1.0, 1.0, 0.2, 2.0, 0.5]
+    assert [ga[name] for name in figures] == [1.5, 1.5, pytest.approx(1 - 0.8 / 1.5, rel=1e-5), 3.0, 0.5]
+    assert [hedonic[name] for name in figures] == [None] * 5
+    assert any(note.startswith("Means are of the 3 of 4 instances") for note in group["notes"])
+    with sqlite3.connect(store) as edited:
+        edited.execute("UPDATE runs SET makespan = NULL " + of.format("NOT IN"))
+    (group,) = written(store, tmp_path)["main"]["groups"]
+    assert [row["makespan"] for row in group["methods"]] == [None] * 3
+    assert any(note.startswith("No instance was served by every method") for note in group["notes"])
 
 
 def test_every_method_is_compared_with_one_where_every_pair_is_too_many(store, tmp_path, monkeypatch):
@@ -182,6 +207,20 @@ def test_runs_under_other_conditions_are_told_apart(store, tmp_path):
     assert sorted(found["labels"]) == ["ga[population=4]", "greedy", "hedonic (plug 1)", "hedonic (plug 2)"]
 
 
+def test_the_plan_of_a_run_is_of_the_store_that_its_record_is_of(tmp_path):
+    """Of a run in two stores the one that ended last counts, with its own plan, whichever store is named first."""
+    stores = [tmp_path / "early.db", tmp_path / "late.db"]
+    for store in stores:
+        fill(store, instances=1, methods=["greedy"])
+    with sqlite3.connect(stores[1]) as edited:
+        edited.execute("UPDATE runs SET finished_at = finished_at + 1")
+        edited.execute("UPDATE plans SET plan = ?", (packed(Allocation([-1, 1, 0])),))
+    for order in (stores, stores[::-1]):
+        archive = read_stores(order)
+        plans = archive.plans(list(archive.records))
+        assert [unpacked(plan).task_of_agent.tolist() for plan in plans.values()] == [[-1, 1, 0]] * 2
+
+
 def test_the_time_of_a_mission_stands_for_the_makespan(store, tmp_path):
     """Runs of policies have measures as JSON; where a mission was not done there is no time."""
     with sqlite3.connect(store) as edited:
@@ -246,3 +285,38 @@ def test_progress_is_told(store, tmp_path):
     said = []
     report_html([store], tmp_path / "report.html", progress=said.append)
     assert said == ["statistics of 1 of 1 conditions", "4 of 4 instances"]
+
+
+@pytest.fixture
+def foreign_folder():
+    """A folder of somebody else, read by a user without rights to write it, as which this process acts meanwhile."""
+    with tempfile.TemporaryDirectory() as name:
+        folder, own = Path(name), os.geteuid()
+        fill(folder / "runs.db", methods=["greedy"])
+        writer = sqlite3.connect(folder / "runs.db")
+        with closing(writer):
+            yield folder, writer, lambda: (folder.chmod(0o555), os.seteuid(own or NOBODY))
+            os.seteuid(own)
+            folder.chmod(0o755)
+
+
+NOBODY = 65534
+
+
+@pytest.mark.skipif(not hasattr(os, "seteuid"), reason="users and their rights are those of POSIX")
+def test_a_store_in_a_folder_that_is_read_only_is_read_unless_somebody_writes_it(foreign_folder):
+    """Runs in the log of a writer are seen where SQLite lets them be; a log alone is an error of one line."""
+    folder, writer, become_another = foreign_folder
+    writer.execute("UPDATE runs SET makespan = 7.0")
+    writer.commit()
+    become_another()
+    assert {record.ending.makespan for record in read_stores([folder / "runs.db"]).records.values()} == {7.0}
+    os.seteuid(os.getuid())
+    folder.chmod(0o755)
+    for part in ("", "-wal"):
+        (folder / f"copy.db{part}").write_bytes((folder / f"runs.db{part}").read_bytes())
+    writer.close()
+    become_another()
+    assert {record.ending.makespan for record in read_stores([folder / "runs.db"]).records.values()} == {7.0}
+    with pytest.raises(InputError, match=r"copy\.db: is being written, .*copy\.db-wal shows, .* read-only here"):
+        read_stores([folder / "copy.db"])

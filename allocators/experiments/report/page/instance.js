@@ -1,11 +1,15 @@
 "use strict";
 // What is shown of a single instance: the map with a plan, its groups, and what each run had found when.
 
+let latest = 0; // call of showInstance: an earlier one draws no more
 async function showInstance(index) {
+  const mine = ++latest;
+  const isLatest = () => latest === mine;
   state.instance = index;
   const { name, agents, tasks, chunk } = page.instances;
   byId("find").value = name[index];
   const detail = chunk[index] < 0 ? { traces: [], runs: 0 } : JSON.parse(await unpack(`detail-${chunk[index]}`))[index];
+  if (!isLatest()) return;
   const map = detail.map;
   const plans = map ? map.plans.filter((plan) => plan.group === state.group && !state.off.has(plan.method)).sort((one, other) => one.method - other.method) : [];
   let about = `${name[index]}: ${counted(agents[index], "agent")}, ${counted(tasks[index], "task")}.`;
@@ -23,8 +27,8 @@ async function showInstance(index) {
     chip.append(`${page.labels[plan.method]}: ${figures}`);
     chip.onclick = () => { state.plan = plan.method; showInstance(index); };
   }
-  await showPlan(map, plans.find((plan) => plan.method === state.plan));
-  await showTraces(detail.traces);
+  await showPlan(map, plans.find((plan) => plan.method === state.plan), isLatest);
+  if (isLatest()) await showTraces(detail.traces);
 }
 const caption = (id, title, note) => {
   const place = byId(id).querySelector("figcaption");
@@ -32,19 +36,20 @@ const caption = (id, title, note) => {
   add(place, "b", title);
   place.append(note);
 };
-async function showPlan(map, plan) {
+async function showPlan(map, plan, isLatest) {
   const chart = byId("place").querySelector(".chart");
   const [width, height] = [Math.max(chart.clientWidth - 75, 180), window.innerWidth < 760 ? 320 : 420];
   caption("place", plan ? `Plan of ${page.labels[plan.method]}` : "Map", plan
     ? "Sites by workload (area) and time done; orange rings are unserved. Squares are starts, hollow where all stay idle. Drag to move, turn the wheel to zoom."
     : "Sites by workload (area); squares are starts. Drag to move, turn the wheel to zoom.");
   const [laid, zoom] = map ? await drawMap(chart, map, plan, width, height) : [null, null];
+  if (!isLatest()) return;
   byId("zoom").hidden = !zoom;
   byId("groups").hidden = !plan;
   if (!zoom) await draw(chart, map ? "There is no map: the instance has no positions." : "There is no map: the store has no content of this instance, as it was made before alloc kept that, or it is left out here.");
   else if (!plan) add(chart, "p", "No plan is kept under these conditions: no run was solved, or they were made before alloc kept plans.", { class: "none" });
   for (const [id, factor] of [["in", 1 / 1.6], ["out", 1.6], ["fit", 0]]) byId(id).onclick = () => zoom(factor);
-  if (!plan) return;
+  if (!plan || !isLatest()) return;
   makeTable(byId("groups").querySelector("table"), [text("task", (task) => task.id), number("workload", (task) => task.work), number("done at", (task) => task.done),
     number("ability", (task) => task.ability), number("agents", (task) => task.count), text("who", (task) => task.count ? listed(task.agents, task.count) : "-")],
   laid.tasks, { paging: laid.tasks.length > 25 });

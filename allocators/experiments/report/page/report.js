@@ -34,6 +34,7 @@ const when = (seconds) => new Date(1000 * seconds).toISOString().slice(0, 16).re
 async function embed(element, spec) {
   element.drawn?.finalize(); // it would go on to listen for another size of the window
   element.drawn = await vegaEmbed(element, { config: config(), ...spec }, { mode: "vega-lite", renderer: "svg", actions: { export: true, source: false, compiled: false, editor: false }, tooltip: { theme: isDark() ? "dark" : "light" } });
+  if (!element.isConnected) element.drawn.finalize(); // it left the page meanwhile
   return element.drawn;
 }
 async function draw(element, spec) {
@@ -117,6 +118,8 @@ function tellMethods() {
 }
 function tellPaired() {
   const place = byId("paired");
+  place.querySelectorAll("table").forEach(dropTable); // what leaves the page would else be kept for ever
+  place.querySelectorAll(".chart").forEach((chart) => chart.drawn?.finalize());
   place.replaceChildren();
   const references = [...new Set(group().paired.map((one) => one.against))];
   if (!references.length) {

@@ -16,6 +16,7 @@ from alloc.allocators.experiments.store.key import Run
 from alloc.allocators.experiments.store.outcome import Ending, TracePoints
 from alloc.allocators.experiments.store.schema import checked_version
 from alloc.allocators.experiments.store.store import ENDING, RUN, Record, record_of
+from alloc.problems import InputError
 from alloc.problems.formats.files import PathLike, named
 
 EDGES_S = tuple(1e-3 * 10 ** (step / 20) for step in range(256))
@@ -48,26 +49,33 @@ class Archive:
         Runs by key, in the order in which they began. Of a run in several stores, what ended last.
     instances : dict
         By the hash of their content.
+    origins : dict
+        Of each run, which of the paths its record is of.
     """
 
     paths: Sequence[PathLike]
     records: dict[str, Record] = field(default_factory=dict)
     instances: dict[str, Known] = field(default_factory=dict)
+    origins: dict[str, int] = field(default_factory=dict)
 
     def contents(self, wanted: Sequence[str]) -> Iterator[tuple[str, bytes]]:
         """Yield the hash and the .npz of each instance that is wanted and kept, in the order that is wanted."""
         yield from self._blobs("SELECT content FROM contents WHERE instance = ?", wanted)
 
     def plans(self, wanted: Sequence[str]) -> dict[str, bytes]:
-        """Return the plans that are kept of these runs, packed, by key."""
-        return dict(self._blobs("SELECT plan FROM plans WHERE key = ?", wanted))
+        """Return the plans that are kept of these runs, packed, by key; each from the store that its record is of."""
+        return dict(self._blobs("SELECT plan FROM plans WHERE key = ?", wanted, self.origins))
 
-    def _blobs(self, query: str, wanted: Sequence[str]) -> Iterator[tuple[str, bytes]]:
+    def _blobs(
+        self, query: str, wanted: Sequence[str], origins: Mapping[str, int] | None = None
+    ) -> Iterator[tuple[str, bytes]]:
+        """Yield what a query finds of each key in the store that it is of; without `origins`, in the first with it."""
         with ExitStack() as stack:
             opened = [(stack.enter_context(_opened(path)), named(path)) for path in self.paths]
-            able = [one for one in opened if _has_plans(one[0])]
+            able = {number: one for number, one in enumerate(opened) if _has_plans(one[0])}
             for key in wanted:
-                for connection, name in able:
+                for number in able if origins is None else able.keys() & {origins[key]}:
+                    connection, name = able[number]
                     with explained(name):
                         row = connection.execute(query, (key,)).fetchone()
                     if row is not None:
@@ -85,7 +93,8 @@ def read_stores(paths: Sequence[PathLike], progress: Progress = lambda words: No
     """
     found: dict[str, Record] = {}
     instances: dict[str, Known] = {}
-    for path in paths:
+    origins: dict[str, int] = {}
+    for number, path in enumerate(paths):
         with _opened(path) as connection:
             if checked_version(connection, named(path)) == 0:  # an empty file: no run has begun
                 continue
@@ -93,11 +102,11 @@ def read_stores(paths: Sequence[PathLike], progress: Progress = lambda words: No
                 instances[known] = Known(*about)
             for key, record in _records(connection):
                 if key not in found or found[key].ending.finished_at < record.ending.finished_at:
-                    found[key] = record
+                    found[key], origins[key] = record, number
                 if len(found) % EVERY == 0:
                     progress(f"{len(found)} runs read")
     order = sorted(found, key=lambda key: found[key].ending.started_at)
-    return Archive(paths, _with_shared_bounds({key: found[key] for key in order}), instances)
+    return Archive(paths, _with_shared_bounds({key: found[key] for key in order}), instances, origins)
 
 
 def _with_shared_bounds(records: dict[str, Record]) -> dict[str, Record]:
@@ -140,13 +149,50 @@ def _has_plans(connection: sqlite3.Connection) -> bool:
 
 @contextmanager
 def _opened(path: PathLike) -> Iterator[sqlite3.Connection]:
-    """Open a store for reading; a file in a folder that is read-only cannot be written by others meanwhile."""
-    place = os.path.abspath(os.fspath(path))
-    mode = "mode=ro" if os.access(os.path.dirname(place), os.W_OK) else "immutable=1"
+    """Open a store for reading, while others may write it."""
     with explained(named(path)):
-        opened = sqlite3.connect(f"file:{pathname2url(place)}?{mode}", uri=True, timeout=BUSY_S)
+        opened = _connected(os.path.abspath(os.fspath(path)), named(path))
     with closing(opened) as connection, explained(named(path)):
         yield connection
+
+
+def _connected(place: str, name: str) -> sqlite3.Connection:
+    """Return a connection that only reads.
+
+    In a folder that may not be written, SQLite cannot make the files by which readers and writers find each other.
+    There a store is read without them, which is right only while nobody writes it: a log beside it shows that somebody
+    does, or was ended while writing. Who begins to write later is not noticed.
+
+    Raises
+    ------
+    InputError
+        If there is such a log.
+    """
+    try:
+        return _tried(place, "mode=ro")
+    except sqlite3.OperationalError as error:
+        kind = str(getattr(error, "sqlite_errorname", ""))
+        if not kind.startswith(("SQLITE_READONLY", "SQLITE_CANTOPEN")) or not os.path.exists(place):
+            raise
+    for log in (f"{place}-wal", f"{place}-journal"):
+        if os.path.exists(log) and os.path.getsize(log):
+            raise InputError(
+                f"is being written, or was when its writer was ended, which {os.path.basename(log)} shows, and its"
+                " folder is read-only here; read it when the comparison has ended, or make the folder writable",
+                source=name,
+            )
+    return _tried(place, "immutable=1")
+
+
+def _tried(place: str, mode: str) -> sqlite3.Connection:
+    """Return a connection by which something was read: a file is not looked at before."""
+    connection = sqlite3.connect(f"file:{pathname2url(place)}?{mode}", uri=True, timeout=BUSY_S)
+    try:
+        connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
+    except sqlite3.Error:
+        connection.close()
+        raise
+    return connection
 
 
 def moment(time_s: float) -> int:

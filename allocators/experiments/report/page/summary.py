@@ -52,9 +52,13 @@ def _flat(endings: Endings) -> list[Ending]:
 
 
 def methods(group: Group) -> list[Entry]:
-    """Return what each method came to, a row for each."""
+    """Return what each method came to, a row for each.
+
+    Means are of the instances that every method served: over its own, one that fails on the hardest would look best.
+    """
     makespans = {label: scores(runs, "makespan") for label, runs in group.endings.items()}
     ratios = relative_to_best(list(makespans.values()))
+    shared = _served_by_all(list(makespans.values()))
     rows = []
     for (label, runs), number, ratio in zip(group.endings.items(), group.methods, ratios, strict=True):
         ended = [one for some in runs for one in some if one is not None]
@@ -68,11 +72,11 @@ def methods(group: Group) -> list[Entry]:
                 "instances": sum(bool(some) for some in runs),
                 "served": int((~np.isnan(makespans[label])).sum()),
                 "best": int((ratio <= 1 + 1e-9).sum()),
-                "ratio": _finite(np.exp(_mean(np.log(ratio[ratio > 0])))),
-                "makespan": _finite(_mean(makespans[label])),
-                "gap": _finite(_mean(scores(runs, "gap"))),
-                "energy": _finite(_mean(scores(runs, "energy"))),
-                "runtime_s": _finite(_mean(scores(runs, "runtime_s"))),
+                "ratio": _finite(np.exp(_mean(np.log(ratio[shared & (ratio > 0)])))),
+                "makespan": _finite(_mean(makespans[label][shared])),
+                "gap": _finite(_mean(scores(runs, "gap")[shared])),
+                "energy": _finite(_mean(scores(runs, "energy")[shared])),
+                "runtime_s": _finite(_mean(scores(runs, "runtime_s")[shared])),
                 "memory_mb": max(one.memory_mb for one in ended),
                 "picked": ", ".join(
                     sorted({one.picked for one in ended if one.picked and label.partition("[")[0] == "auto"})
@@ -80,6 +84,12 @@ def methods(group: Group) -> list[Entry]:
             }
         )
     return rows
+
+
+def _served_by_all(makespans: Sequence[NDArray[np.float64]]) -> NDArray[np.bool_]:
+    """Return which instances have a makespan of every method that has one at all, shape (instances,)."""
+    known = ~np.isnan(np.array(makespans))
+    return np.asarray(known[known.any(axis=1)].all(axis=0))
 
 
 def _outcomes(ended: Sequence[Ending]) -> Counter[Outcome]:
@@ -141,6 +151,7 @@ def notes(group: Group) -> list[str]:
     if len(group.endings) > 1 and common and common < SMALL:
         least = f"; fewer than {LEAST} allow neither interval nor test" if common < LEAST else ""
         found.append(f"Small sample: {counted(common, 'instance')} in common{least}.")
+    found += _about_means(group)
     ended = _flat(group.endings)
     if all(one.outcome is not Outcome.SOLVED for one in ended):
         found.append("No run was solved: there are no scores to draw. See the failures below.")
@@ -149,3 +160,16 @@ def notes(group: Group) -> list[str]:
     elif all(one.lower_bound is None for one in ended):
         found.append("No run proved a bound on the makespan: there are no gaps to a bound.")
     return found
+
+
+def _about_means(group: Group) -> list[str]:
+    """Return what is to be known about the means of methods, where these served different instances."""
+    makespans = [scores(runs, "makespan") for runs in group.endings.values()]
+    shared = int(_served_by_all(makespans).sum())
+    served = int((~np.isnan(np.array(makespans))).any(axis=0).sum())
+    if shared == served or not served:
+        return []
+    if not shared:
+        return ["No instance was served by every method with results: there are no means; see the paired differences."]
+    share = f"{shared} of {counted(served, 'instance')}"
+    return [f"Means are of the {share} that every method with results served, and tell nothing of the others."]

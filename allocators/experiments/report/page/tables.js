@@ -7,9 +7,13 @@ const tables = new Map(); // by their elements
 const text = (title, get) => ({ title, get, isText: true, show: (value) => value });
 const number = (title, get, show = figure) => ({ title, get, show });
 
+function dropTable(element) {
+  tables.get(element)?.destroy();
+  tables.delete(element);
+}
 // rows are whatever `get` of the columns takes; nothing is last in either direction
 function makeTable(element, columns, rows, { order = [], paging = false, filters = false, pick = null } = {}) {
-  if (tables.has(element)) tables.get(element).destroy();
+  dropTable(element);
   element.replaceChildren();
   const head = add(element, "thead");
   const titles = add(head, "tr");
