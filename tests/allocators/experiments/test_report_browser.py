@@ -81,6 +81,10 @@ SCRIPT = """<script>(async () => {
     unpack = async (id) => { unpack = real; await new Promise((done) => setTimeout(done, 500)); return real(id); };
     await Promise.all([showInstance(0), showInstance(1)]);
     found.latest = [state.instance, byId("size").textContent.split(":")[0]];
+    group().methods.forEach(({ method }) => state.off.add(method));
+    await showInstance(1);
+    found.off = byId("place").querySelector(".none").textContent;
+    state.off.clear();
     byId("failed").querySelectorAll("details").forEach((one) => { one.open = true; });
     await until(() => byId("failed").querySelector("pre"));
     found.traceback = byId("failed").querySelector("pre").textContent;
@@ -126,6 +130,7 @@ def test_the_page_sorts_filters_and_zooms(folder, tmp_path):
     assert found["groups"] == ["a1, a2", "a3"]
     assert found["traceback"] == f"Traceback\n{ANGRY}"
     assert (found["more"], found["finalized"]) == (0, True)  # tables and charts that are made anew replace others
+    assert "switched off above" in found["off"]
     assert found["latest"] == [1, "i1"]  # though what the first one waited for came later
     assert found["dialog"]
 

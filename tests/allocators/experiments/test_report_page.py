@@ -139,6 +139,8 @@ def test_maps_hold_places_groups_and_plans(store, tmp_path):
     assert shown["agent"]["id"] == ["a1", "a2", "a3"]
     plan = next(one for one in shown["plans"] if one["method"] == 0)
     assert (plan["of"], plan["count"], plan["ability"], plan["done"]) == ([0, 0, 1], [2, 1], [3.0, 3.0], [1.0, 1.0])
+    assert (detail[str(number)]["groups"], main["most_traces"]) == ([0], details_module.MOST_TRACES)
+    assert main["edges_s"] == pytest.approx(EDGES_S, rel=1e-5)
     worst = next(one for one in shown["plans"] if one["method"] == 1)
     assert (worst["done"][1], worst["count"]) == (None, [3, 0])
     trace = detail[str(number)]["traces"][0]["steps"]

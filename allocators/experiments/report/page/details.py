@@ -89,6 +89,7 @@ def _detail(archive: Archive, layout: Layout, number: int, keys: Sequence[str], 
     shown = sorted(keys, key=lambda key: (layout.places[key].group, layout.places[key].seed))[:MOST_TRACES]
     found: Entry = {
         "runs": len(keys),
+        "groups": sorted({layout.places[key].group for key in keys}),
         "traces": [
             _trace(archive.records[key].ending, layout, key) for key in shown if archive.records[key].ending.trace
         ],

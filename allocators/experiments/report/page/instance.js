@@ -8,7 +8,7 @@ async function showInstance(index) {
   state.instance = index;
   const { name, agents, tasks, chunk } = page.instances;
   byId("find").value = name[index];
-  const detail = chunk[index] < 0 ? { traces: [], runs: 0 } : JSON.parse(await unpack(`detail-${chunk[index]}`))[index];
+  const detail = chunk[index] < 0 ? { traces: [], runs: 0, groups: [] } : JSON.parse(await unpack(`detail-${chunk[index]}`))[index];
   if (!isLatest()) return;
   const map = detail.map;
   const plans = map ? map.plans.filter((plan) => plan.group === state.group && !state.off.has(plan.method)).sort((one, other) => one.method - other.method) : [];
@@ -16,7 +16,7 @@ async function showInstance(index) {
   if (chunk[index] < 0) about += " Its map and traces are left out, to keep the page small; those of other instances are there.";
   if (map && map.agents > map.agent.id.length) about += ` Thinned: the map shows ${counted(map.agent.id.length, "agent")}, evenly chosen.`;
   if (map && map.tasks > map.task.id.length) about += ` Thinned: it shows the ${counted(map.task.id.length, "task")} with the largest workload.`;
-  if (detail.runs > 200) about += " Curves are of 200 of its runs.";
+  if (detail.runs > page.most_traces) about += ` Curves are of ${page.most_traces} of its runs.`;
   byId("size").textContent = about;
   if (!plans.some((plan) => plan.method === state.plan)) state.plan = plans.length ? plans[0].method : -1;
   byId("plans").replaceChildren();
@@ -27,7 +27,11 @@ async function showInstance(index) {
     chip.append(`${page.labels[plan.method]}: ${figures}`);
     chip.onclick = () => { state.plan = plan.method; showInstance(index); };
   }
-  await showPlan(map, plans.find((plan) => plan.method === state.plan), isLatest);
+  const others = map ? map.plans.some((plan) => plan.group === state.group) : false;
+  const none = !detail.groups.includes(state.group) ? "No plan is kept: the instance was not run under these conditions."
+    : others ? "No plan is shown: those that are kept are of methods that are switched off above."
+      : "No plan is kept under these conditions: no run was solved, or they were made before alloc kept plans.";
+  await showPlan(map, plans.find((plan) => plan.method === state.plan), none, isLatest);
   if (isLatest()) await showTraces(detail.traces);
 }
 const caption = (id, title, note) => {
@@ -36,7 +40,7 @@ const caption = (id, title, note) => {
   add(place, "b", title);
   place.append(note);
 };
-async function showPlan(map, plan, isLatest) {
+async function showPlan(map, plan, none, isLatest) {
   const chart = byId("place").querySelector(".chart");
   const [width, height] = [Math.max(chart.clientWidth - 75, 180), window.innerWidth < 760 ? 320 : 420];
   caption("place", plan ? `Plan of ${page.labels[plan.method]}` : "Map", plan
@@ -47,7 +51,7 @@ async function showPlan(map, plan, isLatest) {
   byId("zoom").hidden = !zoom;
   byId("groups").hidden = !plan;
   if (!zoom) await draw(chart, map ? "There is no map: the instance has no positions." : "There is no map: the store has no content of this instance, as it was made before alloc kept that, or it is left out here.");
-  else if (!plan) add(chart, "p", "No plan is kept under these conditions: no run was solved, or they were made before alloc kept plans.", { class: "none" });
+  else if (!plan) add(chart, "p", none, { class: "none" });
   for (const [id, factor] of [["in", 1 / 1.6], ["out", 1.6], ["fit", 0]]) byId(id).onclick = () => zoom(factor);
   if (!plan || !isLatest()) return;
   makeTable(byId("groups").querySelector("table"), [text("task", (task) => task.id), number("workload", (task) => task.work), number("done at", (task) => task.done),
@@ -60,10 +64,11 @@ async function showTraces(traces) {
   caption("trace", "What each run found when", "Makespan of the best plan so far, a line for each run.");
   if (!own.length) return draw(chart, "There is nothing to draw: no run has a trace with a makespan.");
   const end = Math.max(...own.map((one) => one.steps[one.steps.length - 2])) + 2;
+  const last = page.edges_s.length - 1;
   const values = own.flatMap((one) => {
     const points = one.steps.flatMap((step, i) => (i % 2 ? [] : [{ x: step, y: one.steps[i + 1] }]));
     points.push({ x: end, y: points[points.length - 1].y });
-    return points.map(({ x, y }) => ({ x: 1e-3 * 10 ** (x / 20), y, method: page.labels[one.method], seed: one.seed, run: `${one.method} ${one.seed}` }));
+    return points.map(({ x, y }) => ({ x: page.edges_s[Math.min(x, last)], y, method: page.labels[one.method], seed: one.seed, run: `${one.method} ${one.seed}` }));
   });
   const methods = [...new Set(own.map((one) => one.method))];
   const { color, strokeDash } = byMethod(page, methods, chart.clientWidth);

@@ -8,12 +8,12 @@ from collections.abc import Sequence
 from importlib.metadata import version
 from importlib.resources import files
 
-from alloc.allocators.experiments.report.page.details import details, rounded
+from alloc.allocators.experiments.report.page.details import MOST_TRACES, details, rounded
 from alloc.allocators.experiments.report.page.encode import compressed
 from alloc.allocators.experiments.report.page.groups import Layout, laid_out
 from alloc.allocators.experiments.report.page.libraries import libraries, require_packages
 from alloc.allocators.experiments.report.page.series import series
-from alloc.allocators.experiments.report.page.source import Archive, Progress, read_stores
+from alloc.allocators.experiments.report.page.source import EDGES_S, Archive, Progress, read_stores
 from alloc.allocators.experiments.report.page.summary import Entry, conditions, methods, notes, paired
 from alloc.allocators.experiments.store.outcome import Outcome
 from alloc.allocators.plan.palette import SERIES
@@ -113,6 +113,8 @@ def _contents(
         "version": version("alloc-mrta"),
         "colours": (*SERIES, GREY),
         "labels": layout.labels,
+        "edges_s": EDGES_S,
+        "most_traces": MOST_TRACES,
         "instances": {
             "name": layout.names,
             "agents": [one.agents for one in layout.known],

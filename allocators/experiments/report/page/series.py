@@ -39,7 +39,7 @@ def series(layout: Layout, group: Group) -> Entry:
 
 
 def _profiles(group: Group) -> list[Entry]:
-    """Return performance profiles, up to the factor within which nine of ten results are, at least 2 %."""
+    """Return performance profiles, up to the factor within which nineteen of twenty results are, at least 2 %."""
     common = group.endings_in_common
     if len(common) < 2 or not group.common:
         return []
