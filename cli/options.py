@@ -100,6 +100,9 @@ ObjectiveOption = Annotated[
     PlainObjective,
     typer.Option(help="What is minimised, after the number of unserved tasks: the makespan, then the energy."),
 ]
+MethodOption = Annotated[
+    str, typer.Option(autocompletion=complete_methods, help="One of `alloc methods`, or auto, which picks one.")
+]
 TimeLimitOption = Annotated[
     float | None,
     typer.Option(help="Seconds for one run.", show_default="10; none where --iterations is given"),

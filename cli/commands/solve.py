@@ -31,10 +31,6 @@ EXAMPLES = examples(
     closing="Ctrl-C ends a run as its time limit does: the best allocation so far is printed and saved.",
 )
 
-MethodOption = Annotated[
-    str,
-    typer.Option(autocompletion=options.complete_methods, help="One of `alloc methods`, or auto, which picks one."),
-]
 ObjectiveOption = Annotated[
     Objective,
     typer.Option(
@@ -95,7 +91,7 @@ def register(app: typer.Typer) -> None:
 
 def solve_command(
     instance: options.InstanceArgument,
-    method: MethodOption = "auto",
+    method: options.MethodOption = "auto",
     objective: ObjectiveOption = Objective.MAKESPAN,
     time_limit: options.TimeLimitOption = None,
     iterations: options.IterationsOption = None,

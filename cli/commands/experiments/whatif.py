@@ -11,7 +11,7 @@ from alloc.cli import options
 from alloc.cli.options import examples
 from alloc.cli.output.console import is_terminal, note, say, table, to_json
 from alloc.cli.output.files import check_outputs, check_picture, save
-from alloc.problems.text import counted, number, percent
+from alloc.problems.text import counted, heading, number, percent
 
 if TYPE_CHECKING:
     from alloc.allocators import Fleet, WhatIf
@@ -46,10 +46,7 @@ def whatif_command(
     remove: Annotated[
         list[str] | None, typer.Option(metavar="ID", help="An agent that drops out; may be repeated.")
     ] = None,
-    method: Annotated[
-        str,
-        typer.Option(autocompletion=options.complete_methods, help="One of `alloc methods`, or auto, which picks one."),
-    ] = "auto",
+    method: options.MethodOption = "auto",
     objective: options.ObjectiveOption = options.PlainObjective.MAKESPAN,
     time_limit: Annotated[
         float | None,
@@ -121,8 +118,8 @@ def _tell(found: "WhatIf", *, with_table: bool) -> None:
 
 def _table(found: "WhatIf") -> str:
     units = found.instance.units
-    header = ["agents", "change", _named("makespan", units.time), "change", "at least", "gap"]
-    header += [_named("energy", units.energy), "at least", "time (s)", "status"]
+    header = ["agents", "change", heading("makespan", units.time), "change", "at least", "gap"]
+    header += [heading("energy", units.energy), "at least", "time (s)", "status"]
     now = found.fleets[0].result.makespan
     unserved = [fleet.result.unserved_count for fleet in found.fleets]
     if any(unserved):
@@ -144,10 +141,6 @@ def _table(found: "WhatIf") -> str:
         for fleet, left in zip(found.fleets, unserved, strict=True)
     ]
     return table(header, rows, left=0)
-
-
-def _named(quantity: str, unit: str) -> str:
-    return f"{quantity} ({unit})" if unit else quantity
 
 
 def _changes(fleet: "Fleet") -> str:
