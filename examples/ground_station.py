@@ -52,7 +52,7 @@ class Drones:
 def main() -> None:
     """Lead the drones until all is done."""
     drones = Drones()
-    with MissionPlanner(FLEET, "routes", deadline_ms=100) as planner:
+    with MissionPlanner(FLEET, "routes", deadline_ms=1000) as planner:
         hour, orders = 0.0, planner.plan()
         while any(drones.left.values()):
             for change in planner.why_changed() if orders.hour == hour else ():
