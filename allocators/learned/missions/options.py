@@ -36,8 +36,8 @@ def expect(situation: Situation) -> int:
 
     Only tasks that the agent can take are filled in.
     """
-    coming, arrives, target = situation.coming, situation.other[known.ARRIVES], situation.target
-    first, following, idle = coming.first, coming.following, coming.idle
+    coming, target = situation.coming, situation.target
+    first, idle = coming.first, coming.idle
     first[:] = NOBODY
     found = 0
     for i in range(len(target)):
@@ -47,18 +47,26 @@ def expect(situation: Situation) -> int:
             idle[found] = i
             found += 1
             continue
-        before, after = NOBODY, first[target[i]]
-        while after != NOBODY and arrives[after] <= arrives[i]:
-            before, after = after, following[after]
-        following[i] = after
-        if before == NOBODY:
-            first[target[i]] = i
-        else:
-            following[before] = i
+        queue(situation, i)
     for j in range(len(first)):
         if situation.can[j]:
             coming.others[j], coming.without[j] = done_without(situation, j)
     return found
+
+
+@inlined
+def queue(situation: Situation, i: int) -> None:
+    """Put another agent among those that come to its task, in the order in which they arrive."""
+    arrives, first, following = situation.other[known.ARRIVES], situation.coming.first, situation.coming.following
+    goal = situation.target[i]
+    before, after = NOBODY, first[goal]
+    while after != NOBODY and arrives[after] <= arrives[i]:
+        before, after = after, following[after]
+    following[i] = after
+    if before == NOBODY:
+        first[goal] = i
+    else:
+        following[before] = i
 
 
 @inlined
@@ -213,12 +221,20 @@ def fill_crowding(situation: Situation, tasks: IntArray, options: Singles) -> No
 @compiled_in_place
 def fill_whole(situation: Situation, choice: IntArray, tasks: int, options: Singles) -> None:
     """Fill the features that all options share, and those that compare with a mean."""
-    own, agents, ability = situation.own, 1.0, situation.own[known.ABILITY]
+    agents, ability = 1.0, situation.own[known.ABILITY]
     for i in range(len(situation.counts)):
         if situation.counts[i]:
             agents += 1
             ability += situation.other[known.STRENGTH, i]
-    priority = work = 0.0
+    fill_shared(situation, choice, tasks, options, agents, ability)
+
+
+@compiled_in_place
+def fill_shared(
+    situation: Situation, choice: IntArray, tasks: int, options: Singles, agents: float, ability: float
+) -> None:
+    """Fill them where it is known how many agents there are, this one included, and the sum of their abilities."""
+    own, priority, work = situation.own, 0.0, 0.0
     for row in range(tasks):
         priority += situation.task[known.PRIORITY, choice[row]] / tasks
         work += situation.task[known.LEFT, choice[row]]

@@ -232,6 +232,8 @@ class Picture:
         self._changes.note_task(task)
         for agent in workers:
             self._changes.note_agent(agent)
+        if task.status is TaskStatus.OPEN and task.facts.deadline <= state.hour:
+            self._close(task, status_at_deadline(state, task))  # work that was not done in time, after all
 
     def _note_deadline(self, task: TaskState) -> None:
         if task.status in (TaskStatus.TO_COME, TaskStatus.OPEN) and task.facts.deadline < math.inf:

@@ -99,6 +99,16 @@ def test_deadlines_pass_by_themselves(pair):
         assert "task t1 was missed at 2" in planner.why_changed()[0].cause
 
 
+def test_work_that_was_not_done_by_the_deadline_is_missed(pair):
+    """Work that is reported of a done task after its deadline is too late: nobody is sent there."""
+    with MissionPlanner(Mission(pair, deadline=[4, np.nan]), "nearest", None) as planner:
+        planner.plan()
+        assert planner.plan(3.5)["ann"] != Order("t1")  # it is done at 3
+        planner.submit({"hour": 5.0, "event": "task-changes", "task": "t1", "workload": 1.0})
+        assert planner.plan()["ann"] != Order("t1")
+        assert planner._picture.state.task("t1").missed == 1.0
+
+
 @pytest.mark.parametrize("policy", ["greedy", "hedonic"])
 def test_it_believes_what_the_simulation_makes_of_its_orders(policy):
     """Told the events of a mission as they come, it gives the orders of a simulation, at the same hours."""
