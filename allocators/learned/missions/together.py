@@ -21,7 +21,7 @@ from alloc.allocators.learned.missions.options import (
 from alloc.allocators.learned.missions.play import Room, is_due, room_for
 from alloc.allocators.learned.missions.situation import Situation
 from alloc.allocators.missions.layout import NOBODY
-from alloc.allocators.runtime.compiled import compiled_in_place
+from alloc.allocators.runtime.compiled import compiled_in_place, inlined
 from alloc.problems.fields import BoolArray, FloatArray, IntArray
 
 NOT_DUE = -3
@@ -40,7 +40,11 @@ class Together(NamedTuple):
         Distance of each agent from each task.
     can : ndarray of bool, shape (n, m)
     gaps : ndarray, shape (m, n)
-        Squared distance of each task from each agent that has none, ``inf`` for the others.
+        Squared distance of each task from the agents that have none, in the first columns.
+    idle : ndarray of int, shape (n + 1,)
+        Those agents by column; last, how many they are.
+    column : ndarray of int, shape (n,)
+        Where an agent is among them, -1 if it is not.
     crowding : ndarray, shape (m, features)
         How much work there is near each task; one column is used.
     crowded : ndarray of bool, shape (m,)
@@ -54,6 +58,8 @@ class Together(NamedTuple):
     ways: FloatArray
     can: BoolArray
     gaps: FloatArray
+    idle: IntArray
+    column: IntArray
     crowding: Singles
     crowded: BoolArray
     abilities: FloatArray
@@ -67,7 +73,9 @@ def together_for(n: int, m: int) -> Together:
         own=np.zeros((n, known.OWN)),
         ways=np.zeros((n, m)),
         can=np.zeros((n, m), np.bool_),
-        gaps=np.full((m, n), np.inf),
+        gaps=np.zeros((m, n)),
+        idle=np.zeros(n + 1, np.intp),
+        column=np.zeros(n, np.intp),
         crowding=np.zeros_like(room.options[:m]),
         crowded=np.zeros(m, np.bool_),
         abilities=np.zeros(1),
@@ -80,27 +88,40 @@ def meet(together: Together) -> None:
     situation, own = together.room.situation, together.own
     other = situation.other
     together.crowded[:] = False
-    together.abilities[0] = 0.0
+    together.abilities[0], together.idle[-1], together.column[:] = 0.0, 0, -1
     for i in range(len(own)):
         target = int(own[i, known.TARGET])
         situation.counts[i], situation.target[i] = True, target
         other[known.STRENGTH, i] = own[i, known.ABILITY]
         together.abilities[0] += own[i, known.ABILITY]
         other[known.ARRIVES, i] = arrival(together, i, target)
-        note_gaps(together, i)
+        note_idle(together, i)
     situation.can[:] = True
     expect(situation)
 
 
 @compiled_in_place
-def note_gaps(together: Together, i: int) -> None:
-    """Note how far an agent is from tasks, if it has none."""
-    own, situation = together.own[i], together.room.situation
-    tasks, has_none = situation.task, situation.target[i] == NOBODY
-    for j in range(len(together.gaps)):
-        x, y = own[known.X] - tasks[known.TASK_X, j], own[known.Y] - tasks[known.TASK_Y, j]
-        z = own[known.Z] - tasks[known.TASK_Z, j]
-        together.gaps[j, i] = x * x + y * y + z * z if has_none else np.inf
+def note_idle(together: Together, i: int) -> None:
+    """Put an agent among those that have no task, or take it from them, by its target."""
+    own, situation, gaps, column = together.own[i], together.room.situation, together.gaps, together.column
+    tasks, idle = situation.task, together.idle
+    has_none, place = situation.target[i] == NOBODY, column[i]
+    if has_none and place == NOBODY:
+        place = column[i] = idle[-1]
+        idle[place] = i
+        idle[-1] += 1
+        for j in range(len(gaps)):
+            x, y = own[known.X] - tasks[known.TASK_X, j], own[known.Y] - tasks[known.TASK_Y, j]
+            z = own[known.Z] - tasks[known.TASK_Z, j]
+            gaps[j, place] = x * x + y * y + z * z
+    elif not has_none and place != NOBODY:
+        idle[-1] -= 1
+        last = idle[-1]
+        for j in range(len(gaps)):
+            gaps[j, place] = gaps[j, last]
+        idle[place] = idle[last]
+        column[idle[place]] = place
+        column[i] = NOBODY
 
 
 @compiled_in_place
@@ -167,7 +188,7 @@ def step_in(together: Together, i: int, target: int) -> None:
     """Let others know where an agent goes."""
     situation = together.room.situation
     situation.counts[i], situation.target[i] = True, target
-    note_gaps(together, i)
+    note_idle(together, i)
     if target == NOBODY:
         return
     situation.other[known.ARRIVES, i] = arrival(together, i, target)
@@ -206,7 +227,7 @@ def fill_turn(together: Together, i: int) -> int:
         j = choice[row]
         fill_task(situation, j, options[row], 0)
         options[row, names.CROWDING] = together.crowding[row, names.CROWDING]
-        options[row, names.RIVALS] = squashed(nearer(together.gaps[j], i, together.ways[i, j]) / 3.0)
+        options[row, names.RIVALS] = squashed(nearer(together, i, j) / 3.0)
     choice[count] = WAIT
     options[count, names.STAYS] = 1
     others = float(len(together.own))
@@ -214,10 +235,11 @@ def fill_turn(together: Together, i: int) -> int:
     return count + 1
 
 
-@compiled_in_place
-def nearer(gaps: FloatArray, i: int, way: float) -> float:
-    """Return how many others that have no task are nearer to a task than an agent."""
-    limit, found = way * way, 0
-    for other in range(len(gaps)):
-        found += gaps[other] < limit
-    return float(found - (gaps[i] < limit))
+@inlined
+def nearer(together: Together, i: int, task: int) -> float:
+    """Return how many others that have no task are nearer to one than an agent."""
+    gaps, limit, found = together.gaps[task], together.ways[i, task] ** 2, 0
+    for place in range(together.idle[-1]):
+        found += gaps[place] < limit
+    place = together.column[i]
+    return float(found - (place != NOBODY and gaps[place] < limit))
