@@ -2,27 +2,27 @@
 
 import gc
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
-
-_lock = threading.Lock()
-_waiting = 0
-_was_enabled = False
+from contextlib import ContextDecorator
 
 
-@contextmanager
-def collected_later() -> Iterator[None]:
-    """Hold back automatic collections until the last of those who ask for it at once is ready."""
-    global _waiting, _was_enabled
-    with _lock:
-        if _waiting == 0:
-            _was_enabled = gc.isenabled()
-            gc.disable()
-        _waiting += 1
-    try:
-        yield
-    finally:
-        with _lock:
-            _waiting -= 1
-            if _waiting == 0 and _was_enabled:
-                gc.enable()
+class CollectedLater(ContextDecorator):
+    """Holds back automatic collections while it is entered, by however many threads at once."""
+
+    def __init__(self) -> None:
+        self._lock, self._entered, self._was_enabled = threading.Lock(), 0, False
+
+    def __enter__(self) -> None:
+        with self._lock:
+            if self._entered == 0:
+                self._was_enabled = gc.isenabled()
+                gc.disable()
+            self._entered += 1
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._entered -= 1
+            if self._entered == 0 and self._was_enabled:
+                gc.enable()  # nothing is made after that, which would be when it collects
+
+
+collected_later = CollectedLater()

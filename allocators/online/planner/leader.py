@@ -127,7 +127,7 @@ class Leader:
         while (decision := self._wanted.get()) is not None:
             try:
                 if not decision.is_overdue:
-                    with collected_later():
+                    with collected_later:
                         self._decide(self._look(decision), decision)
             except Exception as error:  # whatever a policy does, the last plan stands
                 decision.problem = f"{type(error).__name__}: {error}"

@@ -147,7 +147,7 @@ class MissionPlanner(AbstractContextManager["MissionPlanner"]):
             self._pins.remove(agent)
             self._version += 1
 
-    @collected_later()
+    @collected_later
     def plan(self, hour: float | None = None) -> Plan:
         """Return the orders of all agents, by the policy if it answers in time.
 

@@ -1,5 +1,6 @@
 """A planner is told what happens and what agents report, and answers with orders, and why they changed."""
 
+import gc
 import math
 from collections import defaultdict
 
@@ -170,6 +171,23 @@ def test_a_policy_that_fails_leaves_the_last_plan(pair):
             answers["now"] = lambda view, answer=answer: answer
             planner.submit(Event(hour, "task-changes", task="t1", workload=5))
             assert dict(planner.plan()) == {"ben": Order("t1")}
+
+
+def test_what_is_void_is_forgotten(pair):
+    """However often agents are diverted, little more is kept than what is to come, and no garbage collected."""
+    seen = []
+
+    def turn_round(view):
+        seen.append(gc.isenabled())
+        return Order("t1" if round(view.hour * 1000) % 2 else "t2")
+
+    with MissionPlanner(pair, Stubborn(turn_round), None) as planner:
+        for step in range(40):
+            planner.submit(Report(step / 1000, "ann", battery=19))
+            assert planner.plan().is_new
+            assert len(planner._picture.agenda) <= 4 * 4
+    assert not any(seen)
+    assert gc.isenabled()
 
 
 def test_settings_belong_to_names(pair):
