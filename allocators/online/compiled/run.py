@@ -54,7 +54,9 @@ def memory_of(policy: Policy, mission: Mission) -> float:
     """Return for how many hours a policy uses what was heard of other agents."""
     if isinstance(policy, NetworkPolicy):
         return MEMORY * mission.radio.period
-    return policy.parameters.memory if isinstance(policy.parameters, UtilityParameters) else math.inf
+    if policy.parameters_type is None or not issubclass(policy.parameters_type, UtilityParameters):
+        return math.inf
+    return float(policy.parameters.memory)
 
 
 def parameters_of(policy: Policy) -> FloatArray:
