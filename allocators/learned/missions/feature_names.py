@@ -39,9 +39,9 @@ others there or coming, none; the agent's ability and its hours for the work; wh
 of what is known; share of the time that would be work; other work near by; hours gained; priority; hours before the
 deadline, which it misses; growth; energy; agents without a task that are nearer; whether the option is to look around,
 or to stay; how long a place was not seen; and of the whole situation: known tasks per agent, agents, work of all.
-And of what comes after: how far it is to the next task to which nobody goes, and how much such work is near by; the size
-of the task among those known; whether it is done late without the agent, by the hours for all work; and the travel, and
-looking around, where little work is left."""
+And of what comes after: how far it is to the next task to which nobody goes, and how much such work is near by; the
+size of the task among those known; how late it is done without the agent, over the hours for all work; and travel and
+looking around where little work is left."""
 
 FEATURES = 32
 FEATURE_SET = "missions/2"

@@ -1,4 +1,8 @@
-"""What free neighbours will choose: an agent decides for them as it would in their place, and then for itself, compiled."""
+"""What free neighbours will choose: an agent decides for them as if in their place, and then for itself; compiled.
+
+When a coalition has done its task, all its agents are free at once and know the same. If each decided by itself they
+would choose alike, and learn of that too late.
+"""
 
 from typing import NamedTuple
 
@@ -14,7 +18,12 @@ from alloc.allocators.missions.motion import distance_between
 from alloc.allocators.runtime.compiled import compiled_in_place
 from alloc.problems.fields import BoolArray, FloatArray, IntArray
 
+Scratch = tuple[Singles, Singles, Singles, Singles, IntArray]
+"""Options, token, pooled, scores and choice, as in `Room`."""
+
 ORDER = (known.STRENGTH, known.CHARGE, known.OTHER_X, known.OTHER_Y)
+
+"""What decides who is first, the largest number first."""
 
 MOST = 6
 """Neighbours for whom an agent decides at the most."""
@@ -43,7 +52,9 @@ class Swap(NamedTuple):
 
 def swap_for(n: int, m: int) -> Swap:
     """Return room for n agents and m tasks."""
-    return Swap(np.zeros(known.OWN), np.zeros((known.OTHER, 2)), np.zeros(m), np.zeros(m, np.bool_), np.zeros(n, np.bool_))
+    return Swap(
+        np.zeros(known.OWN), np.zeros((known.OTHER, 2)), np.zeros(m), np.zeros(m, np.bool_), np.zeros(n, np.bool_)
+    )
 
 
 @compiled_in_place
@@ -59,24 +70,29 @@ def precedes(one: FloatArray, i: int, other: FloatArray, k: int) -> bool:
 
 
 @compiled_in_place
-def foresee(
-    situation: Situation, swap: Swap, look: FloatArray, room: tuple[Singles, Singles, Singles, Singles, IntArray], weights: MissionWeights
-) -> int:
-    """Fill in what free neighbours will choose that decide before the agent, as it would itself in their place.
+def foresee(situation: Situation, swap: Swap, look: FloatArray, room: Scratch, weights: MissionWeights) -> int:
+    """Fill in what free neighbours will choose that decide before an agent without a task; return how many they are.
 
-    Returns
-    -------
-    decided : int
-        For how many neighbours.
+    Those that were free when the agent last heard of them have decided since; of those that are free now, the ones
+    that come before it by `precedes` decide first. An agent that has a task keeps to it as a rule, and does without.
+
+    Parameters
+    ----------
+    situation : Situation
+    swap : Swap
+    look : ndarray, shape (3,)
+        See `fill_options`; what the agent knows of places to look around counts for others as well.
+    room : Scratch
+    weights : MissionWeights
     """
     own, other, waits = situation.own, situation.other, swap.waits
-    if own[known.METRIC] == known.OTHER_WAYS:
+    if own[known.METRIC] == known.OTHER_WAYS or own[known.TARGET] >= 0:
         return 0
     step_out(situation, swap)
     found = 0
     for i in range(len(waits)):
         waits[i] = situation.counts[i] and situation.target[i] == NOBODY and other[known.IS_FREE, i] > 0
-        if waits[i] and other[known.HEARD, i] >= own[known.HOUR] and own[known.TARGET] < 0:
+        if waits[i] and other[known.HEARD, i] >= own[known.HOUR]:
             waits[i] = precedes(other, i, swap.other, 0)
         found += waits[i]
     decided = min(found, MOST)
@@ -103,11 +119,7 @@ def step_out(situation: Situation, swap: Swap) -> None:
     mine[known.STRENGTH, 0], mine[known.PACE, 0] = own[known.ABILITY], own[known.SPEED]
     mine[known.CHARGE, 0], mine[known.PRICE, 0] = own[known.BATTERY], own[known.ENERGY_PER_DISTANCE]
     mine[known.OTHER_X, 0], mine[known.OTHER_Y, 0], mine[known.OTHER_Z, 0] = own[known.X], own[known.Y], own[known.Z]
-    mine[known.HEARD, 0], mine[known.IS_FREE, 0] = own[known.HOUR], own[known.TARGET] < 0
-    mine[known.ARRIVES, 0] = -np.inf
-    target = int(own[known.TARGET])
-    if 0 <= target < len(swap.can) and own[known.IS_WORKING] == 0:
-        mine[known.ARRIVES, 0] = own[known.HOUR] + swap.distance[target] / own[known.SPEED]
+    mine[known.HEARD, 0], mine[known.IS_FREE, 0] = own[known.HOUR], 1.0
 
 
 @compiled_in_place
@@ -121,7 +133,7 @@ def step_in(situation: Situation, swap: Swap) -> None:
 
 @compiled_in_place
 def decide_for(
-    situation: Situation, swap: Swap, i: int, look: FloatArray, room: tuple[Singles, Singles, Singles, Singles, IntArray], weights: MissionWeights
+    situation: Situation, swap: Swap, i: int, look: FloatArray, room: Scratch, weights: MissionWeights
 ) -> None:
     """Fill in what a neighbour will choose; the agent has its place among others meanwhile."""
     own, other, task = situation.own, situation.other, situation.task
@@ -129,7 +141,7 @@ def decide_for(
     own[known.X], own[known.Y], own[known.Z] = other[known.OTHER_X, i], other[known.OTHER_Y, i], other[known.OTHER_Z, i]
     own[known.ABILITY], own[known.SPEED] = other[known.STRENGTH, i], other[known.PACE, i]
     own[known.BATTERY], own[known.ENERGY_PER_DISTANCE] = other[known.CHARGE, i], other[known.PRICE, i]
-    own[known.TARGET], own[known.IS_WORKING], own[known.IS_FLYING] = NOBODY, 0.0, 0.0
+    own[known.IS_FLYING] = 0.0
     here = own[known.X], own[known.Y], own[known.Z]
     is_manhattan = own[known.METRIC] == known.MANHATTAN_WAYS
     for j in range(len(swap.can)):
@@ -141,7 +153,6 @@ def decide_for(
     for number in range(known.OTHER):
         swap.other[number, 1] = other[number, i]
         other[number, i] = swap.other[number, 0]
-    situation.target[i] = int(swap.own[known.TARGET])
     count = fill_options(situation, look, options, choice)
     score(options, count, weights, token, pooled, scores)
     chosen = choice[np.argmax(scores[:count])]

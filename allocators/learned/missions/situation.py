@@ -67,7 +67,9 @@ class Situation(NamedTuple):
     coming: Coming
 
 
-HOUR, X, Y, Z, ABILITY, SPEED, BATTERY, ENERGY_PER_DISTANCE, SPAN, TARGET, IS_WORKING, IS_FLYING, METRIC, OWN = range(14)
+HOUR, X, Y, Z, ABILITY, SPEED, BATTERY, ENERGY_PER_DISTANCE, SPAN, TARGET, IS_WORKING, IS_FLYING, METRIC, OWN = range(
+    14
+)
 """Of the agent; `SPAN` is the longest distance in the area, `TARGET` the task of its order, -1 for none."""
 
 EUCLIDEAN_WAYS, MANHATTAN_WAYS, OTHER_WAYS = range(3)
