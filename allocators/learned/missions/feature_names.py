@@ -27,27 +27,15 @@
     TASKS_PER_AGENT,
     KNOWN_AGENTS,
     WORK_AHEAD,
-    NEXT,
-    OPEN_WORK,
-    SIZE,
-    BALANCE,
-    TRAVEL_AT_END,
-    LOOK_AT_END,
-) = range(32)
+) = range(26)
 """Hours of travel, until it is done with the agent and without; whether it is the last order, and work goes on there;
 others there or coming, none; the agent's ability and its hours for the work; whether others end before it arrives; age
 of what is known; share of the time that would be work; other work near by; hours gained; priority; hours before the
 deadline, which it misses; growth; energy; agents without a task that are nearer; whether the option is to look around,
-or to stay; how long a place was not seen; and of the whole situation: known tasks per agent, agents, work of all.
-And of what comes after: how far it is to the next task to which nobody goes, and how much such work is near by; the
-size of the task among those known; how late it is done without the agent, over the hours for all work; and travel and
-looking around where little work is left."""
+or to stay; how long a place was not seen; and of the whole situation: known tasks per agent, agents, work of all."""
 
-FEATURES = 32
-FEATURE_SET = "missions/2"
-
-FORMER_SET, FORMER_FEATURES = "missions/1", 26
-"""Networks that were told the first ones only give the same scores with weights of 0 for those that came later."""
+FEATURES = 26
+FEATURE_SET = "missions/1"
 
 FIRST_WEIGHTS = {
     TRAVEL: -3.0,

@@ -1,7 +1,5 @@
 """The options of an agent in a mission, and what the network is told of each, compiled."""
 
-import math
-
 import numpy as np
 
 from alloc.allocators.learned.missions import feature_names as names
@@ -199,24 +197,17 @@ def rivals(situation: Situation, j: int, distance: float, idle: int) -> float:
 
 @compiled_in_place
 def fill_crowding(situation: Situation, tasks: IntArray, options: Singles) -> None:
-    """Fill in how much other work there is near each task, and how far off the next one is to which nobody goes."""
-    task, others, span = situation.task, situation.coming.others, situation.own[known.SPAN]
-    near, strength = (NEAR * span) ** 2, situation.own[known.ABILITY] * time_scale(situation.own)
-    x, y, z, left = task[known.TASK_X], task[known.TASK_Y], task[known.TASK_Z], task[known.LEFT]
+    """Fill in how much other work there is near each task."""
+    task, near = situation.task, (NEAR * situation.own[known.SPAN]) ** 2
+    x, y, z = task[known.TASK_X], task[known.TASK_Y], task[known.TASK_Z]
     for row in range(len(tasks)):
-        j, found, work, nearest = tasks[row], 0, 0.0, np.inf
+        j, found = tasks[row], 0
         for place in range(len(tasks)):
             other = tasks[place]
             dx, dy, dz = x[other] - x[j], y[other] - y[j], z[other] - z[j]
-            square = dx * dx + dy * dy + dz * dz
-            found += square < near
-            if others[other] == 0 and other != j and square == square:
-                nearest = min(nearest, square)
-                work += left[other] * (near / (near + square) if near > 0.0 else 1.0)
+            found += dx * dx + dy * dy + dz * dz < near
         is_near_itself = near > 0.0 and x[j] == x[j]
         options[row, names.CROWDING] = squashed((found - is_near_itself) / 3.0)
-        options[row, names.NEXT] = min(1.0, math.sqrt(nearest) / span) if span > 0 else 0.0
-        options[row, names.OPEN_WORK] = squashed(work / strength)
 
 
 @compiled_in_place
@@ -231,21 +222,12 @@ def fill_whole(situation: Situation, choice: IntArray, tasks: int, options: Sing
     for row in range(tasks):
         priority += situation.task[known.PRIORITY, choice[row]] / tasks
         work += situation.task[known.LEFT, choice[row]]
-    scale = time_scale(own)
-    hours = work / ability
-    is_end = 1.0 - squashed(hours / scale)
     for row in range(len(options)):
         option = options[row]
         option[names.TASKS_PER_AGENT] = squashed(tasks / agents)
         option[names.KNOWN_AGENTS] = squashed((agents - 1) / 5.0)
-        option[names.WORK_AHEAD] = squashed(hours / scale)
-        option[names.TRAVEL_AT_END] = option[names.TRAVEL] * is_end
-        option[names.LOOK_AT_END] = option[names.EXPLORES] * is_end
+        option[names.WORK_AHEAD] = squashed(work / ability / time_scale(own))
         if row < tasks:
             option[names.STRENGTH] = min(own[known.ABILITY] * agents / ability - 1, 3.0)
-            left = situation.task[known.LEFT, choice[row]]
-            option[names.SIZE] = left / (left + work / tasks) - 0.5 if left > 0 else -0.5
-            late = max(0.0, situation.coming.without[choice[row]] - own[known.HOUR])
-            option[names.BALANCE] = squashed(late / (hours + 1e-9))
             own_priority = situation.task[known.PRIORITY, choice[row]]
             option[names.PRIORITY] = own_priority / (own_priority + priority) - 0.5 if priority > 0 else 0.0

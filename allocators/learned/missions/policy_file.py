@@ -6,11 +6,10 @@ from importlib.metadata import version
 from pathlib import Path
 
 from safetensors.torch import load, save
-from torch import Tensor, nn
 
 from alloc.allocators.learned.files.policy_file import sorted_metadata
 from alloc.allocators.learned.files.policy_header import read_header
-from alloc.allocators.learned.missions.feature_names import FEATURE_SET, FEATURES, FORMER_FEATURES, FORMER_SET
+from alloc.allocators.learned.missions.feature_names import FEATURE_SET, FEATURES
 from alloc.allocators.learned.missions.network import MissionNetwork
 from alloc.allocators.learned.missions.network_arrays import HIDDEN
 from alloc.problems import InputError
@@ -58,16 +57,13 @@ def load_network(path: Path | str | None = None) -> MissionNetwork:
     """
     path = SHIPPED if path is None else path
     source, metadata = str(path), read_header(path)
-    is_former = metadata.get("features") == FORMER_SET
-    for key, expected in (_expected(FORMER_SET, FORMER_FEATURES) if is_former else _expected()).items():
+    for key, expected in _expected().items():
         if metadata.get(key) != expected:
             hint = "train anew with alloc train gappo --missions"
             raise InputError(f"is {metadata.get(key)!r}, missions need {expected!r}; {hint}", key, source)
     tensors = load(read_bytes(path))
     if not all(bool(tensor.isfinite().all()) for tensor in tensors.values()):
         raise InputError("weights are not finite; train anew", "", source)
-    if is_former:
-        tensors = {name: _widened(name, tensor) for name, tensor in tensors.items()}
     network = MissionNetwork()
     try:
         network.load_state_dict(tensors)
@@ -77,11 +73,5 @@ def load_network(path: Path | str | None = None) -> MissionNetwork:
     return network.eval().requires_grad_(False)
 
 
-def _expected(features: str = FEATURE_SET, count: int = FEATURES) -> dict[str, str]:
-    return {"format": POLICY_FORMAT, "features": features, "size": json.dumps([count, HIDDEN])}
-
-
-def _widened(name: str, weight: Tensor) -> Tensor:
-    """Return a weight of a network that knew the first features only, with 0 for the later ones."""
-    is_of_features = name in ("inner.weight", "skip.weight")
-    return nn.functional.pad(weight, (0, FEATURES - FORMER_FEATURES)) if is_of_features else weight
+def _expected() -> dict[str, str]:
+    return {"format": POLICY_FORMAT, "features": FEATURE_SET, "size": json.dumps([FEATURES, HIDDEN])}

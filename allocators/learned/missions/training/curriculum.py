@@ -68,7 +68,7 @@ class MissionCurriculum:
     tasks: tuple[int, int] = (20, 80)
     radii: tuple[float, ...] = (0.3, 0.3, 0.2, 0.15)
     losses: tuple[float, ...] = (0.2, 0.0, 0.8)
-    periods: tuple[int, ...] = (1, 12)
+    periods: tuple[int, ...] = (1, 10)
     varied_from: float = 0.1
     missions: tuple[Mission, ...] = field(default=())
 
