@@ -90,7 +90,7 @@ def foresee(situation: Situation, swap: Swap, look: FloatArray, room: Scratch, w
         return 0
     step_out(situation, swap)
     found = 0
-    for i in range(len(waits)):
+    for i in range(situation.others[0]):
         waits[i] = situation.counts[i] and situation.target[i] == NOBODY and other[known.IS_FREE, i] > 0
         if waits[i] and other[known.HEARD, i] >= own[known.HOUR]:
             waits[i] = precedes(other, i, swap.other, 0)
@@ -98,7 +98,7 @@ def foresee(situation: Situation, swap: Swap, look: FloatArray, room: Scratch, w
     decided = min(found, MOST)
     for _ in range(decided):
         first = -1
-        for i in range(len(waits)):
+        for i in range(situation.others[0]):
             if waits[i] and (first < 0 or precedes(other, i, other, first)):
                 first = i
         waits[first] = False
