@@ -105,6 +105,7 @@ def _own(view: View, agent: AgentReport, span: float, index: dict[str, int]) -> 
         NOBODY if agent.task is None else index.get(agent.task, len(index)),
         agent.status is AgentStatus.WORKING,
         agent.status is AgentStatus.FLYING,
+        known.OTHER_WAYS,  # by which nobody guesses what others will choose: each knows what those before it chose
     )
 
 
