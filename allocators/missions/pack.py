@@ -37,11 +37,8 @@ MOST_REPORTS = 4_000_000
 LEAST_COLUMNS, COLUMNS = 40, 8
 """What is known stands in rows of a multiple of so many columns, as processors compare several at once."""
 
-EMPTY = frozenset(
-    "reports renumbered known_agent known_report sent_task_hour sent_task_left sent_agent sent_report sent_of sender "
-    "links".split()
-)
-"""Arrays that are large and empty at hour 0: memory is taken up where they are filled."""
+EMPTY = ("reports", "renumbered", "known_", "sent_", "sender", "links")
+"""How the names of arrays begin that are empty at hour 0: they take up memory only where they are filled."""
 
 
 def pack(mission: Mission, knowledge: Knowledge | str | None = None, memory: float = math.inf) -> MissionArrays:
@@ -96,10 +93,7 @@ def pack(mission: Mission, knowledge: Knowledge | str | None = None, memory: flo
         **_knowledge(n, m, rows, slots, words=-(-n // 64) if memory < mission.end else 0),
         "links": np.zeros((n, n) if mission.radio.burst else (0, 0), np.int32),
         "silences": np.zeros(len(events), np.intp),
-        "lookers": np.zeros(n, np.intp),
-        "marked": np.zeros(n, np.intp),
-        "deciding": np.zeros(n, np.intp),
-        "changed_agents": np.zeros(n, np.intp),
+        **{name: np.zeros(n, np.intp) for name in ("lookers", "marked", "deciding", "changed_agents")},
         "changed_tasks": np.zeros(m, np.intp),
     }
     return MissionArrays(**{name: _by_attribute(part) for name, part in parts.items()})  # type: ignore[arg-type]
@@ -142,7 +136,7 @@ def begun(packed: MissionArrays, seed: int = 0) -> MissionArrays:
     seed : int
         Of the radio's chances, beside that of the mission.
     """
-    parts = {name: _fresh(part) if name in EMPTY else part.copy() for name, part in packed._asdict().items()}
+    parts = {name: _fresh(part) if name.startswith(EMPTY) else part.copy() for name, part in packed._asdict().items()}
     state = MissionArrays(**parts)
     head = state.head[0]
     head.loss_key, head.burst_key = keyed(head.loss_key, seed), keyed(head.burst_key, seed)
