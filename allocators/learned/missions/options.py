@@ -40,7 +40,7 @@ def expect(situation: Situation) -> int:
     first, following, idle = coming.first, coming.following, coming.idle
     first[:] = NOBODY
     found = 0
-    for i in range(len(target)):
+    for i in range(situation.others[0]):
         if not situation.counts[i]:
             continue
         if target[i] == NOBODY:
@@ -214,7 +214,7 @@ def fill_crowding(situation: Situation, tasks: IntArray, options: Singles) -> No
 def fill_whole(situation: Situation, choice: IntArray, tasks: int, options: Singles) -> None:
     """Fill the features that all options share, and those that compare with a mean."""
     own, agents, ability = situation.own, 1.0, situation.own[known.ABILITY]
-    for i in range(len(situation.counts)):
+    for i in range(situation.others[0]):
         if situation.counts[i]:
             agents += 1
             ability += situation.other[known.STRENGTH, i]
