@@ -172,14 +172,18 @@ def step_out(together: Together, i: int, target: int) -> None:
     situation.counts[i] = False
     if target == NOBODY:
         return
-    first, following = situation.coming.first, situation.coming.following
-    if first[target] == i:
-        first[target] = following[i]
+    coming, before = situation.coming, NOBODY
+    if coming.first[target] == i:
+        coming.first[target] = coming.following[i]
     else:
-        before = first[target]
-        while following[before] != i:
-            before = following[before]
-        following[before] = following[i]
+        before = coming.first[target]
+        while coming.following[before] != i:
+            before = coming.following[before]
+        coming.following[before] = coming.following[i]
+    if coming.last[target] == i:
+        coming.last[target] = before
+    if coming.working[target] == i:
+        coming.working[target] = before
     renew(situation, target)
 
 
@@ -192,7 +196,7 @@ def step_in(together: Together, i: int, target: int) -> None:
     if target == NOBODY:
         return
     situation.other[known.ARRIVES, i] = arrival(together, i, target)
-    queue(situation, i)
+    queue(situation.coming, situation.other[known.ARRIVES], target, i)
     renew(situation, target)
 
 
