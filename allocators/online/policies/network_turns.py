@@ -127,7 +127,8 @@ def _reach(view: View, agents: list[AgentReport], tasks: list[TaskReport], ways:
         [(agent.facts.range, agent.battery, agent.facts.energy_per_distance) for agent in agents]
     ).T[:, :, None]
     near = (ways <= reach + TOLERANCE) & (ways < math.inf)
-    return near & (rate * (ways + back) <= battery + TOLERANCE) & _allowed(agents, tasks)
+    can: BoolArray = near & (rate * (ways + back) <= battery + TOLERANCE) & _allowed(agents, tasks)
+    return can
 
 
 def _allowed(agents: list[AgentReport], tasks: list[TaskReport]) -> BoolArray:

@@ -104,7 +104,7 @@ class MissionFleetEnv(gymnasium.Env[Floats, np.int64]):
         """Return what is so now, as `Truth` of `truth.py` describes."""
         return self._truth.array(self._course.state)
 
-    def render(self) -> str | None:  # type: ignore[override]  # text is what there is
+    def render(self) -> str | None:
         """Return what is so now as text, or print it, by the render mode."""
         return rendered(self._course.state, self.render_mode)
 
