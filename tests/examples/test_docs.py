@@ -138,7 +138,7 @@ WITHOUT_CODE = {
     "docs/developing/architecture.md",
     "docs/glossary.md",
     "docs/paper/paper.md",
-    "docs/reference.md",
+    *(path.relative_to(ROOT).as_posix() for path in (ROOT / "docs" / "reference").rglob("*.md")),
 }
 """Documents that show neither code nor commands: nothing of them is tested here but their links."""
 

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from alloc.allocators.missions.layout import NOBODY, TO_TASK, WORKING, MissionArrays
+from alloc.allocators.missions.layout import IDLE, NOBODY, TO_TASK, WORKING, MissionArrays
 from alloc.allocators.missions.motion import battery_of, can_fly, distance_between, place_of
 from alloc.allocators.runtime.compiled import compiled_in_place
 from alloc.problems.fields import BoolArray, FloatArray, IntArray
@@ -70,14 +70,19 @@ class Situation(NamedTuple):
     coming: Coming
 
 
-HOUR, X, Y, Z, ABILITY, SPEED, BATTERY, ENERGY_PER_DISTANCE, SPAN, TARGET, IS_WORKING, IS_FLYING, OWN = range(13)
+HOUR, X, Y, Z, ABILITY, SPEED, BATTERY, ENERGY_PER_DISTANCE, SPAN = range(9)
+TARGET, IS_WORKING, IS_FLYING, METRIC, OWN = range(9, 14)
 """Of the agent; `SPAN` is the longest distance in the area, `TARGET` the task of its order, -1 for none."""
+
+EUCLIDEAN_WAYS, MANHATTAN_WAYS, OTHER_WAYS = range(3)
+"""What `METRIC` is: how far places are apart; others than these two cannot be told from coordinates."""
 
 TASK_X, TASK_Y, TASK_Z, LEFT, KNOWN_AT, PRIORITY, DEADLINE, GROWTH, DISTANCE, TASK = range(10)
 """Of a task; `DISTANCE` is that from the agent."""
 
-ARRIVES, STRENGTH, OTHER_X, OTHER_Y, OTHER_Z, OTHER = range(6)
-"""Of another agent: hour at which it is at its task, ability, place."""
+ARRIVES, STRENGTH, OTHER_X, OTHER_Y, OTHER_Z, PACE, CHARGE, PRICE, HEARD, IS_FREE, OTHER = range(11)
+"""Of another agent: hour at which it is at its task, ability, place, speed, battery, energy per distance, the hour when
+that was true, and whether it was idle."""
 
 
 def empty(n: int, m: int) -> Situation:
@@ -119,6 +124,7 @@ def fill_own(state: MissionArrays, number: int, own: FloatArray) -> None:
     own[SPAN] = head.span
     own[TARGET] = agent.order_task if agent.order == TO_TASK else NOBODY
     own[IS_WORKING], own[IS_FLYING] = agent.task != NOBODY, agent.flight != 0
+    own[METRIC] = MANHATTAN_WAYS if head.is_manhattan else EUCLIDEAN_WAYS
 
 
 @compiled_in_place
@@ -151,7 +157,10 @@ def fill_others(state: MissionArrays, number: int, situation: Situation, memory:
         report = state.reports[known[place]]
         if who[place] == number or head.hour - report.hour > memory or not 1 <= report.status <= WORKING:
             continue
-        other[STRENGTH, found] = report.ability
+        agent = state.agents[who[place]]
+        other[STRENGTH, found], other[PACE, found] = report.ability, agent.speed
+        other[CHARGE, found], other[PRICE, found] = report.battery, agent.energy_per_distance
+        other[HEARD, found], other[IS_FREE, found] = report.hour, report.status == IDLE
         other[OTHER_X, found], other[OTHER_Y, found], other[OTHER_Z, found] = report.x, report.y, report.z
         target[found] = report.task if report.task != NOBODY and task_hours[report.task] >= 0 else NOBODY
         other[ARRIVES, found] = report.arrives
