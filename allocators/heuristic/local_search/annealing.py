@@ -37,10 +37,23 @@ def draw_candidate(random: NDArray[np.uint64], tasks: int, candidates: Int32Arra
 
 
 @compiled
-def draw_helper(arrays: InstanceArrays, plan: Plan, task: int) -> int:
-    """Return a random agent, one that can reach `task` if a few draws find any."""
+def draw_helper(arrays: InstanceArrays, plan: Plan, candidates: Candidates, task: int) -> int:
+    """Return a random agent, one that can reach `task` if a few draws find any.
+
+    Without a table, mostly one of a task that some agent of `task` can do as well, or that is near it: of a million
+    agents hardly any reaches a given task.
+    """
     agent = 0
     table, origin, random, agents = arrays.distance, arrays.origin, plan.random, plan.group_of_agent.shape[0]
+    if table.shape[0] == 0 and plan.size[task] > 0 and draw(random, ANY_TASK_PERIOD) > 0:
+        row = origin[plan.slot[plan.begin[task] + draw(random, plan.size[task])]]
+        begin, count = arrays.list_begin[row], arrays.list_begin[row + 1] - arrays.list_begin[row]
+        if count > 0:
+            near = arrays.listed_task[begin + draw(random, count)]
+        else:
+            near = candidates.of_origin[candidates.row[row], draw(random, candidates.of_origin.shape[1])]
+        if 0 <= near < plan.demand.shape[0] - 1 and near != task and plan.size[near] > 0:
+            return int(plan.slot[plan.begin[near] + draw(random, plan.size[near])])
     for _ in range(TRIES):
         agent = draw(random, agents)
         if table.shape[0] == 0 or table[origin[agent], task] < np.inf:
@@ -90,7 +103,7 @@ def anneal(
             if plan.size[tasks] > 0 and draw(plan.random, 2) == 0:
                 other = tasks
             else:
-                agent = draw_helper(arrays, plan, task)
+                agent = draw_helper(arrays, plan, candidates, task)
                 other = plan.group_of_agent[agent]
         else:
             agent = draw(plan.random, agents)
