@@ -4,16 +4,39 @@ It says where agents were at some hour. Until the fastest of them may have left 
 in cells that are so much further off.
 """
 
+import math
 from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
 
 from alloc.allocators.missions.layout import Numbers
 from alloc.allocators.missions.motion import place_of
 from alloc.allocators.missions.records import Agent, Head
 from alloc.allocators.runtime.compiled import compiled_in_place, inlined
 from alloc.problems.fields import FloatArray, IntArray
+from alloc.problems.missions.mission import Mission
+
+FEW = 100
+"""Agents up to which all are looked at, instead of those in the cells of a grid."""
 
 SLACK = 1e-6
 """By how much more of itself than by its speed an agent may have moved, as numbers are rounded."""
+
+
+def divide(mission: Mission, head: NDArray[np.void]) -> Numbers:
+    """Return room for the cells of a grid, which the head then describes; one cell for few, or at unknown places."""
+    places = [mission.instance.start_position, mission.instance.task_position, mission.instance.bases.position]
+    low, high = np.array(mission.area)[:, :2]
+    n, width = mission.instance.n, float((high - low).max())
+    side = max(min(mission.sensing, mission.radio.radius), width / math.sqrt(n))
+    columns = rows = 1
+    if n > FEW and 0 < side < width and all(np.isfinite(some).all() for some in places):
+        columns, rows = (max(1, math.ceil(float(extent) / side)) for extent in high - low)
+    head["left"], head["low"], head["side"] = *low, side if columns * rows > 1 else -1.0
+    head["columns"], head["rows"] = columns, rows
+    head["fastest"], head["located"] = mission.instance.speed.max(initial=0.0), -np.inf
+    return np.array([0] * (columns * rows) + [n], np.int32)
 
 
 @inlined

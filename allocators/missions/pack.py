@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from alloc.allocators.missions.chance import first_key, keyed
+from alloc.allocators.missions.grid import divide
 from alloc.allocators.missions.layout import NOBODY, MissionArrays
 from alloc.allocators.missions.records import Agent, Entry, Happening, Head, Report, Task, record_type
 from alloc.problems.errors import RefusedError
@@ -36,14 +37,8 @@ MOST_REPORTS = 4_000_000
 LEAST_COLUMNS, COLUMNS = 40, 8
 """What is known stands in rows of a multiple of so many columns, as processors compare several at once."""
 
-FEW = 100
-"""Agents up to which all are looked at, instead of those in the cells of a grid."""
-
-EMPTY = frozenset(
-    ("reports", "renumbered", "known_agent", "known_report", "sent_task_hour", "sent_task_left", "sent_agent")
-    + ("sent_report", "sent_of", "sender", "links")
-)
-"""Arrays that are large and empty at hour 0: memory is taken up where they are filled."""
+EMPTY = ("reports", "renumbered", "known_", "sent_", "sender", "links")
+"""How the names of arrays begin that are empty at hour 0: they take up memory only where they are filled."""
 
 
 def pack(mission: Mission, knowledge: Knowledge | str | None = None, memory: float = math.inf) -> MissionArrays:
@@ -90,7 +85,7 @@ def pack(mission: Mission, knowledge: Knowledge | str | None = None, memory: flo
         "area": np.array(mission.area),
         "sites": np.ascontiguousarray(instance.task_position.T),
         "places": np.ascontiguousarray(instance.start_position.T),
-        "cells": _divide(mission, head),
+        "cells": divide(mission, head),
         "in_cells": np.arange(n, dtype=np.int32),
         "is_near": np.zeros(m, np.bool_),
         "speaks": np.zeros(n, np.bool_),
@@ -98,10 +93,7 @@ def pack(mission: Mission, knowledge: Knowledge | str | None = None, memory: flo
         **_knowledge(n, m, rows, slots, words=-(-n // 64) if memory < mission.end else 0),
         "links": np.zeros((n, n) if mission.radio.burst else (0, 0), np.int32),
         "silences": np.zeros(len(events), np.intp),
-        "lookers": np.zeros(n, np.intp),
-        "marked": np.zeros(n, np.intp),
-        "deciding": np.zeros(n, np.intp),
-        "changed_agents": np.zeros(n, np.intp),
+        **{name: np.zeros(n, np.intp) for name in ("lookers", "marked", "deciding", "changed_agents")},
         "changed_tasks": np.zeros(m, np.intp),
     }
     return MissionArrays(**{name: _by_attribute(part) for name, part in parts.items()})  # type: ignore[arg-type]
@@ -130,21 +122,6 @@ def _knowledge(n: int, m: int, rows: int, slots: int, words: int) -> dict[str, F
     return cast(dict[str, FloatArray], known)
 
 
-def _divide(mission: Mission, head: Records) -> NDArray[np.int32]:
-    """Return room for the cells of a grid, which the head describes: one cell for few, or at places that are unknown."""
-    places = [mission.instance.start_position, mission.instance.task_position, mission.instance.bases.position]
-    low, high = np.array(mission.area)[:, :2]
-    n, width = mission.instance.n, float((high - low).max())
-    side = max(min(mission.sensing, mission.radio.radius), width / math.sqrt(n))
-    columns = rows = 1
-    if n > FEW and 0 < side < width and all(np.isfinite(some).all() for some in places):
-        columns, rows = (max(1, math.ceil(float(extent) / side)) for extent in high - low)
-    head["left"], head["low"], head["side"] = *low, side if columns * rows > 1 else -1.0
-    head["columns"], head["rows"] = columns, rows
-    head["fastest"], head["located"] = mission.instance.speed.max(initial=0.0), -np.inf
-    return np.array([0] * (columns * rows) + [n], np.int32)
-
-
 def _on_the_air(radio: Radio) -> int:
     """Return how many messages of an agent are on the air at once at the most."""
     return 1 if radio.delay == 0 else int(radio.delay // radio.period) + 2
@@ -159,7 +136,7 @@ def begun(packed: MissionArrays, seed: int = 0) -> MissionArrays:
     seed : int
         Of the radio's chances, beside that of the mission.
     """
-    parts = {name: _fresh(part) if name in EMPTY else part.copy() for name, part in packed._asdict().items()}
+    parts = {name: _fresh(part) if name.startswith(EMPTY) else part.copy() for name, part in packed._asdict().items()}
     state = MissionArrays(**parts)
     head = state.head[0]
     head.loss_key, head.burst_key = keyed(head.loss_key, seed), keyed(head.burst_key, seed)

@@ -204,7 +204,7 @@ def renumber(known: Numbers, number: Numbers) -> None:
 
 @compiled_in_place
 def count_known(known: int, heard_of: IntArray) -> int:
-    """Return of how many agents anything was ever known, by how many are known and bits for those that were heard of."""
+    """Return of how many agents anything was ever known: those that are, or those of whom bits say so."""
     if len(heard_of) == 0:
         return known
     count = np.uint64(0)

@@ -28,6 +28,10 @@ class Coming(NamedTuple):
         Hour at which they have done it, ``inf`` where nobody comes.
     idle : ndarray of int, shape (n,)
         Others that have no task.
+    last, working : ndarray of int, shape (m,)
+        Who is last at each task to which somebody comes, and who last of those that work there already.
+    idle_places, task_places : ndarray, shape (3, n) and (3, m)
+        Where these others are, and the tasks of the options.
     """
 
     first: IntArray
@@ -35,6 +39,10 @@ class Coming(NamedTuple):
     others: IntArray
     without: FloatArray
     idle: IntArray
+    last: IntArray
+    working: IntArray
+    idle_places: FloatArray
+    task_places: FloatArray
 
 
 class Situation(NamedTuple):
@@ -101,6 +109,10 @@ def empty(n: int, m: int) -> Situation:
             others=np.zeros(m, np.intp),
             without=np.full(m, np.inf),
             idle=np.full(n, NOBODY),
+            last=np.full(m, NOBODY),
+            working=np.full(m, NOBODY),
+            idle_places=np.zeros((3, n)),
+            task_places=np.zeros((3, m)),
         ),
     )
 
