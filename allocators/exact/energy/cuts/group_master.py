@@ -4,8 +4,8 @@ import highspy
 import numpy as np
 from scipy.sparse import csr_array
 
+from alloc.allocators.exact.energy.cuts.subset_rows import violated_sets
 from alloc.allocators.exact.energy.energy_model import EnergyModel
-from alloc.allocators.exact.energy.subset_rows import violated_sets
 from alloc.allocators.exact.knapsack import WholeArray
 from alloc.problems.instance import FloatArray, IntArray
 
