@@ -3,6 +3,7 @@
 import posixpath
 import re
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 from mkdocs.config.defaults import MkDocsConfig
@@ -24,12 +25,25 @@ LINK = re.compile(r"\[([^\[\]]*)\]\(([^)\s#:]+)(#[^)\s]*)?\)")
 CODE = re.compile(r"(^```.*?^```$|^ {4}[^\n]*$|^#[^\n]*$)", re.MULTILINE | re.DOTALL)
 """Blocks of code, and headings."""
 
-REFERENCE = "reference.md"
+REFERENCE = ROOT / "docs" / "reference"
 
 EXTERNAL = re.compile(
     r"<(?:script|img|iframe|source)\b[^>]*?\bsrc=[\"']?https?:|<link\b(?![^>]*\bcanonical)[^>]*?\bhref=[\"']?https?:"
 )
 """What makes a browser load something from elsewhere when it shows a page; plain links do not."""
+
+
+def on_config(config: MkDocsConfig) -> MkDocsConfig:
+    """Put the pages of all public names into the navigation, by the topics of the page that lists them."""
+    chapters = (REFERENCE / "index.md").read_text(encoding="utf-8").split("\n## ")[1:]
+    topics = [
+        {chapter.partition("\n")[0]: [f"reference/{page}" for page in re.findall(r"\((\w+/\w+\.md)\)", chapter)]}
+        for chapter in chapters
+    ]
+    (section,) = (one["Reference"] for one in config.nav if "Reference" in one)
+    (entry,) = (one for one in section if "Python" in one)
+    entry["Python"] = [entry["Python"], *topics]
+    return config
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
@@ -55,7 +69,8 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
     if page.is_homepage:
         page.meta["hide"] = ["navigation"]  # it would have a single entry
     text = site_links(markdown, page.file.src_uri).replace("```console\n", "```bash\n")
-    return reference_links(text, page.file.src_uri, (ROOT / "docs" / REFERENCE).read_text(encoding="utf-8"))
+    pages = {path.stem: path.relative_to(ROOT / "docs").as_posix() for path in REFERENCE.glob("*/*.md")}
+    return reference_links(text, page.file.src_uri, pages)
 
 
 def site_links(markdown: str, source: str) -> str:
@@ -92,17 +107,20 @@ def title(path: Path) -> str:
     return heading[1] if heading else path.name
 
 
-def reference_links(markdown: str, source: str, reference: str) -> str:
-    """Return the text of a page in which classes of the Python reference are links to their entries.
+def reference_links(markdown: str, source: str, pages: Mapping[str, str]) -> str:
+    """Return the text of a page in which classes of the Python reference are links to their pages.
 
     In the reference itself functions are, too; elsewhere their names are often those of commands.
     """
-    is_reference = source == REFERENCE
-    names = re.findall(r"^### (\w+)$" if is_reference else r"^### ([A-Z][a-z]\w+)$", reference, re.MULTILINE)
-    page = "" if is_reference else posixpath.relpath(REFERENCE, posixpath.dirname(source) or ".")
-    name = re.compile(rf"(?<![`\[\w])`({'|'.join(names)})`(?![`\]])")
+    is_reference = source.startswith("reference/")
+    found = {name: page for name, page in pages.items() if page != source and (is_reference or "/classes/" in page)}
+    name = re.compile(rf"(?<![`\[\w])`({'|'.join(found)})`(?![`\]])")
+
+    def lead(match: re.Match[str]) -> str:
+        return f"[{match[0]}]({posixpath.relpath(found[match[1]], posixpath.dirname(source) or '.')})"
+
     parts = CODE.split(markdown)
-    parts[::2] = [name.sub(lambda match: f"[{match[0]}]({page}#{match[1].lower()})", part) for part in parts[::2]]
+    parts[::2] = [name.sub(lead, part) for part in parts[::2]]
     return "".join(parts)
 
 

@@ -1,58 +1,104 @@
-"""Writes docs/reference.md from the docstrings of the public names: ``python docs/make_reference.py``."""
+"""Writes docs/reference/, a page for each public name, from their docstrings: ``python docs/make_reference.py``."""
 
 import dataclasses
 import enum
 import importlib
 import inspect
 import re
-from collections.abc import Callable, Iterator
+import shutil
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
-PAGE = Path(__file__).with_name("reference.md")
+FOLDER = Path(__file__).with_name("reference")
 
 MODULES = ("alloc.problems", "alloc.allocators")
+
+TOPICS = {
+    "Instances and allocations": (
+        "alloc.problems.instance",
+        "alloc.problems.allocation",
+        "alloc.problems.evaluation",
+        "alloc.problems.vocabulary",
+        "alloc.problems.units",
+        "alloc.problems.distances",
+        "alloc.problems.classes",
+    ),
+    "Files": ("alloc.problems.formats", "alloc.allocators.plan"),
+    "Generated instances": ("alloc.problems.generate",),
+    "Bounds, and what cannot be served": ("alloc.problems.bounds", "alloc.problems.matching"),
+    "Solving": (
+        "alloc.allocators.solve",
+        "alloc.allocators.serving",
+        "alloc.allocators.result",
+        "alloc.allocators.explain",
+        "alloc.allocators.replanning",
+        "alloc.allocators.plotting",
+    ),
+    "Methods": (
+        "alloc.allocators.registry",
+        "alloc.allocators.heuristic",
+        "alloc.allocators.exact",
+        "alloc.allocators.learned",
+    ),
+    "A method of your own": ("alloc.allocators.contract",),
+    "Comparing": ("alloc.allocators.experiments", "alloc.allocators.pareto"),
+    "Missions": ("alloc.problems.missions", "alloc.allocators.plotting.missions"),
+    "Policies of missions, and the planner": ("alloc.allocators.online",),
+    "Errors": ("alloc.problems.errors",),
+}
+"""Where a name stands in the table of all: by the longest of these that the module which defines it begins with."""
 
 SECTION = re.compile(r"^(\w[\w ]*)\n-{3,}\n", re.MULTILINE)
 """A heading of a section in a docstring of numpydoc style."""
 
-HEAD = """# Reference
+HEAD = """# Python reference
 
-The public names of `alloc.problems` and `alloc.allocators`, made from their docstrings by `docs/make_reference.py`.
-[glossary.md](glossary.md) explains the terms, [embedding.md](use/embedding.md) shows the names at work. All else is
-reachable by its module, and may change.
+The public names of `alloc.problems` and `alloc.allocators`, a page for each, made from their docstrings by
+`docs/make_reference.py`. [glossary.md](../glossary.md) explains the terms, [embedding.md](../use/embedding.md) shows
+the names at work. All else is reachable by its module, and may change.
 """
 
 
-def reference() -> str:
-    """Return the text of the page."""
-    return "\n".join([HEAD, *(chapter(name) for name in MODULES)])
+def pages() -> dict[str, str]:
+    """Return the text of each page by its place in docs/reference/; that of the table of all names comes first."""
+    origins = {name: module for module in reversed(MODULES) for name in importlib.import_module(module).__all__}
+    names = {name: getattr(importlib.import_module(origins[name]), name) for name in sorted(origins, key=str.casefold)}
+    by_topic = {title: [name for name in names if topic(names[name]) == title] for title in TOPICS}
+    entries = {place(name, value): entry(f"{origins[name]}.{name}", value) for name, value in names.items()}
+    return {"index.md": "\n".join([HEAD, *(table(title, by_topic[title], names) for title in TOPICS)]), **entries}
 
 
-def chapter(module: str) -> str:
-    """Return the chapter of a module: an entry for each of its public names, in the order of the alphabet."""
-    loaded = importlib.import_module(module)
-    entries = {name: getattr(loaded, name) for name in sorted(loaded.__all__, key=str.casefold)}
-    summary = inspect.getdoc(loaded) or ""
-    index = ", ".join(f"[`{name}`](#{name.lower().replace('.', '')})" for name in entries)
-    own = [
-        entry(name, value) if getattr(value, "__module__", module).startswith(module) else above(name, value)
-        for name, value in entries.items()
-    ]
-    return "\n".join([f"## {module}", "", summary.splitlines()[0], "", index, "", *own])
+def topic(value: object) -> str:
+    """Return the topic of a public name; constants, which do not know their modules, are those of allocations."""
+    module = getattr(value, "__module__", "alloc.problems.allocation")
+    known = {prefix: title for title, prefixes in TOPICS.items() for prefix in prefixes if module.startswith(prefix)}
+    return known[max(known, key=len)]
 
 
-def above(name: str, value: object) -> str:
-    """Return the entry of a name that comes from an earlier chapter."""
-    origin = ".".join(str(value.__module__).split(".")[:2])
-    return f"### {name}\n\nThat of `{origin}`: [above](#{name.lower()}).\n"
+def place(name: str, value: object) -> str:
+    """Return the page of a name; `WhatIf` and `whatif` are one file where names of files have no case."""
+    return f"{'classes' if isinstance(value, type) else 'functions' if callable(value) else 'constants'}/{name}.md"
 
 
-def entry(name: str, value: object) -> str:
-    """Return the entry of one name: how it is called, its docstring, and its public methods or members."""
-    lines = [f"### {name}", ""]
+def table(title: str, names: list[str], values: Mapping[str, object]) -> str:
+    """Return the names of a topic with the first sentences of their docstrings."""
+    rows = [f"| [`{name}`]({place(name, values[name])}) | {summary(values[name])} |" for name in names]
+    return "\n".join([f"## {title}", "", "| Name | What it is |", "|---|---|", *rows, ""])
+
+
+def summary(value: object) -> str:
+    """Return the first paragraph of a docstring, which is one line, or the value of a constant."""
+    first = (inspect.getdoc(value) or "").partition("\n\n")[0] if callable(value) else f"`{value!r}`"
+    return first.replace("\n", " ").replace("|", "\\|")
+
+
+def entry(path: str, value: object) -> str:
+    """Return the page of one name: how it is called, its docstring, and its public methods or members."""
+    name = path.rpartition(".")[2]
+    lines = [f"# {name}", ""]
     if not callable(value):
-        return "\n".join([*lines, f"`{name} = {value!r}`", ""])
-    lines += ["```text", signature(name, value), "```", "", *markdown(inspect.getdoc(value) or "")]
+        return "\n".join([*lines, f"`{path} = {value!r}`", ""])
+    lines += ["```text", signature(path, value), "```", "", *markdown(inspect.getdoc(value) or "")]
     if isinstance(value, type):
         lines += members(value)
     return "\n".join(lines)
@@ -96,7 +142,7 @@ def markdown(docstring: str) -> list[str]:
     pieces = SECTION.split(docstring)
     lines = [pieces[0].strip(), ""]
     for title, text in zip(pieces[1::2], pieces[2::2], strict=True):
-        lines += [f"**{title}**", "", *(items(text) if is_list(text) else [text.strip()]), ""]
+        lines += [f"## {title}", "", *(items(text) if is_list(text) else [text.strip()]), ""]
     return lines
 
 
@@ -132,7 +178,7 @@ def members(kind: type) -> Iterator[str]:
             call = "" if isinstance(value, property) else f"({', '.join(arguments(value))})"
             methods.append(f"- `.{name}{call}`: {first}")
     if methods:
-        yield from ("**Methods**", "", *methods, "")
+        yield from ("## Methods", "", *methods, "")
 
 
 def is_own(kind: type, name: str) -> bool:
@@ -141,4 +187,7 @@ def is_own(kind: type, name: str) -> bool:
 
 
 if __name__ == "__main__":
-    PAGE.write_text(reference(), encoding="utf-8")
+    shutil.rmtree(FOLDER, ignore_errors=True)
+    for page, text in pages().items():
+        (FOLDER / page).parent.mkdir(parents=True, exist_ok=True)
+        (FOLDER / page).write_text(text, encoding="utf-8")

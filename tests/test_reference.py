@@ -1,4 +1,4 @@
-"""docs/reference.md is what its script makes of the docstrings, and has every public name."""
+"""docs/reference/ is what its script makes of the docstrings, and has a page for every public name."""
 
 import importlib.util
 import re
@@ -23,19 +23,32 @@ def script() -> ModuleType:
     return module
 
 
-def test_the_page_is_up_to_date(script: ModuleType) -> None:
-    """The page is that of the docstrings; `python docs/make_reference.py` writes it anew."""
-    assert (DOCS / "reference.md").read_text(encoding="utf-8") == script.reference()
+@pytest.fixture(scope="module")
+def pages(script: ModuleType) -> dict[str, str]:
+    """What the script makes of the docstrings, by place in docs/reference/."""
+    made: dict[str, str] = script.pages()
+    return made
 
 
-@pytest.mark.parametrize("module", [problems, allocators], ids=lambda module: module.__name__)
-def test_no_public_name_is_missing(module: ModuleType) -> None:
-    """Every name in `__all__` has a heading, and more than a heading."""
-    page = (DOCS / "reference.md").read_text(encoding="utf-8")
-    chapter = page.split(f"## {module.__name__}\n")[1].split("\n## ")[0]
-    entries = dict(re.findall(r"^### (\w+)\n(.*?)(?=^### |\Z)", chapter, re.MULTILINE | re.DOTALL))
-    assert set(entries) == set(module.__all__)
-    assert [name for name, text in entries.items() if len(text.split()) < 3] == []
+def test_the_pages_are_up_to_date(pages: dict[str, str]) -> None:
+    """They are those of the docstrings, and no others; `python docs/make_reference.py` writes them anew."""
+    folder = DOCS / "reference"
+    assert {path.relative_to(folder).as_posix(): path.read_text("utf-8") for path in folder.rglob("*.md")} == pages
+
+
+def test_every_public_name_has_a_page(pages: dict[str, str]) -> None:
+    """Every name in `__all__` has one, with more than a heading, and stands once in the table of all with a summary."""
+    index = pages["index.md"]
+    entries = {path.rpartition("/")[2][:-3]: text for path, text in pages.items() if path != "index.md"}
+    assert set(entries) == {*problems.__all__, *allocators.__all__}
+    assert [name for name, text in entries.items() if len(text.split()) < 5] == []
+    rows = re.findall(r"^\| \[`(\w+)`\]\(([\w/.]+)\) \| .+ \|$", index, re.MULTILINE)
+    assert sorted(rows) == sorted((path.rpartition("/")[2][:-3], path) for path in pages if path != "index.md")
+
+
+def test_no_two_pages_are_one_where_names_have_no_case(pages: dict[str, str]) -> None:
+    """As on macOS and Windows."""
+    assert len({path.casefold() for path in pages}) == len(pages)
 
 
 def test_sections_of_docstrings_become_lists(script: ModuleType) -> None:
@@ -45,11 +58,11 @@ def test_sections_of_docstrings_become_lists(script: ModuleType) -> None:
     assert script.markdown(f"Do it.\n\n{parameters}\n{raises}") == [
         "Do it.",
         "",
-        "**Parameters**",
+        "## Parameters",
         "",
         "- `x, y` (int): How often, at most.",
         "",
-        "**Raises**",
+        "## Raises",
         "",
         "- `InputError`: If not.",
         "",

@@ -5,7 +5,7 @@ import json
 import re
 import sys
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 
 import pytest
 from command_line import COMMANDS
@@ -35,13 +35,14 @@ def hooks(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
 
 
 def test_every_page_is_in_the_navigation() -> None:
-    """Each page of docs/ is named once in mkdocs.yml, and each that is named is there or is made."""
+    """Each page of docs/ but of the reference is named once in mkdocs.yml, and each that is named is there or made."""
     made = {
         "use/commands.md",
         *(f"examples/notebooks/{path.stem}.md" for path in ROOT.glob("examples/notebooks/*.ipynb")),
     }
-    named = re.findall(r": ([\w/.-]+\.md)$", (ROOT / "mkdocs.yml").read_text("utf-8"), re.MULTILINE)
-    pages = {path.relative_to(DOCS).as_posix() for path in DOCS.rglob("*.md")}
+    named = re.findall(r": ([\w/.-]+\.md)(?:  #|$)", (ROOT / "mkdocs.yml").read_text("utf-8"), re.MULTILINE)
+    names = {*DOCS.glob("reference/*/*.md")}
+    pages = {path.relative_to(DOCS).as_posix() for path in {*DOCS.rglob("*.md")} - names}
     assert len(named) == len(set(named))
     assert set(named) == pages | made | {"examples/README.md", "CONTRIBUTING.md", "CHANGELOG.md"}
 
@@ -127,7 +128,7 @@ def test_links_out_of_docs_lead_into_the_site(hooks: ModuleType) -> None:
 @pytest.mark.needs("mkdocs")
 def test_classes_are_links_to_the_reference(hooks: ModuleType) -> None:
     """Their names in sentences are; those in code, headings and links are not, nor are functions on other pages."""
-    reference = "### Search\n\n### solve\n"
+    reference = {"Search": "reference/classes/Search.md", "solve": "reference/functions/solve.md"}
     for text in (
         "```python\n`Search`\n```",
         "    a `Search`",
@@ -138,8 +139,20 @@ def test_classes_are_links_to_the_reference(hooks: ModuleType) -> None:
     ):
         assert hooks.reference_links(text, "use/a.md", reference) == text
     page = hooks.reference_links("# `Search`\n\na `Search`.", "use/a.md", reference)
-    assert page == "# `Search`\n\na [`Search`](../reference.md#search)."
-    assert hooks.reference_links("a `solve`.", "reference.md", reference) == "a [`solve`](#solve)."
+    assert page == "# `Search`\n\na [`Search`](../reference/classes/Search.md)."
+    own = hooks.reference_links("a `Search` of `solve`.", "reference/classes/Search.md", reference)
+    assert own == "a `Search` of [`solve`](../functions/solve.md)."
+
+
+@pytest.mark.needs("mkdocs")
+def test_the_navigation_has_a_page_for_each_name(hooks: ModuleType) -> None:
+    """Those of the reference are in the navigation once, below the table of all of them, by topic."""
+    nav = [{"Reference": [{"Python": "reference/index.md"}]}]
+    config = hooks.on_config(SimpleNamespace(nav=nav))
+    index, *topics = config.nav[0]["Reference"][0]["Python"]
+    pages = [page for topic in topics for (found,) in [topic.values()] for page in found]
+    assert index == "reference/index.md"
+    assert sorted(pages) == sorted(path.relative_to(DOCS).as_posix() for path in DOCS.glob("reference/*/*.md"))
 
 
 @pytest.mark.needs("mkdocs")

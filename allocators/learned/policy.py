@@ -98,7 +98,7 @@ class A2c(PolicyAllocator):
 
 
 class Dqn(PolicyAllocator):
-    """A network that estimates what each bid is utility."""
+    """A network that estimates the utility of each bid."""
 
     method, trained_by = BUILT_IN["dqn"], "dqn"
     parameters = PlannerParameters(temperature=(DqnParameters().final_temperature, DqnParameters().temperature))

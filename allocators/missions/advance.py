@@ -7,6 +7,7 @@ import numpy as np
 from alloc.allocators.missions.agenda import first_hour, pop, push
 from alloc.allocators.missions.channel import deliver, is_silent, send_all
 from alloc.allocators.missions.events import happen
+from alloc.allocators.missions.grid import sort
 from alloc.allocators.missions.knowledge import look_around, refresh
 from alloc.allocators.missions.layout import (
     DONE,
@@ -18,14 +19,13 @@ from alloc.allocators.missions.layout import (
     ORDERS,
     OVER,
     WORKING,
-    Agent,
-    Head,
     MissionArrays,
 )
 from alloc.allocators.missions.motion import bring_up_to_date, distance_between, stop_work
-from alloc.allocators.missions.orders import balance, close, land, note_agent
+from alloc.allocators.missions.orders import balance, close, land, let_decide, note_agent
+from alloc.allocators.missions.records import Agent, Head
+from alloc.allocators.missions.reports import find_oldest
 from alloc.allocators.runtime.compiled import compiled_in_place, inlined
-from alloc.problems.fields import IntArray
 from alloc.problems.missions.simulation.agenda import Turn
 from alloc.problems.missions.simulation.motion import CLOSE
 
@@ -61,7 +61,7 @@ def advance(state: MissionArrays) -> int:
             if head.changed_agents or head.changed_tasks:
                 balance(state)
         head.stage = BETWEEN
-        if find_deciding(head, agents, state.deciding) and not is_over(head, agents):
+        if find_deciding(state) and not is_over(head, agents):
             look(state)
             head.stage = ORDERED
             return ORDERS
@@ -102,7 +102,7 @@ def arrive(state: MissionArrays, number: int) -> None:
     land(state, number)
     note_agent(state, number, task)
     if agent.status == IDLE:
-        agent.decides = 1
+        let_decide(state, number)
         state.head[0].is_news = 1
 
 
@@ -113,11 +113,13 @@ def talk(state: MissionArrays) -> bool:
     for number in range(len(state.agents)):
         agent = state.agents[number]
         if IDLE <= agent.status <= WORKING:
-            agent.decides = 1
+            let_decide(state, number)
             agent.looked = head.turn
-            state.looks[number] = True
+            state.lookers[head.lookers] = number
+            head.lookers += 1
             can_send = can_send or not head.silences or not is_silent(state, number)
-    look_around(state)
+    find_oldest(state)
+    look_around(state, True)
     if not can_send:
         head.tick += 1
         push(state, head.tick * head.period, RADIO, 0, 0)
@@ -128,7 +130,7 @@ def talk(state: MissionArrays) -> bool:
 def send(state: MissionArrays) -> None:
     """Let all send that can and will; when they can the next time stands on the agenda."""
     head = state.head[0]
-    slot = head.tick % len(state.heard)
+    slot = head.tick % len(state.sent)
     if send_all(state, slot):
         push(state, head.hour + head.delay, DELIVERY, slot, 0)
     push(state, head.tick * head.period, RADIO, 0, 0)
@@ -137,15 +139,23 @@ def send(state: MissionArrays) -> None:
 
 
 @compiled_in_place
-def find_deciding(head: Head, agents: Sequence[Agent], deciding: IntArray) -> bool:
+def find_deciding(state: MissionArrays) -> bool:
     """Fill in who is to get orders now, in their order in the mission; return whether there is anybody."""
+    head, agents = state.head[0], state.agents
+    sort(state.marked, 0, head.marked)
     head.deciding = 0
-    for number in range(len(agents)):
-        agent = agents[number]
-        if IDLE <= agent.status <= WORKING and (agent.decides if head.is_local else head.is_news):
-            deciding[head.deciding] = number
+    for place in range(head.marked):
+        number = state.marked[place]
+        agents[number].decides = 0
+        if head.is_local and IDLE <= agents[number].status <= WORKING:
+            state.deciding[head.deciding] = number
             head.deciding += 1
-        agent.decides = 0
+    head.marked = 0
+    if head.is_news and not head.is_local:
+        for number in range(len(agents)):
+            if IDLE <= agents[number].status <= WORKING:
+                state.deciding[head.deciding] = number
+                head.deciding += 1
     return head.deciding > 0
 
 
@@ -156,14 +166,14 @@ def look(state: MissionArrays) -> None:
     if not head.is_local:
         refresh(state)
         return
-    is_stale = False
     for place in range(head.deciding):
-        agent = state.agents[state.deciding[place]]
-        if agent.looked != head.turn:
-            agent.looked = head.turn
-            state.looks[state.deciding[place]] = is_stale = True
-    if is_stale:
-        look_around(state)
+        number = state.deciding[place]
+        if state.agents[number].looked != head.turn:
+            state.agents[number].looked = head.turn
+            state.lookers[head.lookers] = number
+            head.lookers += 1
+    if head.lookers:
+        look_around(state, False)
 
 
 @inlined

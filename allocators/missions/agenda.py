@@ -4,7 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from alloc.allocators.missions.layout import OPEN, Agent, Entry, Head, MissionArrays, Task
+from alloc.allocators.missions.layout import OPEN, MissionArrays
+from alloc.allocators.missions.records import Agent, Entry, Head, Task
 from alloc.allocators.runtime.compiled import compiled_in_place, inlined
 from alloc.problems.missions.simulation.agenda import Turn
 

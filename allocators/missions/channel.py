@@ -1,17 +1,19 @@
 """The radio, compiled: see `alloc.problems.missions.simulation.channel`."""
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
 from alloc.allocators.missions.chance import fraction, keyed
-from alloc.allocators.missions.knowledge import Numbers, length
-from alloc.allocators.missions.layout import IDLE, NOBODY, WORKING, Agent, Head, MissionArrays
+from alloc.allocators.missions.grid import cells_near, sort
+from alloc.allocators.missions.knowledge import length
+from alloc.allocators.missions.layout import IDLE, NOBODY, WORKING, MissionArrays, Numbers
 from alloc.allocators.missions.motion import distance_between, place_of
+from alloc.allocators.missions.records import Head
+from alloc.allocators.missions.reports import count_known, hear_of_agents, keep_recent
 from alloc.allocators.runtime.compiled import compiled_in_place
 from alloc.problems.distances.reach import TOLERANCE
-from alloc.problems.fields import BoolArray, FloatArray, IntArray
+from alloc.problems.fields import FloatArray
 from alloc.problems.missions.simulation.reports import BYTES_OF_AGENT, BYTES_OF_MESSAGE, BYTES_OF_TASK
 
 
@@ -38,129 +40,147 @@ def send_all(state: MissionArrays, slot: int) -> bool:
     """Send a message of each agent that can and will, all that it knows; return whether any is heard."""
     head, agents, speaks = state.head[0], state.agents, state.speaks
     for number in range(len(agents)):
-        speaks[number] = state.visible[number] and agents[number].speaks != 0
+        agent = agents[number]
+        speaks[number] = IDLE <= agent.status <= WORKING and agent.speaks != 0
         if speaks[number] and head.silences and is_silent(state, number):
             speaks[number] = False
         if speaks[number]:
-            agents[number].messages += 1
-            agents[number].bytes += BYTES_OF_MESSAGE
-    heard = state.heard[slot]
-    found = find_hearers(head, speaks, state.visible, state.places, heard)
-    of_tasks = state.sent_task_hour[slot], state.sent_task_left[slot]
-    keep(agents, speaks, state.task_hour, state.task_left, of_tasks[0], of_tasks[1], BYTES_OF_TASK)
-    of_agents = state.sent_agent_hour[slot], state.sent_agent_report[slot]
-    keep(agents, speaks, state.agent_hour, state.agent_report, of_agents[0], of_agents[1], BYTES_OF_AGENT)
-    if head.has_burst and found:
-        lose_in_bursts(head, heard, state.link_number, state.link_bad)
+            agent.messages += 1
+            known = BYTES_OF_AGENT * count_known(state.known[number], state.heard_of[number])
+            agent.bytes += BYTES_OF_MESSAGE + BYTES_OF_TASK * count(state.task_hour[number]) + known
+    found = find_senders(state, slot)
+    if found:
+        for number in range(len(agents)):
+            if speaks[number]:
+                keep(state, slot, number)
     head.tick += 1
     return found
 
 
 @compiled_in_place
-def keep(
-    agents: Sequence[Agent],
-    speaks: BoolArray,
-    hour: FloatArray,
-    known: FloatArray | Numbers,
-    sent_hour: FloatArray,
-    sent: FloatArray | Numbers,
-    size: int,
-) -> None:
-    """Keep what agents send of tasks, or of agents, and count its bytes: `size` for each of which anything is known."""
-    for number in range(len(speaks)):
-        if speaks[number]:
-            count = 0
-            hours, values, sent_hours, sent_values = hour[number], known[number], sent_hour[number], sent[number]
-            for one in range(len(hours)):
-                sent_hours[one] = hours[one]
-                sent_values[one] = values[one]
-                count += hours[one] >= 0
-            agents[number].bytes += size * count
+def count(hours: FloatArray) -> int:
+    """Return of how many tasks anything is known."""
+    known = 0
+    for one in range(len(hours)):
+        known += hours[one] >= 0
+    return known
 
 
 @compiled_in_place
-def find_hearers(head: Head, speaks: BoolArray, visible: BoolArray, places: FloatArray, heard: BoolArray) -> bool:
-    """Fill in who will hear the message that each agent sends now; return whether there is anybody."""
-    found = False
-    loss, tick = head.loss, head.tick
-    for sender in range(len(speaks)):
-        hears = heard[sender]
-        if not speaks[sender]:
-            hears[:] = False
-            continue
-        find_near(head.is_manhattan, head.radius, places, sender, visible, hears)
-        hears[sender] = False
-        key = keyed(head.loss_key, sender)
-        for number in range(len(hears)):
-            if hears[number]:
-                hears[number] = not (loss > 0 and fraction(keyed(keyed(key, number), tick)) < loss)
-                found = found or hears[number]
+def keep(state: MissionArrays, slot: int, number: int) -> None:
+    """Keep what an agent sends, but for what nobody uses any more."""
+    hours, left = state.task_hour[number], state.task_left[number]
+    sent_hours, sent_left = state.sent_task_hour[slot, number], state.sent_task_left[slot, number]
+    for one in range(len(hours)):
+        sent_hours[one], sent_left[one] = hours[one], left[one]
+    known, to_who, told = state.known[number], state.sent_agent[slot, number], state.sent_report[slot, number]
+    who, reports = state.known_agent[number], state.known_report[number]
+    state.sent[slot, number] = keep_recent(who, reports, known, state.head[0].oldest, to_who, told)
+    for word in range(state.heard_of.shape[1]):
+        state.sent_of[slot, number, word] = state.heard_of[number, word]
+
+
+@compiled_in_place
+def find_senders(state: MissionArrays, slot: int) -> bool:
+    """Fill in whom each agent will hear of those that send now; return whether anybody hears anybody.
+
+    What is lost in bursts counts as heard in that.
+    """
+    head, found, begin = state.head[0], False, 0
+    for number in range(len(state.agents)):
+        state.first_sender[slot, number] = begin
+        end = begin
+        if IDLE <= state.agents[number].status <= WORKING:
+            end = find_near(state, number, begin, state.sender[slot])
+        found = found or end > begin
+        if head.has_burst:
+            end = lose_in_bursts(head, state.sender[slot], begin, end, number, state.links)
+        state.senders[slot, number] = end - begin
+        if len(state.cells) > 2:
+            sort(state.sender[slot], begin, end - begin)
+        begin = end
     return found
 
 
 @compiled_in_place
-def find_near(
-    is_manhattan: int, radius: float, places: FloatArray, sender: int, visible: BoolArray, is_near: BoolArray
-) -> None:
-    """Fill in which agents in the mission are within the radius of one of them."""
-    at_x, at_y, at_z = places[0], places[1], places[2]
-    x, y, z = at_x[sender], at_y[sender], at_z[sender]
-    for number in range(len(is_near)):
-        far = length(is_manhattan, at_x[number] - x, at_y[number] - y, at_z[number] - z) > radius + TOLERANCE
-        is_near[number] = visible[number] & (not far)
+def find_near(state: MissionArrays, number: int, end: int, near: Numbers) -> int:
+    """Fill in who sends within the radius of an agent, but for those that are lost; return where they end."""
+    head, at_x, at_y, at_z = state.head[0], state.places[0], state.places[1], state.places[2]
+    x, y, z = at_x[number], at_y[number], at_z[number]
+    radius, is_manhattan = head.radius + TOLERANCE, head.is_manhattan
+    first, last, low, high = cells_near(head, x, y, radius)
+    for row in range(low, high + 1):
+        for place in range(state.cells[row * head.columns + first], state.cells[row * head.columns + last + 1]):
+            other = state.in_cells[place]
+            if not state.speaks[other] or other == number:
+                continue
+            if length(is_manhattan, at_x[other] - x, at_y[other] - y, at_z[other] - z) > radius:
+                continue
+            if head.loss > 0:
+                key = keyed(keyed(keyed(head.loss_key, other), number), head.tick)
+                if fraction(key) < head.loss:
+                    continue
+            near[end] = other
+            end += 1
+    return end
 
 
 @compiled_in_place
-def lose_in_bursts(head: Head, heard: BoolArray, number: IntArray, bad: IntArray) -> None:
-    """Lose messages of this tick by the state of each link."""
-    for sender in range(len(heard)):
-        for hearer in range(len(heard)):
-            if heard[sender, hearer]:
-                is_bad = is_link_bad(head, sender, hearer, number, bad)
-                key = keyed(keyed(keyed(keyed(head.loss_key, sender), hearer), head.tick), 1)
-                loss = head.burst_loss_bad if is_bad else head.burst_loss_good
-                heard[sender, hearer] = fraction(key) >= loss
+def lose_in_bursts(head: Head, senders: Numbers, begin: int, end: int, hearer: int, links: Numbers) -> int:
+    """Lose messages of this tick to one agent by the state of each link; return where those end that are left."""
+    kept = begin
+    for place in range(begin, end):
+        sender = senders[place]
+        key = keyed(keyed(keyed(keyed(head.loss_key, sender), hearer), head.tick), 1)
+        loss = head.burst_loss_bad if is_link_bad(head, sender, hearer, links) else head.burst_loss_good
+        senders[kept] = sender
+        kept += fraction(key) >= loss
+    return kept
 
 
 @compiled_in_place
-def is_link_bad(head: Head, sender: int, hearer: int, number: IntArray, bad: IntArray) -> bool:
+def is_link_bad(head: Head, sender: int, hearer: int, links: Numbers) -> bool:
     """Whether a link is bad now; a Markov chain over all messages up to this one, whether sent or not."""
     key = keyed(keyed(head.burst_key, sender), hearer)
     share = head.burst_bad / (head.burst_good + head.burst_bad)
-    is_bad = bad[sender, hearer]
-    for step in range(number[sender, hearer] + 1, head.tick + 1):
+    is_bad = links[sender, hearer] & 1
+    for step in range(links[sender, hearer] >> 1, head.tick + 1):
         hours = head.period if step else np.inf
         forgotten = -math.expm1(-hours * (1 / head.burst_good + 1 / head.burst_bad))
         is_bad = int(fraction(keyed(key, step)) < share + (is_bad - share) * (1 - forgotten))
-    number[sender, hearer], bad[sender, hearer] = head.tick, is_bad
+    links[sender, hearer] = 2 * (head.tick + 1) + is_bad
     return bool(is_bad != 0)
 
 
 @compiled_in_place
 def deliver(state: MissionArrays, slot: int) -> None:
     """Let all hear what was sent to them."""
-    head, heard = state.head[0], state.heard[slot]
-    for number in range(len(state.agents)):
+    head, senders = state.head[0], state.senders[slot]
+    for place in range(len(state.agents)):
+        number = state.in_cells[place]  # those near each other in turn: they hear the same
+        if not senders[number]:
+            continue
         is_there = IDLE <= state.agents[number].status <= WORKING
         if not is_there or (head.silences and is_silent(state, number)):
-            heard[:, number] = False
-    hear(heard, state.sent_task_hour[slot], state.sent_task_left[slot], state.task_hour, state.task_left)
-    hear(heard, state.sent_agent_hour[slot], state.sent_agent_report[slot], state.agent_hour, state.agent_report)
+            senders[number] = 0
+            continue
+        hear_of_tasks(state, slot, number)
+        hear_of_agents(state, slot, number)
+    state.sent[slot] = 0
 
 
 @compiled_in_place
-def hear(
-    heard: BoolArray, told_hour: FloatArray, told: FloatArray | Numbers, hour: FloatArray, known: FloatArray | Numbers
-) -> None:
-    """Take over what is newer in messages than what is known of tasks, or of agents."""
-    for sender in range(len(heard)):
-        for number in range(len(heard)):
-            if heard[sender, number]:
-                take_over(told_hour[sender], told[sender], hour[number], known[number])
+def hear_of_tasks(state: MissionArrays, slot: int, number: int) -> None:
+    """Let an agent take over what is newer in the messages that it hears than what it knows of tasks."""
+    first = state.first_sender[slot, number]
+    hours, left = state.task_hour[number], state.task_left[number]
+    for place in range(first, first + state.senders[slot, number]):
+        sender = state.sender[slot, place]
+        take_over(state.sent_task_hour[slot, sender], state.sent_task_left[slot, sender], hours, left)
 
 
 @compiled_in_place
-def take_over(told_hour: FloatArray, told: FloatArray | Numbers, hour: FloatArray, known: FloatArray | Numbers) -> None:
+def take_over(told_hour: FloatArray, told: FloatArray, hour: FloatArray, known: FloatArray) -> None:
     """Take over from one message what is newer than what one agent knows."""
     for one in range(len(hour)):
         if told_hour[one] > hour[one]:

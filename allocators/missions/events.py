@@ -12,7 +12,7 @@ from alloc.allocators.missions.layout import (
     MissionArrays,
 )
 from alloc.allocators.missions.motion import bring_up_to_date
-from alloc.allocators.missions.orders import close, note_agent, note_task, stand_still
+from alloc.allocators.missions.orders import close, let_decide, note_agent, note_task, stand_still
 from alloc.allocators.runtime.compiled import compiled_in_place
 
 JOINS, FAILS, RECALLED, RETURNS, RECHARGES, APPEARS, CANCELS, CHANGES, SILENT = range(9)
@@ -32,7 +32,7 @@ def happen(state: MissionArrays, number: int) -> None:
         left = agent.task
         happen_to_agent(state, event.agent, event.kind, event.amount)
         note_agent(state, event.agent, left)
-        agent.decides = 1
+        let_decide(state, event.agent)
     else:
         happen_to_task(state, event.task, event.kind, event.amount)
         note_task(state, event.task)

@@ -1,72 +1,42 @@
-"""What agents see and hear, compiled: see `alloc.problems.missions.simulation.awareness`."""
+"""What agents see, compiled: see `alloc.problems.missions.simulation.awareness`."""
 
 import math
 from collections.abc import Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
-from alloc.allocators.missions.layout import (
-    ABSENT,
-    IDLE,
-    NOBODY,
-    OPEN,
-    TO_COME,
-    TO_TASK,
-    WORKING,
-    Agent,
-    Head,
-    MissionArrays,
-    Report,
-    Task,
-)
-from alloc.allocators.missions.motion import battery_of, place_of, work_left
+from alloc.allocators.missions.grid import SLACK, cells_near, drift, locate
+from alloc.allocators.missions.layout import ABSENT, IDLE, OPEN, TO_COME, WORKING, MissionArrays
+from alloc.allocators.missions.motion import place_of, work_left
+from alloc.allocators.missions.records import Agent, Head, Task
+from alloc.allocators.missions.reports import drop_unknown, learn, report_now, write_report
 from alloc.allocators.runtime.compiled import compiled_in_place, inlined
 from alloc.problems.distances.reach import TOLERANCE
 from alloc.problems.fields import BoolArray, FloatArray
 
-Numbers = NDArray[np.int32]
-
-INVISIBLE = -9.0
-"""What is seen of a task that is to come."""
-
 
 @compiled_in_place
-def look_around(state: MissionArrays) -> None:
-    """Let all agents that are to look around see all tasks and all agents in the mission within the sensing radius."""
-    head, agents = state.head[0], state.agents
-    if head.reports + len(agents) > len(state.reports):
+def look_around(state: MissionArrays, is_located: bool) -> None:
+    """Let those that are to look around see all tasks and all agents in the mission within the sensing radius.
+
+    Parameters
+    ----------
+    state : MissionArrays
+    is_located : bool
+        Whether the grid is to say where agents are now.
+    """
+    head = state.head[0]
+    if head.reports + len(state.agents) > head.limit:
         drop_unknown(state)
-    for number in range(len(agents)):
-        agent = agents[number]
-        state.visible[number] = IDLE <= agent.status <= WORKING
-        if state.visible[number]:
-            agent.report = head.reports
-            write_report(head, agent, state.reports[head.reports])
-            head.reports += 1
-    locate(head, agents, state.places, state.numbers)
-    for number in range(len(state.tasks)):
-        state.now[number] = seen_of(head, agents, state.tasks[number], number)
-    see_tasks(head, state.looks, state.places, state.sites, state.now, state.task_hour, state.task_left)
-    seen = state.visible, state.numbers, state.agent_hour, state.agent_report
-    see_agents(head, state.looks, state.places, seen[0], seen[1], seen[2], seen[3])
-    state.looks[:] = False
-
-
-@compiled_in_place
-def locate(head: Head, agents: Sequence[Agent], places: FloatArray, reports: Numbers) -> None:
-    """Fill in where all agents are, and their last reports."""
-    for number in range(len(agents)):
-        places[0, number], places[1, number], places[2, number] = place_of(agents[number], head.hour)
-        reports[number] = agents[number].report
-
-
-@compiled_in_place
-def seen_of(head: Head, agents: Sequence[Agent], task: Task, number: int) -> float:
-    """Return the work left of a task, minus its status where it is closed."""
-    if task.status == OPEN:
-        return work_left(head, agents, task, number)
-    return INVISIBLE if task.status == TO_COME else -float(task.status)
+    head.looks += 1
+    is_located = is_located or not drift(head) <= head.side
+    if is_located:
+        locate(head, state.agents, state.places, state.cells, state.in_cells)
+    for place in range(head.lookers):
+        number = state.lookers[place]
+        x, y, z = place_of(state.agents[number], head.hour)
+        find_near_tasks(head, x, y, z, state.sites, state.is_near)
+        see_tasks(state, number)
+        see_agents(state, number, (x, y, z), is_located)
+    head.lookers = 0
 
 
 @inlined
@@ -76,93 +46,58 @@ def length(is_manhattan: int, dx: float, dy: float, dz: float) -> float:
 
 
 @compiled_in_place
-def see_tasks(
-    head: Head,
-    looks: BoolArray,
-    places: FloatArray,
-    sites: FloatArray,
-    now: FloatArray,
-    task_hour: FloatArray,
-    task_left: FloatArray,
-) -> None:
-    """Take notice of the tasks that agents see."""
+def find_near_tasks(head: Head, x: float, y: float, z: float, sites: FloatArray, is_near: BoolArray) -> None:
+    """Fill in which tasks lie within the sensing radius of a place."""
     at_x, at_y, at_z = sites[0], sites[1], sites[2]
-    sensing, hour, is_manhattan = head.sensing + TOLERANCE, head.hour, head.is_manhattan
-    for number in range(len(looks)):
-        if looks[number]:
-            x, y, z = places[0, number], places[1, number], places[2, number]
-            for task in range(len(now)):
-                is_far = length(is_manhattan, at_x[task] - x, at_y[task] - y, at_z[task] - z) > sensing
-                if not is_far and now[task] != INVISIBLE:
-                    task_hour[number, task] = hour
-                    task_left[number, task] = now[task]
+    sensing, is_manhattan = head.sensing + TOLERANCE, head.is_manhattan
+    for task in range(len(is_near)):
+        is_near[task] = not length(is_manhattan, at_x[task] - x, at_y[task] - y, at_z[task] - z) > sensing
 
 
 @compiled_in_place
-def see_agents(
-    head: Head,
-    looks: BoolArray,
-    places: FloatArray,
-    visible: BoolArray,
-    reports: Numbers,
-    agent_hour: FloatArray,
-    agent_report: Numbers,
-) -> None:
-    """Take notice of the agents that agents see."""
-    at_x, at_y, at_z = places[0], places[1], places[2]
-    sensing, hour, is_manhattan = head.sensing + TOLERANCE, head.hour, head.is_manhattan
-    for number in range(len(looks)):
-        if looks[number]:
-            x, y, z = at_x[number], at_y[number], at_z[number]
-            for other in range(len(visible)):
-                is_far = length(is_manhattan, at_x[other] - x, at_y[other] - y, at_z[other] - z) > sensing
-                if not is_far and visible[other]:
-                    agent_hour[number, other] = hour
-                    agent_report[number, other] = reports[other]
+def see_tasks(state: MissionArrays, number: int) -> None:
+    """Take notice of the tasks that an agent sees."""
+    head, hours, left = state.head[0], state.task_hour[number], state.task_left[number]
+    for at in range(len(state.is_near)):
+        if state.is_near[at]:
+            task = state.tasks[at]
+            if task.status == TO_COME:
+                continue
+            if task.seen != head.looks:
+                task.seen, task.now = head.looks, seen_of(head, state.agents, task, at)
+            hours[at], left[at] = head.hour, task.now
 
 
 @compiled_in_place
-def write_report(head: Head, agent: Agent, report: Report) -> None:
-    """Write a report of an agent."""
-    report.x, report.y, report.z = place_of(agent, head.hour)
-    report.status, report.battery = agent.status, battery_of(agent, head.hour)
-    report.task = agent.order_task if agent.order == TO_TASK else NOBODY
+def seen_of(head: Head, agents: Sequence[Agent], task: Task, number: int) -> float:
+    """Return the work left of a task, minus its status where it is closed."""
+    return work_left(head, agents, task, number) if task.status == OPEN else -float(task.status)
 
 
 @compiled_in_place
-def drop_unknown(state: MissionArrays) -> None:
-    """Make room where no more reports can be kept: drop those that nobody knows any more."""
-    head = state.head[0]
-    number = state.renumbered
-    number[:] = NOBODY
-    for known in state.agent_report.flat:
-        if known != NOBODY:
-            number[known] = 0
-    for known in state.sent_agent_report.flat:
-        if known != NOBODY:
-            number[known] = 0
-    kept = 0
-    for place in range(len(number)):
-        if number[place] != NOBODY:
-            number[place] = kept
-            if kept != place:
-                one, other = state.reports[kept], state.reports[place]
-                one.status, one.x, one.y, one.z = other.status, other.x, other.y, other.z
-                one.battery, one.task = other.battery, other.task
-            kept += 1
-    if kept + len(state.agents) > len(number):
-        raise OverflowError("a compiled mission has no room for what agents know")
-    head.reports = kept
-    renumber(state.agent_report.reshape(-1), number)
-    renumber(state.sent_agent_report.reshape(-1), number)
-
-
-@compiled_in_place
-def renumber(known: Numbers, number: Numbers) -> None:
-    """Replace numbers of reports by new ones."""
-    for place in range(len(known)):
-        if known[place] != NOBODY:
-            known[place] = number[known[place]]
+def see_agents(state: MissionArrays, number: int, here: tuple[float, float, float], is_located: bool) -> None:
+    """Take notice of the agents that an agent sees; `is_located` if the grid says where they are now."""
+    head, at_x, at_y, at_z = state.head[0], state.places[0], state.places[1], state.places[2]
+    x, y, z = here
+    sensing, is_manhattan = head.sensing + TOLERANCE, head.is_manhattan
+    reach = sensing if is_located else (sensing + drift(head)) * (1 + SLACK)
+    first, last, low, high = cells_near(head, x, y, reach)
+    for row in range(low, high + 1):
+        begin, end = state.cells[row * head.columns + first], state.cells[row * head.columns + last + 1]
+        for place in range(begin, end):
+            other = state.in_cells[place]
+            if length(is_manhattan, at_x[other] - x, at_y[other] - y, at_z[other] - z) > reach:
+                continue
+            agent = state.agents[other]
+            if not IDLE <= agent.status <= WORKING:
+                continue
+            if not is_located:
+                at = place_of(agent, head.hour)
+                if length(is_manhattan, at[0] - x, at[1] - y, at[2] - z) > sensing:
+                    continue
+            if agent.reported != head.looks:
+                report_now(state, agent)
+            learn(state, number, other, agent.report)
 
 
 @compiled_in_place
@@ -181,6 +116,5 @@ def refresh(state: MissionArrays) -> None:
 @compiled_in_place
 def tell_all(state: MissionArrays, number: int) -> None:
     """Let all know what is so of an agent now."""
-    write_report(state.head[0], state.agents[number], state.reports[number])
-    state.agent_hour[0, number] = state.head[0].hour
-    state.agent_report[0, number] = number
+    write_report(state, state.agents[number], state.reports[number])
+    learn(state, 0, number, number)

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from alloc.allocators.missions.chance import fraction, keyed
-from alloc.allocators.missions.layout import FLYING, IDLE, NOBODY, OPEN, WORKING, Agent, Head, Task
+from alloc.allocators.missions.layout import FLYING, IDLE, NOBODY, OPEN, WORKING
+from alloc.allocators.missions.records import Agent, Head, Task
 from alloc.allocators.runtime.compiled import compiled_in_place
 from alloc.problems.distances.reach import TOLERANCE
 

@@ -15,7 +15,6 @@ from alloc.allocators.missions.layout import (
     TO_PLACE,
     TO_TASK,
     WORKING,
-    Agent,
     MissionArrays,
 )
 from alloc.allocators.missions.motion import (
@@ -31,6 +30,7 @@ from alloc.allocators.missions.motion import (
     stop_work,
     work_left,
 )
+from alloc.allocators.missions.records import Agent
 from alloc.allocators.runtime.compiled import compiled_in_place, inlined
 from alloc.problems.missions.simulation.agenda import Turn
 
@@ -57,6 +57,16 @@ def note_agent(state: MissionArrays, number: int, left: int) -> None:
         head.changed_agents += 1
     note_task(state, left)
     note_task(state, agent.task)
+
+
+@compiled_in_place
+def let_decide(state: MissionArrays, number: int) -> None:
+    """Note that an agent is to decide as soon as all of this hour has happened."""
+    agent, head = state.agents[number], state.head[0]
+    if not agent.decides:
+        agent.decides = 1
+        state.marked[head.marked] = number
+        head.marked += 1
 
 
 @compiled_in_place
@@ -102,7 +112,8 @@ def close(state: MissionArrays, number: int, status: int) -> None:
     task.first = task.last = NOBODY
     while worker != NOBODY:
         agent = state.agents[worker]
-        agent.task, agent.status, agent.order, agent.decides = NOBODY, IDLE, STAY, 1
+        agent.task, agent.status, agent.order = NOBODY, IDLE, STAY
+        let_decide(state, worker)
         note_agent(state, worker, NOBODY)
         worker = agent.next
 

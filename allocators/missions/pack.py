@@ -7,9 +7,10 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from alloc.allocators.missions import layout
 from alloc.allocators.missions.chance import first_key, keyed
-from alloc.allocators.missions.layout import NOBODY, MissionArrays, record_type
+from alloc.allocators.missions.grid import divide
+from alloc.allocators.missions.layout import NOBODY, MissionArrays
+from alloc.allocators.missions.records import Agent, Entry, Happening, Head, Report, Task, record_type
 from alloc.problems.errors import RefusedError
 from alloc.problems.fields import BoolArray, FloatArray
 from alloc.problems.missions.chance import BURST, LOSS, PACE
@@ -25,14 +26,22 @@ from alloc.problems.vocabulary import GEOGRAPHIC, MANHATTAN, Knowledge
 Records = NDArray[np.void]
 
 MOST_KNOWN = 50_000_000
-"""Pairs of who knows and what is known up to which a mission is simulated."""
+"""Pairs of agents and tasks, each once for an agent and once for a message on the air, up to which missions are run."""
 
+MOST_PAIRS = 1_000_000_000
+"""Likewise of agents, that may know each other: 8 bytes of memory for each that does."""
+
+MOST_REPORTS = 4_000_000
+"""Reports of agents for which there is room, where agents are not so many that each may need more than a hundredth."""
 
 LEAST_COLUMNS, COLUMNS = 40, 8
 """What is known stands in rows of a multiple of so many columns, as processors compare several at once."""
 
+EMPTY = ("reports", "renumbered", "known_", "sent_", "sender", "links")
+"""How the names of arrays begin that are empty at hour 0: they take up memory only where they are filled."""
 
-def pack(mission: Mission, knowledge: Knowledge | str | None = None) -> MissionArrays:
+
+def pack(mission: Mission, knowledge: Knowledge | str | None = None, memory: float = math.inf) -> MissionArrays:
     """Return a mission at hour 0 for compiled code; `begun` makes it ready for a run.
 
     Parameters
@@ -40,6 +49,9 @@ def pack(mission: Mission, knowledge: Knowledge | str | None = None) -> MissionA
     mission : Mission
     knowledge : {"full", "local"}, optional
         That of the mission by default.
+    memory : float
+        Hours after which the policy uses nothing that was heard of other agents; it is forgotten then, but for the
+        bytes of messages.
 
     Raises
     ------
@@ -51,49 +63,63 @@ def pack(mission: Mission, knowledge: Knowledge | str | None = None) -> MissionA
         raise RefusedError("the compiled simulation has neither geographic distances nor tables of distances")
     known = mission.knowledge if knowledge is None else Knowledge(knowledge)
     n, m = instance.n, instance.m
-    wide_n, wide_m = (max(LEAST_COLUMNS, -(-count // COLUMNS) * COLUMNS) for count in (n, m))
     rows, slots = (n, _on_the_air(mission.radio)) if known is Knowledge.LOCAL else (1, 0)
-    if (rows + slots * n) * (n + m) > MOST_KNOWN:
+    if max((rows + slots * n) * m / MOST_KNOWN, (1 + slots) * n * n / MOST_PAIRS) > 1:
         raise RefusedError(f"{n} agents and {m} tasks are too many for the compiled simulation with local knowledge")
-    agents, tasks, events = _agents(mission, known), _tasks(mission), _events(mission)
+    tasks, events = _tasks(mission), _events(mission)
     deadlines = np.flatnonzero(np.isfinite(mission.deadline))
-    agenda = _agenda(mission, deadlines, known, slots)
-    reports = 2 * (rows + slots) * n + 2 * n + 1024 if known is Knowledge.LOCAL else n
+    reports = n
+    if known is Knowledge.LOCAL:
+        reports = min(2 * (rows + slots) * n + 2 * n + 1024, max(MOST_REPORTS, 400 * n))
     head = _head(mission, known, len(events) + len(deadlines) + (known is Knowledge.LOCAL))
+    head["memory"], head["limit"] = memory, min(reports, 32 * n + 1024)
     parts = {
         "head": head,
-        "agents": agents,
+        "agents": _agents(mission, known),
         "tasks": tasks,
         "events": events,
-        "agenda": agenda,
-        "reports": np.zeros(reports, record_type(layout.Report)),
+        "agenda": _agenda(mission, deadlines, known, slots),
+        "reports": np.zeros(reports, record_type(Report)),
         "renumbered": np.zeros(reports, np.int32),
         "allowed": _allowed(mission),
         "area": np.array(mission.area),
         "sites": np.ascontiguousarray(instance.task_position.T),
         "places": np.ascontiguousarray(instance.start_position.T),
-        "visible": np.zeros(n, np.bool_),
-        "now": np.zeros(m),
-        "looks": np.zeros(n, np.bool_),
+        "cells": divide(mission, head),
+        "in_cells": np.arange(n, dtype=np.int32),
+        "is_near": np.zeros(m, np.bool_),
         "speaks": np.zeros(n, np.bool_),
-        "numbers": np.zeros(n, np.int32),
-        "task_hour": np.full((rows, wide_m), -1.0),
-        "task_left": np.zeros((rows, wide_m)),
-        "agent_hour": np.full((rows, wide_n), -1.0),
-        "agent_report": np.full((rows, wide_n), NOBODY, np.int32),
-        "sent_task_hour": np.full((slots, n, wide_m), -1.0),
-        "sent_task_left": np.zeros((slots, n, wide_m)),
-        "sent_agent_hour": np.full((slots, n, wide_n), -1.0),
-        "sent_agent_report": np.full((slots, n, wide_n), NOBODY, np.int32),
-        "heard": np.zeros((slots, n, n), np.bool_),
-        "link_number": np.full((n, n) if mission.radio.burst else (0, 0), -1),
-        "link_bad": np.zeros((n, n) if mission.radio.burst else (0, 0), np.intp),
+        "newest": np.full(n, NOBODY, np.int32),
+        **_knowledge(n, m, rows, slots, words=-(-n // 64) if memory < mission.end else 0),
+        "links": np.zeros((n, n) if mission.radio.burst else (0, 0), np.int32),
         "silences": np.zeros(len(events), np.intp),
-        "deciding": np.zeros(n, np.intp),
-        "changed_agents": np.zeros(n, np.intp),
+        **{name: np.zeros(n, np.intp) for name in ("lookers", "marked", "deciding", "changed_agents")},
         "changed_tasks": np.zeros(m, np.intp),
     }
     return MissionArrays(**{name: _by_attribute(part) for name, part in parts.items()})  # type: ignore[arg-type]
+
+
+def _knowledge(n: int, m: int, rows: int, slots: int, words: int) -> dict[str, FloatArray]:
+    """Return what agents know, and the messages that are on the air."""
+    wide = max(LEAST_COLUMNS, -(-m // COLUMNS) * COLUMNS)
+    known: dict[str, NDArray[np.generic]] = {
+        "task_hour": np.full((rows, wide), -1.0),
+        "task_left": np.zeros((rows, wide)),
+        "known": np.zeros(rows, np.int32),
+        "known_agent": np.zeros((rows, n), np.int32),
+        "known_report": np.zeros((rows, n), np.int32),
+        "heard_of": np.zeros((rows, words), np.intp),
+        "sent_task_hour": np.zeros((slots, n, wide)),
+        "sent_task_left": np.zeros((slots, n, wide)),
+        "sent": np.zeros((slots, n), np.int32),
+        "sent_agent": np.zeros((slots, n, n), np.int32),
+        "sent_report": np.zeros((slots, n, n), np.int32),
+        "sent_of": np.zeros((slots, n, words), np.intp),
+        "senders": np.zeros((slots, n), np.int32),
+        "first_sender": np.zeros((slots, n), np.intp),
+        "sender": np.zeros((slots, n * n), np.int32),
+    }
+    return cast(dict[str, FloatArray], known)
 
 
 def _on_the_air(radio: Radio) -> int:
@@ -110,10 +136,16 @@ def begun(packed: MissionArrays, seed: int = 0) -> MissionArrays:
     seed : int
         Of the radio's chances, beside that of the mission.
     """
-    state = MissionArrays(*(cast(FloatArray, part).copy() for part in packed))  # type: ignore[arg-type]
+    parts = {name: _fresh(part) if name.startswith(EMPTY) else part.copy() for name, part in packed._asdict().items()}
+    state = MissionArrays(**parts)
     head = state.head[0]
     head.loss_key, head.burst_key = keyed(head.loss_key, seed), keyed(head.burst_key, seed)
     return state
+
+
+def _fresh(part: Records | FloatArray) -> Records | FloatArray:
+    """Return an empty array like another one."""
+    return _by_attribute(np.zeros(part.shape, part.dtype))
 
 
 def records(part: object) -> Records:
@@ -128,7 +160,7 @@ def _by_attribute(part: Records | FloatArray) -> Records | FloatArray:
 
 def _head(mission: Mission, knowledge: Knowledge, entries: int) -> Records:
     radio, pace, burst = mission.radio, mission.pace, mission.radio.burst
-    head = np.zeros(1, record_type(layout.Head))
+    head = np.zeros(1, record_type(Head))
     values: dict[str, float] = {
         "end": mission.end,
         "span": math.dist(*mission.area),
@@ -156,7 +188,7 @@ def _head(mission: Mission, knowledge: Knowledge, entries: int) -> Records:
 
 def _agents(mission: Mission, knowledge: Knowledge) -> Records:
     instance = mission.instance
-    agents = np.zeros(instance.n, record_type(layout.Agent))
+    agents = np.zeros(instance.n, record_type(Agent))
     agents["ability"], agents["speed"], agents["returns"] = instance.ability, instance.speed, instance.returns
     agents["energy_per_distance"] = instance.agent_energy_per_distance
     agents["range"] = instance.communication_range
@@ -167,14 +199,14 @@ def _agents(mission: Mission, knowledge: Knowledge) -> Records:
     agents["battery"] = agents["capacity"] = instance.battery
     for name in ("task", "previous", "next", "order_task", "report"):
         agents[name] = NOBODY
-    agents["speaks"] = 1
+    agents["speaks"], agents["seen"] = 1, -1.0
     agents["known"] = np.arange(instance.n) if knowledge is Knowledge.LOCAL else 0
     return agents
 
 
 def _tasks(mission: Mission) -> Records:
     instance = mission.instance
-    tasks = np.zeros(instance.m, record_type(layout.Task))
+    tasks = np.zeros(instance.m, record_type(Task))
     tasks["workload"], tasks["priority"] = instance.workload, instance.priority
     for axis, name in enumerate("xyz"):
         tasks[name] = instance.task_position[:, axis]
@@ -186,7 +218,7 @@ def _tasks(mission: Mission) -> Records:
 
 
 def _events(mission: Mission) -> Records:
-    events = np.zeros(len(mission.timeline), record_type(layout.Happening))
+    events = np.zeros(len(mission.timeline), record_type(Happening))
     kinds = list(EventKind)
     for row, event in zip(events, mission.timeline, strict=True):
         row["hour"], row["kind"] = event.hour, kinds.index(event.kind)
@@ -213,7 +245,7 @@ def _agenda(mission: Mission, deadlines: NDArray[np.intp], knowledge: Knowledge,
     if knowledge is Knowledge.LOCAL:
         rows.append((0.0, int(Turn.RADIO), 0))
     least = len(rows) + slots + mission.instance.n + mission.instance.m
-    agenda = np.zeros(2 * least + 64, record_type(layout.Entry))
+    agenda = np.zeros(2 * least + 64, record_type(Entry))
     ordered = sorted((hour, turn, count, item) for count, (hour, turn, item) in enumerate(rows, 1))
     for row, (hour, turn, count, item) in zip(agenda, ordered, strict=False):
         row["hour"], row["turn"], row["count"], row["subject"] = hour, turn, count, item

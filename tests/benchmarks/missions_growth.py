@@ -13,8 +13,9 @@ import time
 from pathlib import Path
 
 import matplotlib.pyplot as plt
-from missions_local import in_compiled_loops
 
+from alloc.allocators import load_policy
+from alloc.allocators.online.compiled.run import run_compiled
 from alloc.problems.missions.families.draw import random_mission
 from alloc.problems.missions.families.parameters import MissionParameters
 from alloc.problems.missions.mission import Mission
@@ -41,11 +42,11 @@ def main() -> None:
     print("|--:|--:|--:|---|--:|--:|--:|--:|")
     figure, axes = plt.subplots()
     for policy in given.policies:
-        in_compiled_loops(mission(10, 10), policy, 0)  # compiles
+        run_compiled(mission(10, 10), load_policy(policy))  # compiles
         taken: list[float] = []
         for agents in given.agents:
             drawn, began = mission(agents, given.tasks), time.process_time()
-            result = in_compiled_loops(drawn, policy, 0)
+            result = run_compiled(drawn, load_policy(policy))
             taken.append(time.process_time() - began)
             events = sum(event.hour > 0 for event in drawn.timeline)
             before = math.nan if len(taken) < 2 else given.agents[len(taken) - 2]

@@ -2,15 +2,17 @@
 
     python tests/benchmarks/missions_local.py --csv docs/missions/missions.csv
     python tests/benchmarks/missions_local.py --csv new.csv --missions 5 --rows "20/40;10/40" --first-seed 4000000000
+    python tests/benchmarks/missions_local.py --csv docs/missions/missions.csv --again "gappo;gappo[periods=1]"
 
 Half of the missions of a row are of the family `steady`, half of `failures`; all policies meet the same. They run in
 compiled loops, with the measures of the reference. The CSV has a line for each mission; one that is there is not run
-again, so that an interrupted benchmark goes on. The table has, of mission times and energy, the mean difference of
+again, so that an interrupted benchmark goes on; `--again` runs policies anew that have changed. The table has, of
 `gappo` from each other policy in per cent, paired, with its 95 % interval (Student's t).
 """
 
 import argparse
 import csv
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -59,10 +61,10 @@ def drawn(
     )
 
 
-def measured(mission: Mission, seed: int) -> dict[str, str]:
-    """Return the columns of a mission."""
+def measured(mission: Mission, seed: int, labels: Sequence[str] = POLICIES) -> dict[str, str]:
+    """Return the columns of some policies in a mission."""
     found = {}
-    for label in POLICIES:
+    for label in labels:
         name, _, periods = label.rstrip("]").partition("[periods=")
         result = run_compiled(mission, load_policy(name, **({"periods": int(periods)} if periods else {})), seed)
         values = [getattr(result, measure) for measure in MEASURES]
@@ -99,6 +101,7 @@ def main() -> None:
     parser.add_argument("--missions", type=int, default=100)
     parser.add_argument("--rows", default="", help="names, with a semicolon between them; all by default")
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED)
+    parser.add_argument("--again", default="", help="policies to run anew, with a semicolon between them")
     given = parser.parse_args()
     names = given.rows.split(";") if given.rows else list(ROWS)
     header = ["missions", "number", *(f"{policy} {measure}" for policy in POLICIES for measure in MEASURES)]
@@ -106,6 +109,14 @@ def main() -> None:
         given.csv.write_text(",".join(header) + "\n")
     with given.csv.open(newline="") as file:
         done: Lines = {(line["missions"], int(line["number"])): line for line in csv.DictReader(file)}
+    if given.again:
+        for (name, number), line in done.items():
+            mission = drawn(given.first_seed + number, **ROWS[name])
+            line |= measured(mission, number, given.again.split(";"))
+        with given.csv.open("w", newline="") as file:
+            writer = csv.DictWriter(file, header, lineterminator="\n")
+            writer.writeheader()
+            writer.writerows(done.values())
     for number in range(given.missions):  # all rows grow together
         for name in names:
             if (name, number) not in done:

@@ -14,31 +14,33 @@ import time
 
 import numpy as np
 
-from alloc.allocators import RefusedError, describe, load, names, solve
+from alloc.allocators import Allocator, RefusedError, describe, load, names, solve
 from alloc.problems import Instance
 from alloc.problems.generate import paper, paper_like
 
 SIZES = {"30/8": paper_like(30, 8, 120, seed=1), "100/20": paper(1, seed=1), "500/50": paper(4, seed=1)}
 LIMITS_MS = (20, 50, 100)
-OBJECTIVE = "makespan-energy"
+GOAL = "makespan-energy"
 """With energy no method is done at once."""
 
 
-def overshoot_ms(instance: Instance, method: object, limit_ms: float, calls: int) -> np.ndarray:
-    """Return the milliseconds beyond the limit of so many calls; negative where the method was done before."""
+def overshoot(instance: Instance, method: Allocator, limit_ms: float, calls: int) -> str:
+    """Return p50, p99 and worst of the milliseconds beyond the limit."""
     times = []
-    for seed in range(calls):
+    for seed in range(-2, calls):  # the first two are in vain
         begin = time.monotonic()
-        solve(instance, method, objective=OBJECTIVE, time_limit_s=limit_ms / 1000, seed=seed, threads=1)
+        try:
+            solve(instance, method, objective=GOAL, time_limit_s=limit_ms / 1000, seed=abs(seed), threads=1)
+        except RefusedError:
+            return "refused"
         times.append(1000 * (time.monotonic() - begin) - limit_ms)
-    return np.array(times)
+    return "{:.1f}, {:.1f}, {:.1f}".format(*np.percentile(times[2:], [50, 99, 100]))
 
 
-def main() -> None:
-    """Print the table."""
+if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--calls", type=int, default=1000)
-    parser.add_argument("--methods", default=",".join(name for name in names() if describe(name).anytime))
+    parser.add_argument("--methods", nargs="+", default=[name for name in names() if describe(name).anytime])
     parser.add_argument("--processor", action="store_true", help="processor time")
     options = parser.parse_args()
     if options.processor:
@@ -47,19 +49,7 @@ def main() -> None:
     print("| method | size | " + " | ".join(f"{limit} ms: p50, p99, worst" for limit in LIMITS_MS) + " |")
     print("|---" * (2 + len(LIMITS_MS)) + "|")
     gc.freeze()
-    for name in options.methods.split(","):
+    for name, (size, instance) in ((name, one) for name in options.methods for one in SIZES.items()):
         method = load(name)
-        for size, instance in SIZES.items():
-            cells = []
-            for limit in LIMITS_MS:
-                try:
-                    overshoot_ms(instance, method, limit, 2)
-                    late = overshoot_ms(instance, method, limit, options.calls)
-                    cells.append("{:.1f}, {:.1f}, {:.1f}".format(*np.percentile(late, [50, 99, 100])))
-                except RefusedError:
-                    cells.append("refused")
-            print(f"| {name} | {size} | {' | '.join(cells)} |", flush=True)
-
-
-if __name__ == "__main__":
-    main()
+        cells = [overshoot(instance, method, limit, options.calls) for limit in LIMITS_MS]
+        print(f"| {name} | {size} | {' | '.join(cells)} |", flush=True)

@@ -1,10 +1,11 @@
-r"""Published programs as methods of `alloc compare`.
+r"""Published programs and a plain model as methods of `alloc compare`.
 
     export PYTHONPATH=tests/benchmarks:FOLDER    # with peers-1.0.dist-info and, for pygrape, pyGRAPE.py
     alloc compare paper-1:0-4 'covering[agents=9,tasks=3,ability_max=20]:0-4' --time-limit 3 \
         --methods cpsat,'milp[plain=true]','cpsat[plain=true]',prtpy --store peers.db --report peers.md
 
-`prtpy` is its integer programme for the weighted largest smallest sum (pip install alloc-mrta[bench]); `pygrape` is
+`classes` is one maximisation of 1 / T by CP-SAT over classes of agents alike, for whole abilities and workloads;
+`prtpy` its integer programme for the weighted largest smallest sum (pip install alloc-mrta[bench]); `pygrape` is
 github.com/inmo-jang/pyGRAPE, in which agents hear each other up to `communication_radius`.
 """
 
@@ -17,7 +18,7 @@ import numpy as np
 
 from alloc.allocators import Allocator, Method, Proposal, Search
 from alloc.allocators.contract.parameters import CheckedParameters, bounded
-from alloc.problems import Allocation, RefusedError
+from alloc.problems import Allocation, RefusedError, agent_classes
 
 
 def refuse_ranges(search: Search) -> None:
@@ -52,6 +53,36 @@ class Prtpy(Allocator):
         for members, task in zip(by_sum, np.argsort(instance.workload).tolist(), strict=True):
             plan[members] = task
         return Proposal(Allocation(plan))
+
+
+class Classes(Allocator):
+    """Maximise the least share of a task's work that is done in an hour, in millionths."""
+
+    method = Method(name="classes", summary="CP-SAT over classes of agents, as one would state it")
+
+    def allocate(self, search: Search) -> Proposal:
+        """Solve, and hand the members of each class out in their order."""
+        from ortools.sat.python import cp_model
+
+        refuse_ranges(search)
+        instance, fine = search.instance, 10**6
+        classes = agent_classes(instance, by_place=False)
+        ability, work = classes.ability.astype(int).tolist(), instance.workload.astype(int).tolist()
+        model = cp_model.CpModel()
+        x = [[model.new_int_var(0, int(count), "") for _ in work] for count in classes.count]
+        pace = model.new_int_var(0, int(fine * instance.ability.sum() / min(work)) + 1, "")
+        for j, h in enumerate(work):
+            model.add(fine * sum(a * x[k][j] for k, a in enumerate(ability)) >= h * pace)
+        for row, count in zip(x, classes.count.tolist(), strict=True):
+            model.add(sum(row) <= count)
+        model.maximize(pace)
+        solver = cp_model.CpSolver()
+        solver.parameters.max_time_in_seconds, solver.parameters.num_workers = search.remaining_s, search.threads
+        if solver.solve(model) not in (cp_model.OPTIMAL, cp_model.FEASIBLE):
+            return Proposal(None)
+        counts = np.array([[solver.value(variable) for variable in row] for row in x])
+        bound = fine / max(solver.best_objective_bound + 1, 1)
+        return Proposal(classes.spread(counts), makespan_lower_bound=bound)
 
 
 @dataclass(frozen=True)

@@ -14,11 +14,13 @@ Geoffrion (1974), Lagrangean relaxation for integer programming, doi:10.1007/BFb
 (1975), On improving relaxation methods by modified gradient techniques, doi:10.1007/BFb0120697.
 """
 
-from dataclasses import dataclass
+from collections import deque
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from alloc.allocators.exact.energy.clusters import Clusters, cluster_tasks
+from alloc.allocators.exact.energy.cutting_planes import CuttingPlanes, is_small
 from alloc.allocators.exact.energy.energy_model import EnergyModel
 from alloc.allocators.exact.energy.subproblems import solve_subproblems
 from alloc.allocators.exact.knapsack import WholeArray
@@ -61,8 +63,11 @@ after which a solver does better, and without."""
 MAX_LINKS = 5_000_000
 """Clusters times pairs of class and task above which there are no clusters."""
 
-DECAYS_ALONE = 4
-"""Shortenings of the step after which the clusters are added."""
+DECAYS_ALONE, DECAYS_WITHOUT_CLUSTERS = 4, 1
+"""Shortenings of the step after which clusters are added, and where there are none, cutting planes take over."""
+
+LAST_GROUPS = 150
+"""Rounds whose groups the cutting planes begin with, the last ones."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,6 +125,7 @@ class LagrangianBound:
         self._dropped = np.zeros(len(model.class_of_pair), dtype=bool)
         self._step, self._rounds_without_rise, self._decays = FIRST_STEP_PRICED if price.any() else 1.0, 0, 0
         self._rounds = 0
+        self._groups: deque[WholeArray] = deque(maxlen=LAST_GROUPS)
 
     @property
     def converged(self) -> bool:
@@ -132,6 +138,25 @@ class LagrangianBound:
     def is_rising_slowly(self) -> bool:
         """Whether a solver may soon do better; hardly where sums of weights are limited, which clusters make use of."""
         return self._clusters is not None and bool(self._model.max_weight[0] < 0)
+
+    @property
+    def may_be_cut(self) -> bool:
+        """Whether the model is small enough for cutting planes."""
+        return is_small(self._model)
+
+    @property
+    def is_nearly_optimal(self) -> bool:
+        """Whether prices are so good that cutting planes raise the bound faster."""
+        return self._decays >= DECAYS_WITHOUT_CLUSTERS if self._member is None else self.converged
+
+    def cutting_planes(self, plan: WholeArray) -> CuttingPlanes:
+        """Return an ascent that goes on from here, given the agents of each pair of a plan, shape (p,)."""
+        model, clusters, cost, constant = self._model, self._clusters, self._model.cost, 0.0
+        if clusters is not None:
+            cost = cost + clusters.link @ self._cluster_price
+            _, _, constant = solve_subproblems(clusters.model, -self._cluster_price, compare=False)
+        groups = [plan[self.kept], *self._groups]
+        return CuttingPlanes(replace(model, cost=cost), constant, self._price, groups)
 
     def ascend(self, rounds: int, cost: float) -> None:
         """Change prices `rounds` times, given the cost of a plan at hand."""
@@ -149,6 +174,7 @@ class LagrangianBound:
         if len(relaxed.excess):
             self._dropped |= relaxed.value + relaxed.excess > cost * (1 + 1e-9)
         self._note(relaxed.value)
+        self._groups.append(relaxed.group)
         self._change_prices(relaxed, cost)
         add = self._clusters is None and self._decays >= DECAYS_ALONE and self._member is not None
         if add:
@@ -210,6 +236,7 @@ class LagrangianBound:
     def _shrink(self, *, clusters: bool) -> None:
         """Leave out the pairs that no better plan has, and build the clusters anew, with their last prices."""
         stay = ~self._dropped
+        self._groups.clear()
         self.kept[self.kept] = stay
         self._model = self._model.only(stay)
         self._dropped = np.zeros(len(self._model.class_of_pair), dtype=bool)

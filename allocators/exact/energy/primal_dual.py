@@ -6,6 +6,7 @@ from collections.abc import Callable
 import numpy as np
 
 from alloc.allocators.exact.demand import Demand
+from alloc.allocators.exact.energy.cutting_planes import CuttingPlanes
 from alloc.allocators.exact.energy.energy_model import MAX_NEED, EnergyModel, round_demand
 from alloc.allocators.exact.energy.lagrangian import LagrangianBound
 from alloc.allocators.exact.energy.linear import class_prices
@@ -30,6 +31,9 @@ SLICE_S = 0.01
 MAX_LEAD_S = 0.1
 """How much more time one side may have had before it waits for the other."""
 
+MAX_CUT_ROUNDS = 5
+"""Rounds of cutting planes in one call, of which one may take as long as many of subgradients."""
+
 REPEATABLE_SLICES, REPEATABLE_ROUNDS = 60, 10
 """Slices, and rounds in each, where effort is counted."""
 
@@ -44,6 +48,7 @@ def compile_loops() -> None:
     for weight in (one, np.ones(2)):
         model = EnergyModel(two, two, weight, one, np.ones(2), weight, one, one, one, None)
         LagrangianBound(model, np.zeros((2, 2)), np.zeros(2)).ascend(1, 3.0)
+        CuttingPlanes(model, 0.0, np.zeros(2), [one]).ascend(1)
 
 
 class Timer:
@@ -85,10 +90,11 @@ class PrimalDual:
     def __init__(
         self, instance: Instance, model: Model, demand: Demand, plan: Allocation, seed: int, seconds: float
     ) -> None:
-        self._model, self._demand = model, demand
+        self._model, self._demand, self._plan = model, demand, plan
         task_distance = pairwise_distance(instance.reach.goal[model.tasks])
         self._pairs: IntArray = np.arange(len(demand.class_of_pair))
         self._dual = None if demand.partial else self._begin_dual(task_distance, seconds)
+        self._cuts: CuttingPlanes | None = None
         self._primal = _begin_primal(instance, model, demand, plan, task_distance, seed)
         self._reported = self._cost = _cost_of_plan(instance, plan)
         self._primal_timer, self._dual_timer = Timer(), Timer()
@@ -97,7 +103,13 @@ class PrimalDual:
     @property
     def bound(self) -> float:
         """Cost that every plan needs, as far as proven."""
-        return 0.0 if self._dual is None else min(self._dual.bound * (1 - ROUNDING), self._cost)
+        return min(self._proven * (1 - ROUNDING), self._cost)
+
+    @property
+    def _proven(self) -> float:
+        """The bound, which may exceed the cost of the best plan by rounding."""
+        bound = 0.0 if self._dual is None else self._dual.bound
+        return bound if self._cuts is None else max(bound, self._cuts.bound)
 
     @property
     def finds_plans(self) -> bool:
@@ -112,17 +124,21 @@ class PrimalDual:
     @property
     def closed(self) -> bool:
         """Whether the best plan is proven."""
-        return self._dual is not None and self._dual.bound >= self._cost * (1 - 1e-9)
+        return self._dual is not None and self._proven >= self._cost * (1 - 1e-9)
 
     @property
     def converged(self) -> bool:
         """Whether bounds hardly rise any more."""
-        return self._dual is None or self._dual.converged
+        if self._cuts is not None:
+            return self._cuts.converged
+        return self._dual is None or (self._dual.converged and not self._dual.may_be_cut)
 
     @property
     def is_rising_slowly(self) -> bool:
         """Whether bounds have risen for long enough that the solver may raise them faster."""
-        return self._dual is None or self._dual.is_rising_slowly
+        if self._cuts is not None:
+            return self._cuts.converged
+        return self._dual is None or (self._dual.is_rising_slowly and not self._dual.may_be_cut)
 
     @property
     def keep(self) -> IntArray:
@@ -158,13 +174,13 @@ class PrimalDual:
             return self._descend()
         if self._primal is not None:
             self._primal.anneal(REPEATABLE_ROUNDS, slice_ / REPEATABLE_SLICES)
-        if self._dual is not None:
-            self._dual.ascend(REPEATABLE_ROUNDS, self._cost)
+        self._raise_bound(REPEATABLE_ROUNDS)
         return self._better()
 
-    def note_cost(self, cost: float) -> None:
-        """Take note of the cost of a plan found elsewhere."""
-        self._cost = min(self._cost, cost)
+    def note_plan(self, plan: Allocation, cost: float) -> None:
+        """Take note of a plan that was submitted, and of its cost."""
+        if cost <= self._cost:
+            self._plan, self._cost = plan, cost
 
     def _descend(self) -> Allocation | None:
         """Descend before prices change, as their steps depend on the cost of the plan at hand."""
@@ -173,9 +189,18 @@ class PrimalDual:
         return self._better()
 
     def _ascend(self) -> None:
-        if self._dual is not None:
-            dual, cost = self._dual, self._cost
-            self._dual_timer.run(lambda rounds: dual.ascend(rounds, cost))
+        self._dual_timer.run(self._raise_bound)
+
+    def _raise_bound(self, rounds: int) -> None:
+        """Work on the dual side: prices by subgradients, and when they are nearly the best, cutting planes."""
+        if self._dual is None:
+            return
+        if self._cuts is None and self._dual.is_nearly_optimal and self._dual.may_be_cut:
+            self._cuts = self._dual.cutting_planes(self._model.counts(self._demand, self._plan)[self._pairs])
+        if self._cuts is None:
+            self._dual.ascend(rounds, self._cost)
+        else:
+            self._cuts.ascend(min(rounds, MAX_CUT_ROUNDS))
 
     def _better(self) -> Allocation | None:
         """Return the best plan if it has not been returned yet."""

@@ -94,10 +94,11 @@ class EnergyState:
         return (self.search.elapsed_s - self.begin_s) / stage_s if stage_s > 0 else 1.0
 
     def submit(self, plan: Allocation | None) -> None:
-        """Submit a plan of `primal_dual`, if there is a new one, and pass it the cost of the best plan."""
+        """Submit a plan of `primal_dual`, if there is a new one, and pass it the best plan."""
         if plan is not None:
             self.search.submit(plan)
         if self.local_search is not None:
             self.local_search.exchange()
         if self.primal_dual is not None:
-            self.primal_dual.note_cost(self.cost)
+            assert self.search.best is not None
+            self.primal_dual.note_plan(self.search.best.allocation, self.cost)

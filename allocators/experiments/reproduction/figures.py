@@ -56,7 +56,7 @@ def _convergence(rows: Sequence[Learned], solved: Sequence[Solved], scenario: in
             right.plot(number, np.median(found), MARKS[method], color="0.25")
     _frame(left, right, rows, solved)
     sizes = SCENARIOS[scenario]
-    counts = {len(runs_of(rows, method)) for method in PAPER_METHODS} - {0}
+    counts = {len(runs_of(rows, method)) for method in PAPER_METHODS} - {0} or {0}  # variants alone are not drawn
     extent = counted(max(counts), "run") if len(counts) == 1 else f"{min(counts)} to {max(counts)} runs"
     figure.suptitle(f"{sizes.agents} agents and {sizes.tasks} tasks, {extent}: median and quartiles", fontsize=11)
     return figure

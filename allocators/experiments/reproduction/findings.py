@@ -59,6 +59,17 @@ def told(one: Effect | None, form: str = "+.3f") -> str:
     return f"{one.mean:{form}} [{one.low:{form}}, {one.high:{form}}], {counted(one.runs, 'run')}{left_out}"
 
 
+def tested(one: Effect | None, p: float | None, form: str) -> str:
+    """Return an effect in words, with its corrected p-value where there is one."""
+    return told(one, form) + ("" if p is None else f", p = {p:.2g}")
+
+
+def table(header: Sequence[str], rows: Sequence[Sequence[str]], left: int = 1) -> str:
+    """Return a table in Markdown, whose first `left` columns are text and all others numbers."""
+    rule = ["---"] * left + ["--:"] * (len(header) - left)
+    return "\n".join("| " + " | ".join(line) + " |" for line in (header, rule, *rows))
+
+
 def against_all(data: Data, scenario: int, figure: Callable[[list[Learned]], float], sign: int, form: str) -> Finding:
     """Test that `gappo` is better than each rival: `sign` times the difference above 0, corrected by Holm."""
     rows = of_scenario(data.learned, scenario)

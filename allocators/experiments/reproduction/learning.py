@@ -21,12 +21,15 @@ from alloc.allocators.experiments.reproduction.protocol import (
     TUNED,
     VARIANTS,
     Job,
+    Variant,
     judged,
 )
 from alloc.allocators.experiments.reproduction.rows import Learned
 from alloc.allocators.learned.algorithms.genes import GeneticPpo
+from alloc.allocators.learned.algorithms.hyperparameters import GappoParameters
 from alloc.allocators.learned.algorithms.learner import Learner, TrainingJob
 from alloc.allocators.learned.algorithms.registry import method_parameters, new_learner
+from alloc.allocators.learned.algorithms.separate import SeparateMembers
 from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize
 from alloc.allocators.learned.play.action_sampling import sample_actions
 from alloc.allocators.learned.play.rollout import position
@@ -74,11 +77,9 @@ class _Played:
 
 def learn(job: Job) -> list[Learned]:
     """Train a method from nothing, and return its rows: at every point on the test games and the run's instances."""
-    method, changes = VARIANTS[job.method]
     games = _judged_by(job.run)
     with plain_torch(), torch_threads(1):
-        parameters = method_parameters(method, {**TUNED[method], **changes})
-        learner = new_learner(method, NetworkSize(), parameters, job.run)
+        learner = _untrained(VARIANTS[job.method], job.run)
         rows = [_row(job, learner, scenario, own, 0, (0, 0, 0.0)) for scenario, own in games.items()]
         spent = (0, 0, 0.0)
         for point in (point for point in POINTS if point <= job.iterations):
@@ -86,6 +87,15 @@ def learn(job: Job) -> list[Learned]:
             wanted = (key for key in games if point in judged(key, job.iterations))
             rows += [_row(job, learner, key, games[key], point, spent) for key in wanted]
     return rows
+
+
+def _untrained(variant: Variant, seed: int) -> Learner:
+    parameters = method_parameters(variant.method, {**TUNED[variant.method], **variant.changes})
+    size = NetworkSize(attention=variant.has_attention)
+    if variant.shares_network:
+        return new_learner(variant.method, size, parameters, seed)
+    assert isinstance(parameters, GappoParameters)
+    return SeparateMembers(size, parameters, seed)
 
 
 def _trained(learner: Learner, job: Job, point: int, spent: tuple[int, int, float]) -> tuple[int, int, float]:

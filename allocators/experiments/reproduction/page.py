@@ -5,20 +5,20 @@ from collections.abc import Sequence
 import numpy as np
 
 from alloc.allocators.experiments.reproduction.claims import CLAIMS
-from alloc.allocators.experiments.reproduction.findings import NOT, UNKNOWN, Data, told
+from alloc.allocators.experiments.reproduction.findings import NOT, UNKNOWN, Data, table, tested
+from alloc.allocators.experiments.reproduction.parts import ablations, population
 from alloc.allocators.experiments.reproduction.prose import ASSUMED, ASSUMPTIONS, FIGURES, HEAD, PROCEDURE, SEEDS
 from alloc.allocators.experiments.reproduction.protocol import (
     DECISIONS,
+    LEARNING,
     OTHERS,
     PAPER_BATTERY,
     PAPER_METHODS,
     SCENARIOS,
     TESTS,
-    VARIANTS,
 )
 from alloc.allocators.experiments.reproduction.rows import Learned, Solved
 from alloc.allocators.experiments.reproduction.summary import (
-    Effect,
     effect,
     final,
     latest_length,
@@ -29,16 +29,6 @@ from alloc.allocators.experiments.reproduction.summary import (
 )
 from alloc.allocators.experiments.statistics import holm, interval
 from alloc.problems.text import counted
-
-GAIN = 0.01
-"""p-value, corrected by Holm's procedure, below which the population is said to bring something."""
-
-
-DECISIVE = 9
-"""Runs below which not even the same sign in all of them is below `GAIN`, after Holm over two tests."""
-
-COMPARED = {"makespan": "final T", "drawn": "best of 8 drawn games"}
-"""Figures by which the population is judged, in words."""
 
 
 def page(learned: Sequence[Learned], solved: Sequence[Solved], environments: Sequence[dict[str, str]]) -> str:
@@ -58,6 +48,8 @@ def page(learned: Sequence[Learned], solved: Sequence[Solved], environments: Seq
         "Bars are means, lines the least and the most of the runs; grey is what the paper has.",
         "## Equal decisions",
         *(part for length in _lengths(learned) for part in _budget(learned, length)),
+        "## What each part of GAPPO brings",
+        ablations(rows),
         "## The four scenarios",
         _scenarios(rows),
         "Battery is that of the episode, where every hop is flown; a mean over the runs, as are hops per agent.",
@@ -65,7 +57,7 @@ def page(learned: Sequence[Learned], solved: Sequence[Solved], environments: Seq
         _others(solved),
         PROCEDURE,
         ASSUMPTIONS,
-        _table(["open", "ours"], ASSUMED, left=2),
+        table(["open", "ours"], ASSUMED, left=2),
         SEEDS,
         "## Versions and machines",
         _environments(environments),
@@ -81,12 +73,12 @@ def _lengths(rows: Sequence[Learned]) -> list[int]:
 def _budget(learned: Sequence[Learned], length: int) -> tuple[str, ...]:
     """Return title, table and finding of all runs with so many iterations."""
     rows = [row for row in learned if row.iterations == length]
-    return f"### {length} iterations, {DECISIONS * length:,} decisions", _tests(rows), _population(rows)
+    return f"### {length} iterations, {DECISIONS * length:,} decisions", _tests(rows), population(rows)
 
 
 def _extent(rows: Sequence[Learned], solved: Sequence[Solved]) -> str:
     """Say how many runs there are: the paper has 100."""
-    counts = {method: len(runs_of(of_scenario(rows, TESTS), method)) for method in VARIANTS}
+    counts = {method: len(runs_of(of_scenario(rows, TESTS), method)) for method in LEARNING}
     named = ", ".join(f"`{method}` {count}" for method, count in counts.items() if count)
     others = len({row.run for row in solved})
     length = max(row.iterations for row in rows)
@@ -96,11 +88,6 @@ def _extent(rows: Sequence[Learned], solved: Sequence[Solved]) -> str:
     )
     tail = f"The methods that learn nothing: {counted(others, 'run')}." if others else ""
     return f"{short}Runs of {length} iterations: {named}. {tail}".rstrip()
-
-
-def _table(header: Sequence[str], rows: Sequence[Sequence[str]], left: int = 1) -> str:
-    rule = ["---"] * left + ["--:"] * (len(header) - left)
-    return "\n".join("| " + " | ".join(line) + " |" for line in (header, rule, *rows))
 
 
 def _claims(data: Data) -> str:
@@ -115,7 +102,7 @@ def _claims(data: Data) -> str:
     total = (
         f"Of {len(verdicts)} claims, those that hold: {held}, that do not: {fail}, that cannot be checked: {unknown}."
     )
-    return f"{total}\n\n" + _table(["where", "the paper", "our test", "effect", "verdict"], lines, left=5)
+    return f"{total}\n\n" + table(["where", "the paper", "our test", "effect", "verdict"], lines, left=5)
 
 
 def _figure(scenario: int) -> str:
@@ -145,7 +132,7 @@ def _mean(values: Sequence[float], form: str) -> str:
 def _tests(rows: Sequence[Learned]) -> str:
     """Return the table of the test games, with the differences from `ppo`."""
     own = of_scenario(rows, TESTS)
-    present = [name for name in VARIANTS if runs_of(own, name)]
+    present = [name for name in LEARNING if runs_of(own, name)]
     effects = {
         (name, figure): effect(own, name, "ppo", final(figure))
         for figure in ("makespan", "drawn")
@@ -159,8 +146,7 @@ def _tests(rows: Sequence[Learned]) -> str:
     def less(name: str, figure: str, form: str) -> str:
         if (name, figure) not in p_values:
             return ""
-        p = p_values[name, figure]
-        return told(effects[name, figure], form) + ("" if p is None else f", p = {p:.2g}")
+        return tested(effects[name, figure], p_values[name, figure], form)
 
     lines = []
     for name in present:
@@ -181,49 +167,13 @@ def _tests(rows: Sequence[Learned]) -> str:
             ]
         )
     header = ["method", "runs", "final T", "less `ppo`'s", "best of 8 drawn", "less `ppo`'s"]
-    return _table([*header, "iterations to T = 1.05", "unserved", "decisions"], lines)
-
-
-def _population(rows: Sequence[Learned]) -> str:
-    """Say whether the population of GAPPO brings anything, by a single member; differences from PPO are told apart."""
-    finding = _against_one_member(rows)
-    beside = "; ".join(f"{words} {told(one, '+.4f')}" for words, one in _differences(rows, "ppo").items())
-    return finding + (f" Against `ppo`, which differs in more than the population: {beside}." if beside else "")
-
-
-def _differences(rows: Sequence[Learned], other: str) -> dict[str, Effect]:
-    """Return by how much `gappo` differs from another method on the test games."""
-    own = of_scenario(rows, TESTS)
-    pairs = {words: effect(own, "gappo", other, final(figure)) for figure, words in COMPARED.items()}
-    return {words: one for words, one in pairs.items() if one is not None}
-
-
-def _against_one_member(rows: Sequence[Learned]) -> str:
-    """Return the finding on the population, from the runs of `gappo` and `gappo-single` alone."""
-    known = _differences(rows, "gappo-single")
-    if not known:
-        return "**What the population brings is not measured**: `gappo` and `gappo-single` have no run in common."
-    corrected = holm([one.p for one in known.values()])
-    gains = [
-        words
-        for (words, one), p in zip(known.items(), corrected, strict=True)
-        if one.mean < 0 and p is not None and p < GAIN
-    ]
-    figures = "; ".join(f"{words} {told(one, '+.4f')}" for words, one in known.items())
-    if gains:
-        return (
-            f"**The population brings something** ({', '.join(gains)}; p < {GAIN} after Holm), against one member: "
-            f"{figures}."
-        )
-    few = max(one.runs for one in known.values()) < DECISIVE
-    why = f"fewer than {DECISIVE} runs cannot show it" if few else f"no p < {GAIN} after Holm"
-    return f"**Nothing is shown to come of the population** ({why}), against one member: {figures}."
+    return table([*header, "iterations to T = 1.05", "unserved", "decisions"], lines)
 
 
 def _scenarios(rows: Sequence[Learned]) -> str:
     lines = []
     for scenario in SCENARIOS:
-        for name in VARIANTS:
+        for name in LEARNING:
             runs = runs_of(of_scenario(rows, scenario), name)
             if not runs:
                 continue
@@ -242,7 +192,7 @@ def _scenarios(rows: Sequence[Learned]) -> str:
                 ]
             )
     header = ["scenario", "method", "median T", "mean T", "battery (%)", "in the paper", "hops", "unserved"]
-    return _table(header, lines, left=2)
+    return table(header, lines, left=2)
 
 
 def _others(solved: Sequence[Solved]) -> str:
@@ -270,11 +220,11 @@ def _others(solved: Sequence[Solved]) -> str:
     told_limits = " and ".join(f"{limit:g} s" for limit in limits)
     if not lines:
         return "None was run."
-    return f"Objective makespan-energy, {told_limits} and one thread each.\n\n{_table(header, lines, left=2)}"
+    return f"Objective makespan-energy, {told_limits} and one thread each.\n\n{table(header, lines, left=2)}"
 
 
 def _environments(environments: Sequence[dict[str, str]]) -> str:
     lines = [
         [entry["machine"], ", ".join(f"{k} {v}" for k, v in entry.items() if k != "machine")] for entry in environments
     ]
-    return _table(["machine", "versions"], lines, left=2) if lines else "None is noted."
+    return table(["machine", "versions"], lines, left=2) if lines else "None is noted."

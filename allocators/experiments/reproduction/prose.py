@@ -10,12 +10,17 @@ from rows that lie beside the page.
 
     alloc reproduce folder --runs 100        # as many runs as the paper; hours
     alloc reproduce folder --quick           # two short runs; minutes
+    alloc reproduce folder --runs 10 --methods gappo,gappo-unshared    # a part of GAPPO left out
     alloc reproduce folder --page            # figures and page from the rows that are there
 
 Ctrl-C keeps the runs that have ended, and the same command goes on from there."""
 
 FIGURES = """As in the paper, with the proven lower bound of the makespan as a pink dotted line, a median over the
 instances. The panel on the right has what methods that learn nothing reach on the same instances."""
+
+ABLATION = """Each variant lacks one part of `gappo` and is the same in all else, also in step sizes and all that was
+tuned for `gappo`. Differences are on the test games, the variant less `gappo`: above 0 the part is of use. They are
+paired by run, with intervals and tests as in the tables above."""
 
 PROCEDURE = """## How it is measured
 - **Length**: schedules of step sizes end with the run, so that short runs are no beginnings of long ones. Claims and

@@ -1,17 +1,70 @@
 """What is run, and all that the paper leaves open about it; does not import torch."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 PAPER_METHODS = ("gappo", "a2c", "ppo", "dqn", "ddpg")
 """The five of the paper, in its order."""
 
-VARIANTS: Mapping[str, tuple[str, Mapping[str, object]]] = {
-    "gappo": ("gappo", {"genes": 3}),
-    "gappo-single": ("gappo", {"genes": 1}),
-    **{name: (name, {}) for name in PAPER_METHODS[1:]},
+
+@dataclass(frozen=True)
+class Variant:
+    """What learns: a method, and how it differs from that method as it was tuned.
+
+    Attributes
+    ----------
+    method : str
+    changes : mapping of str to object
+        Hyperparameters that differ from `TUNED`.
+    has_attention : bool
+        Whether the network has attention.
+    shares_network : bool
+        Whether the members of a population share one.
+    """
+
+    method: str
+    changes: Mapping[str, object] = field(default_factory=dict)
+    has_attention: bool = True
+    shares_network: bool = True
+
+
+_POPULATION: Mapping[str, object] = {"genes": 3}
+
+LEARNING: Mapping[str, Variant] = {
+    "gappo": Variant("gappo", _POPULATION),
+    "gappo-single": Variant("gappo", {"genes": 1}),
+    **{name: Variant(name) for name in PAPER_METHODS[1:]},
 }
-"""Method and what differs from `TUNED`, by the name in the rows; `gappo-single` is without a population."""
+"""Methods that are compared with each other, by their names in the rows; `gappo-single` is without a population."""
+
+VARIANTS: Mapping[str, Variant] = {
+    **LEARNING,
+    "gappo-unshared": Variant("gappo", _POPULATION, shares_network=False),
+    "gappo-no-evolution": Variant("gappo", {**_POPULATION, "breeding_interval": 0}),
+    "gappo-linear-rate": Variant("gappo", {**_POPULATION, "target_kl": None}),
+    "gappo-no-attention": Variant("gappo", _POPULATION, has_attention=False),
+    "gappo-on-policy": Variant("gappo", {**_POPULATION, "buffer_size": 0}),
+}
+"""All that can learn: further ones lack one part of `gappo`."""
+
+ABLATIONS: Mapping[str, tuple[str, str]] = {
+    "gappo-unshared": (
+        "sharing",
+        "each member has a network and a step size of its own; first members, turns and replay buffer are the same",
+    ),
+    "gappo-single": ("genes", "one member, which is PPO with the adaptive rate and the replay buffer"),
+    "gappo-no-evolution": (
+        "genetic algorithm",
+        "genes stay as they are drawn, without selection, crossover and mutation; the policy is the first member's",
+    ),
+    "gappo-linear-rate": ("adaptive rate", "the step size falls linearly, as that of `ppo`"),
+    "gappo-no-attention": (
+        "attention",
+        "of its group and of other tasks an agent sees what the features sum up, such as abilities and their number",
+    ),
+    "gappo-on-policy": ("replay", "every game is learned from once; fewer gradient steps for the same decisions"),
+}
+"""What each lacks, and what that means, by the name of the variant."""
 
 _PPO: Mapping[str, object] = {
     "learning_rate": 0.003274,

@@ -107,32 +107,40 @@ class GeneticPpo(Ppo):
         self, board: Board, steps: int, rules: Rules, generator: torch.Generator, max_rate: float
     ) -> list[Update]:
         """Let the member whose turn it is play and learn, and breed where a generation ends; see `Ppo.learn`."""
-        self.genes.express(len(self.since) % self.population.genes)
-        updates = super().learn(board, steps, rules, generator, max_rate)
-        self.genes.express(0)
+        updates = self._turn(len(self.since) % self.population.genes, board, steps, rules, generator, max_rate)
         self.since += updates
         if len(self.since) >= max(self.population.breeding_interval, self.population.genes):
-            self._breed(generator)
+            if self.population.breeding_interval and self.population.genes > 1:
+                self._breed(int(torch.randint(2**62, (1,), generator=generator)))
             self.since = []
         return updates
 
-    def _breed(self, generator: torch.Generator) -> None:
+    def _turn(
+        self, member: int, board: Board, steps: int, rules: Rules, generator: torch.Generator, max_rate: float
+    ) -> list[Update]:
+        """Let one member play and learn."""
+        self.genes.express(member)
+        updates = super().learn(board, steps, rules, generator, max_rate)
+        self.genes.express(0)
+        return updates
+
+    def _breed(self, seed: int) -> None:
         """Replace the genes by those of the next generation, the fittest first."""
-        count = self.population.genes
-        if count == 1:
-            return
         parameters = replace(BreedingParameters(), mutation_sigma=self.population.gene_sigma, mutated_fraction=1.0)
+        old = self.genes.vectors
+        born = offspring(old.tolist(), self._fitness(parameters), parameters, random.Random(seed))
+        self.genes.replace(
+            torch.stack([old[one.parent] if one.genome is None else torch.tensor(one.genome) for one in born])
+        )
+
+    def _fitness(self, parameters: BreedingParameters) -> list[float]:
+        """Return the fitness (12) of each member in the updates since the last generation."""
+        count = self.population.genes
         returns, entropies, evaluations = (
             [float(np.mean([getattr(one, name) for one in self.since[member::count]])) for member in range(count)]
             for name in ("reward", "entropy", "evaluations")
         )
-        scores = fitness(returns, entropies, evaluations, parameters)
-        rng = random.Random(int(torch.randint(2**62, (1,), generator=generator)))
-        old = self.genes.vectors
-        born = offspring(old.tolist(), scores, parameters, rng)
-        self.genes.replace(
-            torch.stack([old[one.parent] if one.genome is None else torch.tensor(one.genome) for one in born])
-        )
+        return fitness(returns, entropies, evaluations, parameters)
 
     def state_dict(self) -> StateDict:
         """Return weights with the fittest member's biases, optimiser, replay buffer and genes."""

@@ -60,7 +60,7 @@ RANGES: Mapping[str, Range] = {
         ("update_epochs", "minibatch_size", "batch_size", "num_steps", "target_update_interval", "tournament_size"),
         COUNT,
     ),
-    **dict.fromkeys(("replay_draws", "genes", "breeding_interval"), COUNT),
+    **dict.fromkeys(("replay_draws", "genes"), COUNT),
     **dict.fromkeys(("final_lr_fraction", "actor_lr_fraction", "tau", "mutated_fraction"), SHARE),
     **dict.fromkeys(("gae_lambda", "exploration_initial_eps", "crossover_probability", "mutation_probability"), SHARE),
     **dict.fromkeys(("learning_rate", "max_learning_rate", "gamma"), RATE),
@@ -70,7 +70,7 @@ RANGES: Mapping[str, Range] = {
     **dict.fromkeys(
         ("return_weight", "entropy_weight", "cost_weight", "mutation_sigma", "gene_sigma", "replay_ratio"), WEIGHT
     ),
-    **dict.fromkeys(("buffer_size", "elite"), Range(0, MAX_VALUE, whole=True)),
+    **dict.fromkeys(("buffer_size", "elite", "breeding_interval"), Range(0, MAX_VALUE, whole=True)),
     "target_kl": Range(1 / MAX_VALUE, MAX_VALUE, optional=True),
 }
 """Range of each by name, whatever the method."""

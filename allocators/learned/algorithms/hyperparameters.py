@@ -77,7 +77,7 @@ class GappoParameters(PpoParameters):
     gene_sigma : float
         Standard deviation of the first differences between their biases, and of mutations.
     breeding_interval : int
-        Updates between two generations of genes.
+        Updates between two generations of genes; 0 for genes that stay as they are drawn.
     """
 
     target_kl: float | None = 0.012

@@ -72,7 +72,7 @@ def find_unseen(
         See `fill_options`.
     """
     own = situation.own
-    for i in range(len(situation.counts)):
+    for i in range(situation.others[0]):
         if situation.counts[i]:
             at = situation.other[known.OTHER_X, i], situation.other[known.OTHER_Y, i]
             notice(area, sensing, at[0], at[1], own[known.HOUR] - 1e-3, last)

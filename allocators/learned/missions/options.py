@@ -5,7 +5,7 @@ import numpy as np
 from alloc.allocators.learned.missions import feature_names as names
 from alloc.allocators.learned.missions import situation as known
 from alloc.allocators.learned.missions.network_arrays import Singles
-from alloc.allocators.learned.missions.situation import Situation
+from alloc.allocators.learned.missions.situation import Coming, Situation
 from alloc.allocators.missions.layout import NOBODY
 from alloc.allocators.runtime.compiled import compiled_in_place, inlined
 from alloc.problems.fields import FloatArray, IntArray
@@ -37,28 +37,44 @@ def expect(situation: Situation) -> int:
     Only tasks that the agent can take are filled in.
     """
     coming, arrives, target = situation.coming, situation.other[known.ARRIVES], situation.target
-    first, following, idle = coming.first, coming.following, coming.idle
-    first[:] = NOBODY
+    coming.first[:] = NOBODY
     found = 0
-    for i in range(len(target)):
+    for i in range(situation.others[0]):
         if not situation.counts[i]:
             continue
         if target[i] == NOBODY:
-            idle[found] = i
+            coming.idle[found] = i
+            for axis in range(3):
+                coming.idle_places[axis, found] = situation.other[known.OTHER_X + axis, i]
             found += 1
-            continue
-        before, after = NOBODY, first[target[i]]
-        while after != NOBODY and arrives[after] <= arrives[i]:
-            before, after = after, following[after]
-        following[i] = after
-        if before == NOBODY:
-            first[target[i]] = i
         else:
-            following[before] = i
-    for j in range(len(first)):
+            queue(coming, arrives, target[i], i)
+    for j in range(len(situation.can)):
         if situation.can[j]:
             coming.others[j], coming.without[j] = done_without(situation, j)
     return found
+
+
+@inlined
+def queue(coming: Coming, arrives: FloatArray, j: int, i: int) -> None:
+    """Put another who comes to a task behind those who are there no later: mostly all, or all who work there."""
+    first, following, last, working = coming.first, coming.following, coming.last, coming.working
+    before, after = NOBODY, first[j]
+    if after != NOBODY and arrives[last[j]] <= arrives[i]:
+        before, after = last[j], NOBODY
+    elif after != NOBODY and arrives[after] == -np.inf:
+        before, after = working[j], following[working[j]]
+    while after != NOBODY and arrives[after] <= arrives[i]:
+        before, after = after, following[after]
+    following[i] = after
+    if before == NOBODY:
+        first[j] = i
+    else:
+        following[before] = i
+    if after == NOBODY:
+        last[j] = i
+    if arrives[i] == -np.inf:
+        working[j] = i
 
 
 @inlined
@@ -186,12 +202,18 @@ def fill_task(situation: Situation, j: int, option: Singles, idle: int) -> None:
 @inlined
 def rivals(situation: Situation, j: int, distance: float, idle: int) -> float:
     """Return how many others that have no task are nearer to one."""
-    other, found = situation.other, 0.0
     x, y, z = situation.task[known.TASK_X, j], situation.task[known.TASK_Y, j], situation.task[known.TASK_Z, j]
-    for place in range(idle):
-        i = situation.coming.idle[place]
-        dx, dy, dz = other[known.OTHER_X, i] - x, other[known.OTHER_Y, i] - y, other[known.OTHER_Z, i] - z
-        found += dx * dx + dy * dy + dz * dz < distance * distance
+    return nearer(situation.coming.idle_places, idle, x, y, z, distance * distance)
+
+
+@compiled_in_place
+def nearer(places: FloatArray, count: int, x: float, y: float, z: float, square: float) -> int:
+    """Return how many of the first places are nearer to one than a distance, whose square is given."""
+    at_x, at_y, at_z = places[0], places[1], places[2]
+    found = 0
+    for place in range(count):
+        dx, dy, dz = at_x[place] - x, at_y[place] - y, at_z[place] - z
+        found += dx * dx + dy * dy + dz * dz < square
     return found
 
 
@@ -199,26 +221,34 @@ def rivals(situation: Situation, j: int, distance: float, idle: int) -> float:
 def fill_crowding(situation: Situation, tasks: IntArray, options: Singles) -> None:
     """Fill in how much other work there is near each task."""
     task, near = situation.task, (NEAR * situation.own[known.SPAN]) ** 2
-    x, y, z = task[known.TASK_X], task[known.TASK_Y], task[known.TASK_Z]
+    places = situation.coming.task_places
     for row in range(len(tasks)):
-        j, found = tasks[row], 0
-        for place in range(len(tasks)):
-            other = tasks[place]
-            dx, dy, dz = x[other] - x[j], y[other] - y[j], z[other] - z[j]
-            found += dx * dx + dy * dy + dz * dz < near
-        is_near_itself = near > 0.0 and x[j] == x[j]
+        for axis in range(3):
+            places[axis, row] = task[known.TASK_X + axis, tasks[row]]
+    for row in range(len(tasks)):
+        x, y, z = places[0, row], places[1, row], places[2, row]
+        found = nearer(places, len(tasks), x, y, z, near)
+        is_near_itself = near > 0.0 and x == x
         options[row, names.CROWDING] = squashed((found - is_near_itself) / 3.0)
 
 
 @compiled_in_place
 def fill_whole(situation: Situation, choice: IntArray, tasks: int, options: Singles) -> None:
     """Fill the features that all options share, and those that compare with a mean."""
-    own, agents, ability = situation.own, 1.0, situation.own[known.ABILITY]
-    for i in range(len(situation.counts)):
+    agents, ability = 1.0, situation.own[known.ABILITY]
+    for i in range(situation.others[0]):
         if situation.counts[i]:
             agents += 1
             ability += situation.other[known.STRENGTH, i]
-    priority = work = 0.0
+    fill_shared(situation, choice, tasks, options, agents, ability)
+
+
+@compiled_in_place
+def fill_shared(
+    situation: Situation, choice: IntArray, tasks: int, options: Singles, agents: float, ability: float
+) -> None:
+    """Fill them where it is known how many agents there are, this one included, and the sum of their abilities."""
+    own, priority, work = situation.own, 0.0, 0.0
     for row in range(tasks):
         priority += situation.task[known.PRIORITY, choice[row]] / tasks
         work += situation.task[known.LEFT, choice[row]]

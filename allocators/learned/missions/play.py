@@ -6,6 +6,7 @@ import numpy as np
 
 from alloc.allocators.learned.missions.exploring import CELLS, centre, find_unseen, notice
 from alloc.allocators.learned.missions.forward import score
+from alloc.allocators.learned.missions.neighbours import Swap, foresee, swap_for
 from alloc.allocators.learned.missions.network_arrays import HIDDEN, WIDTH, MissionWeights, Singles
 from alloc.allocators.learned.missions.options import WAIT, fill_options
 from alloc.allocators.learned.missions.situation import IS_FLYING, TARGET, Situation, empty, fill
@@ -38,6 +39,7 @@ class Room(NamedTuple):
     Attributes
     ----------
     situation : Situation
+    swap : Swap
     options, token, pooled, scores : ndarray
         See `score`.
     choice : ndarray of int
@@ -59,6 +61,7 @@ class Room(NamedTuple):
     """
 
     situation: Situation
+    swap: Swap
     options: Singles
     token: Singles
     pooled: Singles
@@ -80,6 +83,7 @@ def room_for(n: int, m: int, periods: int = 1) -> Room:
     """Return room for the decisions of n agents on m tasks, who send a message every so many radio periods."""
     return Room(
         situation=empty(n, m),
+        swap=swap_for(n, m),
         options=np.zeros((m + 2, WIDTH), np.float32),
         token=np.zeros((m + 2, HIDDEN), np.float32),
         pooled=np.zeros((2, HIDDEN), np.float32),
@@ -130,6 +134,8 @@ def consider(
         for cell in range(len(room.last)):
             room.last[cell] = room.seen[row, cell]
         room.goal[row] = find_unseen(room.situation, area, sensing, room.last, seed, number, goal, room.look)
+    scratch = room.options, room.token, room.pooled, room.scores, room.choice
+    foresee(room.situation, room.swap, room.look, scratch, weights)
     count = fill_options(room.situation, room.look, room.options, room.choice)
     score(room.options, count, weights, room.token, room.pooled, room.scores)
     return count

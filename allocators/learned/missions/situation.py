@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from alloc.allocators.missions.layout import NOBODY, TO_TASK, WORKING, MissionArrays
+from alloc.allocators.missions.layout import IDLE, NOBODY, TO_TASK, WORKING, MissionArrays
 from alloc.allocators.missions.motion import battery_of, can_fly, distance_between, place_of
 from alloc.allocators.runtime.compiled import compiled_in_place
 from alloc.problems.fields import BoolArray, FloatArray, IntArray
@@ -28,6 +28,10 @@ class Coming(NamedTuple):
         Hour at which they have done it, ``inf`` where nobody comes.
     idle : ndarray of int, shape (n,)
         Others that have no task.
+    last, working : ndarray of int, shape (m,)
+        Who is last at each task to which somebody comes, and who last of those that work there already.
+    idle_places, task_places : ndarray, shape (3, n) and (3, m)
+        Where these others are, and the tasks of the options.
     """
 
     first: IntArray
@@ -35,6 +39,10 @@ class Coming(NamedTuple):
     others: IntArray
     without: FloatArray
     idle: IntArray
+    last: IntArray
+    working: IntArray
+    idle_places: FloatArray
+    task_places: FloatArray
 
 
 class Situation(NamedTuple):
@@ -54,6 +62,8 @@ class Situation(NamedTuple):
         Task to which it goes or where it works, -1 for none.
     counts : ndarray of bool, shape (n,)
         Whether anything recent is known of an agent, and it is another one.
+    others : ndarray of int, shape (1,)
+        Rows on other agents that are filled in, from the first one on; those behind them count for nothing.
     coming : Coming
         Room for what follows from all that.
     """
@@ -64,17 +74,23 @@ class Situation(NamedTuple):
     other: FloatArray
     target: IntArray
     counts: BoolArray
+    others: IntArray
     coming: Coming
 
 
-HOUR, X, Y, Z, ABILITY, SPEED, BATTERY, ENERGY_PER_DISTANCE, SPAN, TARGET, IS_WORKING, IS_FLYING, OWN = range(13)
+HOUR, X, Y, Z, ABILITY, SPEED, BATTERY, ENERGY_PER_DISTANCE, SPAN = range(9)
+TARGET, IS_WORKING, IS_FLYING, METRIC, OWN = range(9, 14)
 """Of the agent; `SPAN` is the longest distance in the area, `TARGET` the task of its order, -1 for none."""
+
+EUCLIDEAN_WAYS, MANHATTAN_WAYS, OTHER_WAYS = range(3)
+"""What `METRIC` is: how far places are apart; others than these two cannot be told from coordinates."""
 
 TASK_X, TASK_Y, TASK_Z, LEFT, KNOWN_AT, PRIORITY, DEADLINE, GROWTH, DISTANCE, TASK = range(10)
 """Of a task; `DISTANCE` is that from the agent."""
 
-ARRIVES, STRENGTH, OTHER_X, OTHER_Y, OTHER_Z, OTHER = range(6)
-"""Of another agent: hour at which it is at its task, ability, place."""
+ARRIVES, STRENGTH, OTHER_X, OTHER_Y, OTHER_Z, PACE, CHARGE, PRICE, HEARD, IS_FREE, OTHER = range(11)
+"""Of another agent: hour at which it is at its task, ability, place, speed, battery, energy per distance, the hour when
+that was true, and whether it was idle."""
 
 
 def empty(n: int, m: int) -> Situation:
@@ -86,12 +102,17 @@ def empty(n: int, m: int) -> Situation:
         other=np.zeros((OTHER, n)),
         target=np.full(n, NOBODY),
         counts=np.zeros(n, np.bool_),
+        others=np.full(1, n, np.intp),
         coming=Coming(
             first=np.full(m, NOBODY),
             following=np.full(n, NOBODY),
             others=np.zeros(m, np.intp),
             without=np.full(m, np.inf),
             idle=np.full(n, NOBODY),
+            last=np.full(m, NOBODY),
+            working=np.full(m, NOBODY),
+            idle_places=np.zeros((3, n)),
+            task_places=np.zeros((3, m)),
         ),
     )
 
@@ -101,7 +122,7 @@ def fill(state: MissionArrays, number: int, situation: Situation) -> None:
     """Fill in what an agent knows in a compiled mission."""
     fill_own(state, number, situation.own)
     fill_tasks(state, number, situation.task, situation.can)
-    fill_others(state, number, situation.other, situation.target, situation.counts)
+    fill_others(state, number, situation, MEMORY * state.head[0].period)
 
 
 @compiled_in_place
@@ -115,6 +136,7 @@ def fill_own(state: MissionArrays, number: int, own: FloatArray) -> None:
     own[SPAN] = head.span
     own[TARGET] = agent.order_task if agent.order == TO_TASK else NOBODY
     own[IS_WORKING], own[IS_FLYING] = agent.task != NOBODY, agent.flight != 0
+    own[METRIC] = MANHATTAN_WAYS if head.is_manhattan else EUCLIDEAN_WAYS
 
 
 @compiled_in_place
@@ -138,21 +160,30 @@ def fill_tasks(state: MissionArrays, number: int, task: FloatArray, can: BoolArr
 
 
 @compiled_in_place
-def fill_others(state: MissionArrays, number: int, other: FloatArray, target: IntArray, counts: BoolArray) -> None:
-    """Fill in what an agent knows of others."""
-    head, row = state.head[0], state.agents[number].known
-    hours, known, task_hours = state.agent_hour[row], state.agent_report[row], state.task_hour[row]
-    for i in range(len(counts)):
-        counts[i] = i != number and hours[i] >= 0 and head.hour - hours[i] <= MEMORY * head.period
-        if not counts[i]:
+def fill_others(state: MissionArrays, number: int, situation: Situation, memory: float) -> None:
+    """Fill in what an agent knows of others, by what it heard at most `memory` hours ago; only those that count."""
+    head, row, found = state.head[0], state.agents[number].known, 0
+    who, known, task_hours = state.known_agent[row], state.known_report[row], state.task_hour[row]
+    other, target, counts = situation.other, situation.target, situation.counts
+    for place in range(state.known[row]):
+        report = state.reports[known[place]]
+        if who[place] == number or head.hour - report.hour > memory or not 1 <= report.status <= WORKING:
             continue
-        report, agent = state.reports[known[i]], state.agents[i]
-        counts[i] = 1 <= report.status <= WORKING
-        other[STRENGTH, i] = agent.ability
-        other[OTHER_X, i], other[OTHER_Y, i], other[OTHER_Z, i] = report.x, report.y, report.z
-        target[i] = report.task if report.task != NOBODY and task_hours[report.task] >= 0 else NOBODY
-        if target[i] != NOBODY:
-            facts = state.tasks[report.task]
-            place = (facts.x, facts.y, facts.z)
-            way = distance_between(head.is_manhattan, (report.x, report.y, report.z), place)
-            other[ARRIVES, i] = -np.inf if report.status == WORKING else hours[i] + way / agent.speed
+        agent = state.agents[who[place]]
+        other[STRENGTH, found], other[PACE, found] = report.ability, agent.speed
+        other[CHARGE, found], other[PRICE, found] = report.battery, agent.energy_per_distance
+        other[HEARD, found], other[IS_FREE, found] = report.hour, report.status == IDLE
+        other[OTHER_X, found], other[OTHER_Y, found], other[OTHER_Z, found] = report.x, report.y, report.z
+        target[found] = report.task if report.task != NOBODY and task_hours[report.task] >= 0 else NOBODY
+        other[ARRIVES, found] = report.arrives
+        counts[found] = True
+        found += 1
+    clear_others(situation, found)
+
+
+@compiled_in_place
+def clear_others(situation: Situation, found: int) -> None:
+    """Let only the first rows on other agents count."""
+    for place in range(found, situation.others[0]):
+        situation.counts[place] = False
+    situation.others[0] = found

@@ -60,12 +60,11 @@ def bid(state: MissionArrays, number: int, room: Room, parameters: FloatArray, n
 def count_seats(state: MissionArrays, number: int, bids: FloatArray, factor: float) -> int:
     """Return the seats of a task; bids of those who were seen to go elsewhere since are forgotten."""
     row, agents, tasks, n = state.agents[number].known, 0, 0, len(state.agents)
-    for i in range(n):
-        if state.agent_hour[row, i] >= 0:
-            report = state.reports[state.agent_report[row, i]]
-            agents += IDLE <= report.status <= WORKING
-            if state.agent_hour[row, i] > bids[HOUR * n + i] and report.task != bids[i]:
-                bids[i] = NOBODY
+    for place in range(state.known[row]):
+        i, report = state.known_agent[row, place], state.reports[state.known_report[row, place]]
+        agents += IDLE <= report.status <= WORKING
+        if report.hour > bids[HOUR * n + i] and report.task != bids[i]:
+            bids[i] = NOBODY
     for j in range(len(state.tasks)):
         tasks += state.task_hour[row, j] >= 0 and state.task_left[row, j] >= 0
     return max(1, int(np.ceil(factor * agents / max(1, tasks))))

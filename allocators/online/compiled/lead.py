@@ -109,7 +109,7 @@ def led(arrays: MissionArrays, policy: str, parameters: FloatArray, seed: int, r
         Of the ids of agents in the order of letters.
     """
     state, leader = begun(arrays, seed), NAMES.index(policy)
-    n, m, slots = len(state.agents), len(state.tasks), len(state.heard)
+    n, m, slots = len(state.agents), len(state.tasks), len(state.sent)
     none = np.zeros(n, np.intp)
     memory = Memory(notes_for(NOTES[leader], n, slots), none, none.copy(), rank, np.zeros(0))
     lead(state, room_for(n, m), leader, NOTES[leader], parameters, memory, seed)

@@ -11,11 +11,15 @@ import numpy as np
 from alloc.allocators.missions.channel import is_silent
 from alloc.allocators.missions.layout import IDLE, NOBODY, WORKING, MissionArrays
 from alloc.allocators.runtime.compiled import compiled_in_place
+from alloc.problems.errors import RefusedError
 from alloc.problems.fields import FloatArray
 from alloc.problems.missions.simulation.reports import BYTES_OF_VALUE
 
 PARTITION, BIDS = 1, 3
 """Kinds of notes: how many numbers there are for each agent."""
+
+MOST_NOTES = 250_000_000
+"""Numbers of all agents, up to which missions are run."""
 
 TASK, AMOUNT, HOUR = range(3)
 """Numbers of a bid; the parts of a row with those of all agents are in this order."""
@@ -41,7 +45,15 @@ class Notes(NamedTuple):
 
 
 def notes_for(kind: int, n: int, slots: int) -> Notes:
-    """Return the notes at hour 0; none of kind 0."""
+    """Return the notes at hour 0; none of kind 0.
+
+    Raises
+    ------
+    RefusedError
+        If agents are too many for notes on all others.
+    """
+    if kind * n * n * (2 + slots) > MOST_NOTES:
+        raise RefusedError(f"{n} agents are too many for a policy whose agents note something of each other one")
     row = np.zeros(kind * n + 2 * (kind == PARTITION))
     row[: n * (kind > 0)] = NOBODY
     heard = row.copy()
@@ -81,11 +93,10 @@ def hear(state: MissionArrays, notes: Notes, kind: int) -> None:
         if not notes.hour[slot] + head.delay <= head.hour:
             continue
         notes.hour[slot] = np.inf
-        for sender in range(len(notes.own)):
-            told = notes.sent[slot, sender]
-            for number in range(len(notes.own)):
-                if not state.heard[slot, sender, number]:
-                    continue
+        for number in range(len(notes.own)):
+            first = state.first_sender[slot, number]
+            for place in range(first, first + state.senders[slot, number]):
+                told = notes.sent[slot, state.sender[slot, place]]
                 if kind == BIDS:
                     take_newer(notes.heard[number], told)
                 elif precedes(told, notes.heard[number]):

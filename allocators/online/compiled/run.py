@@ -1,15 +1,18 @@
 """Runs of policies with local knowledge in the compiled simulation, with the measures of the reference."""
 
 import dataclasses
+import math
 
 import numpy as np
 
 from alloc.allocators.learned.missions.network import compiled_weights
 from alloc.allocators.learned.missions.play import play, room_for
+from alloc.allocators.learned.missions.situation import MEMORY
 from alloc.allocators.missions.pack import begun, measure, pack
 from alloc.allocators.online.compiled.lead import NAMES, led
 from alloc.allocators.online.contract import Policy
 from alloc.allocators.online.policies.gappo import NetworkPolicy
+from alloc.allocators.online.policies.outlook import UtilityParameters
 from alloc.problems.errors import InputError
 from alloc.problems.fields import FloatArray, IntArray
 from alloc.problems.missions.mission import Mission
@@ -34,7 +37,8 @@ def run_compiled(mission: Mission, policy: Policy, seed: int = 0) -> MissionResu
     RefusedError
         If the mission has distances that they do not know, or is too large.
     """
-    arrays, name = pack(mission), policy.info.name
+    name = policy.info.name
+    arrays = pack(mission, memory=memory_of(policy, mission))
     if isinstance(policy, NetworkPolicy):
         state = begun(arrays, seed)
         room = room_for(mission.instance.n, mission.instance.m, policy.parameters.periods)
@@ -44,6 +48,15 @@ def run_compiled(mission: Mission, policy: Policy, seed: int = 0) -> MissionResu
     else:
         raise InputError(f"policy {name!r} has no compiled loops", "policy")
     return measure(mission, state, name, seed)
+
+
+def memory_of(policy: Policy, mission: Mission) -> float:
+    """Return for how many hours a policy uses what was heard of other agents."""
+    if isinstance(policy, NetworkPolicy):
+        return MEMORY * mission.radio.period
+    if policy.parameters_type is None or not issubclass(policy.parameters_type, UtilityParameters):
+        return math.inf
+    return float(policy.parameters.memory)
 
 
 def parameters_of(policy: Policy) -> FloatArray:

@@ -2,12 +2,10 @@
 
 import math
 
-import numpy as np
-
 from alloc.allocators.learned.missions import situation as known
 from alloc.allocators.learned.missions.options import done_with, expect
 from alloc.allocators.learned.missions.play import Room
-from alloc.allocators.learned.missions.situation import Situation, fill_own, fill_tasks
+from alloc.allocators.learned.missions.situation import Situation, fill_others, fill_own, fill_tasks
 from alloc.allocators.missions.layout import NOBODY, WORKING, MissionArrays
 from alloc.allocators.missions.motion import distance_between
 from alloc.allocators.runtime.compiled import compiled_in_place
@@ -30,23 +28,26 @@ def fill_with(state: MissionArrays, number: int, situation: Situation, memory: f
     """
     fill_own(state, number, situation.own)
     fill_tasks(state, number, situation.task, situation.can)
-    head, row, other = state.head[0], state.agents[number].known, situation.other
-    for i in range(len(situation.counts)):
-        hour = state.agent_hour[row, i]
-        situation.counts[i] = i != number and hour >= 0 and head.hour - hour <= memory
-        if not situation.counts[i]:
+    fill_others(state, number, situation, memory)
+    if len(goals):
+        redirect(state, number, situation, memory, goals)
+
+
+@compiled_in_place
+def redirect(state: MissionArrays, number: int, situation: Situation, memory: float, goals: FloatArray) -> None:
+    """Let others whose tasks are agreed go to these, from where they were by the last that was heard."""
+    head, row, found = state.head[0], state.agents[number].known, 0
+    for place in range(state.known[row]):
+        i, report = state.known_agent[row, place], state.reports[state.known_report[row, place]]
+        if i == number or head.hour - report.hour > memory or not 1 <= report.status <= WORKING:
             continue
-        report, agent = state.reports[state.agent_report[row, i]], state.agents[i]
-        situation.counts[i] = 1 <= report.status <= WORKING
-        goal = int(goals[i]) if len(goals) else report.task
-        situation.target[i] = goal if goal != NOBODY and state.task_hour[row, goal] >= 0 else NOBODY
-        other[known.STRENGTH, i] = agent.ability
-        if situation.target[i] != NOBODY:
+        goal = int(goals[i])
+        situation.target[found] = goal if goal != NOBODY and state.task_hour[row, goal] >= 0 else NOBODY
+        if goal != report.task and situation.target[found] != NOBODY:
             facts = state.tasks[goal]
-            place = (facts.x, facts.y, facts.z)
-            way = distance_between(head.is_manhattan, (report.x, report.y, report.z), place)
-            is_there = report.status == WORKING and report.task == goal
-            other[known.ARRIVES, i] = -np.inf if is_there else hour + way / agent.speed
+            way = distance_between(head.is_manhattan, (report.x, report.y, report.z), (facts.x, facts.y, facts.z))
+            situation.other[known.ARRIVES, found] = report.hour + way / state.agents[i].speed
+        found += 1
 
 
 @compiled_in_place

@@ -127,12 +127,12 @@ def require_same_knowledge(view: View, state: MissionArrays, row: int, mission: 
             assert left[j] == pytest.approx(task.left, rel=1e-9, abs=1e-9)
         else:
             assert TASK_STATUS[int(-left[j])] is task.status
-    known = state.agent_hour[row] >= 0
-    assert {mission.instance.agent_index[name] for name in view.agents} == set(np.flatnonzero(known).tolist())
+    count = state.known[row]
+    reports = dict(zip(state.known_agent[row, :count].tolist(), state.known_report[row, :count].tolist(), strict=True))
+    assert {mission.instance.agent_index[name] for name in view.agents} == set(reports)
     for name, agent in view.agents.items():
-        i = mission.instance.agent_index[name]
-        assert state.agent_hour[row, i] == pytest.approx(agent.hour, rel=1e-9)
-        report = state.reports[state.agent_report[row, i]]
+        report = state.reports[reports[mission.instance.agent_index[name]]]
+        assert report.hour == pytest.approx(agent.hour, rel=1e-9)
         assert AGENT_STATUS[report.status] is agent.status
         if agent.place.position is not None:
             assert (report.x, report.y, report.z) == pytest.approx(agent.place.position, rel=1e-9, abs=1e-9)

@@ -19,7 +19,7 @@ def narrowed(sides: PrimalDual, instance: Instance, plan: Allocation) -> Allocat
     """Work on both sides to the end."""
     for number in range(REPEATABLE_SLICES):
         plan = sides.repeat(number) or plan
-        sides.note_cost(evaluate(instance, plan).distance)
+        sides.note_plan(plan, evaluate(instance, plan).distance)
     return plan
 
 

@@ -4,10 +4,11 @@ import math
 import os
 import shutil
 import threading
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import pytest
+import torch
 
 from alloc.allocators.experiments.reproduction import folder as module
 from alloc.allocators.experiments.reproduction import learning, others
@@ -28,16 +29,20 @@ from alloc.allocators.experiments.reproduction.findings import (
 from alloc.allocators.experiments.reproduction.folder import Folder
 from alloc.allocators.experiments.reproduction.page import page
 from alloc.allocators.experiments.reproduction.protocol import (
+    ABLATIONS,
     OTHERS,
     PAPER_METHODS,
     SCENARIOS,
     TESTS,
+    VARIANTS,
     Job,
     expected,
     planned,
 )
 from alloc.allocators.experiments.reproduction.rows import Learned, Solved, append, begin, read
 from alloc.allocators.experiments.reproduction.summary import effect, final, fluctuation, reached, runs_of
+from alloc.allocators.learned.algorithms.genes import GeneticPpo
+from alloc.allocators.learned.network.actor_critic import ActorCritic
 from alloc.allocators.parallel.serial import SerialEngine
 from alloc.problems import InputError, makespan_lower_bound
 from alloc.problems.generate.paper_scenarios import paper_like
@@ -265,6 +270,57 @@ def test_the_population_is_judged_by_a_single_member(rivals: dict[str, float], r
     text = page(rows, [], [])
     assert f"**{words}" in text
     assert "Against `ppo`, which differs in more than the population: final T" in text
+
+
+@pytest.mark.parametrize(
+    ("change", "runs", "verdict"),
+    [(0.1, 12, "brings something"), (-0.1, 12, "better without"), (0.0, 12, "nothing shown"), (0.1, 5, "too few runs")],
+)
+def test_a_part_is_judged_by_the_variant_without_it(change: float, runs: int, verdict: str) -> None:
+    """Enough runs of a variant and the sign of their difference decide; variants without runs are not measured."""
+    rows = [row for run in range(runs) for row in history("gappo", run, 1.2)]
+    rows += [row for run in range(runs) for row in history("gappo-on-policy", run, 1.2 + change * (1 + 0.1 * run))]
+    lines = page(rows, [], []).splitlines()
+    (line,) = (line for line in lines if "`gappo-on-policy` |" in line)
+    assert line.startswith("| replay |")
+    assert line.endswith(f"**{verdict}** |")
+    assert sum(line.endswith("**not measured** |") for line in lines) == len(ABLATIONS) - 1
+
+
+def test_ablations_lack_one_part(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each variant learns, and differs from `gappo` in the part that it is named after and nothing else."""
+    monkeypatch.setattr(learning, "DECISIONS", 4)
+    whole = learning._untrained(VARIANTS["gappo"], 3)
+    assert isinstance(whole, GeneticPpo)
+    for name in ABLATIONS:
+        variant = learning._untrained(VARIANTS[name], 3)
+        assert isinstance(variant, GeneticPpo)
+        changed = {
+            field.name
+            for field in fields(whole.population)
+            if getattr(whole.population, field.name) != getattr(variant.population, field.name)
+        }
+        assert changed == LACKS[name]
+        assert variant.policy.size.attention == (name != "gappo-no-attention")
+        if name not in ("gappo-no-attention", "gappo-single"):
+            pairs = zip(whole.policies(), variant.policies(), strict=True)
+            assert all(weights(one).allclose(weights(other), atol=1e-6) for one, other in pairs)
+        assert learning._trained(variant, Job(0, name), 5, (0, 0, 0.0))[0] >= 20
+
+
+def weights(network: ActorCritic) -> torch.Tensor:
+    return torch.cat([weight.detach().flatten() for weight in network.parameters()])
+
+
+LACKS: dict[str, set[str]] = {
+    "gappo-unshared": set(),
+    "gappo-single": {"genes"},
+    "gappo-no-evolution": {"breeding_interval"},
+    "gappo-linear-rate": {"target_kl"},
+    "gappo-no-attention": set(),
+    "gappo-on-policy": {"buffer_size"},
+}
+"""Hyperparameters in which each differs."""
 
 
 @pytest.mark.slow

@@ -60,6 +60,16 @@ def test_members_take_turns_and_are_bred() -> None:
     assert sum(kept) >= 2  # the elite
 
 
+def test_without_generations_genes_stay() -> None:
+    """With an interval of 0 members take turns, and nothing is bred."""
+    learner = GeneticPpo(SMALL, GappoParameters(genes=2, breeding_interval=0, gene_sigma=0.1), seed=4)
+    first = learner.genes.vectors.clone()
+    for seed in range(3):
+        learner.train_on(job(seed, decisions=1))
+    assert learner.genes.vectors.equal(first)
+    assert len(learner.since) == 1
+
+
 def test_the_fittest_is_the_policy() -> None:
     """The member with the highest returns is expressed after a generation, and is the first of all policies."""
     learner = GeneticPpo(SMALL, GappoParameters(genes=2, breeding_interval=2, gene_sigma=0.1), seed=4)

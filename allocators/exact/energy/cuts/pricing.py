@@ -1,0 +1,176 @@
+"""The cheapest group of a task where some sets of classes cost a penalty: a knapsack and a tree search; compiled.
+
+A cut counts the agents that a group takes from a set of classes; each second one costs the penalty of the cut. Without
+penalties a table by dynamic programming bounds what the rest of a group costs, which guides a depth-first search over
+the agents, those in cuts first. Where weights are whole, the table itself has the answer for all others. Where they
+are not, it rounds them up, and the search goes on to the last agent.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from alloc.allocators.exact.knapsack import WholeArray, order_of
+from alloc.allocators.runtime.compiled import compiled
+from alloc.problems.instance import FloatArray
+
+MAX_NODES = 20_000
+"""Nodes of the search for one group after which it ends with the bound of the nodes still open."""
+
+STEPS = 1000
+"""Steps of a need to which the table rounds where weights are not whole."""
+
+
+@compiled
+def price_groups(
+    first: WholeArray, weight: FloatArray, price: FloatArray, copies: WholeArray, need: FloatArray,
+    max_weight: WholeArray, whole: bool, first_cut: WholeArray, cut: WholeArray, penalty: FloatArray,
+    cost: FloatArray, group: WholeArray,
+) -> float:  # fmt: skip
+    """Write the cheapest group of each task that is cheaper than one known, and return what all groups cost at least.
+
+    Parameters
+    ----------
+    first : ndarray of int, shape (t + 1,)
+        Where the pairs of each task begin.
+    weight, price, copies : ndarray, shape (p,)
+    need, max_weight : ndarray, shape (t,)
+        Sums of weights; no limit where the latter is below 0.
+    whole : bool
+        Whether weights and needs are whole numbers.
+    first_cut, cut : ndarray of int, shapes (p + 1,) and (c,)
+        The cuts that each pair is in.
+    penalty : ndarray, shape (cuts,)
+        >= 0.
+    cost : ndarray, shape (t,)
+        Of the cheapest group known of each task.
+    group : ndarray of int, shape (p,)
+        Zeros; stays so where no group is cheaper.
+    """
+    total, taken = 0.0, np.zeros(len(penalty), dtype=np.int64)
+    for j in range(len(need)):
+        a, b = first[j], first[j + 1]
+        total += cheapest_with_cuts(
+            weight[a:b], price[a:b], copies[a:b], need[j], max_weight[j], whole,
+            first_cut[a : b + 1], cut, penalty, taken, cost[j], group[a:b],
+        )  # fmt: skip
+    return total
+
+
+@compiled
+def cheapest_with_cuts(
+    weight: FloatArray, price: FloatArray, copies: WholeArray, need: float, max_weight: int, whole: bool,
+    first_cut: WholeArray, cut: WholeArray, penalty: FloatArray, taken: WholeArray, best: float, group: WholeArray,
+) -> float:  # fmt: skip
+    """Do the work of `price_groups` for one task; `taken` counts agents in each cut, 0 before and after."""
+    item, searched = list_items(weight, price, copies, first_cut, whole)
+    scale = 1.0 if whole else STEPS * (1 - 1e-9) / need
+    least, exact = int(np.floor(need * scale)), max_weight >= 0
+    rest = tabulate_rest(weight, price, item, scale, least, max(least, max_weight), exact)
+    top, still_open, nodes, q = rest.shape[1] - 1, np.inf, 0, 0
+    done, paid = np.zeros(searched + 1), np.zeros(searched + 1)
+    branches, take = np.zeros(searched + 1, dtype=np.int64), np.zeros(searched + 1, dtype=np.bool_)
+    slack = 1e-9 * (1.0 + abs(best))
+    while q >= 0:
+        here = min(top, int(np.ceil(done[q] * scale)))
+        if branches[q] == 0:
+            lower, nodes = paid[q] + rest[q, here], nodes + 1
+            is_open = lower < best - slack
+            if is_open and nodes > MAX_NODES:
+                still_open, is_open = min(still_open, lower), False
+            if is_open and q == searched:
+                is_open = False
+                if whole or done[q] >= need:
+                    best = lower
+                    write_group(item, take[:searched], weight, rest, here, top, group)
+            if not is_open:
+                q -= 1
+                continue
+        elif take[q]:  # that branch has been searched
+            count_cuts(item[q], -1, first_cut, cut, taken)
+        if branches[q] == 2:
+            q -= 1
+            continue
+        k, with_it = item[q], np.inf
+        paid_with = paid[q] + price[k] + fine_of(k, first_cut, cut, penalty, taken)
+        after = int(np.ceil((done[q] + weight[k]) * scale))
+        if (after <= top or not exact) and (q == 0 or item[q - 1] != k or take[q - 1]):  # of agents alike the first
+            with_it = paid_with + rest[q + 1, min(after, top)]
+        take[q] = (with_it < paid[q] + rest[q + 1, here]) == (branches[q] == 0)
+        branches[q] += 1
+        if take[q] and not np.isfinite(with_it):
+            take[q] = False
+            continue
+        done[q + 1], paid[q + 1], branches[q + 1] = done[q], paid[q], 0
+        if take[q]:
+            done[q + 1], paid[q + 1] = done[q] + weight[k], paid_with
+            count_cuts(k, 1, first_cut, cut, taken)
+        q += 1
+    return min(best - slack, still_open)
+
+
+@compiled
+def list_items(
+    weight: FloatArray, price: FloatArray, copies: WholeArray, first_cut: WholeArray, whole: bool
+) -> tuple[WholeArray, int]:
+    """Return the class of each agent, those in cuts first, and how many of them the search decides on."""
+    item, items, searched = np.empty(copies.sum(), dtype=np.int64), 0, 0
+    order = order_of(price / weight)
+    for in_cuts in (True, False):
+        for k in order:
+            if (first_cut[k + 1] > first_cut[k]) == in_cuts:
+                item[items : items + copies[k]] = k
+                items += copies[k]
+        if in_cuts or not whole:
+            searched = items
+    return item, searched
+
+
+@compiled
+def tabulate_rest(
+    weight: FloatArray, price: FloatArray, item: WholeArray, scale: float, need: int, top: int, exact: bool
+) -> FloatArray:
+    """Return the least cost of agents q, q + 1, ... where those before weigh s, shape (agents + 1, top + 1)."""
+    rest = np.full((len(item) + 1, top + 1), np.inf)
+    rest[len(item), need:] = 0.0
+    for q in range(len(item) - 1, -1, -1):
+        paid, row, after = price[item[q]], rest[q], rest[q + 1]
+        w = int(np.ceil(weight[item[q]] * scale))
+        inside = max(0, top + 1 - w)
+        for s in range(inside):
+            row[s] = min(after[s], after[s + w] + paid)
+        beyond = np.inf if exact else after[top] + paid
+        for s in range(inside, top + 1):
+            row[s] = min(after[s], beyond)
+    return rest
+
+
+@compiled
+def write_group(
+    item: WholeArray, take: NDArray[np.bool_], weight: FloatArray, rest: FloatArray, done: int, top: int,
+    group: WholeArray,
+) -> None:  # fmt: skip
+    """Write the agents taken of the first ones, and the cheapest of the others by the table."""
+    group[:] = 0
+    for q in range(len(item)):
+        if q < len(take):
+            group[item[q]] += take[q]
+        elif rest[q + 1, done] > rest[q, done]:
+            group[item[q]] += 1
+            done = min(top, done + int(weight[item[q]]))
+
+
+@compiled
+def count_cuts(k: int, change: int, first_cut: WholeArray, cut: WholeArray, taken: WholeArray) -> None:
+    """Count an agent of class `k`, or no longer, in the cuts that it is in."""
+    for z in range(first_cut[k], first_cut[k + 1]):
+        taken[cut[z]] += change
+
+
+@compiled
+def fine_of(k: int, first_cut: WholeArray, cut: WholeArray, penalty: FloatArray, taken: WholeArray) -> float:
+    """Return the penalties that one more agent of class `k` costs."""
+    fine = 0.0
+    for z in range(first_cut[k], first_cut[k + 1]):
+        if taken[cut[z]] % 2 == 1:
+            fine += penalty[cut[z]]
+    return fine

@@ -1,0 +1,87 @@
+"""GAPPO whose members share nothing but the replay buffer: Algorithm 1 to the letter, each with a network of its own.
+
+For the ablation of sharing: `GeneticPpo` has the same first members, turns, buffer and generations.
+"""
+
+import copy
+
+import torch
+
+from alloc.allocators.learned.algorithms.gappo import breed
+from alloc.allocators.learned.algorithms.genes import GeneticPpo
+from alloc.allocators.learned.algorithms.hyperparameters import BreedingParameters, PpoParameters
+from alloc.allocators.learned.algorithms.ppo import Ppo, Update
+from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize
+from alloc.allocators.learned.network.state_dict import StateDict
+from alloc.problems.game import Board, Rules
+
+
+class SeparateMembers(GeneticPpo):
+    """A learner by PPO of `GappoParameters.genes` members, each with its own network and step size; see `GeneticPpo`.
+
+    They begin as the members of `GeneticPpo` do; from then on all of their weights are their own, and are bred as those
+    of a population in `train` are.
+
+    Parameters
+    ----------
+    size : NetworkSize, optional
+    parameters : GappoParameters or PpoParameters, optional
+    seed : int
+        Seed of the initial weights and genes.
+    """
+
+    def __init__(self, size: NetworkSize | None = None, parameters: PpoParameters | None = None, seed: int = 0) -> None:
+        super().__init__(size, parameters, seed)
+        self.members: list[Ppo] = []
+        for network in super().policies():
+            member = Ppo(size, self.parameters, seed)
+            member.network.load_state_dict(network.state_dict())
+            member.replay = self.replay
+            self.members.append(member)
+
+    @property
+    def policy(self) -> ActorCritic:
+        """The network of the fittest member."""
+        return self.members[0].network
+
+    @property
+    def learning_rate(self) -> float:
+        """Learning rate of the fittest member."""
+        return self.members[0].learning_rate
+
+    def policies(self) -> list[ActorCritic]:
+        """Return each member's network, the fittest first."""
+        return [member.network for member in self.members]
+
+    def _turn(
+        self, member: int, board: Board, steps: int, rules: Rules, generator: torch.Generator, max_rate: float
+    ) -> list[Update]:
+        return self.members[member].learn(board, steps, rules, generator, max_rate)
+
+    def _breed(self, seed: int) -> None:
+        """Replace weights and step sizes by those of the next generation, the fittest first."""
+        parameters = BreedingParameters()
+        self._load(breed(self._members(), self._fitness(parameters), parameters, seed))
+
+    def _members(self) -> list[StateDict]:
+        """Return weights and optimiser of each member, without the buffer that is common to all."""
+        return [
+            {"network": member.network.state_dict(), "optimiser": member.optimiser.state_dict()}
+            for member in self.members
+        ]
+
+    def _load(self, states: list[StateDict]) -> None:
+        for member, state in zip(self.members, copy.deepcopy(states), strict=True):
+            member.network.load_state_dict(state["network"])
+            member.optimiser.load_state_dict(state["optimiser"])
+
+    def state_dict(self) -> StateDict:
+        """Return weights and optimiser of each member, and the replay buffer."""
+        since = [tuple(one) for one in self.since]
+        return {"members": self._members(), "replay": self.replay.state_dict(), "since": since}
+
+    def load_state_dict(self, state: StateDict) -> None:
+        """See `Learner.load_state_dict`."""
+        self._load(state["members"])
+        self.replay.load_state_dict(state["replay"])
+        self.since = [Update(*one) for one in state["since"]]

@@ -1,0 +1,103 @@
+"""Who is near: a grid of cells, by which only those are looked at that may be within a radius; compiled.
+
+It says where agents were at some hour. Until the fastest of them may have left its cell, those near a place are found
+in cells that are so much further off.
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from alloc.allocators.missions.layout import Numbers
+from alloc.allocators.missions.motion import place_of
+from alloc.allocators.missions.records import Agent, Head
+from alloc.allocators.runtime.compiled import compiled_in_place, inlined
+from alloc.problems.fields import FloatArray, IntArray
+from alloc.problems.missions.mission import Mission
+
+FEW = 100
+"""Agents up to which all are looked at, instead of those in the cells of a grid."""
+
+SLACK = 1e-6
+"""By how much more of itself than by its speed an agent may have moved, as numbers are rounded."""
+
+
+def divide(mission: Mission, head: NDArray[np.void]) -> Numbers:
+    """Return room for the cells of a grid, which the head then describes; one cell for few, or at unknown places."""
+    places = [mission.instance.start_position, mission.instance.task_position, mission.instance.bases.position]
+    low, high = np.array(mission.area)[:, :2]
+    n, width = mission.instance.n, float((high - low).max())
+    side = max(min(mission.sensing, mission.radio.radius), width / math.sqrt(n))
+    columns = rows = 1
+    if n > FEW and 0 < side < width and all(np.isfinite(some).all() for some in places):
+        columns, rows = (max(1, math.ceil(float(extent) / side)) for extent in high - low)
+    head["left"], head["low"], head["side"] = *low, side if columns * rows > 1 else -1.0
+    head["columns"], head["rows"] = columns, rows
+    head["fastest"], head["located"] = mission.instance.speed.max(initial=0.0), -np.inf
+    return np.array([0] * (columns * rows) + [n], np.int32)
+
+
+@inlined
+def drift(head: Head) -> float:
+    """Return how far an agent may be from where the grid says; NaN or infinite where the grid says nothing."""
+    return head.fastest * (head.hour - head.located) * (1 + SLACK)
+
+
+@compiled_in_place
+def cell_along(value: float, begin: float, side: float, count: int) -> int:
+    """Return the column, or row, of a coordinate; those outside belong to the first or last one."""
+    return 0 if count == 1 else int(min(max((value - begin) / side, 0.0), count - 1.0))
+
+
+@inlined
+def cells_near(head: Head, x: float, y: float, reach: float) -> tuple[int, int, int, int]:
+    """Return the first and last column, and the first and last row, in which there may be agents so near."""
+    first = cell_along(x - reach, head.left, head.side, head.columns)
+    last = cell_along(x + reach, head.left, head.side, head.columns)
+    low = cell_along(y - reach, head.low, head.side, head.rows)
+    return first, last, low, cell_along(y + reach, head.low, head.side, head.rows)
+
+
+@compiled_in_place
+def locate(head: Head, agents: Sequence[Agent], places: FloatArray, cells: Numbers, in_cells: Numbers) -> None:
+    """Fill in where all agents are now, by cells."""
+    head.located = head.hour
+    for number in range(len(agents)):
+        places[0, number], places[1, number], places[2, number] = place_of(agents[number], head.hour)
+    if len(cells) == 2:
+        return
+    cells[:] = 0
+    for number in range(len(agents)):
+        cells[cell_of(head, places, number) + 1] += 1
+    for cell in range(1, len(cells)):
+        cells[cell] += cells[cell - 1]
+    for number in range(len(agents) - 1, -1, -1):
+        cell = cell_of(head, places, number)
+        cells[cell + 1] -= 1
+        in_cells[cells[cell + 1]] = number
+    for cell in range(1, len(cells) - 1):
+        cells[cell] = cells[cell + 1]
+    cells[len(cells) - 1] = len(agents)
+
+
+@compiled_in_place
+def cell_of(head: Head, places: FloatArray, number: int) -> int:
+    """Return the cell of an agent."""
+    column = cell_along(places[0, number], head.left, head.side, head.columns)
+    return cell_along(places[1, number], head.low, head.side, head.rows) * head.columns + column
+
+
+@compiled_in_place
+def sort(numbers: IntArray, begin: int, count: int) -> None:
+    """Sort a part of an array: by insertion over ever smaller gaps."""
+    gap = count // 2
+    while gap > 0:
+        for place in range(begin + gap, begin + count):
+            number, at = numbers[place], place
+            while at >= begin + gap and numbers[at - gap] > number:
+                numbers[at] = numbers[at - gap]
+                at -= gap
+            numbers[at] = number
+        gap //= 2
