@@ -50,8 +50,8 @@ LARGEST_EXPONENT = 50.0
 """Of a price."""
 
 
-class Supply:
-    """Some agents, and the tasks that are worth most to them.
+class Bidders:
+    """Some agents, and the tasks where they have the most value.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ class TaskPrices:
     makespan : float
         The least makespan of a fractional allocation, about.
     price : ndarray, shape (m,)
-    supply : Supply or None
+    bidders : Bidders or None
         All agents, once `improve` has found that prices help.
 
     References
@@ -138,7 +138,7 @@ class TaskPrices:
         self._some = instance.workload > 0
         self.price = self._some.astype(float)
         self._best_price = self.price
-        self.supply: Supply | None = None
+        self.bidders: Bidders | None = None
         self._tree = build_tree(instance.reach.goal, np.flatnonzero(self._some))
         self._run_all, self._threads = run_all, threads
 
@@ -153,7 +153,7 @@ class TaskPrices:
 
         n, before = self.instance.n, self.bound
         size = min(n, SAMPLED_PER_TASK * int(self._some.sum()))
-        sample = self._supply(np.random.default_rng(0).permutation(n)[:size], COARSE_LENGTH)
+        sample = self._bidders(np.random.default_rng(0).permutation(n)[:size], COARSE_LENGTH)
         self._renew(sample)
         spread = max(LEAST_SPREAD, float((sample.lists.lost.max(axis=1) - sample.lists.lost[:, 0]).mean()))
         for width, iterations in COARSE:
@@ -161,26 +161,26 @@ class TaskPrices:
                 return False
             self._adjust(sample, width * spread, iterations, is_over)
             self._renew(sample)
-        self.supply = self._supply(np.arange(n), FINE_LENGTH)
-        self._prove(self.supply)
+        self.bidders = self._bidders(np.arange(n), FINE_LENGTH)
+        self._prove(self.bidders)
         for width, iterations in FINE:
             if is_over():
                 break
-            self._adjust(self.supply, width * spread, iterations, is_over)
-            self._prove(self.supply)
+            self._adjust(self.bidders, width * spread, iterations, is_over)
+            self._prove(self.bidders)
         return self.bound > before * (1 + SAFETY)
 
-    def _supply(self, chosen: IntArray, length: int) -> Supply:
-        return Supply(self.instance, self._tree, chosen, length, self._run_all, self._threads)
+    def _bidders(self, chosen: IntArray, length: int) -> Bidders:
+        return Bidders(self.instance, self._tree, chosen, length, self._run_all, self._threads)
 
-    def _renew(self, supply: Supply) -> float:
-        """Renew the shortlists; return the makespan at which the agents are worth as much as all workloads."""
-        value = supply.renew(self.price, self.makespan)
+    def _renew(self, bidders: Bidders) -> float:
+        """Renew the shortlists; return the makespan at which the value of the agents is that of all workloads."""
+        value = bidders.renew(self.price, self.makespan)
         hours = float(self.price @ self.instance.workload) / max(value, 1e-300)
         before, self.makespan = self.makespan, max(self.bound, hours)
         return min(before, hours)
 
-    def _prove(self, everyone: Supply) -> None:
+    def _prove(self, everyone: Bidders) -> None:
         """Raise the bound; the value of agents by T is convex and 0 at 0: below T, it falls at least in proportion."""
         proven = self._renew(everyone)
         if self.makespan > proven * (1 + PROMISING):
@@ -191,7 +191,7 @@ class TaskPrices:
             self.price = self._best_price
             self._renew(everyone)
 
-    def _adjust(self, supply: Supply, width: float, iterations: int, is_over: Callable[[], bool]) -> None:
+    def _adjust(self, bidders: Bidders, width: float, iterations: int, is_over: Callable[[], bool]) -> None:
         """Adjust the prices by some iterations of the quasi-Newton method."""
         from scipy.optimize import minimize
 
@@ -201,11 +201,12 @@ class TaskPrices:
         def price_of(x: FloatArray) -> FloatArray:
             price = np.zeros(len(work))
             price[some] = np.exp(np.clip(x * unit, -LARGEST_EXPONENT, LARGEST_EXPONENT))
-            return price / price.max()
+            price /= price.max()
+            return price
 
         def dual(x: FloatArray) -> tuple[float, FloatArray]:
             price = price_of(x)
-            smoothed, _, share = supply.value(price, self.makespan, width)
+            smoothed, _, share = bidders.value(price, self.makespan, width)
             needed = price * work
             slope = (share / smoothed - needed / needed.sum())[some] * unit
             return float(np.log(smoothed / needed.sum())) / width, slope / width

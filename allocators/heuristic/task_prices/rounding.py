@@ -9,27 +9,27 @@ from alloc.allocators.runtime.compiled import compiled
 from alloc.problems import Allocation
 
 FREE = 0.3
-"""Part of the agents that go where they are needed most among the tasks that are worth nearly as much to them."""
+"""Part of the agents that go where they are needed most among tasks where they have nearly the most value."""
 
 
 def rounded(prices: TaskPrices) -> Allocation:
-    """Return a plan in which each agent does a task that is worth nearly the most to it.
+    """Return a plan in which each agent does a task where it has nearly the most value.
 
     Parameters
     ----------
     prices : TaskPrices
-        With a supply.
+        With bidders.
     """
-    supply, instance = prices.supply, prices.instance
-    assert supply is not None
-    scale = supply.makespan / prices.makespan
+    bidders, instance = prices.bidders, prices.instance
+    assert bidders is not None
+    scale = bidders.makespan / prices.makespan
     regret = np.empty(instance.n)
-    find_regrets(supply.lists, scale, prices.price, regret)
+    find_regrets(bidders.lists, scale, prices.price, regret)
     least = float(np.quantile(regret, FREE))
     order = np.argsort(-instance.ability, kind="stable")
     task = np.full(instance.n, -1, dtype=np.intp)
     done = np.zeros(instance.m)
-    assign(order, supply.lists, scale, prices.price, regret, least, instance.ability, instance.workload, done, task)
+    assign(order, bidders.lists, scale, prices.price, regret, least, instance.ability, instance.workload, done, task)
     return Allocation(task)
 
 

@@ -78,14 +78,14 @@ def find_shortlists(
 
 
 @inlined
-def _offer(agent: int, task: int, worth: float, lost: float, value: Floats, found: Shortlists) -> None:
-    """Insert a task that is worth more than the last one on the shortlist."""
+def _offer(agent: int, task: int, gain: float, lost: float, value: Floats, found: Shortlists) -> None:
+    """Insert a task where the agent has more value than on the last one of the shortlist."""
     at = len(value) - 1
-    while at > 0 and value[at - 1] < worth:
+    while at > 0 and value[at - 1] < gain:
         value[at] = value[at - 1]
         found.task[agent, at], found.lost[agent, at] = found.task[agent, at - 1], found.lost[agent, at - 1]
         at -= 1
-    value[at], found.task[agent, at], found.lost[agent, at] = worth, task, lost
+    value[at], found.task[agent, at], found.lost[agent, at] = gain, task, lost
 
 
 @compiled
@@ -104,9 +104,9 @@ def _search_list(agent: int, agents: Agents, goal: Floats, price: Floats, value:
             longest, battery = agents.longest_distance[origin], agents.battery[origin]
             if not is_reachable(distance, longest, battery, agents.energy_per_distance, horizon):
                 continue
-        worth = price[task] * (1.0 - distance / horizon)
-        if worth > value[-1]:
-            _offer(agent, task, worth, distance / horizon, value, found)
+        gain = price[task] * (1.0 - distance / horizon)
+        if gain > value[-1]:
+            _offer(agent, task, gain, distance / horizon, value, found)
 
 
 @compiled
@@ -145,9 +145,9 @@ def _search_tree(
             task = tree.order[entry]
             distance = straight_distance(position, goal[task])
             if is_reachable(distance, longest, battery, agents.energy_per_distance, horizon):
-                worth = price[task] * (1.0 - distance / horizon)
-                if worth > value[-1]:
-                    _offer(agent, task, worth, distance / horizon, value, found)
+                gain = price[task] * (1.0 - distance / horizon)
+                if gain > value[-1]:
+                    _offer(agent, task, gain, distance / horizon, value, found)
 
 
 @compiled

@@ -46,12 +46,12 @@ def test_shortlists_have_the_most_valuable_tasks():
     instance = travelling(200, 60)
     prices = TaskPrices(instance, 1.0, map, 1)
     price = np.random.default_rng(1).uniform(0.5, 1.0, instance.m)
-    supply = prices._supply(np.arange(instance.n), 5)
-    total = supply.renew(price, 2.0)
+    bidders = prices._bidders(np.arange(instance.n), 5)
+    total = bidders.renew(price, 2.0)
     distance, mask = instance.reach.rows(instance.reach.origin)
     value = np.where(mask, price * np.maximum(0, 1 - distance / (2.0 * instance.speed[:, None])), 0.0)
     assert total == pytest.approx(float(instance.ability @ value.max(axis=1)))
-    assert (np.argsort(-value, axis=1)[:, :5] == supply.lists.task).all()
+    assert (np.argsort(-value, axis=1)[:, :5] == bidders.lists.task).all()
 
 
 def test_prices_raise_the_bound_to_the_fractional_optimum():
@@ -88,4 +88,4 @@ def test_where_nothing_is_scarce_prices_end_early():
     instance = Instance(ability=np.ones(100), workload=np.full(10, 5.0), allowed_tasks=[[*range(10)]] * 100)
     prices = TaskPrices(instance, makespan_lower_bound(instance), map, 1)
     assert not prices.improve(np.inf, never)
-    assert prices.supply is None
+    assert prices.bidders is None
