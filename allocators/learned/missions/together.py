@@ -15,6 +15,7 @@ from alloc.allocators.learned.missions.options import (
     fill_crowding,
     fill_shared,
     fill_task,
+    queue,
     squashed,
 )
 from alloc.allocators.learned.missions.play import Room, is_due, room_for
@@ -171,14 +172,18 @@ def step_out(together: Together, i: int, target: int) -> None:
     situation.counts[i] = False
     if target == NOBODY:
         return
-    first, following = situation.coming.first, situation.coming.following
-    if first[target] == i:
-        first[target] = following[i]
+    coming, before = situation.coming, NOBODY
+    if coming.first[target] == i:
+        coming.first[target] = coming.following[i]
     else:
-        before = first[target]
-        while following[before] != i:
-            before = following[before]
-        following[before] = following[i]
+        before = coming.first[target]
+        while coming.following[before] != i:
+            before = coming.following[before]
+        coming.following[before] = coming.following[i]
+    if coming.last[target] == i:
+        coming.last[target] = before
+    if coming.working[target] == i:
+        coming.working[target] = before
     renew(situation, target)
 
 
@@ -191,22 +196,8 @@ def step_in(together: Together, i: int, target: int) -> None:
     if target == NOBODY:
         return
     situation.other[known.ARRIVES, i] = arrival(together, i, target)
-    put_in(situation, i, target)
+    queue(situation.coming, situation.other[known.ARRIVES], target, i)
     renew(situation, target)
-
-
-@inlined
-def put_in(situation: Situation, i: int, task: int) -> None:
-    """Put an agent among those that come to a task, in the order in which they arrive."""
-    arrives, first, following = situation.other[known.ARRIVES], situation.coming.first, situation.coming.following
-    before, after = NOBODY, first[task]
-    while after != NOBODY and arrives[after] <= arrives[i]:
-        before, after = after, following[after]
-    following[i] = after
-    if before == NOBODY:
-        first[task] = i
-    else:
-        following[before] = i
 
 
 @compiled_in_place
