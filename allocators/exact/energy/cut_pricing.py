@@ -9,7 +9,7 @@ are not, it rounds them up, and the search goes on to the last agent.
 import numpy as np
 from numpy.typing import NDArray
 
-from alloc.allocators.exact.knapsack import WholeArray
+from alloc.allocators.exact.knapsack import WholeArray, order_of
 from alloc.allocators.runtime.compiled import compiled
 from alloc.problems.instance import FloatArray
 
@@ -114,7 +114,7 @@ def list_items(
 ) -> tuple[WholeArray, int]:
     """Return the class of each agent, those in cuts first, and how many of them the search decides on."""
     item, items, searched = np.empty(copies.sum(), dtype=np.int64), 0, 0
-    order = np.argsort(price / weight)
+    order = order_of(price / weight)
     for in_cuts in (True, False):
         for k in order:
             if (first_cut[k + 1] > first_cut[k]) == in_cuts:

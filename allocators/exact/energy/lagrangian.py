@@ -63,8 +63,8 @@ after which a solver does better, and without."""
 MAX_LINKS = 5_000_000
 """Clusters times pairs of class and task above which there are no clusters."""
 
-DECAYS_ALONE = 4
-"""Shortenings of the step after which the clusters are added, or without them the cutting planes take over."""
+DECAYS_ALONE, DECAYS_WITHOUT_CLUSTERS = 4, 1
+"""Shortenings of the step after which clusters are added, and where there are none, cutting planes take over."""
 
 LAST_GROUPS = 150
 """Rounds whose groups the cutting planes begin with, the last ones."""
@@ -147,7 +147,7 @@ class LagrangianBound:
     @property
     def is_nearly_optimal(self) -> bool:
         """Whether prices are so good that cutting planes raise the bound faster."""
-        return self._decays >= DECAYS_ALONE if self._member is None else self.converged
+        return self._decays >= DECAYS_WITHOUT_CLUSTERS if self._member is None else self.converged
 
     def cutting_planes(self, plan: WholeArray) -> CuttingPlanes:
         """Return an ascent that goes on from here, given the agents of each pair of a plan, shape (p,)."""

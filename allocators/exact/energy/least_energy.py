@@ -20,7 +20,7 @@ SHARE_WITHOUT_SOLVER = 0.3
 SMALL_PAIRS = 3000
 """Pairs of class and task that a better plan may have, up to which the solver comes next even if bounds still rise."""
 
-LOCAL_SHARE, MAX_LOCAL_S = 0.6, 30.0
+LOCAL_SHARE, MAX_LOCAL_S = 0.7, 30.0
 """Share of the time, and seconds at the most, of local search where nothing else finds plans."""
 
 

@@ -1,4 +1,4 @@
-"""Close the gap on the energy from both sides: plans by pairwise repartition, bounds by Lagrangian relaxation and cuts."""
+"""Close the gap on the energy from both sides: plans by pairwise repartition, bounds by Lagrangian relaxation."""
 
 import time
 from collections.abc import Callable

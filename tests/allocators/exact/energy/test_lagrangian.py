@@ -1,3 +1,4 @@
+from dataclasses import replace
 from functools import cache
 from itertools import product
 
@@ -6,6 +7,7 @@ import pytest
 from oracle import brute_force, least_energy_within
 from tiny_instances import all_can_be_served, seeds_where, tiny_instance
 
+from alloc.allocators.exact.energy.cutting_planes import CuttingPlanes
 from alloc.allocators.exact.energy.energy_model import EnergyModel, round_demand
 from alloc.allocators.exact.energy.lagrangian import LagrangianBound
 from alloc.allocators.exact.energy.subproblems import solve_subproblems
@@ -77,6 +79,23 @@ def test_excess_is_what_a_pair_costs_more(seed, limited):
         for p, pair in enumerate(pairs):
             best_with = cost[groups[:, p] > 0].min(initial=np.inf)
             assert excess[pair] <= best_with - cost.min() + 1e-9
+
+
+@pytest.mark.parametrize("kind", ["whole", "limited", "real"])
+@pytest.mark.parametrize("seed", range(8))
+def test_bound_by_cutting_planes_is_below_the_best_plan(seed, kind):
+    """Until no cut is violated any more, the best plan of all bounds the bound, which is not far below."""
+    model, best, plan = model_of(seed, 4, limited=kind == "limited")
+    if kind == "real":
+        part, need = model.weight / model.need[model.task_of_pair], np.full(len(model.need), 1 - 1e-10)
+        model = replace(model, weight=part, need=need, ability=None)
+    group = (model.task_of_pair == plan[model.class_of_pair]).astype(np.int64)
+    cuts = CuttingPlanes(model, 0.0, np.zeros(len(model.count)), [group])
+    for _ in range(200):
+        cuts.ascend(1)
+        assert cuts.bound <= best * (1 + 1e-9)
+    assert cuts.converged
+    assert cuts.bound >= 0.9 * best
 
 
 def has_float_weights(instance):

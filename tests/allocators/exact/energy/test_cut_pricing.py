@@ -1,0 +1,38 @@
+from itertools import product
+
+import numpy as np
+import pytest
+
+from alloc.allocators.exact.energy.cut_pricing import price_groups
+from alloc.allocators.exact.energy.subset_rows import violated_sets
+
+
+@pytest.mark.parametrize("kind", ["whole", "limited", "real"])
+@pytest.mark.parametrize("seed", range(12))
+def test_cheapest_group_with_cuts_is_that_of_all_groups_written_out(seed, kind):
+    """With classes of up to two agents and random cuts, no group is cheaper, and the one found costs what it says."""
+    rng = np.random.default_rng(seed)
+    weight = rng.uniform(0.1, 0.6, 7) if kind == "real" else rng.integers(1, 6, 7).astype(float)
+    need, max_weight = (1.0, -1) if kind == "real" else (9.0, 10 if kind == "limited" else -1)
+    price, copies = rng.uniform(-0.1 if kind == "limited" else 0.0, 1.0, 7), rng.integers(1, 3, 7)
+    member, penalty = rng.random((4, 7)) < 0.4, rng.uniform(0.0, 1.0, 4)
+    first_cut = np.append(0, member.sum(axis=0).cumsum())
+    groups = np.array(list(product(*(range(most + 1) for most in copies))))
+    done = groups @ weight
+    groups = groups[(done >= need) & ((done <= max_weight) | (max_weight < 0))]
+    cost = groups @ price + (groups @ member.T // 2) @ penalty
+    group = np.zeros(7, dtype=np.int64)
+    least = price_groups(
+        np.array([0, 7]), weight, price, copies, np.array([need]), np.array([max_weight]), kind != "real",
+        first_cut, np.nonzero(member.T)[1], penalty, np.array([100.0]), group,
+    )  # fmt: skip
+    assert least == pytest.approx(cost.min(), abs=1e-6)
+    assert group @ price + (member @ group // 2) @ penalty == pytest.approx(cost.min())
+
+
+def test_a_cut_closes_the_gap_of_three_agents_for_two_tasks():
+    """Any two of three agents do a task: halves of them would do for both, whole ones for one alone."""
+    use = np.array([[1, 0, 1], [1, 1, 0], [0, 1, 1], [0, 0, 0]])
+    sets, excess = violated_sets(use, np.array([0.5, 0.5, 0.5]), np.array([1, 1, 1, 0]), 0.05, 10)
+    assert sets.tolist() == [[0, 1, 2]]
+    assert excess == pytest.approx([0.5])
