@@ -33,7 +33,7 @@ def divide(mission: Mission, head: NDArray[np.void]) -> Numbers:
     columns = rows = 1
     if n > FEW and 0 < side < width and all(np.isfinite(some).all() for some in places):
         columns, rows = (max(1, math.ceil(float(extent) / side)) for extent in high - low)
-    head["left"], head["low"], head["side"] = *low, side if columns * rows > 1 else -1.0
+    head["left"], head["low"], head["side"] = low[0], low[1], side if columns * rows > 1 else -1.0
     head["columns"], head["rows"] = columns, rows
     head["fastest"], head["located"] = mission.instance.speed.max(initial=0.0), -np.inf
     return np.array([0] * (columns * rows) + [n], np.int32)

@@ -137,7 +137,7 @@ def begun(packed: MissionArrays, seed: int = 0) -> MissionArrays:
         Of the radio's chances, beside that of the mission.
     """
     parts = {name: _fresh(part) if name.startswith(EMPTY) else part.copy() for name, part in packed._asdict().items()}
-    state = MissionArrays(**parts)
+    state = MissionArrays(**parts)  # type: ignore[arg-type]
     head = state.head[0]
     head.loss_key, head.burst_key = keyed(head.loss_key, seed), keyed(head.burst_key, seed)
     return state
@@ -145,7 +145,7 @@ def begun(packed: MissionArrays, seed: int = 0) -> MissionArrays:
 
 def _fresh(part: Records | FloatArray) -> Records | FloatArray:
     """Return an empty array like another one."""
-    return _by_attribute(np.zeros(part.shape, part.dtype))
+    return _by_attribute(cast(FloatArray, np.zeros(part.shape, part.dtype)))
 
 
 def records(part: object) -> Records:
