@@ -1,6 +1,7 @@
 """The optimum by brute force, from the definitions alone: nothing of it comes from the code that it checks."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,7 @@ class Optimum:
     lost: float
 
 
+@lru_cache(1024)  # of an instance that is solved by many methods, once
 def brute_force(instance: Instance) -> Optimum:
     """Try all (m + 1)^n allocations; those that send an agent where it cannot go are left out."""
     plans, unserved, lost, makespan, energy = _scored_plans(instance)

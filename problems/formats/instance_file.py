@@ -128,7 +128,9 @@ def _require_folder(path: PathLike) -> None:
         return
     suffix = Path(path).suffix
     if suffix == ".csv":
-        raise InputError("is a single table; give the folder that holds agents.csv and tasks.csv")
+        raise InputError(
+            "is a single table; give the folder of agents.csv and tasks.csv, or join two tables by `alloc import`"
+        )
     try:
         exists = os.path.lexists(path)
     except ValueError:

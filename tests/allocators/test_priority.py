@@ -25,6 +25,7 @@ METHODS = (
     "gappo-ls",
 )
 EXACT = ("cpsat", "milp")
+SCARCE = [scarce_instance(seed) for seed in range(20)]
 
 
 @pytest.fixture(scope="module", params=METHODS)
@@ -37,8 +38,7 @@ def method(request: pytest.FixtureRequest) -> tuple[str, str | Allocator]:
 def test_the_served_tasks_have_the_most_priority(method: tuple[str, str | Allocator], objective: Objective) -> None:
     """As many tasks as can be are served, the most urgent, and by exact methods at the least makespan and energy."""
     name, allocator = method
-    for seed in range(20):
-        instance = scarce_instance(seed)
+    for instance in SCARCE:
         if instance.has_travel_time and name != "auto" and not BUILT_IN[name].finite_speeds:
             continue
         best = brute_force(instance)

@@ -39,7 +39,7 @@ GAPPO = pytest.param("gappo", marks=pytest.mark.slow)
 ENDS = [
     pytest.param("gappo", 0.0, marks=pytest.mark.slow),
     pytest.param("gappo", 0.8, marks=pytest.mark.slow),
-    ("milp", 0.0),
+    pytest.param("milp", 0.0, marks=pytest.mark.slow),
     pytest.param("milp", 0.8, marks=pytest.mark.slow),
 ]
 """Methods, and seconds after which the main thread ends."""
@@ -51,7 +51,7 @@ def run(method: str, after_s: float, how: str, times: int = 1) -> subprocess.Com
     return subprocess.run(command, capture_output=True, text=True, timeout=60)
 
 
-@pytest.mark.parametrize("method", [MILP, "cpsat", GAPPO, "local-search"])
+@pytest.mark.parametrize("method", [MILP, pytest.param("cpsat", marks=pytest.mark.slow), GAPPO, "local-search"])
 def test_a_daemon_thread_is_stopped_and_awaited(method: str) -> None:
     """However often it solves, its run is ended as by a stop event, the next is none, and nothing crashes."""
     ran = run(method, 0.8, "daemon", 1000)

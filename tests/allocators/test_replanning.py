@@ -1,5 +1,6 @@
 """Re-planning: a price on moves, pinned agents, and plans for another state of affairs, against brute force."""
 
+from functools import cache
 from itertools import product
 
 import numpy as np
@@ -16,6 +17,7 @@ LONG = ("gappo", "hedonic", "lp-round", "ga")
 """Methods whose comparison with brute force takes seconds, and is left to CI."""
 
 
+@cache
 def cases() -> list[tuple[Instance, Allocation, dict[str, str | None]]]:
     """Return instances with a plan in force, and a pin in every other one."""
     found = []
@@ -32,10 +34,10 @@ def cases() -> list[tuple[Instance, Allocation, dict[str, str | None]]]:
     return found
 
 
-def best_cost(
-    instance: Instance, plan: Allocation, pins: dict[str, str | None], objective: Objective, price: float
-) -> tuple[int, float, float]:
-    """Return unserved tasks, makespan and cost of the best allocation with these pins, by trying all."""
+@cache
+def best_cost(number: int, objective: Objective, price: float) -> tuple[int, float, float]:
+    """Return unserved tasks, makespan and cost of the best allocation in one of the cases, by trying all."""
+    instance, plan, pins = cases()[number]
     mask = instance.reach.mask[instance.reach.origin]
     options = []
     for agent in range(instance.n):
@@ -62,10 +64,10 @@ def best_cost(
 def test_moves_against_brute_force(method: str, objective: Objective, price: float) -> None:
     """Exact methods find the least cost of moves with all pins kept, and no method claims less."""
     allocator = load(method)
-    for instance, plan, pins in cases():
+    for number, (instance, plan, pins) in enumerate(cases()):
         if instance.has_travel_time and not BUILT_IN[method].finite_speeds:
             continue
-        unserved, hours, cost = best_cost(instance, plan, pins, objective, price)
+        unserved, hours, cost = best_cost(number, objective, price)
         result = solve(
             instance,
             allocator,

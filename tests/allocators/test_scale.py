@@ -46,14 +46,20 @@ def test_refusals_are_quick(far_and_wide: Instance, method: str, objective: Obje
     allocator = load(method)
     instance = far_and_wide
     instance.reach.is_complete  # noqa: B018 - what any method needs
-    begin = time.perf_counter()
+    begin = time.process_time()
     with pytest.raises(RefusedError, match=r"\d"):
         solve(instance, allocator, objective=objective)
-    assert time.perf_counter() - begin < 1.0  # milliseconds on an idle machine
+    assert time.process_time() - begin < 1.0  # milliseconds, and not those of others
 
 
-@pytest.mark.parametrize("starts", ["tasks", "own"])
-@pytest.mark.parametrize("objective", OBJECTIVES)
+@pytest.mark.parametrize(
+    ("starts", "objective"),
+    [
+        pytest.param(starts, objective, marks=[pytest.mark.slow] * ((starts == "own") == (objective == OBJECTIVES[0])))
+        for starts in ("tasks", "own")
+        for objective in OBJECTIVES
+    ],
+)
 def test_greedy_with_complete_reach(starts: str, objective: Objective) -> None:
     """200,000 agents and 2,500 tasks: within a tenth of a per cent of the bound, whatever the agents begin at."""
     instance = random_instance(Family(agents=200_000, tasks=2_500, starts=starts), 0)
@@ -77,8 +83,8 @@ def test_without_time_tasks_are_served_all_the_same(far_and_wide: Instance) -> N
 
 def test_auto_picks_at_once(far_and_wide: Instance) -> None:
     """What cannot be held is not picked."""
-    begin = time.perf_counter()
+    begin = time.process_time()
     for objective in OBJECTIVES:
         method, _ = choose(far_and_wide, objective, Budget(10))
         assert method in ("greedy", "local-search")
-    assert time.perf_counter() - begin < 2.0
+    assert time.process_time() - begin < 2.0

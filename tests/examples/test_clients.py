@@ -28,6 +28,7 @@ def test_node_over_lines(checkout):
 
 
 @pytest.mark.skipif(not all(map(shutil.which, ("curl", "jq"))), reason="curl or jq is not installed")
+@pytest.mark.slow
 def test_clients_over_http(checkout, tmp_path):
     """A shell and, where it is there, node get plans over HTTP; SIGTERM ends the service with exit code 0."""
     ran(

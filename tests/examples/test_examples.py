@@ -25,6 +25,7 @@ def test_solve_from_python(checkout):
     assert float(second.split()[-1]) < float(first.split()[-1])
 
 
+@pytest.mark.slow
 def test_replan(checkout):
     """Few drones move as one drops out, each with a reason; with forty fewer, all is done later."""
     printed = run(checkout / "examples" / "replan.py")

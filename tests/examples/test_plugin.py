@@ -74,6 +74,7 @@ def test_is_listed(plugin):
     assert "random-restart" in done.stdout
 
 
+@pytest.mark.slow
 def test_passes_the_conformance_suite(plugin):
     """Its own tests, which subclass the suite, pass against the installed plugin."""
     done = run(plugin, "pytest", "-q", "-p", "no:cacheprovider", "tests")

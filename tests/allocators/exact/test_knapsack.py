@@ -2,7 +2,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from alloc.allocators.exact.knapsack import cheapest_group, fill_table, read_group
@@ -94,6 +94,7 @@ def test_core_has_the_cheapest_group(seed, spare, classes):
         assert (group <= copies).all()
 
 
+@settings(max_examples=20)
 @given(st.integers(0, 2**32), st.integers(1, 60), st.sampled_from([1, 2**30]))
 def test_states_have_the_cheapest_group(seed, classes, scale):
     """Lists of states find what the table does, also where numbers are far beyond any table."""

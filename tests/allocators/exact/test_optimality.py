@@ -14,7 +14,7 @@ def exact(request: pytest.FixtureRequest) -> Allocator:
     return load(request.param)
 
 
-@pytest.mark.parametrize("seed", range(60))
+@pytest.mark.parametrize("seed", [pytest.param(one, marks=[pytest.mark.slow] * (one >= 24)) for one in range(60)])
 def test_answer_is_that_of_brute_force(exact, seed):
     """On tiny instances of every sort the answer is the optimum, or the best partial plan, and is known to be."""
     instance = tiny_instance(seed)

@@ -27,7 +27,9 @@ SERVED = [seed for seed in range(40) if fewest_unserved(scaled_instance(seed)) =
 
 
 @pytest.mark.parametrize("method", ["milp", "cpsat", "auto"])
-@pytest.mark.parametrize("seed", SERVED[:20])
+@pytest.mark.parametrize(
+    "seed", [pytest.param(one, marks=[pytest.mark.slow] * (k >= 6)) for k, one in enumerate(SERVED[:20])]
+)
 def test_optima_and_bounds_are_those_of_brute_force(seed, method):
     """What is called optimal is so, and no bound exceeds what some plan reaches."""
     instance = scaled_instance(seed)

@@ -41,7 +41,7 @@ def test_playing_without_learning_is_not_enough(name: str) -> None:
 
 
 @pytest.mark.parametrize("method", PARAMETERS)
-@pytest.mark.parametrize("name", PROBES)
+@pytest.mark.parametrize("name", [pytest.param(one, marks=[pytest.mark.slow] * (one == "pairing")) for one in PROBES])
 def test_ppo_solves_probes(name: str, method: str) -> None:
     """Games with known answers are solved, all of them."""
     assert share_learned(Ppo(parameters=PARAMETERS[method]), name) == 1.0

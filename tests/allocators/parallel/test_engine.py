@@ -118,6 +118,7 @@ def test_errors_of_the_function_are_raised_here(engine: Engine) -> None:
         engine.map(jobs.fail_oddly, [5])
 
 
+@pytest.mark.slow
 def test_a_stop_drops_what_is_under_work(tmp_path: Path, pair: ProcessEngine) -> None:
     """`map` returns None at once, its workers are gone, and the engine can be used again."""
     markers = [tmp_path / name for name in ("a", "b")]

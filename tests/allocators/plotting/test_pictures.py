@@ -333,6 +333,7 @@ WRONG: dict[str, tuple[str, Callable[[str], object]]] = {
 }
 
 
+@pytest.mark.slow  # all of them test the test before
 @pytest.mark.parametrize("what", WRONG)
 def test_a_wrong_picture_is_noticed(tmp_path: Path, what: str) -> None:
     """A picture of another plan, bound or front is not taken for the one that is kept."""

@@ -41,6 +41,14 @@ def test_it_says_what_it_guessed(alloc):
 
 
 @pytest.mark.usefixtures("tables")
+def test_a_table_alone_leads_to_this_command(alloc):
+    """Whoever has a table and solves it at once is told what makes an instance of two."""
+    ran = alloc("solve", "tasks.csv")
+    assert (ran.code, len(ran.err.splitlines())) == (2, 1)
+    assert "join two tables by `alloc import`" in ran.err
+
+
+@pytest.mark.usefixtures("tables")
 def test_it_goes_to_standard_output(alloc):
     """`-` gives JSON and nothing else; `--quiet` says nothing."""
     ran = run(alloc, "--output", "-", "--quiet")

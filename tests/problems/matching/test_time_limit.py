@@ -1,5 +1,6 @@
 """Far more tasks than agents: as many are served as can be, within the time limit."""
 
+import time
 from collections.abc import Callable
 
 import numpy as np
@@ -31,11 +32,12 @@ def surplus_of_tasks(reach: float | None, agents: int = 2_000, tasks: int = 20_0
 @pytest.mark.parametrize("reach", [0.1, 0.5])
 @pytest.mark.parametrize("method", ["greedy", "local-search"])
 def test_the_limit_holds_and_every_agent_serves_a_small_task(reach: float, method: str) -> None:
-    """Each of 2,000 agents serves one of 20,000 tasks, soon after a limit of one second, and not the largest."""
-    solve(surplus_of_tasks(reach, 20, 200), method, time_limit_s=1)  # loads what is compiled
+    """Each of 2,000 agents serves one of 20,000 tasks after 1.6 s of processor time at most, and not the largest."""
+    solve(surplus_of_tasks(reach, 20, 200), method, time_limit_s=0.1)  # loads what is compiled
     instance = surplus_of_tasks(reach)
-    result = solve(instance, method, time_limit_s=1)
-    assert result.runtime_s <= 1.6
+    begin_s = time.process_time()  # a busy machine is no bug
+    result = solve(instance, method, time_limit_s=1, threads=1)
+    assert time.process_time() - begin_s <= 1.6
     assert result.evaluation is not None
     assert len(result.evaluation.unserved_tasks) == 18_000
     bound = bound_by_size(instance, np.arange(instance.n), np.arange(instance.m))

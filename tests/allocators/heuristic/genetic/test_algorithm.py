@@ -2,6 +2,7 @@
 
 import random
 import threading
+import time
 from unittest.mock import patch
 
 import numpy as np
@@ -37,9 +38,15 @@ def test_finds_perfect_partitions_of_the_paper(scenario: int, seed: int) -> None
     assert result.stop_reason is StopReason.PROVEN
 
 
-def test_improves_on_greedy() -> None:
+@pytest.fixture(scope="module")
+def evolved() -> Result:
+    """A few hundred generations on a hard instance."""
+    return solve(hard(), "ga", time_limit_s=None, iterations=300)
+
+
+def test_improves_on_greedy(evolved: Result) -> None:
     """A few hundred generations close most of the gap that list scheduling leaves on a hard instance."""
-    greedy, ga = solve(hard(), "greedy"), solve(hard(), "ga", time_limit_s=None, iterations=300)
+    greedy, ga = solve(hard(), "greedy"), evolved
     assert ga.makespan is not None
     assert greedy.gap is not None
     assert ga.gap is not None
@@ -105,9 +112,9 @@ def test_threads_share_one_allocator() -> None:
     assert [together[0], together[1]] == alone
 
 
-def test_builds_on_a_start() -> None:
+def test_builds_on_a_start(evolved: Result) -> None:
     """The answer is never worse than the warm start, which is better than what one generation finds by itself."""
-    good = solve(hard(), "ga", time_limit_s=None, iterations=400)
+    good = evolved
     assert good.allocation is not None
     cold = solve(hard(), "ga", time_limit_s=None, iterations=1, seed=5)
     warm = solve(hard(), "ga", time_limit_s=None, iterations=1, seed=5, start=good.allocation)
@@ -166,9 +173,10 @@ def test_holds_its_time_limit_on_many_agents() -> None:
         task_position=rng.random((100, 3)),
         communication_range=np.full(10_000, 0.7),
     )
-    result = solve(instance, "ga", time_limit_s=0.5)
+    begin_s = time.process_time()
+    result = solve(instance, "ga", time_limit_s=0.5, threads=1)
     assert result.makespan is not None
-    assert result.runtime_s < 0.5 * 1.1 + 0.5
+    assert time.process_time() - begin_s < 0.5 * 1.1 + 0.5
 
 
 def test_all_idle_where_nothing_can_be_served():

@@ -76,8 +76,9 @@ def assert_scored_anew(network: ActorCritic, scores: LocalScores, board: Board, 
     torch.testing.assert_close(kept.reserve, anew.reserve, atol=1e-5, rtol=1e-5)
 
 
-@pytest.mark.parametrize("rules", [Rules(), Rules(most_moves=1), Rules(turn=TurnRule.SIMULTANEOUS)])
-@pytest.mark.parametrize("anew", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize(
+    ("rules", "anew"), [(Rules(), 0.5), (Rules(most_moves=1), 1.0), (Rules(turn=TurnRule.SIMULTANEOUS), 0.0)]
+)
 def test_incremental_scores_equal_full_ones(
     board: Board, network: ActorCritic, rules: Rules, anew: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:

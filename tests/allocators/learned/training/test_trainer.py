@@ -82,16 +82,14 @@ def planned(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     ids=[*METHODS, "rules of the paper"],
 )
 def test_a_resumed_run_goes_on_as_if_nothing_had_happened(tmp_path: Path, changes: dict[str, Any]) -> None:
-    """Four generations at once, and two and two with a checkpoint between, give the same figures and weights."""
+    """Two generations at once, and one and one with a checkpoint between, give the same figures and weights."""
     limits = Limits(steps=1000)
     whole, first, second = (trainer(**changes) for _ in range(3))
-    for _ in range(4):
-        whole.advance(limits)
-    first.advance(limits)
+    whole.advance(limits)
+    whole.advance(limits)
     first.advance(limits)
     first.save(tmp_path / "checkpoint")
     second.resume(tmp_path / "checkpoint")
-    second.advance(limits)
     second.advance(limits)
     assert figures(whole.history) == figures(second.history)
     assert torch.equal(weights(whole), weights(second))

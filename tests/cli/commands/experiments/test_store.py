@@ -101,6 +101,7 @@ def test_differences_are_printed_and_reported(alloc):
     assert "Against" not in alloc(*words, "--json").err
 
 
+@pytest.mark.slow
 def test_failures_have_rows_and_are_tried_again_where_asked(alloc, plugin):
     """A failure has a row with the reason; it is run again with --retry alone, which leaves good runs as they are."""
     words = ("compare", f"{TINY}:0", "--methods", "leave,nap", *QUICK)
