@@ -36,9 +36,9 @@ def violated_sets(
     near = np.zeros((classes, classes + 1), dtype=np.bool_)
     for g in range(use.shape[1]):
         inside = np.flatnonzero(use[:, g])
-        for a in inside:
-            for b in inside:
-                near[a, b] = a != b
+        for one in inside:
+            for other in inside:
+                near[one, other] = one != other
     near[:, classes] = True
     sets, excess = np.empty((most, 3), dtype=np.int64), np.empty(most)
     for a in range(classes):
