@@ -1,7 +1,7 @@
 """The contract of a policy: what it may know, and what it answers when it is asked for orders."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import ClassVar
@@ -174,6 +174,28 @@ class FleetDecider(ABC):
         """
 
 
+class TurnsDecider(ABC):
+    """Decides for agents in turn, as each would for itself, where everything is known to all."""
+
+    @abstractmethod
+    def turns(self, view: View, names: Sequence[str]) -> Iterator[tuple[str, Order | None]]:
+        """Return where agents are to go, one after the other; each knows what those before it were told.
+
+        Parameters
+        ----------
+        view : View
+            Of nobody in particular.
+        names : sequence of str
+            Ids of the agents, in their turn. Whoever asks may stop before the last.
+
+        Yields
+        ------
+        name : str
+        order : Order or None
+            None for where its last order says.
+        """
+
+
 class Policy(Parameterised):
     """A policy, loaded and ready; one object serves many missions.
 
@@ -218,3 +240,17 @@ class Policy(Parameterised):
         -------
         AgentDecider or FleetDecider
         """
+
+    def begin_turns(self, briefing: Briefing) -> TurnsDecider | None:
+        """Return who decides for agents in turn, faster than one by one; None where nobody does.
+
+        Parameters
+        ----------
+        briefing : Briefing
+            Of who leads all agents.
+
+        Returns
+        -------
+        TurnsDecider or None
+        """
+        return None

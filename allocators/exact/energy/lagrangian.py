@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from alloc.allocators.exact.energy.clusters import Clusters, cluster_tasks
-from alloc.allocators.exact.energy.cutting_planes import CuttingPlanes, is_small
+from alloc.allocators.exact.energy.cuts.cutting_planes import CuttingPlanes, is_small
 from alloc.allocators.exact.energy.energy_model import EnergyModel
 from alloc.allocators.exact.energy.subproblems import solve_subproblems
 from alloc.allocators.exact.knapsack import WholeArray

@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 
 from alloc.allocators.exact.demand import Demand
-from alloc.allocators.exact.energy.cutting_planes import CuttingPlanes
+from alloc.allocators.exact.energy.cuts.cutting_planes import CuttingPlanes
 from alloc.allocators.exact.energy.energy_model import MAX_NEED, EnergyModel, round_demand
 from alloc.allocators.exact.energy.lagrangian import LagrangianBound
 from alloc.allocators.exact.energy.linear import class_prices

@@ -50,8 +50,8 @@ class PlainCpSat:
         status = self._solver.solve(model, Reporter())
         proto = self._solver.response_proto
         bound = None
-        if status in (cp_model.OPTIMAL, cp_model.FEASIBLE, cp_model.UNKNOWN):
-            steps = proto.best_objective_bound
+        steps = proto.best_objective_bound  # 0 where the solver was stopped before it had any
+        if status in (cp_model.OPTIMAL, cp_model.FEASIBLE) or (status == cp_model.UNKNOWN and steps):
             bound = (steps + 1) / RATIO_STEPS if self._programme.is_free else max(0.0, steps / scale)
         found = status in (cp_model.OPTIMAL, cp_model.FEASIBLE)
         return PlainAnswer(_chosen(proto.solution, pairs) if found else None, bound)

@@ -88,18 +88,7 @@ class TreeGreedy:
         self._tree = build_tree(position, np.sort(by_size[work[by_size] > 0]))
         self._tasks = Tasks(position, work, rank, np.zeros(instance.m), np.zeros(instance.m))
         update_all(self._tree, self._tasks)
-        self._agents = Agents(
-            origin=reach.origin,
-            ability=instance.ability,
-            horizon=horizon * instance.speed,
-            task=np.full(instance.n, -1, dtype=np.intp),
-            position=reach.place,
-            longest_distance=reach.communication_range + TOLERANCE,
-            battery=reach.battery + TOLERANCE,
-            radius=reach.radius,
-            **_lists(reach),
-            energy_per_distance=float(reach.energy_per_distance),
-        )
+        self._agents = idle_agents(instance, horizon)
 
     @property
     def task(self) -> Indices:
@@ -127,6 +116,23 @@ class TreeGreedy:
             self._tasks.workload > 0, self._tasks.workload, 1
         )
         update_all(self._tree, self._tasks)
+
+
+def idle_agents(instance: Instance, horizon: float) -> Agents:
+    """Return the agents of an instance without tasks; see `TreeGreedy`."""
+    reach = instance.reach
+    return Agents(
+        origin=reach.origin,
+        ability=instance.ability,
+        horizon=horizon * instance.speed,
+        task=np.full(instance.n, -1, dtype=np.intp),
+        position=reach.place,
+        longest_distance=reach.communication_range + TOLERANCE,
+        battery=reach.battery + TOLERANCE,
+        radius=reach.radius,
+        **_lists(reach),
+        energy_per_distance=float(reach.energy_per_distance),
+    )
 
 
 class _Lists(TypedDict):
@@ -194,8 +200,8 @@ def _worst_of_list(agent: int, tasks: Tasks, agents: Agents) -> tuple[int, float
             if agents.listed_distance[entry] < horizon:
                 best, best_distance = j, agents.listed_distance[entry]
             continue
-        distance = _distance(agents.position[origin], tasks.position[j])
-        if _is_reachable(distance, longest, battery, rate, horizon):
+        distance = straight_distance(agents.position[origin], tasks.position[j])
+        if is_reachable(distance, longest, battery, rate, horizon):
             best, best_distance = j, distance
     return best, best_distance
 
@@ -221,8 +227,8 @@ def _worst_in_tree(agent: int, tree: Tree, tasks: Tasks, agents: Agents, stack: 
             continue
         if not is_unknown and _is_beyond(position, low[node], high[node], limit):
             continue
-        distance = _distance(position, positions[j])
-        if _is_reachable(distance, longest, battery, rate, horizon):
+        distance = straight_distance(position, positions[j])
+        if is_reachable(distance, longest, battery, rate, horizon):
             best, best_distance = j, distance
         elif 2 * node + 2 < len(begin):
             left, right = 2 * node + 1, 2 * node + 2
@@ -235,20 +241,20 @@ def _worst_in_tree(agent: int, tree: Tree, tasks: Tasks, agents: Agents, stack: 
                 j = order[entry]
                 if best >= 0 and not is_worse(j, best, coverage, rank):
                     continue
-                distance = _distance(position, positions[j])
-                if _is_reachable(distance, longest, battery, rate, horizon):
+                distance = straight_distance(position, positions[j])
+                if is_reachable(distance, longest, battery, rate, horizon):
                     best, best_distance = j, distance
     return best, best_distance
 
 
 @compiled
-def _is_reachable(distance: float, longest: float, battery: float, energy_per_distance: float, horizon: float) -> bool:
+def is_reachable(distance: float, longest: float, battery: float, energy_per_distance: float, horizon: float) -> bool:
     """Whether a task at that distance is within range, battery and horizon of an agent."""
     return bool(distance <= longest and energy_per_distance * distance <= battery and distance < horizon)
 
 
 @compiled
-def _distance(one: Floats, other: Floats) -> float:
+def straight_distance(one: Floats, other: Floats) -> float:
     """Return the distance as in `alloc.problems.distances.metric`, to the last bit."""
     x, y, z = one[0] - other[0], one[1] - other[1], one[2] - other[2]
     distance = float(np.sqrt(x * x + y * y + z * z))

@@ -10,6 +10,7 @@ from alloc.allocators.heuristic.greedy.list_schedule import greedy
 from alloc.allocators.heuristic.local_search.annealing_state import compile_loops
 from alloc.allocators.heuristic.local_search.improve import improve
 from alloc.allocators.heuristic.local_search.parameters import LocalSearchParameters
+from alloc.allocators.heuristic.task_prices.start import plan_by_prices
 from alloc.problems import Allocation, serve_all
 
 
@@ -19,7 +20,8 @@ class LocalSearch(Allocator):
     An exchange reassigns the agents of two tasks, or of one task and the idle agents, at the least cost: the distance,
     a penalty for the ability that either task lacks for the target makespan, and random noise per agent that decreases
     during the run. The assignment is exact, by dynamic programming over sums of abilities where they are integers, and
-    by enumeration of subsets elsewhere. An iteration is a thousand exchanges.
+    by enumeration of subsets elsewhere. An iteration is a thousand exchanges. With thousands of agents, it begins with
+    prices of tasks, which give a bound and a plan near it.
 
     Parameters
     ----------
@@ -51,5 +53,5 @@ class LocalSearch(Allocator):
         if not (instance.workload > 0).any():
             return Proposal(Allocation.idle(instance))
         search.submit(serve_all(instance, greedy(instance, search), lambda: search.remaining_s))
-        improve(search, parameters=self.parameters)
+        improve(search, plan=plan_by_prices(search), parameters=self.parameters)
         return Proposal()

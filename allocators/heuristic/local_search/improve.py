@@ -2,7 +2,6 @@
 
 import math
 import time
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -10,11 +9,11 @@ from alloc.allocators.contract.clock import Clock
 from alloc.allocators.contract.search import Search
 from alloc.allocators.heuristic.local_search.annealing_state import AnnealingState, PenaltyFactor
 from alloc.allocators.heuristic.local_search.parameters import LocalSearchParameters
-from alloc.allocators.heuristic.local_search.parts import MOST_STATES, Parts, Team
+from alloc.allocators.heuristic.local_search.parts import MOST_STATES, Attempt, Parts, Team
 from alloc.allocators.parallel.pool import side_by_side
 from alloc.problems import IDLE, Allocation, Objective, only_allowed
 from alloc.problems.evaluation import RELATIVE_TOLERANCE
-from alloc.problems.instance import FloatArray, IntArray
+from alloc.problems.instance import IntArray
 
 HARD = 100.0
 """Factor on penalties that makes them outweigh any distance."""
@@ -28,6 +27,9 @@ FIRST_CYCLE_SHARE = 0.1
 PATIENCE, LEAST_SHARE = 3.0, 0.2
 """Time without a smaller makespan, as a multiple of the time until then, and share of the time for it, after which the
 energy has its turn."""
+
+EXCHANGES_PER_TASK = 20.0
+"""Least number of exchanges in an attempt, for each task."""
 
 REPORT_INTERVAL = 20.0
 """Time between two reports, as a multiple of the time that scoring one plan takes."""
@@ -47,6 +49,7 @@ def improve(
     *,
     until_s: float = math.inf,
     iterations: float = math.inf,
+    plan: Allocation | None = None,
     parameters: LocalSearchParameters | None = None,
 ) -> None:
     """Improve ``search.best``, which must exist, and submit better plans until the search or a limit ends.
@@ -59,6 +62,8 @@ def improve(
         Time limit, on ``search.elapsed_s``.
     iterations : float
         Most iterations, of ``parameters.exchanges`` exchanges each.
+    plan : Allocation, optional
+        Where the search for less makespan begins, in place of the fastest known.
     parameters : LocalSearchParameters, optional
     """
     assert search.best is not None
@@ -70,15 +75,17 @@ def improve(
         return
     parameters = parameters or LocalSearchParameters()
     with side_by_side(min(search.threads, MOST_STATES)) as run_all:
-        _improve(search, Team.of(search, parameters.neighbours, run_all), parameters, clock)
+        _improve(search, Team.of(search, parameters.neighbours, run_all), parameters, clock, plan)
 
 
-def _improve(search: Search, team: Team, parameters: LocalSearchParameters, clock: Clock) -> None:
+def _improve(
+    search: Search, team: Team, parameters: LocalSearchParameters, clock: Clock, plan: Allocation | None
+) -> None:
     energy_counts = search.objective is Objective.MAKESPAN_ENERGY
     if clock.is_endless and energy_counts:
         _improve_endlessly(search, team, parameters, clock)
         return
-    reduction = MakespanReduction(search, team, parameters)
+    reduction = MakespanReduction(search, team, parameters, plan)
     if not energy_counts:
         reduction.run(clock)
         return
@@ -108,11 +115,17 @@ class MakespanReduction:
         It has a plan.
     team : Team
     parameters : LocalSearchParameters
+    plan : Allocation, optional
+        Where it begins first, in place of the fastest plan.
     """
 
-    def __init__(self, search: Search, team: Team, parameters: LocalSearchParameters) -> None:
-        self._search, self._team, self._parameters = search, team, parameters
-        self._iterations, self._fraction, self._count = float(parameters.attempt_iterations), 0.0, 0
+    def __init__(
+        self, search: Search, team: Team, parameters: LocalSearchParameters, plan: Allocation | None = None
+    ) -> None:
+        self._search, self._team, self._parameters, self._plan = search, team, parameters, plan
+        by_size = EXCHANGES_PER_TASK * search.instance.m / parameters.exchanges
+        self._first_iterations = max(float(parameters.attempt_iterations), by_size)
+        self._iterations, self._fraction, self._count = self._first_iterations, 0.0, 0
         self._known: Allocation | None = None
 
     def run(self, clock: Clock, *, patience: float | None = None) -> None:
@@ -124,9 +137,10 @@ class MakespanReduction:
         search, improved = self._search, 0.0
         assert search.fastest is not None
         if search.fastest.allocation is not self._known:
+            plan, self._plan = self._plan or search.fastest.allocation, None
             for state in self._team.states:
-                state.begin(search.fastest.allocation, search.fastest.evaluation.served_makespan)
-            self._iterations, self._fraction = float(self._parameters.attempt_iterations), 0.0
+                state.begin(plan, search.fastest.evaluation.served_makespan)
+            self._iterations, self._fraction = self._first_iterations, 0.0
         while not clock.is_over and not search.fast_enough:
             fastest = search.fastest.evaluation
             best = fastest.served_makespan
@@ -151,50 +165,16 @@ class MakespanReduction:
                 self._fraction, self._iterations = 0.5 * attempt.fraction, attempt.iterations
                 break
 
-    def _next_attempt(self, number: int, clock: Clock, bound: float, best: float) -> "_Attempt":
+    def _next_attempt(self, number: int, clock: Clock, bound: float, best: float) -> Attempt:
         parameters, state = self._parameters, self._team.states[number]
         initial = parameters.attempt_noise[(self._count + number) % len(parameters.attempt_noise)]
         levels = np.geomspace(initial, parameters.attempt_final_noise, int(self._iterations) + 1)[1:]
         most = int(min(clock.iterations_of(number, len(self._team.states)), len(levels)))
         makespan = bound + self._fraction * (best - bound)
-        attempt = _Attempt(state, self._fraction, makespan, state.mean_ability * levels[:most], self._iterations)
+        attempt = Attempt(state, self._fraction, makespan, state.mean_ability * levels[:most], self._iterations)
         self._fraction = min(0.5 * (1 + self._fraction), 0.999)
         self._iterations *= parameters.attempt_growth
         return attempt
-
-
-@dataclass
-class _Attempt:
-    """An attempt at a target makespan, with the noise of each iteration."""
-
-    state: AnnealingState
-    fraction: float
-    makespan: float
-    noise: FloatArray
-    iterations: float
-    done: int = 0
-
-    def run(self, clock: Clock, exchanges: int) -> "_Attempt":
-        """Look for a plan within the target makespan."""
-        self.state.set_target(self.makespan)
-        for level in self.noise.tolist():
-            if clock.is_over or not self.state.n_short:
-                break
-            self.state.run(exchanges, self.state.weights(0.0, level, 0.0, 1.0))
-            self.done += 1
-        return self
-
-    @property
-    def is_reached(self) -> bool:
-        return not self.state.n_short
-
-    def submit(self, search: Search) -> None:
-        """Submit the plan if it may be faster than the fastest."""
-        assert search.fastest is not None
-        fastest = search.fastest.evaluation.served_makespan
-        # where travel takes time, only the evaluation knows the makespan
-        if self.is_reached or not self.state.arrays.instant_travel or self.state.current_makespan < fastest:
-            search.submit(self.state.allocation)
 
 
 def reduce_energy(search: Search, team: Team, parameters: LocalSearchParameters, clock: Clock) -> None:

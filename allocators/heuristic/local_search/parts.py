@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from alloc.allocators.contract.clock import Clock
 from alloc.allocators.contract.search import Search
 from alloc.allocators.heuristic.local_search.annealing_state import AnnealingState
 from alloc.allocators.heuristic.local_search.plan import Weights
@@ -42,6 +43,41 @@ class Team:
         first = AnnealingState(search.instance, search.seed, neighbours)
         twins = [first.twin([search.seed, number]) for number in range(1, min(search.threads, MOST_STATES))]
         return cls([first, *twins], run_all)
+
+
+@dataclass
+class Attempt:
+    """An attempt at a target makespan, with the noise of each iteration."""
+
+    state: AnnealingState
+    fraction: float
+    makespan: float
+    noise: FloatArray
+    iterations: float
+    done: int = 0
+
+    def run(self, clock: Clock, exchanges: int) -> "Attempt":
+        """Look for a plan within the target makespan."""
+        self.state.set_target(self.makespan)
+        for level in self.noise.tolist():
+            if clock.is_over or not self.state.n_short:
+                break
+            self.state.run(exchanges, self.state.weights(0.0, level, 0.0, 1.0))
+            self.done += 1
+        return self
+
+    @property
+    def is_reached(self) -> bool:
+        """Whether no task is short."""
+        return not self.state.n_short
+
+    def submit(self, search: Search) -> None:
+        """Submit the plan if it may be faster than the fastest."""
+        assert search.fastest is not None
+        fastest = search.fastest.evaluation.served_makespan
+        # where travel takes time, only the evaluation knows the makespan
+        if self.is_reached or not self.state.arrays.instant_travel or self.state.current_makespan < fastest:
+            search.submit(self.state.allocation)
 
 
 class Parts:

@@ -235,12 +235,20 @@ def fill_crowding(situation: Situation, tasks: IntArray, options: Singles) -> No
 @compiled_in_place
 def fill_whole(situation: Situation, choice: IntArray, tasks: int, options: Singles) -> None:
     """Fill the features that all options share, and those that compare with a mean."""
-    own, agents, ability = situation.own, 1.0, situation.own[known.ABILITY]
+    agents, ability = 1.0, situation.own[known.ABILITY]
     for i in range(situation.others[0]):
         if situation.counts[i]:
             agents += 1
             ability += situation.other[known.STRENGTH, i]
-    priority = work = 0.0
+    fill_shared(situation, choice, tasks, options, agents, ability)
+
+
+@compiled_in_place
+def fill_shared(
+    situation: Situation, choice: IntArray, tasks: int, options: Singles, agents: float, ability: float
+) -> None:
+    """Fill them where it is known how many agents there are, this one included, and the sum of their abilities."""
+    own, priority, work = situation.own, 0.0, 0.0
     for row in range(tasks):
         priority += situation.task[known.PRIORITY, choice[row]] / tasks
         work += situation.task[known.LEFT, choice[row]]

@@ -3,15 +3,16 @@
 import math
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from queue import SimpleQueue
 from types import MappingProxyType
 
 from alloc.allocators.online.contract import AgentDecider, Briefing, FleetDecider, Policy, PolicyError
+from alloc.allocators.online.planner.collection import collected_later
 from alloc.allocators.online.planner.state import LiveState
-from alloc.problems.missions.simulation.reports import View
-from alloc.problems.missions.simulation.state import Order
+from alloc.problems.missions.simulation.reports import AgentReport, View
+from alloc.problems.missions.simulation.state import STAY, AgentStatus, Order
 from alloc.problems.vocabulary import Knowledge
 
 DECISION_SHARE = 0.6
@@ -92,6 +93,7 @@ class Leader:
         if policy.info.central and not isinstance(begun, FleetDecider):
             raise PolicyError(f"policy {policy.info.name!r} is central, but began with a {type(begun).__name__}")
         self._fleet = begun if isinstance(begun, FleetDecider) else None
+        self._turns = None if policy.info.central else policy.begin_turns(self._briefing)
         self._agents: dict[str, AgentDecider] = {}
         self._broken_off = ""
         self.last: Decision | None = None
@@ -125,7 +127,8 @@ class Leader:
         while (decision := self._wanted.get()) is not None:
             try:
                 if not decision.is_overdue:
-                    self._decide(self._look(decision), decision)
+                    with collected_later:
+                        self._decide(self._look(decision), decision)
             except Exception as error:  # whatever a policy does, the last plan stands
                 decision.problem = f"{type(error).__name__}: {error}"
             decision.done.set()
@@ -139,24 +142,30 @@ class Leader:
             decision.orders.update({name: _order(order) for name, order in orders.items()})
             self._finish(decision)
             return
-        agents = dict(view.agents)
-        distances, known = self._state.distances, MappingProxyType(agents)
         names = list(view.agents)
         first, self._broken_off = self._broken_off, ""
         if first in view.agents:
             names = [*names[names.index(first) :], *names[: names.index(first)]]
-        for name in names:
-            if decision.is_overdue:
-                self._broken_off = name  # the next one begins there, so that everybody's turn comes
-                return
-            order = self._decider(name).decide(View(view.hour, name, known, view.tasks, distances))
+        turns = self._turns.turns(view, names) if self._turns is not None else self._one_by_one(view, names)
+        for number, (name, order) in enumerate(turns, 1):
             if order is not None:
                 decision.orders[name] = _order(order)
-                agents[name] = replace(agents[name], task=order.task)
+            if decision.is_overdue and number < len(names):
+                self._broken_off = names[number]  # the next one begins there, so that everybody's turn comes
+                return
         self._finish(decision)
 
     def _finish(self, decision: Decision) -> None:
         decision.is_whole, self.last = True, decision
+
+    def _one_by_one(self, view: View, names: list[str]) -> Iterator[tuple[str, Order | None]]:
+        agents = dict(view.agents)
+        distances, known = self._state.distances, MappingProxyType(agents)
+        for name in names:
+            order = self._decider(name).decide(View(view.hour, name, known, view.tasks, distances))
+            if order is not None:
+                agents[name] = _ordered(agents[name], _order(order))
+            yield name, order
 
     def _decider(self, name: str) -> AgentDecider:
         if name not in self._agents:
@@ -166,6 +175,14 @@ class Leader:
                 raise PolicyError(f"it is not central, but began with a {type(begun).__name__}")
             self._agents[name] = begun
         return self._agents[name]
+
+
+def _ordered(report: AgentReport, order: Order) -> AgentReport:
+    """Return an agent as others know it once it has an order."""
+    if order.task == report.task:
+        return report
+    status = AgentStatus.IDLE if order == STAY else AgentStatus.FLYING
+    return replace(report, task=order.task, status=status)
 
 
 def _order(order: object) -> Order:

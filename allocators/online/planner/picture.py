@@ -36,6 +36,10 @@ WORDS = {
 }
 
 
+MOST_ENTRIES = 4
+"""On the agenda, for each agent and task: at most two of them are not void."""
+
+
 @dataclass(frozen=True)
 class News:
     """Something by which a plan may change.
@@ -146,6 +150,10 @@ class Picture:
     def look_ahead(self) -> None:
         """Find out, after some orders, when flights and work will end."""
         self._changes.balance()
+        if len(self.agenda) > MOST_ENTRIES * (len(self.state.agents) + len(self.state.tasks)):
+            self.agenda = Agenda()  # without all that is void, as agents were diverted
+            self._changes = Changes(self.state, self.agenda)
+            self.restore_agenda()
 
     def active(self) -> list[AgentState]:
         """Return the agents that take orders."""
@@ -232,6 +240,8 @@ class Picture:
         self._changes.note_task(task)
         for agent in workers:
             self._changes.note_agent(agent)
+        if task.status is TaskStatus.OPEN and task.facts.deadline <= state.hour:
+            self._close(task, status_at_deadline(state, task))  # work that was not done in time, after all
 
     def _note_deadline(self, task: TaskState) -> None:
         if task.status in (TaskStatus.TO_COME, TaskStatus.OPEN) and task.facts.deadline < math.inf:

@@ -10,6 +10,7 @@ from types import MappingProxyType
 from alloc.allocators.online.contract import Policy
 from alloc.allocators.online.planner import saved
 from alloc.allocators.online.planner.checks import check_hour
+from alloc.allocators.online.planner.collection import collected_later
 from alloc.allocators.online.planner.inputs import Input, Report
 from alloc.allocators.online.planner.leader import Decision, Leader
 from alloc.allocators.online.planner.picture import Picture
@@ -25,8 +26,7 @@ from alloc.problems.missions.simulation.reports import View
 from alloc.problems.missions.simulation.state import STAY, Order, TaskStatus
 
 RESERVE_MS, RESERVE_SHARE = 5.0, 0.3
-"""Kept of the deadline, beside what it took before to wake up and to follow orders, as another thread may hold the
-interpreter; and the part of the deadline that this is at the most."""
+"""Kept of the deadline, beside what it took before to wake up and follow orders; and the most, as a part of it."""
 
 
 class MissionPlanner(AbstractContextManager["MissionPlanner"]):
@@ -98,14 +98,13 @@ class MissionPlanner(AbstractContextManager["MissionPlanner"]):
         Parameters
         ----------
         event : Event, Report or mapping
-            Or its fields as in a file; without an hour it is now. ``task-changes`` says what is left of a task, and
+            Or its fields as in a file; without an hour it is now. ``task-changes`` says what work is left, and
             ``agent-reports`` where an agent is and what its battery holds.
 
         Raises
         ------
         InputError
-            If a field is wrong, an id unknown, its hour has passed, it was submitted before, or cannot happen. Then
-            nothing has changed.
+            If a field is wrong, it was submitted before, or it cannot happen as things are. Then nothing has changed.
         """
         with self._lock:
             given = Input.of(event, self.hour)
@@ -148,6 +147,7 @@ class MissionPlanner(AbstractContextManager["MissionPlanner"]):
             self._pins.remove(agent)
             self._version += 1
 
+    @collected_later
     def plan(self, hour: float | None = None) -> Plan:
         """Return the orders of all agents, by the policy if it answers in time.
 
@@ -258,7 +258,7 @@ class MissionPlanner(AbstractContextManager["MissionPlanner"]):
             return self._picture.view(self._pins.tasks)
 
     def _until(self) -> float:
-        """Return when to wait for the policy no more, as `time.perf_counter` says, so that orders are given in time."""
+        """Return when to wait no more, as `time.perf_counter` says, so that orders are given in time."""
         if self._deadline_s is None:
             return math.inf
         reserve = min(RESERVE_SHARE * self._deadline_s, RESERVE_MS / 1000 + 1.5 * self._last_s)

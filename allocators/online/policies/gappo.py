@@ -24,7 +24,8 @@ from alloc.allocators.learned.missions.situation import (
 from alloc.allocators.learned.missions.talking import is_to_send
 from alloc.allocators.missions.layout import NOBODY
 from alloc.allocators.missions.motion import distance_between
-from alloc.allocators.online.contract import AgentDecider, Briefing, Policy, PolicyInfo
+from alloc.allocators.online.contract import AgentDecider, Briefing, Policy, PolicyInfo, TurnsDecider
+from alloc.allocators.online.policies.network_turns import NetworkTurns
 from alloc.problems.missions.simulation.reports import AgentReport, Message, TaskReport, View
 from alloc.problems.missions.simulation.state import ACTIVE, STAY, AgentStatus, Order, TaskStatus
 from alloc.problems.vocabulary import GEOGRAPHIC, MANHATTAN, Knowledge
@@ -82,6 +83,10 @@ class NetworkPolicy(Policy):
     def begin(self, briefing: Briefing) -> AgentDecider:
         """Return who decides by the network."""
         return _NetworkDecider(briefing, self._weights, self.parameters.periods)
+
+    def begin_turns(self, briefing: Briefing) -> TurnsDecider:
+        """Return who decides by the network for agents in turn."""
+        return NetworkTurns(briefing, self._weights)
 
 
 class PpoPolicy(NetworkPolicy):

@@ -11,6 +11,7 @@ from pettingzoo import AECEnv
 from alloc.problems.arguments import whole
 from alloc.problems.environments.missions.decisions import Decisions, Info, Source, Weights, draw, sizes_of
 from alloc.problems.environments.missions.observation import LIMIT, Floats, Lens, Mask, length
+from alloc.problems.environments.missions.truth import RENDER_MODES, Truth, checked_mode, rendered, state_length
 from alloc.problems.errors import InputError
 from alloc.problems.vocabulary import Knowledge
 
@@ -52,18 +53,20 @@ class MissionEnv(AECEnv[str, Observation, int]):  # type: ignore[misc]
         In the reward.
     max_steps : int, optional
         Decisions after which the mission is truncated; none by default, as missions end by themselves.
+    render_mode : {"ansi", "human"}, optional
+        Whether `render` returns what is so now as text, or prints it.
 
     Raises
     ------
     InputError
-        If missions differ in size.
+        If missions differ in size, or the render mode is unknown.
 
     References
     ----------
     Terry et al. (2021), arXiv:2009.14471.
     """
 
-    metadata = {"name": "alloc_mission_v0", "render_modes": [], "is_parallelizable": False}  # noqa: RUF012
+    metadata = {"name": "alloc_mission_v0", "render_modes": list(RENDER_MODES), "is_parallelizable": False}  # noqa: RUF012
 
     def __init__(
         self,
@@ -75,6 +78,7 @@ class MissionEnv(AECEnv[str, Observation, int]):  # type: ignore[misc]
         waiting_weight: float = 0.5,
         energy_weight: float = 0.0,
         max_steps: int | None = None,
+        render_mode: str | None = None,
     ) -> None:
         super().__init__()
         self._source, self._sizes = missions, sizes_of(missions)
@@ -83,13 +87,15 @@ class MissionEnv(AECEnv[str, Observation, int]):  # type: ignore[misc]
         n, m = self._sizes
         self.possible_agents = [f"agent_{number}" for number in range(n)]
         self.agents: list[str] = []
-        self.render_mode = None
+        self.render_mode = checked_mode(render_mode)
+        self.state_space = spaces.Box(-LIMIT, LIMIT, (state_length(n, m),), np.float32)
         choices = m + self._grid**2 + 1
         self._observes = {name: _space(length(n, m), choices) for name in self.possible_agents}
         self._acts = {name: spaces.Discrete(choices) for name in self.possible_agents}
         self._rng: np.random.Generator | None = None
         self._course: Decisions
         self._lens: Lens
+        self._truth: Truth
         self._steps = 0
 
     def observation_space(self, agent: str) -> spaces.Dict:
@@ -109,7 +115,7 @@ class MissionEnv(AECEnv[str, Observation, int]):  # type: ignore[misc]
         self._course = Decisions(mission, self._knowledge, number, switching=self._switching, weights=self._weights)
         if not self._course.queue:
             raise InputError("is over before anybody decides", mission.name)
-        self._lens, self._steps = Lens(mission, self._grid), 0
+        self._lens, self._truth, self._steps = Lens(mission, self._grid), Truth(mission), 0
         self.agents = list(self.possible_agents)
         self.rewards = dict.fromkeys(self.agents, 0.0)
         self._cumulative_rewards = dict.fromkeys(self.agents, 0.0)
@@ -123,6 +129,17 @@ class MissionEnv(AECEnv[str, Observation, int]):  # type: ignore[misc]
         """Return what an agent knows now, and what it can choose."""
         view = self._course.view(self.possible_agents.index(agent))
         return {"observation": self._lens.observe(view), "action_mask": self._lens.mask(view)}
+
+    def state(self) -> Floats:
+        """Return what is so now, whoever knows it, as `Truth` of `truth.py` describes: for a critic of all agents."""
+        return self._truth.array(self._course.state)
+
+    def render(self) -> str | None:
+        """Return what is so now as text, or print it, by the render mode."""
+        return rendered(self._course.state, self.render_mode)
+
+    def close(self) -> None:
+        """Do nothing: there is no window."""
 
     def step(self, action: int | None) -> None:
         """Let the agent whose turn it is choose, and go on to the next decision."""

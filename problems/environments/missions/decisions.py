@@ -14,7 +14,7 @@ from alloc.problems.missions.simulation.agenda import Wanted
 from alloc.problems.missions.simulation.measures import DecisionTimes, lower_bound, measured
 from alloc.problems.missions.simulation.reports import View
 from alloc.problems.missions.simulation.simulation import Simulation
-from alloc.problems.missions.simulation.state import AgentStatus, Order, TaskStatus
+from alloc.problems.missions.simulation.state import AgentStatus, MissionState, Order, TaskStatus
 from alloc.problems.vocabulary import Knowledge
 
 Source = Sequence[Mission] | Callable[[np.random.Generator], Mission]
@@ -105,6 +105,11 @@ class Decisions:
         self._energy = float((instance.agent_energy_per_distance * mission.longest_flight).sum()) or math.inf
         self._advance()
         self._value = self._value_so_far()
+
+    @property
+    def state(self) -> MissionState:
+        """What is so now, whoever knows it."""
+        return self._simulation.state
 
     def view(self, agent: int) -> View:
         """Return what an agent knows now."""

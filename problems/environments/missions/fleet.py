@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from alloc.problems.environments.missions.decisions import Decisions, Source, Weights, draw, sizes_of
 from alloc.problems.environments.missions.observation import LIMIT, Floats, Lens, length
+from alloc.problems.environments.missions.truth import RENDER_MODES, Truth, checked_mode, rendered
 from alloc.problems.errors import InputError
 from alloc.problems.vocabulary import Knowledge
 
@@ -36,18 +37,20 @@ class MissionFleetEnv(gymnasium.Env[Floats, np.int64]):
     max_steps : int, optional
         Decisions after which the mission is truncated; none by default.
     illegal_reward : float
+    render_mode : {"ansi", "human"}, optional
+        Whether `render` returns what is so now as text, or prints it.
 
     Raises
     ------
     InputError
-        If missions differ in size.
+        If missions differ in size, or the render mode is unknown.
 
     References
     ----------
     Towers et al. (2024), arXiv:2407.17032.
     """
 
-    metadata = {"render_modes": []}  # noqa: RUF012
+    metadata = {"render_modes": list(RENDER_MODES), "render_fps": 1}  # noqa: RUF012
 
     def __init__(
         self,
@@ -58,15 +61,18 @@ class MissionFleetEnv(gymnasium.Env[Floats, np.int64]):
         energy_weight: float = 0.0,
         max_steps: int | None = None,
         illegal_reward: float = 0.0,
+        render_mode: str | None = None,
     ) -> None:
         self._source, self._sizes = missions, sizes_of(missions)
         self._switching, self._weights = switching, Weights(waiting_weight, energy_weight)
         self.max_steps, self.illegal_reward = max_steps, illegal_reward
+        self.render_mode = checked_mode(render_mode)
         n, m = self._sizes
         self.observation_space = spaces.Box(-LIMIT, LIMIT, (length(n, m),), np.float32)
         self.action_space = spaces.Discrete(m + 1)
         self._course: Decisions
         self._lens: Lens
+        self._truth: Truth
         self._agent = self._steps = 0
 
     def reset(
@@ -78,7 +84,8 @@ class MissionFleetEnv(gymnasium.Env[Floats, np.int64]):
         self._course = Decisions(mission, Knowledge.FULL, 0, switching=self._switching, weights=self._weights)
         if not self._course.queue:
             raise InputError("is over before anybody decides", mission.name)
-        self._lens, self._agent, self._steps = Lens(mission, 0), self._course.queue[0], 0
+        self._lens, self._truth = Lens(mission, 0), Truth(mission)
+        self._agent, self._steps = self._course.queue[0], 0
         return self._observation(), self._info(illegal=False)
 
     def step(self, action: np.int64) -> tuple[Floats, float, bool, bool, dict[str, object]]:
@@ -92,6 +99,14 @@ class MissionFleetEnv(gymnasium.Env[Floats, np.int64]):
         self._agent = self._agent if over else self._course.queue[0]
         cut = not over and self.max_steps is not None and self._steps >= self.max_steps
         return self._observation(), gained, over, cut, self._info(illegal=not is_legal)
+
+    def state(self) -> Floats:
+        """Return what is so now, as `Truth` of `truth.py` describes."""
+        return self._truth.array(self._course.state)
+
+    def render(self) -> str | None:  # type: ignore[override]  # text is what there is
+        """Return what is so now as text, or print it, by the render mode."""
+        return rendered(self._course.state, self.render_mode)
 
     def action_masks(self) -> NDArray[np.bool_]:
         """Return which actions are legal now, shape (m + 1,)."""

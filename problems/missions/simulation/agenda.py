@@ -77,6 +77,9 @@ class Agenda:
         self._entries: list[tuple[float, Turn, int, object]] = []
         self._count = 0
 
+    def __len__(self) -> int:
+        return len(self._entries)
+
     @property
     def hour(self) -> float:
         """Hour of the first entry, ``inf`` where there is none."""

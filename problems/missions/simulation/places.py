@@ -94,8 +94,8 @@ class Distances:
             return source
         if self.metric == GEOGRAPHIC:
             return _on_geodesic(source, goal, share)
-        x, y, z = (a + share * (b - a) for a, b in zip(source, goal, strict=True))
-        return x, y, z
+        (x, y, z), (to_x, to_y, to_z) = source, goal
+        return x + share * (to_x - x), y + share * (to_y - y), z + share * (to_z - z)
 
 
 def _array(positions: list[Position | None]) -> FloatArray:

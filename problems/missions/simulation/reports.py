@@ -1,8 +1,11 @@
 """What can be known of agents and tasks: reports, each with the hour at which it was true."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
+from alloc.problems.fields import FloatArray
 from alloc.problems.missions.simulation.motion import battery_at, place_at, refusal, work_left
 from alloc.problems.missions.simulation.places import Distances, Place
 from alloc.problems.missions.simulation.state import (
@@ -136,6 +139,13 @@ class View:
     def hours(self, agent: AgentReport, task: TaskReport) -> float:
         """Return how long the flight of an agent to a task takes."""
         return self.distance(agent, task) / agent.facts.speed
+
+    def distances(self, places: Sequence[Place], tasks: Sequence[TaskReport]) -> FloatArray:
+        """Return how far places are from tasks, shape (places, tasks)."""
+        goals = [task.facts.place for task in tasks]
+        if self._distances.has_table:
+            return np.array([[self._distances.between(place, goal) for goal in goals] for place in places])
+        return self._distances.table([place.position for place in places], [goal.position for goal in goals])
 
     def distance_to_place(self, agent: AgentReport, place: Place) -> float:
         """Return how far an agent was from a place."""

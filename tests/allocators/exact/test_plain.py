@@ -6,8 +6,11 @@ from oracle import brute_force, least_energy_within
 from tiny_instances import tiny_instance
 
 from alloc.allocators import Milp, RefusedError, Status, StopReason, load, solve
-from alloc.problems import Instance
+from alloc.allocators.exact.plain.cpsat import PlainCpSat
+from alloc.allocators.exact.solver_model import SolverLimits
+from alloc.problems import Instance, Objective
 from alloc.problems.generate import paper_like
+from alloc.problems.models.programme import build_programme
 
 
 @pytest.mark.parametrize("name", ["milp", "cpsat"])
@@ -34,6 +37,15 @@ def test_time_limit_ends_the_solver(name):
     assert result.stop_reason is StopReason.TIME_LIMIT
     assert result.runtime_s < 5
     assert result.parameters == {"plain": True}
+
+
+def test_a_solver_stopped_at_once_proves_nothing():
+    """CP-SAT's bound is 0 before it has one: that is no proof that tasks take for ever."""
+    instance = paper_like(100, 20, 400, seed=1)
+    programme = build_programme(instance, by_class=False, objective=Objective.MAKESPAN)
+    limits = SolverLimits(threads=1, seed=0, seconds=1e-3, repeatable=False)
+    answer = PlainCpSat(programme, limits).solve(lambda pairs: None)
+    assert (answer.pairs, answer.bound) == (None, None)
 
 
 def test_what_it_cannot_state_is_refused():

@@ -8,13 +8,17 @@ import pytest
 pytest.importorskip("gymnasium")
 pytest.importorskip("pettingzoo")
 
+import gymnasium
 from gymnasium.utils.env_checker import check_env
-from pettingzoo.test import api_test, seed_test
+from pettingzoo.test import api_test, render_test, seed_test
+from pettingzoo.test.state_test import test_state as check_state
+from pettingzoo.test.state_test import test_state_space as check_state_space
 
 from alloc.allocators import simulate
 from alloc.problems import InputError, Instance, Mission, MissionParameters, Radio, random_mission
 from alloc.problems.environments import MissionEnv, MissionFleetEnv
 from alloc.problems.environments.missions.observation import AGENT_FIGURES, OWN_FIGURES, TASK_FIGURES
+from alloc.problems.environments.missions.truth import AGENT_TRUTHS, TASK_TRUTHS
 
 SMALL = MissionParameters(family="failures", agents=3, tasks=4, sensing=0.3)
 KINDS = ("steady", "waves", "failures", "recharging", "growth", "deadlines", "silence")
@@ -58,20 +62,54 @@ def test_agents_pass_pettingzoos_own_tests(options) -> None:
     with warnings.catch_warnings():  # which it has for all but the names of its own such games
         warnings.filterwarnings("ignore", "Observation is not a NumPy array")
         warnings.filterwarnings("ignore", "Observation space for each agent probably should be")
-        warnings.filterwarnings("ignore", "Environment has not defined a render")
         api_test(agents(**options), num_cycles=100)
     seed_test(lambda: agents(**options), num_cycles=50)
 
 
 @pytest.mark.parametrize("options", [{}, {"switching": True, "max_steps": 20}])
 def test_the_fleet_passes_gymnasiums_own_test(options) -> None:
-    """The project's test of interface and seeds passes, without a warning; there is nothing to render."""
-    check_env(fleet(**options), skip_render_check=True)
+    """The project's test of interface and seeds passes, without a warning."""
+    gymnasium.register("alloc/fleet-v0", fleet)
+    try:
+        check_env(gymnasium.make("alloc/fleet-v0", **options).unwrapped)
+    finally:
+        del gymnasium.registry["alloc/fleet-v0"]
 
 
 def test_the_fleet_passes_the_test_of_stable_baselines3() -> None:
     """So does that of Stable-Baselines3."""
     pytest.importorskip("stable_baselines3.common.env_checker").check_env(fleet(), warn=True)
+
+
+def test_state_and_text_pass_pettingzoos_own_tests(capsys) -> None:
+    """The project's tests of the state and of rendering pass, and text is printed for people."""
+    env = agents()
+    check_state_space(env)
+    check_state(env, num_cycles=20)
+    render_test(agents)
+    assert capsys.readouterr().out.startswith("hour 0: 0 of 4 tasks done\nagent a1: idle at ")
+    with pytest.raises(InputError, match="render_mode: is 'rgb', which is none of human, ansi"):
+        fleet(render_mode="rgb")
+
+
+def test_the_state_is_what_is_so(street: Mission) -> None:
+    """It has what no agent sees, and nothing of the task that is to come; the text says the same."""
+    for env in (MissionEnv([street], grid=0, render_mode="ansi"), MissionFleetEnv([street], render_mode="ansi")):
+        env.reset(seed=0)
+        state = env.state()
+        ann, ben = state[1 : 1 + 2 * AGENT_TRUTHS].reshape(2, AGENT_TRUTHS)
+        tasks = state[1 + 2 * AGENT_TRUTHS :].reshape(3, TASK_TRUTHS)
+        assert ann.tolist() == pytest.approx([1, 0, 0, *[0] * 6, np.log(1 + 4 / 9), np.log(2)])
+        assert ben[3] == ben[6] == pytest.approx(1)
+        assert tasks[1].tolist() == pytest.approx([1, 0, 5 / 9, 0, 0, np.log(5), 0, np.log(3), 10, 0])
+        assert not tasks[2].any()
+        env.step(0)
+        assert env.state()[1 + 6] == pytest.approx(1 / 9)  # where its order leads
+        assert env.render() == (
+            "hour 0: 0 of 3 tasks done\n"
+            "agent a1: flying at 0, 0, 0, order t1, battery 4\nagent a2: idle at 9, 0, 0, battery 40\n"
+            "task t1: 2 left\ntask t2: 4 left\n"
+        )
 
 
 def play(env: MissionEnv, choose) -> dict[str, float]:

@@ -7,7 +7,7 @@ import pytest
 from oracle import brute_force, least_energy_within
 from tiny_instances import all_can_be_served, seeds_where, tiny_instance
 
-from alloc.allocators.exact.energy.cutting_planes import CuttingPlanes
+from alloc.allocators.exact.energy.cuts.cutting_planes import CuttingPlanes
 from alloc.allocators.exact.energy.energy_model import EnergyModel, round_demand
 from alloc.allocators.exact.energy.lagrangian import LagrangianBound
 from alloc.allocators.exact.energy.subproblems import solve_subproblems

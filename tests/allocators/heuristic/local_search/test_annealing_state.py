@@ -55,7 +55,21 @@ def test_helpers_can_reach_the_task():
     instance = Instance(ability=[1.0] * 4, workload=[1.0, 1.0], allowed_tasks=[[0], [0], [1], [0, 1]])
     state = AnnealingState(instance, 0, 2)
     state.begin(Allocation([0, IDLE, 1, IDLE]), 1.0)
-    assert {int(draw_helper(state.arrays, state.plan, np.int32(1))) for _ in range(50)} == {2, 3}
+    assert {int(draw_helper(state.arrays, state.plan, state.candidates, np.int32(1))) for _ in range(50)} == {2, 3}
+
+
+def test_helpers_come_from_tasks_nearby_where_there_is_no_table(monkeypatch):
+    """Without a table of distances, most helpers are of a task next to the short one, hardly any of one far away."""
+    monkeypatch.setattr(candidates, "TABLE_LIMIT", 0)
+    places = np.linspace([0.0, 0.0], [1.0, 0.0], 100)
+    instance = Instance(
+        ability=np.ones(100), workload=np.ones(100), agent_position=places, task_position=places,
+        communication_range=np.full(100, 0.05),
+    )  # fmt: skip
+    state = AnnealingState(instance, 0, 5)
+    state.begin(Allocation(np.arange(100)), 1.0)
+    drawn = [int(draw_helper(state.arrays, state.plan, state.candidates, np.int32(50))) for _ in range(200)]
+    assert sum(abs(agent - 50) <= 5 for agent in drawn) > 100
 
 
 def test_prices_lead_out_of_least_shortfalls():

@@ -1,5 +1,6 @@
 """A planner is told what happens and what agents report, and answers with orders, and why they changed."""
 
+import gc
 import math
 from collections import defaultdict
 
@@ -99,6 +100,16 @@ def test_deadlines_pass_by_themselves(pair):
         assert "task t1 was missed at 2" in planner.why_changed()[0].cause
 
 
+def test_work_that_was_not_done_by_the_deadline_is_missed(pair):
+    """Work that is reported of a done task after its deadline is too late: nobody is sent there."""
+    with MissionPlanner(Mission(pair, deadline=[4, np.nan]), "nearest", None) as planner:
+        planner.plan()
+        assert planner.plan(3.5)["ann"] != Order("t1")  # it is done at 3
+        planner.submit({"hour": 5.0, "event": "task-changes", "task": "t1", "workload": 1.0})
+        assert planner.plan()["ann"] != Order("t1")
+        assert planner._picture.state.task("t1").missed == 1.0
+
+
 @pytest.mark.parametrize("policy", ["greedy", "hedonic"])
 def test_it_believes_what_the_simulation_makes_of_its_orders(policy):
     """Told the events of a mission as they come, it gives the orders of a simulation, at the same hours."""
@@ -160,6 +171,23 @@ def test_a_policy_that_fails_leaves_the_last_plan(pair):
             answers["now"] = lambda view, answer=answer: answer
             planner.submit(Event(hour, "task-changes", task="t1", workload=5))
             assert dict(planner.plan()) == {"ben": Order("t1")}
+
+
+def test_what_is_void_is_forgotten(pair):
+    """However often agents are diverted, little more is kept than what is to come, and no garbage collected."""
+    seen = []
+
+    def turn_round(view):
+        seen.append(gc.isenabled())
+        return Order("t1" if round(view.hour * 1000) % 2 else "t2")
+
+    with MissionPlanner(pair, Stubborn(turn_round), None) as planner:
+        for step in range(40):
+            planner.submit(Report(step / 1000, "ann", battery=19))
+            assert planner.plan().is_new
+            assert len(planner._picture.agenda) <= 4 * 4
+    assert not any(seen)
+    assert gc.isenabled()
 
 
 def test_settings_belong_to_names(pair):

@@ -45,7 +45,8 @@ def violated_sets(
         others = np.flatnonzero(near[a])
         for x in range(len(others)):
             b = others[x]
-            for c in others[x:]:
+            for y in range(x, len(others)):
+                c = others[y]
                 if (b == c and b < classes) or (count[a] + count[b] + count[c]) % 2 == 0:
                     continue
                 if (c == classes or near[b, c]) and a > b:  # found from the least one

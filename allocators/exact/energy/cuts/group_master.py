@@ -4,8 +4,8 @@ import highspy
 import numpy as np
 from scipy.sparse import csr_array
 
+from alloc.allocators.exact.energy.cuts.subset_rows import violated_sets
 from alloc.allocators.exact.energy.energy_model import EnergyModel
-from alloc.allocators.exact.energy.subset_rows import violated_sets
 from alloc.allocators.exact.knapsack import WholeArray
 from alloc.problems.instance import FloatArray, IntArray
 
@@ -109,7 +109,8 @@ class GroupMaster:
         on = np.flatnonzero(self._part > 1e-6)
         use = np.ascontiguousarray(self._use[on].T.astype(np.int64))
         sets, excess = violated_sets(use, self._part[on], self._count, LEAST_VIOLATION, MOST_FOUND)
-        times, new = np.zeros(len(self._count)), []
+        times = np.zeros(len(self._count))
+        new: list[WholeArray] = []
         for row in np.argsort(-excess, kind="stable").tolist():
             members = sets[row][self._count[sets[row]] > 0]
             if len(new) < MOST_CUTS and (times[members] < MOST_OF_CLASS).all():

@@ -3,8 +3,8 @@ from itertools import product
 import numpy as np
 import pytest
 
-from alloc.allocators.exact.energy.cut_pricing import price_groups
-from alloc.allocators.exact.energy.subset_rows import violated_sets
+from alloc.allocators.exact.energy.cuts.pricing import price_groups
+from alloc.allocators.exact.energy.cuts.subset_rows import violated_sets
 
 
 @pytest.mark.parametrize("kind", ["whole", "limited", "real"])

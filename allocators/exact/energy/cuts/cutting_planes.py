@@ -13,9 +13,9 @@ Dantzig-Wolfe decomposition for linear mixed-integer programming, doi:10.1016/S0
 
 import numpy as np
 
-from alloc.allocators.exact.energy.cut_pricing import STEPS, price_groups
+from alloc.allocators.exact.energy.cuts.group_master import GroupMaster
+from alloc.allocators.exact.energy.cuts.pricing import STEPS, price_groups
 from alloc.allocators.exact.energy.energy_model import EnergyModel
-from alloc.allocators.exact.energy.group_master import GroupMaster
 from alloc.allocators.exact.energy.subproblems import solve_subproblems
 from alloc.allocators.exact.knapsack import WholeArray
 from alloc.problems.instance import FloatArray

@@ -1,0 +1,1 @@
+"""Cutting planes for the bound on the least energy."""

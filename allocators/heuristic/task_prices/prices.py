@@ -1,0 +1,220 @@
+"""Prices of tasks at which supply meets demand, and the bound on the makespan that they prove.
+
+By weak duality of the linear programme of single agents: if the value of all agents together, each on the task where it
+has the most, is less than that of all workloads, no plan does all work in time.
+"""
+
+import time
+from collections.abc import Callable
+from itertools import pairwise
+
+import numpy as np
+
+from alloc.allocators.heuristic.greedy.task_tree import Tree, build_tree
+from alloc.allocators.heuristic.greedy.tree_search import idle_agents
+from alloc.allocators.heuristic.task_prices.shortlists import (
+    empty_shortlists,
+    fill_highest,
+    find_shortlists,
+    smooth_value,
+)
+from alloc.allocators.parallel.pool import RunAll
+from alloc.problems import Instance
+from alloc.problems.instance import FloatArray, IntArray
+
+COARSE = (*(4 * [(0.25, 6)]), *(3 * [(0.08, 12)]))
+"""Widths of the smoothing, relative to the spread of values, and the most iterations with each, for a sample."""
+
+FINE = ((0.025, 35), (0.0125, 25))
+"""The same for all agents."""
+
+LEAST_SPREAD = 1e-3
+"""Spread of values where travel takes hardly any time."""
+
+COARSE_LENGTH, FINE_LENGTH = 24, 12
+"""Tasks on the shortlists of each."""
+
+SAMPLED_PER_TASK = 25
+"""Agents in the sample, for each task."""
+
+SAFETY = 1e-9
+"""Part by which a bound is lowered: rounding of a million terms."""
+
+PROMISING = 1e-5
+"""Part by which a bound may be too low before the agents are looked at once more for its sake."""
+
+CORRECTIONS = 20
+"""Steps from which the quasi-Newton method knows the curvature."""
+
+LARGEST_EXPONENT = 50.0
+"""Of a price."""
+
+
+class Bidders:
+    """Some agents, and the tasks where they have the most value.
+
+    Parameters
+    ----------
+    instance : Instance
+    tree : Tree
+        Of its tasks with workload.
+    chosen : ndarray of int
+        The agents; their abilities count so much more that they stand for all.
+    length : int
+        Tasks on each shortlist.
+    run_all : callable
+        What runs calls side by side.
+    threads : int
+    """
+
+    def __init__(
+        self, instance: Instance, tree: Tree, chosen: IntArray, length: int, run_all: RunAll, threads: int
+    ) -> None:
+        agents = idle_agents(instance, 1.0)
+        self.ability = agents.ability[chosen]
+        self.ability = self.ability * (float(agents.ability.sum()) / float(self.ability.sum()))
+        self._agents = agents._replace(origin=agents.origin[chosen], ability=self.ability)
+        self._speed, self._tree = instance.speed[chosen], tree
+        self._goal = np.ascontiguousarray(instance.reach.goal)
+        self.lists, self.makespan = empty_shortlists(len(chosen), length), 1.0
+        self._run_all = run_all
+        cut = np.linspace(0, len(chosen), threads + 1).astype(int).tolist()
+        self._parts = list(pairwise(cut))
+
+    def renew(self, price: FloatArray, makespan: float) -> float:
+        """Fill the shortlists at these prices; return the value of all agents per hour of `makespan`."""
+        self.makespan = makespan
+        agents = self._agents._replace(horizon=makespan * self._speed)
+        highest = np.zeros(len(self._tree.begin))
+        fill_highest(self._tree, price, highest)
+
+        def work(part: tuple[int, int]) -> float:
+            return find_shortlists(*part, agents, self._tree, self._goal, price, highest, self.lists)
+
+        return sum(self._run_all(work, self._parts))
+
+    def value(self, price: FloatArray, makespan: float, width: float) -> tuple[float, float, FloatArray]:
+        """Return the value on shortlists, smoothed and as it is, and the smoothed one by task; see `smooth_value`."""
+
+        def work(part: tuple[int, int]) -> tuple[float, float, FloatArray]:
+            share = np.zeros(len(price))
+            values = smooth_value(*part, self.ability, self.lists, self.makespan / makespan, price, width, share)
+            return *values, share
+
+        smoothed, exact, share = zip(*self._run_all(work, self._parts), strict=True)
+        return sum(smoothed), sum(exact), np.sum(share, axis=0)
+
+
+class TaskPrices:
+    """Prices of tasks, found by a quasi-Newton method on a smoothed dual.
+
+    Parameters
+    ----------
+    instance : Instance
+        With at least one task that has workload.
+    low : float
+        A proven bound on the makespan, > 0, in hours.
+    run_all : callable
+        What runs calls side by side.
+    threads : int
+
+    Attributes
+    ----------
+    bound : float
+        A proven bound on the makespan.
+    makespan : float
+        The least makespan of a fractional allocation, about.
+    price : ndarray, shape (m,)
+    bidders : Bidders or None
+        All agents, once `improve` has found that prices help.
+
+    References
+    ----------
+    Smoothing of the maximum: Nesterov (2005), doi:10.1007/s10107-004-0552-5.
+    """
+
+    def __init__(self, instance: Instance, low: float, run_all: RunAll, threads: int) -> None:
+        self.instance, self.bound, self.makespan = instance, low, low
+        self._some = instance.workload > 0
+        self.price = self._some.astype(float)
+        self._best_price = self.price
+        self.bidders: Bidders | None = None
+        self._tree = build_tree(instance.reach.goal, np.flatnonzero(self._some))
+        self._run_all, self._threads = run_all, threads
+
+    def improve(self, end: float, stopped: Callable[[], bool]) -> bool:
+        """Improve the prices until `end` on the monotonic clock; return whether they raised the bound.
+
+        Ends early where the coarse prices of a sample promise nothing.
+        """
+
+        def is_over() -> bool:
+            return stopped() or time.monotonic() >= end
+
+        n, before = self.instance.n, self.bound
+        size = min(n, SAMPLED_PER_TASK * int(self._some.sum()))
+        sample = self._bidders(np.random.default_rng(0).permutation(n)[:size], COARSE_LENGTH)
+        self._renew(sample)
+        spread = max(LEAST_SPREAD, float((sample.lists.lost.max(axis=1) - sample.lists.lost[:, 0]).mean()))
+        for width, iterations in COARSE:
+            if is_over() or (width < COARSE[0][0] and self.makespan <= before * (1 + SAFETY)):
+                return False
+            self._adjust(sample, width * spread, iterations, is_over)
+            self._renew(sample)
+        self.bidders = self._bidders(np.arange(n), FINE_LENGTH)
+        self._prove(self.bidders)
+        for width, iterations in FINE:
+            if is_over():
+                break
+            self._adjust(self.bidders, width * spread, iterations, is_over)
+            self._prove(self.bidders)
+        return self.bound > before * (1 + SAFETY)
+
+    def _bidders(self, chosen: IntArray, length: int) -> Bidders:
+        return Bidders(self.instance, self._tree, chosen, length, self._run_all, self._threads)
+
+    def _renew(self, bidders: Bidders) -> float:
+        """Renew the shortlists; return the makespan at which the value of the agents is that of all workloads."""
+        value = bidders.renew(self.price, self.makespan)
+        hours = float(self.price @ self.instance.workload) / max(value, 1e-300)
+        before, self.makespan = self.makespan, max(self.bound, hours)
+        return min(before, hours)
+
+    def _prove(self, everyone: Bidders) -> None:
+        """Raise the bound; the value of agents by T is convex and 0 at 0: below T, it falls at least in proportion."""
+        proven = self._renew(everyone)
+        if self.makespan > proven * (1 + PROMISING):
+            proven = max(proven, self._renew(everyone))
+        if proven * (1 - SAFETY) > self.bound:
+            self.bound, self._best_price = proven * (1 - SAFETY), self.price
+        elif self.price is not self._best_price:  # smoothed values are not the values themselves
+            self.price = self._best_price
+            self._renew(everyone)
+
+    def _adjust(self, bidders: Bidders, width: float, iterations: int, is_over: Callable[[], bool]) -> None:
+        """Adjust the prices by some iterations of the quasi-Newton method."""
+        from scipy.optimize import minimize
+
+        work, some = self.instance.workload, self._some
+        unit = width * np.sqrt(work[some].mean() / work[some])  # the curvature grows with the workload
+
+        def price_of(x: FloatArray) -> FloatArray:
+            price = np.zeros(len(work))
+            price[some] = np.exp(np.clip(x * unit, -LARGEST_EXPONENT, LARGEST_EXPONENT))
+            price /= price.max()
+            return price
+
+        def dual(x: FloatArray) -> tuple[float, FloatArray]:
+            price = price_of(x)
+            smoothed, _, share = bidders.value(price, self.makespan, width)
+            needed = price * work
+            slope = (share / smoothed - needed / needed.sum())[some] * unit
+            return float(np.log(smoothed / needed.sum())) / width, slope / width
+
+        def check(_: FloatArray) -> None:
+            if is_over():
+                raise StopIteration
+
+        options = {"maxiter": iterations, "maxcor": CORRECTIONS}
+        start = np.log(self.price[some]) / unit
+        self.price = price_of(minimize(dual, start, jac=True, method="L-BFGS-B", callback=check, options=options).x)

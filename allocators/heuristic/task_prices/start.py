@@ -1,0 +1,44 @@
+"""Where local search begins on large instances: a bound by prices of tasks, and a plan that follows them."""
+
+import time
+
+from alloc.allocators.contract.search import Search
+from alloc.allocators.heuristic.task_prices.prices import TaskPrices
+from alloc.allocators.heuristic.task_prices.rounding import rounded
+from alloc.allocators.parallel.pool import side_by_side
+from alloc.problems import Allocation, serve_all
+
+LEAST_AGENTS = 5_000
+"""Agents below which linear programmes and exchanges alone do as well."""
+
+TIME_SHARE = 0.35
+"""Part of the time left for the prices."""
+
+MOST_THREADS = 32
+"""Threads beyond which more are not used."""
+
+
+def plan_by_prices(search: Search) -> Allocation | None:
+    """Raise the bound by prices of tasks, and return a plan that follows them.
+
+    In such a plan some tasks may lack a little, and agents change between tasks at hardly any loss: its makespan may be
+    large, but exchanges soon bring it near the bound.
+
+    Returns
+    -------
+    Allocation or None
+        None where there are few agents, or prices prove nothing.
+    """
+    instance = search.instance
+    can_choose = instance.has_travel_time or not instance.reach.is_complete
+    if instance.n < LEAST_AGENTS or not can_choose or search.lower_bound <= 0 or search.should_stop():
+        return None
+    end = time.monotonic() + TIME_SHARE * search.remaining_s
+    threads = min(search.threads, MOST_THREADS)
+    with side_by_side(threads) as run_all:
+        prices = TaskPrices(instance, search.lower_bound, run_all, threads)
+        helped = prices.improve(end, lambda: search.interrupted)
+    search.raise_bound(prices.bound)
+    if not helped or search.should_stop():
+        return None
+    return serve_all(instance, rounded(prices), lambda: search.remaining_s)

@@ -1,0 +1,258 @@
+"""All agents decide in turn, each as it would alone, where all know the same: what they share is worked out once."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from alloc.allocators.learned.missions import feature_names as names
+from alloc.allocators.learned.missions import situation as known
+from alloc.allocators.learned.missions.forward import score
+from alloc.allocators.learned.missions.network_arrays import MissionWeights, Singles
+from alloc.allocators.learned.missions.options import (
+    WAIT,
+    done_without,
+    expect,
+    fill_crowding,
+    fill_shared,
+    fill_task,
+    squashed,
+)
+from alloc.allocators.learned.missions.play import Room, is_due, room_for
+from alloc.allocators.learned.missions.situation import Situation
+from alloc.allocators.missions.layout import NOBODY
+from alloc.allocators.runtime.compiled import compiled_in_place, inlined
+from alloc.problems.fields import BoolArray, FloatArray, IntArray
+
+NOT_DUE = -3
+"""Choice of an agent that does not consider its options: its last order stands."""
+
+
+class Together(NamedTuple):
+    """What all agents know, and what each knows of itself.
+
+    Attributes
+    ----------
+    room : Room
+        Its situation is that of the agent whose turn it is: all others count.
+    own : ndarray, shape (n, OWN)
+    ways : ndarray, shape (n, m)
+        Distance of each agent from each task.
+    can : ndarray of bool, shape (n, m)
+    gaps : ndarray, shape (m, n)
+        Squared distance of each task from the agents that have none, in the first columns.
+    idle : ndarray of int, shape (n + 1,)
+        Those agents by column; last, how many they are.
+    column : ndarray of int, shape (n,)
+        Where an agent is among them, -1 if it is not.
+    crowding : ndarray, shape (m, features)
+        How much work there is near each task; one column is used.
+    crowded : ndarray of bool, shape (m,)
+        The tasks for which that holds: those that an agent can take.
+    abilities : ndarray, shape (1,)
+        Sum of those of all agents.
+    """
+
+    room: Room
+    own: FloatArray
+    ways: FloatArray
+    can: BoolArray
+    gaps: FloatArray
+    idle: IntArray
+    column: IntArray
+    crowding: Singles
+    crowded: BoolArray
+    abilities: FloatArray
+
+
+def together_for(n: int, m: int) -> Together:
+    """Return room for n agents and m tasks."""
+    room = room_for(n, m)
+    return Together(
+        room=room,
+        own=np.zeros((n, known.OWN)),
+        ways=np.zeros((n, m)),
+        can=np.zeros((n, m), np.bool_),
+        gaps=np.zeros((m, n)),
+        idle=np.zeros(n + 1, np.intp),
+        column=np.zeros(n, np.intp),
+        crowding=np.zeros_like(room.options[:m]),
+        crowded=np.zeros(m, np.bool_),
+        abilities=np.zeros(1),
+    )
+
+
+@compiled_in_place
+def meet(together: Together) -> None:
+    """Work out what all share, when `own`, `ways`, `can` and the tasks of the situation are filled in."""
+    situation, own = together.room.situation, together.own
+    other = situation.other
+    together.crowded[:] = False
+    together.abilities[0], together.idle[-1], together.column[:] = 0.0, 0, -1
+    for i in range(len(own)):
+        target = int(own[i, known.TARGET])
+        situation.counts[i], situation.target[i] = True, target
+        other[known.STRENGTH, i] = own[i, known.ABILITY]
+        together.abilities[0] += own[i, known.ABILITY]
+        other[known.ARRIVES, i] = arrival(together, i, target)
+        note_idle(together, i)
+    situation.can[:] = True
+    expect(situation)
+
+
+@compiled_in_place
+def note_idle(together: Together, i: int) -> None:
+    """Put an agent among those that have no task, or take it from them, by its target."""
+    own, situation, gaps, column = together.own[i], together.room.situation, together.gaps, together.column
+    tasks, idle = situation.task, together.idle
+    has_none, place = situation.target[i] == NOBODY, column[i]
+    if has_none and place == NOBODY:
+        place = column[i] = idle[-1]
+        idle[place] = i
+        idle[-1] += 1
+        for j in range(len(gaps)):
+            x, y = own[known.X] - tasks[known.TASK_X, j], own[known.Y] - tasks[known.TASK_Y, j]
+            z = own[known.Z] - tasks[known.TASK_Z, j]
+            gaps[j, place] = x * x + y * y + z * z
+    elif not has_none and place != NOBODY:
+        idle[-1] -= 1
+        last = idle[-1]
+        for j in range(len(gaps)):
+            gaps[j, place] = gaps[j, last]
+        idle[place] = idle[last]
+        column[idle[place]] = place
+        column[i] = NOBODY
+
+
+@compiled_in_place
+def arrival(together: Together, i: int, task: int) -> float:
+    """Return the hour at which an agent is at a task; ``-inf`` where it works there."""
+    own = together.own[i]
+    if task == NOBODY or (own[known.IS_WORKING] > 0 and own[known.TARGET] == task):
+        return -np.inf
+    return float(own[known.HOUR] + together.ways[i, task] / own[known.SPEED])
+
+
+@compiled_in_place
+def decide_together(together: Together, weights: MissionWeights, turns: IntArray, period: float, tasks: int) -> None:
+    """Let agents decide in turn; each knows what those before it chose.
+
+    Parameters
+    ----------
+    together : Together
+    weights : MissionWeights
+    turns : ndarray of int
+        Their numbers; in their place come their choices: a task, `WAIT` or `NOT_DUE`.
+    period : float
+        Hours between two messages, in which the time until options are considered anew is counted.
+    tasks : int
+        How many are open.
+    """
+    room = together.room
+    for turn in range(len(turns)):
+        i = turns[turn]
+        own = together.own[i]
+        target = int(own[known.TARGET])
+        is_busy = target < tasks if target != NOBODY else own[known.IS_FLYING] > 0
+        if not is_due(room, i, own[known.HOUR], period, tasks, is_busy):
+            turns[turn] = NOT_DUE
+            continue
+        room.decided[i], room.tasks[i] = own[known.HOUR], tasks
+        step_out(together, i, target)
+        count = fill_turn(together, i)
+        score(room.options, count, weights, room.token, room.pooled, room.scores)
+        turns[turn] = room.choice[np.argmax(room.scores[:count])]
+        step_in(together, i, max(turns[turn], NOBODY))
+
+
+@compiled_in_place
+def step_out(together: Together, i: int, target: int) -> None:
+    """Let an agent be none of those that others know, as it is its turn."""
+    situation = together.room.situation
+    situation.counts[i] = False
+    if target == NOBODY:
+        return
+    first, following = situation.coming.first, situation.coming.following
+    if first[target] == i:
+        first[target] = following[i]
+    else:
+        before = first[target]
+        while following[before] != i:
+            before = following[before]
+        following[before] = following[i]
+    renew(situation, target)
+
+
+@compiled_in_place
+def step_in(together: Together, i: int, target: int) -> None:
+    """Let others know where an agent goes."""
+    situation = together.room.situation
+    situation.counts[i], situation.target[i] = True, target
+    note_idle(together, i)
+    if target == NOBODY:
+        return
+    situation.other[known.ARRIVES, i] = arrival(together, i, target)
+    put_in(situation, i, target)
+    renew(situation, target)
+
+
+@inlined
+def put_in(situation: Situation, i: int, task: int) -> None:
+    """Put an agent among those that come to a task, in the order in which they arrive."""
+    arrives, first, following = situation.other[known.ARRIVES], situation.coming.first, situation.coming.following
+    before, after = NOBODY, first[task]
+    while after != NOBODY and arrives[after] <= arrives[i]:
+        before, after = after, following[after]
+    following[i] = after
+    if before == NOBODY:
+        first[task] = i
+    else:
+        following[before] = i
+
+
+@compiled_in_place
+def renew(situation: Situation, task: int) -> None:
+    """Work out anew when a task is done."""
+    coming = situation.coming
+    coming.others[task], coming.without[task] = done_without(situation, task)
+
+
+@compiled_in_place
+def fill_turn(together: Together, i: int) -> int:
+    """Fill in the options of an agent, as `fill_options` does; return how many there are."""
+    room, situation = together.room, together.room.situation
+    for number in range(known.OWN):
+        situation.own[number] = together.own[i, number]
+    options, choice, count = room.options, room.choice, 0
+    is_same = True
+    for j in range(len(situation.can)):
+        situation.can[j] = together.can[i, j]
+        situation.task[known.DISTANCE, j] = together.ways[i, j]
+        is_same &= situation.can[j] == together.crowded[j]
+        if situation.can[j]:
+            choice[count] = j
+            count += 1
+    if not is_same:
+        for j in range(len(situation.can)):
+            together.crowded[j] = situation.can[j]
+        fill_crowding(situation, choice[:count], together.crowding)
+    options[: count + 1] = 0
+    for row in range(count):
+        j = choice[row]
+        fill_task(situation, j, options[row], 0)
+        options[row, names.CROWDING] = together.crowding[row, names.CROWDING]
+        options[row, names.RIVALS] = squashed(nearer(together, i, j) / 3.0)
+    choice[count] = WAIT
+    options[count, names.STAYS] = 1
+    others = float(len(together.own))
+    fill_shared(situation, choice, count, options[: count + 1], others, together.abilities[0])
+    return count + 1
+
+
+@inlined
+def nearer(together: Together, i: int, task: int) -> float:
+    """Return how many others that have no task are nearer to one than an agent."""
+    gaps, limit, found = together.gaps[task], together.ways[i, task] ** 2, 0
+    for place in range(together.idle[-1]):
+        found += gaps[place] < limit
+    place = together.column[i]
+    return float(found - (place != NOBODY and gaps[place] < limit))

@@ -1,0 +1,140 @@
+"""The network of `gappo` decides for agents in turn, where all know all: one compiled loop instead of one view each."""
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from alloc.allocators.learned.missions import situation as known
+from alloc.allocators.learned.missions.network_arrays import MissionWeights
+from alloc.allocators.learned.missions.options import WAIT
+from alloc.allocators.learned.missions.together import NOT_DUE, Together, decide_together, meet, together_for
+from alloc.allocators.missions.layout import NOBODY
+from alloc.allocators.online.contract import Briefing, TurnsDecider
+from alloc.problems.distances.reach import TOLERANCE
+from alloc.problems.fields import BoolArray, FloatArray
+from alloc.problems.missions.simulation.reports import AgentReport, TaskReport, View
+from alloc.problems.missions.simulation.state import STAY, AgentStatus, Order, TaskStatus
+
+AT_ONCE = 32
+"""Agents for whom the loop decides before it is asked whether there is time for more."""
+
+NOWHERE = (math.nan, math.nan, math.nan)
+
+
+class NetworkTurns(TurnsDecider):
+    """Decides by the network, agents in turn.
+
+    Parameters
+    ----------
+    briefing : Briefing
+    weights : MissionWeights
+    """
+
+    def __init__(self, briefing: Briefing, weights: MissionWeights) -> None:
+        self._weights, self._period, self._span = weights, briefing.radio.period, math.dist(*briefing.area)
+        self._names: list[str] = []
+        self._together = together_for(0, 1)
+        _compile_loops(weights)
+
+    def turns(self, view: View, names: Sequence[str]) -> Iterator[tuple[str, Order | None]]:
+        """Yield the order of each agent."""
+        if not names:
+            return
+        tasks = [task for task in view.tasks.values() if task.status is TaskStatus.OPEN]
+        orders = {**{j: Order(task.facts.id) for j, task in enumerate(tasks)}, WAIT: STAY, NOT_DUE: None}
+        together = self._met(view, tasks)
+        row = {name: i for i, name in enumerate(self._names)}
+        for first in range(0, len(names), AT_ONCE):
+            some = names[first : first + AT_ONCE]
+            choices = np.array([row[name] for name in some])
+            decide_together(together, self._weights, choices, self._period, len(tasks))
+            for name, choice in zip(some, choices.tolist(), strict=True):
+                yield name, orders[choice]
+
+    def _met(self, view: View, tasks: list[TaskReport]) -> Together:
+        """Return what all know, and when they last considered it."""
+        agents = list(view.agents.values())
+        self._make_room(list(view.agents), len(tasks) + 1)
+        together, places = self._together, [agent.place for agent in agents]
+        index = {task.facts.id: j for j, task in enumerate(tasks)}
+        together.own[:] = [_own(view, agent, self._span, index) for agent in agents]
+        if tasks:
+            ways = view.distances(places, tasks)
+            together.ways[:, :-1] = ways
+            together.can[:, :-1] = _reach(view, agents, tasks, ways)
+            together.room.situation.task[: known.DISTANCE, :-1] = np.array([_facts(task) for task in tasks]).T
+        rows, target = np.arange(len(agents)), together.own[:, known.TARGET].astype(np.intp)
+        has_open = (target >= 0) & (target < len(tasks))
+        together.can[rows[has_open], target[has_open]] = True
+        meet(together)
+        return together
+
+    def _make_room(self, names: list[str], m: int) -> None:
+        """Have room for these agents and m tasks; what agents remember is kept."""
+        before, rows = self._together, {name: i for i, name in enumerate(self._names)}
+        if names == self._names and m == before.can.shape[1]:
+            return
+        self._names, self._together = names, together_for(len(names), m)
+        kept = [(i, rows[name]) for i, name in enumerate(names) if name in rows]
+        if kept:
+            now, then = np.array(kept).T
+            self._together.room.decided[now] = before.room.decided[then]
+            self._together.room.tasks[now] = before.room.tasks[then]
+
+
+def _compile_loops(weights: MissionWeights) -> None:
+    """Compile all loops, so that the first decision is in time as well."""
+    together = together_for(1, 2)
+    together.own[:] = 1.0
+    meet(together)
+    decide_together(together, weights, np.zeros(1, np.intp), 1.0, 0)
+
+
+def _own(view: View, agent: AgentReport, span: float, index: dict[str, int]) -> tuple[float, ...]:
+    """Return what an agent knows of itself; a task that is over stands behind all open ones."""
+    facts = agent.facts
+    return (
+        view.hour,
+        *(agent.place.position or NOWHERE),
+        facts.ability,
+        facts.speed,
+        agent.battery,
+        facts.energy_per_distance,
+        span,
+        NOBODY if agent.task is None else index.get(agent.task, len(index)),
+        agent.status is AgentStatus.WORKING,
+        agent.status is AgentStatus.FLYING,
+        known.OTHER_WAYS,  # by which nobody guesses what others will choose: each knows what those before it chose
+    )
+
+
+def _facts(task: TaskReport) -> tuple[float, ...]:
+    facts = task.facts
+    return (*(facts.place.position or NOWHERE), task.left, task.hour, facts.priority, facts.deadline, facts.growth)
+
+
+def _reach(view: View, agents: list[AgentReport], tasks: list[TaskReport], ways: FloatArray) -> BoolArray:
+    """Return which tasks each agent can take, as `View.refusal` says one by one."""
+    is_home_far = view.has_table or any(task.facts.place.position is None for task in tasks)
+    if is_home_far and any(agent.facts.returns for agent in agents):
+        return np.array([[view.refusal(agent, task) is None for task in tasks] for agent in agents])
+    back = np.zeros_like(ways)
+    returning = [i for i, agent in enumerate(agents) if agent.facts.returns]
+    if returning:
+        back[returning] = view.distances([agents[i].facts.home for i in returning], tasks)
+    reach, battery, rate = np.array(
+        [(agent.facts.range, agent.battery, agent.facts.energy_per_distance) for agent in agents]
+    ).T[:, :, None]
+    near = (ways <= reach + TOLERANCE) & (ways < math.inf)
+    return near & (rate * (ways + back) <= battery + TOLERANCE) & _allowed(agents, tasks)
+
+
+def _allowed(agents: list[AgentReport], tasks: list[TaskReport]) -> BoolArray:
+    allowed = np.ones((len(agents), len(tasks)), np.bool_)
+    is_skilled = any(task.facts.needs for task in tasks)
+    for i, agent in enumerate(agents):
+        names, skills = agent.facts.tasks, agent.facts.skills
+        if names is not None or is_skilled:
+            allowed[i] = [(names is None or task.facts.id in names) and task.facts.needs <= skills for task in tasks]
+    return allowed

@@ -1,0 +1,91 @@
+import numpy as np
+import pytest
+from oracle import brute_force
+from tiny_instances import all_can_be_served, seeds_where, tiny_instance
+
+from alloc.allocators.heuristic.task_prices.prices import TaskPrices
+from alloc.allocators.heuristic.task_prices.rounding import rounded
+from alloc.problems import Instance, evaluate, makespan_lower_bound, serve_all
+
+
+def never() -> bool:
+    return False
+
+
+def prices_of(instance: Instance) -> TaskPrices:
+    """Return prices from the simple bound on, improved without a limit."""
+    prices = TaskPrices(instance, makespan_lower_bound(instance), map, 1)
+    prices.improve(np.inf, never)
+    return prices
+
+
+def travelling(agents: int, tasks: int, seed: int = 0) -> Instance:
+    """Return an instance in the unit square with speeds and short ranges."""
+    rng = np.random.default_rng(seed)
+    return Instance(
+        ability=rng.integers(1, 10, agents),
+        workload=rng.integers(50, 800, tasks) * (agents / (80 * tasks)),
+        agent_position=rng.random((agents, 2)),
+        task_position=rng.random((tasks, 2)),
+        communication_range=np.full(agents, 0.5),
+        speed=rng.uniform(1, 5, agents),
+    )
+
+
+@pytest.mark.parametrize("seed", seeds_where(all_can_be_served, 40))
+def test_no_prices_exclude_the_optimum(seed):
+    """On tiny instances of every sort, the bound is at most the optimum of brute force, and at least the simple one."""
+    instance = tiny_instance(seed)
+    if instance.workload.any():
+        bound = prices_of(instance).bound
+        assert makespan_lower_bound(instance) <= bound <= brute_force(instance).makespan * (1 + 1e-9)
+
+
+def test_shortlists_have_the_most_valuable_tasks():
+    """The tree finds the same tasks and values as a look at all pairs."""
+    instance = travelling(200, 60)
+    prices = TaskPrices(instance, 1.0, map, 1)
+    price = np.random.default_rng(1).uniform(0.5, 1.0, instance.m)
+    bidders = prices._bidders(np.arange(instance.n), 5)
+    total = bidders.renew(price, 2.0)
+    distance, mask = instance.reach.rows(instance.reach.origin)
+    value = np.where(mask, price * np.maximum(0, 1 - distance / (2.0 * instance.speed[:, None])), 0.0)
+    assert total == pytest.approx(float(instance.ability @ value.max(axis=1)))
+    assert (np.argsort(-value, axis=1)[:, :5] == bidders.lists.task).all()
+
+
+def test_prices_raise_the_bound_to_the_fractional_optimum():
+    """With travel times, bound and fractional makespan all but meet, well above the simple bound."""
+    instance = travelling(3_000, 30)
+    prices = prices_of(instance)
+    assert prices.bound > 1.002 * makespan_lower_bound(instance)
+    assert prices.makespan < 1.0005 * prices.bound
+
+
+def test_threads_prove_the_same():
+    """Agents in several parts have the same value."""
+    instance = travelling(1_000, 20)
+    bounds = []
+    for threads in (1, 3):
+        prices = TaskPrices(instance, makespan_lower_bound(instance), map, threads)
+        prices.improve(np.inf, never)
+        bounds.append(prices.bound)
+    assert bounds[0] == pytest.approx(bounds[1], rel=1e-5)
+
+
+def test_a_rounded_plan_serves_tasks_nearly_as_prices_say():
+    """A rounded plan sends agents where they can go, and lacks little of the work."""
+    instance = travelling(3_000, 30)
+    prices = prices_of(instance)
+    plan = rounded(prices)
+    score = evaluate(instance, serve_all(instance, plan))
+    assert not score.violations
+    assert score.makespan < 1.1 * prices.bound
+
+
+def test_where_nothing_is_scarce_prices_end_early():
+    """Without travel times, where all reach the like of everything, a sample shows that prices prove nothing."""
+    instance = Instance(ability=np.ones(100), workload=np.full(10, 5.0), allowed_tasks=[[*range(10)]] * 100)
+    prices = TaskPrices(instance, makespan_lower_bound(instance), map, 1)
+    assert not prices.improve(np.inf, never)
+    assert prices.bidders is None
