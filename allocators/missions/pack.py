@@ -32,7 +32,9 @@ MOST_PAIRS = 1_000_000_000
 """Likewise of agents, that may know each other: 8 bytes of memory for each that does."""
 
 MOST_REPORTS = 4_000_000
-"""Reports of agents for which there is room, where agents are not so many that each may need more than a hundredth."""
+"""Reports of agents for which there is room, where `REPORTS_EACH` for each agent are not more."""
+
+REPORTS_EACH = 400
 
 LEAST_COLUMNS, COLUMNS = 40, 8
 """What is known stands in rows of a multiple of so many columns, as processors compare several at once."""
@@ -64,13 +66,13 @@ def pack(mission: Mission, knowledge: Knowledge | str | None = None, memory: flo
     known = mission.knowledge if knowledge is None else Knowledge(knowledge)
     n, m = instance.n, instance.m
     rows, slots = (n, _on_the_air(mission.radio)) if known is Knowledge.LOCAL else (1, 0)
-    if max((rows + slots * n) * m / MOST_KNOWN, (1 + slots) * n * n / MOST_PAIRS) > 1:
+    if max((rows + slots * n) * m / MOST_KNOWN, (rows + slots * n) * n / MOST_PAIRS) > 1:
         raise RefusedError(f"{n} agents and {m} tasks are too many for the compiled simulation with local knowledge")
     tasks, events = _tasks(mission), _events(mission)
     deadlines = np.flatnonzero(np.isfinite(mission.deadline))
     reports = n
     if known is Knowledge.LOCAL:
-        reports = min(2 * (rows + slots) * n + 2 * n + 1024, max(MOST_REPORTS, 400 * n))
+        reports = min(2 * (rows + slots) * n + 2 * n + 1024, max(MOST_REPORTS, REPORTS_EACH * n))
     head = _head(mission, known, len(events) + len(deadlines) + (known is Knowledge.LOCAL))
     head["memory"], head["limit"] = memory, min(reports, 32 * n + 1024)
     parts = {

@@ -10,6 +10,7 @@ import argparse
 import dataclasses
 import math
 import random
+import sys
 from collections import Counter
 
 from alloc.allocators import load_policy, simulate
@@ -72,6 +73,7 @@ def main() -> None:
             print(f"mission {seed} under {name}: {'; '.join(different)}", flush=True)
         if number % 500 == 0 or number == given.missions:
             print(f"{number} missions: {compared['equal']} equal, {compared['different']} different", flush=True)
+    sys.exit(1 if compared["different"] else 0)
 
 
 if __name__ == "__main__":

@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 
 if TYPE_CHECKING:
     from alloc.problems import Mission
@@ -193,7 +194,7 @@ def show(radius: int, times: dict[str, list[float]]) -> None:
 
 def interval(values: NDArray[np.float64], digits: int = 0) -> str:
     """Return a mean with its 95 % interval."""
-    half = 1.96 * values.std(ddof=1) / math.sqrt(len(values)) if len(values) > 1 else math.nan
+    half = stats.t.ppf(0.975, len(values) - 1) * stats.sem(values) if len(values) > 1 else math.nan
     return f"{values.mean():.{digits}f} ± {half:.{digits}f}"
 
 

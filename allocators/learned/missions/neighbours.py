@@ -22,7 +22,6 @@ Scratch = tuple[Singles, Singles, Singles, Singles, IntArray]
 """Options, token, pooled, scores and choice, as in `Room`."""
 
 ORDER = (known.STRENGTH, known.CHARGE, known.OTHER_X, known.OTHER_Y)
-
 """What decides who is first, the largest number first."""
 
 MOST = 6
@@ -61,7 +60,7 @@ def swap_for(n: int, m: int) -> Swap:
 def precedes(one: FloatArray, i: int, other: FloatArray, k: int) -> bool:
     """Whether an agent decides before another: the stronger, then that of more battery, then by place.
 
-    So all agree on the order without a word.
+    So all agree on the order without a message; of two that are equal in all of that, each takes itself for the first.
     """
     for number in ORDER:
         if one[number, i] != other[number, k]:

@@ -22,7 +22,7 @@ class CollectedLater(ContextDecorator):
         with self._lock:
             self._entered -= 1
             if self._entered == 0 and self._was_enabled:
-                gc.enable()  # nothing is made after that, which would be when it collects
+                gc.enable()  # a collection begins only with the next object that is made
 
 
 collected_later = CollectedLater()

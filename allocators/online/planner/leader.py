@@ -9,7 +9,6 @@ from queue import SimpleQueue
 from types import MappingProxyType
 
 from alloc.allocators.online.contract import AgentDecider, Briefing, FleetDecider, Policy, PolicyError
-from alloc.allocators.online.planner.collection import collected_later
 from alloc.allocators.online.planner.state import LiveState
 from alloc.problems.missions.simulation.reports import AgentReport, View
 from alloc.problems.missions.simulation.state import STAY, AgentStatus, Order
@@ -127,8 +126,7 @@ class Leader:
         while (decision := self._wanted.get()) is not None:
             try:
                 if not decision.is_overdue:
-                    with collected_later:
-                        self._decide(self._look(decision), decision)
+                    self._decide(self._look(decision), decision)
             except Exception as error:  # whatever a policy does, the last plan stands
                 decision.problem = f"{type(error).__name__}: {error}"
             decision.done.set()

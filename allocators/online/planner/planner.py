@@ -4,7 +4,7 @@ import math
 import threading
 import time
 from collections.abc import Mapping
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, nullcontext
 from types import MappingProxyType
 
 from alloc.allocators.online.contract import Policy
@@ -147,7 +147,6 @@ class MissionPlanner(AbstractContextManager["MissionPlanner"]):
             self._pins.remove(agent)
             self._version += 1
 
-    @collected_later
     def plan(self, hour: float | None = None) -> Plan:
         """Return the orders of all agents, by the policy if it answers in time.
 
@@ -166,7 +165,10 @@ class MissionPlanner(AbstractContextManager["MissionPlanner"]):
         InputError
             If the hour has passed, or the planner is closed.
         """
-        until = self._until()
+        with nullcontext() if self._deadline_s is None else collected_later:
+            return self._plan_until(self._until(), hour)
+
+    def _plan_until(self, until: float, hour: float | None) -> Plan:
         with self._lock:
             if self._is_closed:
                 raise InputError("is closed", "planner")

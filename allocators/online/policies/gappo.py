@@ -160,7 +160,7 @@ class _NetworkDecider(AgentDecider):
 
 def _compile_loops(weights: MissionWeights) -> None:
     """Compile all loops that a decision needs, so that the first one is in time as well."""
-    room, area = room_for(1, 1), np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
+    room, area = room_for(1, 2), np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
     room.situation.own[:] = 1.0
     is_due(room, 0, 0.0, 1.0, 1, False)
     notice(area, 1.0, 0.0, 0.0, 0.0, room.seen[0])
@@ -207,7 +207,7 @@ def _fill(view: View, situation: Situation, tasks: list[TaskReport], span: float
 
 
 def _ways(view: View) -> int:
-    """Return how far places are apart, see `situation`."""
+    """Return by which metric distances are measured, see `situation`."""
     if view.has_table or view.metric == GEOGRAPHIC:
         return OTHER_WAYS
     return MANHATTAN_WAYS if view.metric == MANHATTAN else EUCLIDEAN_WAYS

@@ -45,12 +45,19 @@ class NetworkTurns(TurnsDecider):
         orders = {**{j: Order(task.facts.id) for j, task in enumerate(tasks)}, WAIT: STAY, NOT_DUE: None}
         together = self._met(view, tasks)
         row = {name: i for i, name in enumerate(self._names)}
+        remembered = together.room.decided, together.room.tasks
         for first in range(0, len(names), AT_ONCE):
             some = names[first : first + AT_ONCE]
-            choices = np.array([row[name] for name in some])
+            rows = np.array([row[name] for name in some])
+            choices, before = rows.copy(), [part[rows] for part in remembered]
             decide_together(together, self._weights, choices, self._period, len(tasks))
-            for name, choice in zip(some, choices.tolist(), strict=True):
-                yield name, orders[choice]
+            for place, (name, choice) in enumerate(zip(some, choices.tolist(), strict=True), 1):
+                try:
+                    yield name, orders[choice]
+                except GeneratorExit:  # the orders that nobody asked for are not given: these agents have not decided
+                    for part, then in zip(remembered, before, strict=True):
+                        part[rows[place:]] = then[place:]
+                    raise
 
     def _met(self, view: View, tasks: list[TaskReport]) -> Together:
         """Return what all know, and when they last considered it."""

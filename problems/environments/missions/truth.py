@@ -23,7 +23,10 @@ from alloc.problems.missions.simulation.state import (
 
 AGENT_TRUTHS, TASK_TRUTHS = 11, 10
 
-RENDER_MODES = ("human", "ansi")
+HUMAN = "human"
+"""Mode in which an environment prints after each step."""
+
+RENDER_MODES = (HUMAN, "ansi")
 
 
 class Truth:
@@ -105,7 +108,7 @@ def checked_mode(mode: str | None) -> str | None:
 
 def rendered(state: MissionState, mode: str | None) -> str | None:
     """Return what is so now as text, or print it; nothing without a mode."""
-    if mode == "human":
+    if mode == HUMAN:
         sys.stdout.write(as_text(state))
     return as_text(state) if mode == "ansi" else None
 

@@ -51,6 +51,19 @@ def test_compiled_runs_have_the_measures_of_the_reference(name: str, settings: d
             assert getattr(found, kind) == (None if value is None else pytest.approx(value, rel=1e-9)), (seed, kind)
 
 
+def test_a_grid_finds_who_is_near() -> None:
+    """Among more than a hundred agents those near by are found in a grid of cells: both simulations agree."""
+    drawn = random_mission(MissionParameters("failures", 150, 20, radius=0.12, sensing=0.12), 5)
+    kept = {name: getattr(drawn, name) for name in KEPT if name != "horizon"}
+    mission = Mission(drawn.instance, **kept, horizon=0.6, radio=drawn.radio)
+    policy = load_policy("nearest")
+    expected, found = simulate(mission, policy, seed=0).result, run_compiled(mission, policy, 0)
+    assert expected.messages > 500
+    for kind in ("tasks_done", "switches", "messages", "bytes"):
+        assert getattr(found, kind) == getattr(expected, kind)
+    assert found.energy == pytest.approx(expected.energy, rel=1e-9)
+
+
 def test_policies_without_loops_are_refused() -> None:
     """What leads all agents is an error, not a wrong figure."""
     with pytest.raises(InputError, match="no compiled loops"):

@@ -88,6 +88,10 @@ def test_state_and_text_pass_pettingzoos_own_tests(capsys) -> None:
     check_state(env, num_cycles=20)
     render_test(agents)
     assert capsys.readouterr().out.startswith("hour 0: 0 of 4 tasks done\nagent a1: idle at ")
+    for shown in (agents(render_mode="human"), fleet(render_mode="human")):
+        shown.reset(seed=0)
+        shown.step(0)
+        assert capsys.readouterr().out.count("hour 0: 0 of 4 tasks done\n") == 2
     with pytest.raises(InputError, match="render_mode: is 'rgb', which is none of human, ansi"):
         fleet(render_mode="rgb")
 

@@ -9,6 +9,7 @@ from alloc.allocators.learned.missions.policy_file import save_network
 from alloc.allocators.online.policies.gappo import NetworkPolicy
 from alloc.allocators.online.run import simulate
 from alloc.problems import Instance, Mission
+from alloc.problems.missions.radio import Radio
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]  # loops are compiled first: half a minute, more under load
 
@@ -23,7 +24,7 @@ def pair(metric: str = "euclidean") -> Mission:
         speed=[1, 1],
         metric=metric,
     )
-    return Mission(instance, knowledge="local")
+    return Mission(instance, knowledge="local", radio=Radio(radius=0))
 
 
 @pytest.mark.parametrize("metric", ["euclidean", "manhattan"])
@@ -34,3 +35,4 @@ def test_free_agents_at_one_place_part(tmp_path: Path, metric: str) -> None:
     orders = {one["agent"]: one["task"] for one in run.log.records if one["record"] == "order" and one["hour"] == 0}
     assert sorted(orders) == ["a1", "a2"]
     assert orders["a1"] != orders["a2"]
+    assert run.result.switches == 0

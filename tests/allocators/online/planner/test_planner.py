@@ -181,7 +181,7 @@ def test_what_is_void_is_forgotten(pair):
         seen.append(gc.isenabled())
         return Order("t1" if round(view.hour * 1000) % 2 else "t2")
 
-    with MissionPlanner(pair, Stubborn(turn_round), None) as planner:
+    with MissionPlanner(pair, Stubborn(turn_round), 10_000) as planner:
         for step in range(40):
             planner.submit(Report(step / 1000, "ann", battery=19))
             assert planner.plan().is_new

@@ -80,3 +80,21 @@ def test_orders_are_those_of_each_by_itself(seed, monkeypatch):
                 continue
             slow.submit(event)
         assert orders > 100 or seed % 2 == 0  # those of any kind are small, and may leave nothing to do
+
+
+def test_who_was_not_asked_has_not_decided() -> None:
+    """Turns that are broken off count for those before that alone: the others consider their options the next time."""
+    considered = []
+    for is_broken_off in (False, True):
+        with MissionPlanner(crowd(np.random.default_rng(1)), "gappo", None) as planner:
+            planner.plan()
+            planner.submit({"event": "task-appears", "task": {"id": "new", "workload": 7.0, "position": [0.5, 0.5]}})
+            turns, view = planner._leader._turns, planner._picture.view({})
+            assert turns is not None
+            if is_broken_off:
+                started = turns.turns(view, list(view.agents))
+                next(started)
+                started.close()
+            considered.append(sum(order is not None for _, order in turns.turns(view, list(view.agents))))
+    assert considered[0] > 20
+    assert considered[1] >= considered[0] - 1
