@@ -121,6 +121,7 @@ def _prepare() -> None:
     """
     from alloc.allocators import describe, load, names
     from alloc.allocators.heuristic.greedy import tree_search
+    from alloc.allocators.heuristic.task_prices import start as task_prices
     from alloc.allocators.online.registry import describe_policy, load_policy, policy_names
     from alloc.allocators.parallel.processes import ProcessEngine
     from alloc.problems import InputError
@@ -135,7 +136,7 @@ def _prepare() -> None:
         if not method.missing:
             kinds.setdefault(str(method.kind), []).append(partial(load, name))
         if name == "greedy":
-            kinds[str(method.kind)].append(tree_search.compile_loops)  # for large instances only, and loaded then
+            kinds[str(method.kind)] += [tree_search.compile_loops, task_prices.compile_loops]  # for large instances
     for name in policy_names():
         try:
             if not describe_policy(name).missing:

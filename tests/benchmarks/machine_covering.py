@@ -112,7 +112,9 @@ def published(
     row = {**columns, "seed": seed, "makespan": makespan, "lower_bound": bound}
     end = {"seconds": round(first.runtime_s, 2), "proof": proof(instance, bound)}
     if "agents" not in columns:
-        others = {name: f"{1 - bound / run.makespan:.2e}" for name, run in list(runs.items())[1:]}
+        others = {
+            name: f"{1 - bound / run.makespan:.2e}" if run.makespan else "" for name, run in list(runs.items())[1:]
+        }
         return {**row, "gap": f"{(makespan - bound) / makespan:.2e}", **end, **others, "plan": plan}
     equal = columns["workloads"] == "equal"  # the figures of the literature: the least load, and its upper bound
     loads = (round(EQUAL_WORKLOAD / makespan), int(EQUAL_WORKLOAD / bound * (1 + 1e-9))) if equal else ("", "")
@@ -125,8 +127,9 @@ def write(rows: list[dict[str, object]], file: Path) -> None:
     if file.exists():
         with file.open(newline="") as text:
             known = {key(row): row for row in csv.DictReader(text)} | known
+    fields = list(dict.fromkeys(name for row in (rows[0], *known.values()) for name in row))
     with file.open("w", newline="") as text:
-        writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
+        writer = csv.DictWriter(text, fields, lineterminator="\n")
         writer.writeheader()
         writer.writerows(known[place] for place in sorted(known))
 

@@ -174,7 +174,8 @@ class LagrangianBound:
         if len(relaxed.excess):
             self._dropped |= relaxed.value + relaxed.excess > cost * (1 + 1e-9)
         self._note(relaxed.value)
-        self._groups.append(relaxed.group)
+        if self.may_be_cut:
+            self._groups.append(relaxed.group)
         self._change_prices(relaxed, cost)
         add = self._clusters is None and self._decays >= DECAYS_ALONE and self._member is not None
         if add:

@@ -197,7 +197,8 @@ class PrimalDual:
             return
         if self._cuts is None and self._dual.is_nearly_optimal and self._dual.may_be_cut:
             self._cuts = self._dual.cutting_planes(self._model.counts(self._demand, self._plan)[self._pairs])
-        if self._cuts is None:
+            self._cuts.ascend(1)  # no more, as this turn also takes the time to build them
+        elif self._cuts is None:
             self._dual.ascend(rounds, self._cost)
         else:
             self._cuts.ascend(min(rounds, MAX_CUT_ROUNDS))

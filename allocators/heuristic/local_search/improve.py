@@ -83,7 +83,7 @@ def _improve(
 ) -> None:
     energy_counts = search.objective is Objective.MAKESPAN_ENERGY
     if clock.is_endless and energy_counts:
-        _improve_endlessly(search, team, parameters, clock)
+        _improve_endlessly(search, team, parameters, clock, plan)
         return
     reduction = MakespanReduction(search, team, parameters, plan)
     if not energy_counts:
@@ -95,11 +95,14 @@ def _improve(
     reduce_energy(search, team, parameters, clock)
 
 
-def _improve_endlessly(search: Search, team: Team, parameters: LocalSearchParameters, clock: Clock) -> None:
+def _improve_endlessly(
+    search: Search, team: Team, parameters: LocalSearchParameters, clock: Clock, plan: Allocation | None
+) -> None:
     """Alternate between makespan and energy, each turn twice as long as the one before."""
     cycle = parameters.first_cycle
     while not clock.is_over:
-        MakespanReduction(search, team, parameters).run(Clock(search, until_iteration=search.iteration + cycle))
+        MakespanReduction(search, team, parameters, plan).run(Clock(search, until_iteration=search.iteration + cycle))
+        plan = None
         reduce_energy(search, team, parameters, Clock(search, until_iteration=search.iteration + cycle))
         cycle *= 2
 

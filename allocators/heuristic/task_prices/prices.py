@@ -137,7 +137,7 @@ class TaskPrices:
         self.instance, self.bound, self.makespan = instance, low, low
         self._some = instance.workload > 0
         self.price = self._some.astype(float)
-        self._best_price = self.price
+        self._most_proven, self._best_price = 0.0, self.price
         self.bidders: Bidders | None = None
         self._tree = build_tree(instance.reach.goal, np.flatnonzero(self._some))
         self._run_all, self._threads = run_all, threads
@@ -157,18 +157,25 @@ class TaskPrices:
         self._renew(sample)
         spread = max(LEAST_SPREAD, float((sample.lists.lost.max(axis=1) - sample.lists.lost[:, 0]).mean()))
         for width, iterations in COARSE:
-            if is_over() or (width < COARSE[0][0] and self.makespan <= before * (1 + SAFETY)):
+            if is_over():
                 return False
             self._adjust(sample, width * spread, iterations, is_over)
             self._renew(sample)
-        self.bidders = self._bidders(np.arange(n), FINE_LENGTH)
-        self._prove(self.bidders)
+        if is_over() or self.makespan <= before * (1 + SAFETY):
+            return False
+        everyone = self.look_at_all()
         for width, iterations in FINE:
             if is_over():
                 break
-            self._adjust(self.bidders, width * spread, iterations, is_over)
-            self._prove(self.bidders)
+            self._adjust(everyone, width * spread, iterations, is_over)
+            self._prove(everyone)
         return self.bound > before * (1 + SAFETY)
+
+    def look_at_all(self) -> Bidders:
+        """Let all agents bid at the present prices, and raise the bound by what that proves; return them."""
+        everyone = self.bidders = self._bidders(np.arange(self.instance.n), FINE_LENGTH)
+        self._prove(everyone)
+        return everyone
 
     def _bidders(self, chosen: IntArray, length: int) -> Bidders:
         return Bidders(self.instance, self._tree, chosen, length, self._run_all, self._threads)
@@ -185,8 +192,9 @@ class TaskPrices:
         proven = self._renew(everyone)
         if self.makespan > proven * (1 + PROMISING):
             proven = max(proven, self._renew(everyone))
-        if proven * (1 - SAFETY) > self.bound:
-            self.bound, self._best_price = proven * (1 - SAFETY), self.price
+        self.bound = max(self.bound, proven * (1 - SAFETY))
+        if proven > self._most_proven:
+            self._most_proven, self._best_price = proven, self.price
         elif self.price is not self._best_price:  # smoothed values are not the values themselves
             self.price = self._best_price
             self._renew(everyone)
@@ -195,6 +203,8 @@ class TaskPrices:
         """Adjust the prices by some iterations of the quasi-Newton method."""
         from scipy.optimize import minimize
 
+        if not (bidders.lists.task[:, 0] >= 0).any():  # no agent of the sample reaches a task by then
+            return
         work, some = self.instance.workload, self._some
         unit = width * np.sqrt(work[some].mean() / work[some])  # the curvature grows with the workload
 

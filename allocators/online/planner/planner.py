@@ -72,8 +72,7 @@ class MissionPlanner(AbstractContextManager["MissionPlanner"]):
         self._made_of = (policy if isinstance(policy, str) else None, settings)
         leader = load_policy(policy, **settings) if isinstance(policy, str) else policy
         self._picture = Picture(mission if isinstance(mission, Mission) else Mission.from_instance(mission))
-        self._lock = threading.RLock()
-        self._pins = Pins(self._picture)
+        self._lock, self._pins = threading.RLock(), Pins(self._picture)
         self._plan, self._version, self._planned = Plan(), 0, -1
         self._told: set[str] = set()
         self._last_s, self._is_closed = 0.0, False
@@ -296,7 +295,6 @@ class MissionPlanner(AbstractContextManager["MissionPlanner"]):
             wanted = self._pins.order(name) or orders.get(name)
             if wanted is not None:
                 picture.order(name, wanted)
-            task = agent.order.task
-            if task is not None and picture.state.task(task).status is not TaskStatus.OPEN:
+            if (task := agent.order.task) is not None and picture.state.task(task).status is not TaskStatus.OPEN:
                 picture.order(name, STAY)
         picture.look_ahead()

@@ -26,15 +26,18 @@ SMOOTHING = 0.7
 PRECISION = 1e-5
 """Relative difference between bound and programme at which cuts are added."""
 
-MAX_PAIRS, MAX_CLASSES, MAX_CELLS = 30_000, 1000, 20_000_000
-"""Pairs of class and task, classes, and cells of all tables of a round, above which all this takes too long."""
+MAX_PAIRS, MAX_CLASSES, MAX_CELLS, MAX_USES = 30_000, 1000, 20_000_000, 200_000
+"""Pairs of class and task, classes, cells of all tables of a round, and tasks times classes, above which all this takes
+too long or too much memory."""
 
 
 def is_small(model: EnergyModel) -> bool:
     """Whether rounds are so short that there may be many."""
     steps = np.maximum(model.need, model.max_weight) if model.is_whole else np.full(len(model.need), STEPS)
     cells = float(model.copies @ steps[model.task_of_pair])
-    return len(model.copies) <= MAX_PAIRS and len(model.count) <= MAX_CLASSES and cells <= MAX_CELLS
+    classes = len(model.count)
+    is_narrow = classes <= MAX_CLASSES and classes * len(model.need) <= MAX_USES
+    return is_narrow and len(model.copies) <= MAX_PAIRS and cells <= MAX_CELLS
 
 
 class CuttingPlanes:

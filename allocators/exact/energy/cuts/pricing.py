@@ -69,7 +69,7 @@ def cheapest_with_cuts(
     top, still_open, nodes, q = rest.shape[1] - 1, np.inf, 0, 0
     done, paid = np.zeros(searched + 1), np.zeros(searched + 1)
     branches, take = np.zeros(searched + 1, dtype=np.int64), np.zeros(searched + 1, dtype=np.bool_)
-    slack = 1e-9 * (1.0 + abs(best))
+    slack = 1e-9 * (abs(best) + (np.abs(price).max() if len(price) else 0.0))
     while q >= 0:
         here = min(top, int(np.ceil(done[q] * scale)))
         if branches[q] == 0:

@@ -15,6 +15,9 @@ from alloc.allocators.exact.knapsack import WholeArray
 from alloc.allocators.runtime.compiled import compiled
 from alloc.problems.instance import FloatArray
 
+MOST_WORK = 100_000_000
+"""Looks at a group after which no further sets are sought: some tenths of a second."""
+
 
 @compiled
 def violated_sets(
@@ -32,7 +35,7 @@ def violated_sets(
     most : int
         Sets at the most.
     """
-    classes, found = len(use) - 1, 0
+    classes, found, work = len(use) - 1, 0, 0
     near = np.zeros((classes, classes + 1), dtype=np.bool_)
     for g in range(use.shape[1]):
         inside = np.flatnonzero(use[:, g])
@@ -43,6 +46,9 @@ def violated_sets(
     sets, excess = np.empty((most, 3), dtype=np.int64), np.empty(most)
     for a in range(classes):
         others = np.flatnonzero(near[a])
+        if work > MOST_WORK:
+            break
+        work += len(others) ** 2 * len(part) // 2
         for x in range(len(others)):
             b = others[x]
             for y in range(x, len(others)):
