@@ -1,7 +1,9 @@
 """The process that serves over HTTP: uvicorn, which a signal ends cleanly."""
 
+import math
 import socket
 import sys
+import time
 from collections.abc import Callable
 from types import FrameType
 
@@ -17,13 +19,16 @@ SWITCH_S = 0.001
 GRACE_S = 5
 """Seconds that open requests have for their answers once a signal has come."""
 
+SAME_SIGNAL_S = 0.5
+"""Seconds within which signals are one: some programs send it to a process, and then to its group."""
+
 
 class Server(uvicorn.Server):
-    """Ends its runs on a signal, so that open requests are answered soon; a second one ends it at once."""
+    """Ends its runs on a signal, so that open requests are answered soon; a later one ends it at once."""
 
     def __init__(self, config: uvicorn.Config, service: Service, tell: Callable[[str], object]) -> None:
         super().__init__(config)
-        self._service, self._tell = service, tell
+        self._service, self._tell, self._signalled = service, tell, math.inf
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """Listen, and tell where."""
@@ -35,8 +40,10 @@ class Server(uvicorn.Server):
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         """Do not raise the signal again at the end, as uvicorn would: this end is a clean one."""
+        now = time.monotonic()
+        self._signalled = min(self._signalled, now)
         self._service.end()
-        self.force_exit = self.should_exit
+        self.force_exit = now > self._signalled + SAME_SIGNAL_S
         self.should_exit = True
 
 
