@@ -5,11 +5,9 @@ import time
 from alloc.allocators.contract.search import Search
 from alloc.allocators.heuristic.task_prices.prices import TaskPrices
 from alloc.allocators.heuristic.task_prices.rounding import rounded
+from alloc.allocators.heuristic.task_prices.use import are_prices_used
 from alloc.allocators.parallel.pool import side_by_side
 from alloc.problems import Allocation, Instance, serve_all
-
-LEAST_AGENTS = 5_000
-"""Agents below which linear programmes and exchanges alone do as well."""
 
 TIME_SHARE = 0.35
 """Part of the time left for the prices."""
@@ -33,7 +31,7 @@ def plan_by_prices(search: Search) -> Allocation | None:
         None where there are few agents, or prices prove nothing.
     """
     instance = search.instance
-    if not _are_prices_used(instance) or search.lower_bound <= 0 or search.fast_enough or search.should_stop():
+    if not are_prices_used(instance) or search.lower_bound <= 0 or search.fast_enough or search.should_stop():
         return None
     end = time.monotonic() + TIME_SHARE * search.remaining_s
     threads = min(search.threads, MOST_THREADS)
@@ -46,20 +44,9 @@ def plan_by_prices(search: Search) -> Allocation | None:
     return serve_all(instance, rounded(prices), lambda: search.remaining_s)
 
 
-def load_compiled(instance: Instance) -> None:
-    """Load the compiled code that prices need, if this instance has them, which may take seconds."""
-    if _are_prices_used(instance):
-        compile_loops()
-
-
 def compile_loops() -> None:
     """Compile the loops, or read them from the cache."""
     one = Instance(ability=[1.0], workload=[1.0], agent_position=[[0, 0]], task_position=[[1, 0]], speed=[1.0])
     prices = TaskPrices(one, 1.0, map, 1)
     prices.look_at_all().value(prices.price, 1.0, 0.1)
     rounded(prices)
-
-
-def _are_prices_used(instance: Instance) -> bool:
-    """Whether there are many agents, for whom tasks differ by more than their workloads."""
-    return instance.n >= LEAST_AGENTS and (instance.has_travel_time or not instance.reach.is_complete)
