@@ -2,10 +2,9 @@
 
 import gc
 import threading
-from contextlib import ContextDecorator
 
 
-class CollectedLater(ContextDecorator):
+class CollectedLater:
     """Holds back automatic collections while it is entered, by however many threads at once."""
 
     def __init__(self) -> None:

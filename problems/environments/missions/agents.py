@@ -11,7 +11,14 @@ from pettingzoo import AECEnv
 from alloc.problems.arguments import whole
 from alloc.problems.environments.missions.decisions import Decisions, Info, Source, Weights, draw, sizes_of
 from alloc.problems.environments.missions.observation import LIMIT, Floats, Lens, Mask, length
-from alloc.problems.environments.missions.truth import HUMAN, RENDER_MODES, Truth, checked_mode, rendered, state_length
+from alloc.problems.environments.missions.truth import (
+    RENDER_MODES,
+    Truth,
+    checked_mode,
+    rendered,
+    show_step,
+    state_length,
+)
 from alloc.problems.errors import InputError
 from alloc.problems.vocabulary import Knowledge
 
@@ -124,7 +131,7 @@ class MissionEnv(AECEnv[str, Observation, int]):  # type: ignore[misc]
         self.infos: dict[str, Info] = {name: {**figures, "illegal": False} for name in self.agents}
         self._skip_agent_selection = None
         self.agent_selection = self.agents[self._course.queue[0]]
-        self._show()
+        show_step(self._course.state, self.render_mode)
 
     def observe(self, agent: str) -> Observation:
         """Return what an agent knows now, and what it can choose."""
@@ -138,10 +145,6 @@ class MissionEnv(AECEnv[str, Observation, int]):  # type: ignore[misc]
     def render(self) -> str | None:
         """Return what is so now as text, or print it, by the render mode."""
         return rendered(self._course.state, self.render_mode)
-
-    def _show(self) -> None:
-        if self.render_mode == HUMAN:
-            self.render()
 
     def close(self) -> None:
         """Do nothing: there is no window."""
@@ -167,7 +170,7 @@ class MissionEnv(AECEnv[str, Observation, int]):  # type: ignore[misc]
         illegal = {name: info["illegal"] for name, info in self.infos.items()} | {agent: not is_legal}
         self.infos = {name: {**figures, "illegal": illegal[name]} for name in self.agents}
         self.agent_selection = self.agents[0 if over or cut else self._course.queue[0]]
-        self._show()
+        show_step(self._course.state, self.render_mode)
 
 
 def _space(figures: int, choices: int) -> spaces.Dict:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from alloc.problems.environments.missions.decisions import Decisions, Source, Weights, draw, sizes_of
 from alloc.problems.environments.missions.observation import LIMIT, Floats, Lens, length
-from alloc.problems.environments.missions.truth import HUMAN, RENDER_MODES, Truth, checked_mode, rendered
+from alloc.problems.environments.missions.truth import RENDER_MODES, Truth, checked_mode, rendered, show_step
 from alloc.problems.errors import InputError
 from alloc.problems.vocabulary import Knowledge
 
@@ -86,7 +86,7 @@ class MissionFleetEnv(gymnasium.Env[Floats, np.int64]):
             raise InputError("is over before anybody decides", mission.name)
         self._lens, self._truth = Lens(mission, 0), Truth(mission)
         self._agent, self._steps = self._course.queue[0], 0
-        self._show()
+        show_step(self._course.state, self.render_mode)
         return self._observation(), self._info(illegal=False)
 
     def step(self, action: np.int64) -> tuple[Floats, float, bool, bool, dict[str, object]]:
@@ -99,7 +99,7 @@ class MissionFleetEnv(gymnasium.Env[Floats, np.int64]):
         over = not self._course.queue
         self._agent = self._agent if over else self._course.queue[0]
         cut = not over and self.max_steps is not None and self._steps >= self.max_steps
-        self._show()
+        show_step(self._course.state, self.render_mode)
         return self._observation(), gained, over, cut, self._info(illegal=not is_legal)
 
     def state(self) -> Floats:
@@ -109,10 +109,6 @@ class MissionFleetEnv(gymnasium.Env[Floats, np.int64]):
     def render(self) -> str | None:
         """Return what is so now as text, or print it, by the render mode."""
         return rendered(self._course.state, self.render_mode)
-
-    def _show(self) -> None:
-        if self.render_mode == HUMAN:
-            self.render()
 
     def action_masks(self) -> NDArray[np.bool_]:
         """Return which actions are legal now, shape (m + 1,)."""

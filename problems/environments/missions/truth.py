@@ -24,8 +24,6 @@ from alloc.problems.missions.simulation.state import (
 AGENT_TRUTHS, TASK_TRUTHS = 11, 10
 
 HUMAN = "human"
-"""Mode in which an environment prints after each step."""
-
 RENDER_MODES = (HUMAN, "ansi")
 
 
@@ -111,6 +109,12 @@ def rendered(state: MissionState, mode: str | None) -> str | None:
     if mode == HUMAN:
         sys.stdout.write(as_text(state))
     return as_text(state) if mode == "ansi" else None
+
+
+def show_step(state: MissionState, mode: str | None) -> None:
+    """Print what is so now in the mode for people: environments do after each step, without being asked."""
+    if mode == HUMAN:
+        rendered(state, mode)
 
 
 def as_text(state: MissionState) -> str:

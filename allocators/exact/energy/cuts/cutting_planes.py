@@ -33,11 +33,11 @@ too long or too much memory."""
 
 def is_small(model: EnergyModel) -> bool:
     """Whether rounds are so short that there may be many."""
-    steps = np.maximum(model.need, model.max_weight) if model.is_whole else np.full(len(model.need), STEPS)
-    cells = float(model.copies @ steps[model.task_of_pair])
-    classes = len(model.count)
-    is_narrow = classes <= MAX_CLASSES and classes * len(model.need) <= MAX_USES
-    return is_narrow and len(model.copies) <= MAX_PAIRS and cells <= MAX_CELLS
+    classes, tasks = len(model.count), len(model.need)
+    if len(model.copies) > MAX_PAIRS or classes > MAX_CLASSES or classes * tasks > MAX_USES:
+        return False
+    steps = np.maximum(model.need, model.max_weight) if model.is_whole else np.full(tasks, STEPS)
+    return float(model.copies @ steps[model.task_of_pair]) <= MAX_CELLS
 
 
 class CuttingPlanes:
