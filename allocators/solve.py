@@ -186,7 +186,7 @@ def _prepared(
     refuse(allocator, request.instance, request.objective, request.budget, request.tolerance)
     is_matched = _is_matched(request.instance)
     spent_s += time.monotonic() - begin
-    if are_prices_used(request.instance):
+    if allocator.method.name == "local-search" and are_prices_used(request.instance):  # the others do without
         from alloc.allocators.heuristic.task_prices.start import compile_loops as compile_prices
 
         compile_prices()
