@@ -6,7 +6,8 @@ import numpy as np
 
 from alloc.allocators.missions.layout import IDLE, NOBODY, TO_TASK, WORKING, MissionArrays
 from alloc.allocators.missions.motion import battery_of, can_fly, distance_between, place_of
-from alloc.allocators.runtime.compiled import compiled_in_place
+from alloc.allocators.missions.records import Report
+from alloc.allocators.runtime.compiled import compiled_in_place, inlined
 from alloc.problems.fields import BoolArray, FloatArray, IntArray
 
 MEMORY = 20
@@ -159,6 +160,12 @@ def fill_tasks(state: MissionArrays, number: int, task: FloatArray, can: BoolArr
             task[DISTANCE, j] = distance_between(head.is_manhattan, here, place)
 
 
+@inlined
+def does_count(report: Report, who: int, number: int, hour: float, memory: float) -> bool:
+    """Whether what an agent knows of another counts: heard at most `memory` hours ago, of one that takes orders."""
+    return who != number and hour - report.hour <= memory and IDLE <= report.status <= WORKING
+
+
 @compiled_in_place
 def fill_others(state: MissionArrays, number: int, situation: Situation, memory: float) -> None:
     """Fill in what an agent knows of others, by what it heard at most `memory` hours ago; only those that count."""
@@ -167,7 +174,7 @@ def fill_others(state: MissionArrays, number: int, situation: Situation, memory:
     other, target, counts = situation.other, situation.target, situation.counts
     for place in range(state.known[row]):
         report = state.reports[known[place]]
-        if who[place] == number or head.hour - report.hour > memory or not 1 <= report.status <= WORKING:
+        if not does_count(report, who[place], number, head.hour, memory):
             continue
         agent = state.agents[who[place]]
         other[STRENGTH, found], other[PACE, found] = report.ability, agent.speed

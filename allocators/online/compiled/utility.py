@@ -5,8 +5,8 @@ import math
 from alloc.allocators.learned.missions import situation as known
 from alloc.allocators.learned.missions.options import done_with, expect
 from alloc.allocators.learned.missions.play import Room
-from alloc.allocators.learned.missions.situation import Situation, fill_others, fill_own, fill_tasks
-from alloc.allocators.missions.layout import NOBODY, WORKING, MissionArrays
+from alloc.allocators.learned.missions.situation import Situation, does_count, fill_others, fill_own, fill_tasks
+from alloc.allocators.missions.layout import NOBODY, MissionArrays
 from alloc.allocators.missions.motion import distance_between
 from alloc.allocators.runtime.compiled import compiled_in_place
 from alloc.problems.fields import FloatArray
@@ -39,7 +39,7 @@ def redirect(state: MissionArrays, number: int, situation: Situation, memory: fl
     head, row, found = state.head[0], state.agents[number].known, 0
     for place in range(state.known[row]):
         i, report = state.known_agent[row, place], state.reports[state.known_report[row, place]]
-        if i == number or head.hour - report.hour > memory or not 1 <= report.status <= WORKING:
+        if not does_count(report, i, number, head.hour, memory):
             continue
         goal = int(goals[i])
         situation.target[found] = goal if goal != NOBODY and state.task_hour[row, goal] >= 0 else NOBODY
