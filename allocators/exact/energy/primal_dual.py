@@ -48,7 +48,7 @@ def compile_loops() -> None:
     for weight in (one, np.ones(2)):
         model = EnergyModel(two, two, weight, one, np.ones(2), weight, one, one, one, None)
         LagrangianBound(model, np.zeros((2, 2)), np.zeros(2)).ascend(1, 3.0)
-        CuttingPlanes(model, 0.0, np.zeros(2), [one]).ascend(1)
+        CuttingPlanes(model, np.zeros((0, 2), dtype=bool), np.zeros(2), [one]).ascend(1)
 
 
 class Timer:

@@ -15,7 +15,7 @@ import numpy as np
 
 from alloc.allocators.exact.energy.cuts.group_master import GroupMaster
 from alloc.allocators.exact.energy.cuts.pricing import STEPS, price_groups
-from alloc.allocators.exact.energy.energy_model import EnergyModel
+from alloc.allocators.exact.energy.energy_model import EnergyModel, Mask
 from alloc.allocators.exact.energy.subproblems import solve_subproblems
 from alloc.allocators.exact.knapsack import WholeArray
 from alloc.problems.instance import FloatArray
@@ -46,9 +46,8 @@ class CuttingPlanes:
     Parameters
     ----------
     model : EnergyModel
-        Its costs include what clusters are paid.
-    constant : float
-        Added to all costs and bounds: what the clusters cost.
+    member : ndarray of bool, shape (f, t)
+        Clusters of tasks.
     price : ndarray, shape (k,)
         To begin with.
     groups : list of ndarray of int, shape (p,)
@@ -62,10 +61,10 @@ class CuttingPlanes:
         Whether the mixture violates no cut, or the programme could not be solved.
     """
 
-    def __init__(self, model: EnergyModel, constant: float, price: FloatArray, groups: list[WholeArray]) -> None:
-        self._model, self._constant = model, constant
+    def __init__(self, model: EnergyModel, member: Mask, price: FloatArray, groups: list[WholeArray]) -> None:
+        self._model = model
         self._weight, self._need = model.weight.astype(np.float64), model.need.astype(np.float64)
-        self._master, self._smoothing = GroupMaster(model), SMOOTHING
+        self._master, self._smoothing = GroupMaster(model, member), SMOOTHING
         for group in groups:
             self._master.add(group)
         self._price, self._penalty = price, np.zeros(0)
@@ -90,7 +89,7 @@ class CuttingPlanes:
         if value > self.bound:
             self.bound, self._price, self._penalty = value, price, penalty
         is_new = master.add(group)
-        if self.bound >= (master.value + self._constant) * (1 - PRECISION) or not (is_new or self._smoothing):
+        if self.bound >= master.value * (1 - PRECISION) or not (is_new or self._smoothing):
             self.converged = not master.separate()
             is_new = True
         self._smoothing = SMOOTHING if is_new else (self._smoothing / 2 if self._smoothing > 0.2 else 0.0)
@@ -98,7 +97,7 @@ class CuttingPlanes:
     def _relax(self, price: FloatArray, penalty: FloatArray) -> tuple[float, WholeArray]:
         """Return the Lagrangian bound at some prices, and groups that are cheaper there than those known."""
         model, master = self._model, self._master
-        whole, paid = model.is_whole, model.cost + price[model.class_of_pair]
+        whole, paid = model.is_whole, model.cost + price[model.class_of_pair] + master.fees(penalty)
         if penalty.any() or whole:
             group = np.zeros(len(paid), dtype=np.int64)
             first_cut, cut = master.cuts_of_pairs(penalty)
@@ -108,5 +107,5 @@ class CuttingPlanes:
             )  # fmt: skip
         else:
             group, _, value = solve_subproblems(model, paid, compare=False)
-        value -= float(np.where(price >= 0, model.count, model.min_agents) @ price + master.limit_of_cut @ penalty)
-        return value + self._constant, group
+        value -= float(np.where(price >= 0, model.count, model.min_agents) @ price + master.limit @ penalty)
+        return value, group
