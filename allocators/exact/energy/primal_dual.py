@@ -48,7 +48,7 @@ def compile_loops() -> None:
     for weight in (one, np.ones(2)):
         model = EnergyModel(two, two, weight, one, np.ones(2), weight, one, one, one, None)
         LagrangianBound(model, np.zeros((2, 2)), np.zeros(2)).ascend(1, 3.0)
-        CuttingPlanes(model, np.zeros((0, 2), dtype=bool), np.zeros(2), [one]).ascend(1)
+        CuttingPlanes(model, np.zeros((0, 2), dtype=bool), np.zeros(2), [one]).ascend(1, 3.0)
 
 
 class Timer:
@@ -143,7 +143,10 @@ class PrimalDual:
     @property
     def keep(self) -> IntArray:
         """Which pairs of the demand a better plan may have, sorted."""
-        return self._pairs if self._dual is None else np.sort(self._pairs[self._dual.kept])
+        if self._dual is None:
+            return self._pairs
+        kept = self._pairs[self._dual.kept]
+        return np.sort(kept if self._cuts is None else kept[self._cuts.kept])
 
     def run(self, progress: float, pool: Pool | None) -> Allocation | None:
         """Work on both sides for some 10 ms each; return a plan if a better one was found.
@@ -180,7 +183,10 @@ class PrimalDual:
     def note_plan(self, plan: Allocation, cost: float) -> None:
         """Take note of a plan that was submitted, and of its cost."""
         if cost <= self._cost:
+            is_better = cost < self._cost * (1 - 1e-9)
             self._plan, self._cost = plan, cost
+            if self._dual is not None and self._cuts is not None and is_better:
+                self._cuts.note_plan(self._counts[self._dual.kept])
 
     def _descend(self) -> Allocation | None:
         """Descend before prices change, as their steps depend on the cost of the plan at hand."""
@@ -196,12 +202,12 @@ class PrimalDual:
         if self._dual is None:
             return
         if self._cuts is None and self._dual.is_nearly_optimal and self._dual.may_be_cut:
-            self._cuts = self._dual.cutting_planes(self._model.counts(self._demand, self._plan)[self._pairs])
-            self._cuts.ascend(1)  # no more, as this turn also takes the time to build them
+            self._cuts = self._dual.cutting_planes(self._counts)
+            self._cuts.ascend(1, self._cost)  # no more, as this turn also takes the time to build them
         elif self._cuts is None:
             self._dual.ascend(rounds, self._cost)
         else:
-            self._cuts.ascend(min(rounds, MAX_CUT_ROUNDS))
+            self._cuts.ascend(min(rounds, MAX_CUT_ROUNDS), self._cost)
 
     def _better(self) -> Allocation | None:
         """Return the best plan if it has not been returned yet."""
@@ -210,6 +216,11 @@ class PrimalDual:
         self._reported = self._primal.cost
         tasks = np.append(self._model.tasks, IDLE)
         return Allocation(tasks[self._primal.best])
+
+    @property
+    def _counts(self) -> IntArray:
+        """Agents of each pair of the dual side in the best plan."""
+        return self._model.counts(self._demand, self._plan)[self._pairs]
 
     def _begin_dual(self, task_distance: FloatArray, seconds: float) -> LagrangianBound | None:
         """Start the dual side; None where its tables are too large."""

@@ -26,6 +26,9 @@ SMOOTHING = 0.7
 PRECISION = 1e-5
 """Relative difference between bound and programme at which cuts are added."""
 
+MOST_KEPT = 0.95
+"""Part of the pairs that are left at the most where some are dropped."""
+
 MAX_PAIRS, MAX_CLASSES, MAX_CELLS, MAX_USES = 30_000, 1000, 20_000_000, 200_000
 """Pairs of class and task, classes, cells of all tables of a round, and tasks times classes, above which all this takes
 too long or too much memory."""
@@ -57,6 +60,8 @@ class CuttingPlanes:
     ----------
     bound : float
         No plan costs less.
+    kept : ndarray of bool, shape (p,)
+        Pairs that have not been dropped, as no better plan has them.
     converged : bool
         Whether the mixture violates no cut, or the programme could not be solved.
     """
@@ -69,14 +74,21 @@ class CuttingPlanes:
             self._master.add(group)
         self._price, self._penalty = price, np.zeros(0)
         self.bound, self.converged = -np.inf, False
+        self.kept = np.ones(len(model.copies), dtype=bool)
 
-    def ascend(self, rounds: int) -> None:
-        """Do so many rounds of pricing."""
+    def ascend(self, rounds: int, cost: float) -> None:
+        """Do so many rounds of pricing, given the cost of a plan at hand."""
         for _ in range(rounds):
-            if not self.converged:
-                self._round()
+            if self.converged or self.bound >= cost * (1 - 1e-12):
+                return
+            self._round(cost)
 
-    def _round(self) -> None:
+    def note_plan(self, plan: WholeArray) -> None:
+        """Take note of a better plan, by its agents of each pair that there was to begin with."""
+        if not plan[~self.kept].any() and self._master.add(plan[self.kept]):
+            self.converged = False
+
+    def _round(self, cost: float) -> None:
         master = self._master
         if not master.solve():
             self.converged = True
@@ -85,27 +97,52 @@ class CuttingPlanes:
         smoothing = self._smoothing if np.isfinite(self.bound) else 1.0
         price = smoothing * self._price + (1 - smoothing) * master.price
         penalty = smoothing * known + (1 - smoothing) * master.penalty
-        value, group = self._relax(price, penalty)
+        value, group, _ = self._relax(price, penalty)
         if value > self.bound:
             self.bound, self._price, self._penalty = value, price, penalty
         is_new = master.add(group)
         if self.bound >= master.value * (1 - PRECISION) or not (is_new or self._smoothing):
-            self.converged = not master.separate()
+            self.converged = not (self._drop_pairs(cost) or master.separate())
             is_new = True
         self._smoothing = SMOOTHING if is_new else (self._smoothing / 2 if self._smoothing > 0.2 else 0.0)
 
-    def _relax(self, price: FloatArray, penalty: FloatArray) -> tuple[float, WholeArray]:
-        """Return the Lagrangian bound at some prices, and groups that are cheaper there than those known."""
+    def _drop_pairs(self, cost: float) -> bool:
+        """Drop the pairs that no plan that costs less has, if they are many; return whether they are.
+
+        With an agent of a pair, its task costs at least as much as its best group with the agent does without the
+        penalties of cuts over classes, and the other tasks cost what they do in the bound.
+        """
+        model = self._model
+        value, _, least = self._relax(self._price, self._penalty)
+        paid = model.cost + self._price[model.class_of_pair] + self._master.fees(self._penalty)
+        group, excess, total = solve_subproblems(model, paid)
+        unpenalised = np.bincount(model.task_of_pair, group * paid, len(least))
+        if not np.isfinite(total) or abs(total - unpenalised.sum()) > 1e-9 * np.abs(unpenalised).sum():
+            return False  # a search for a group ended early
+        more = excess + (unpenalised - least)[model.task_of_pair]
+        stay = value + more <= cost * (1 + 1e-9)
+        if stay.mean() > MOST_KEPT:
+            return False
+        self.kept[self.kept] = stay
+        self._model = model.only(stay)
+        self._weight = self._weight[stay]
+        self._master.restrict(self._model)
+        return True
+
+    def _relax(self, price: FloatArray, penalty: FloatArray) -> tuple[float, WholeArray, FloatArray]:
+        """Return the Lagrangian bound at some prices, groups that are cheaper there than those known, and all costs."""
         model, master = self._model, self._master
         whole, paid = model.is_whole, model.cost + price[model.class_of_pair] + master.fees(penalty)
         if penalty.any() or whole:
             group = np.zeros(len(paid), dtype=np.int64)
             first_cut, cut = master.cuts_of_pairs(penalty)
+            least = master.cheapest(price, penalty)
             value = price_groups(
                 model.first, self._weight, paid, model.copies, self._need, model.max_weight, whole,
-                first_cut, cut, penalty, master.cheapest(price, penalty), group,
+                first_cut, cut, penalty, least, group,
             )  # fmt: skip
         else:
             group, _, value = solve_subproblems(model, paid, compare=False)
+            least = np.bincount(model.task_of_pair, group * paid, len(model.need))
         value -= float(np.where(price >= 0, model.count, model.min_agents) @ price + master.limit @ penalty)
-        return value, group
+        return value, group, least

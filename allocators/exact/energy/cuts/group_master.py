@@ -47,10 +47,11 @@ class GroupMaster:
         self._count = np.append(model.count, 0)
         self._use, self._used = np.zeros((ROOM, classes + 1)), np.zeros((ROOM, ROOM_FOR_CUTS))
         self._task, self._cost, self._groups = np.zeros(ROOM, dtype=np.intp), np.zeros(ROOM), 0
-        self._seen: set[bytes] = set()
+        self._seen: set[tuple[int, bytes, bytes]] = set()
         self._sets, self._set_at = np.zeros((0, 3), dtype=np.int64), np.zeros(0, dtype=np.intp)
         self._clusters: list[ClusterCut] = []
-        self._cluster_at, self._separation = np.zeros(0, dtype=np.intp), ClusterSeparation(model, member)
+        self._cluster_at, self._member = np.zeros(0, dtype=np.intp), member
+        self._separation = ClusterSeparation(model, member)
         self._part = np.zeros(0)
         self._scale = 1 / max(1e-300, float(np.abs(model.cost).mean()))
         self.value, self.price = np.inf, np.zeros(classes)
@@ -69,11 +70,23 @@ class GroupMaster:
         for j in range(self._tasks):
             a, b = self._first[j], self._first[j + 1]
             inside = a + np.flatnonzero(group[a:b])
-            key = inside.tobytes() + group[inside].tobytes()
+            key = j, self._model.class_of_pair[inside].tobytes(), group[inside].tobytes()
             if len(inside) and key not in self._seen:
                 self._seen.add(key)
                 self._add_group(j, inside, group[inside])
         return self._groups > before
+
+    def restrict(self, model: EnergyModel) -> None:
+        """Go on with a model that has only some of the pairs, and without the groups that have others."""
+        self._model, self._first = model, model.first
+        stay = np.zeros((self._tasks, len(model.count)), dtype=bool)
+        stay[model.task_of_pair, model.class_of_pair] = True
+        known = slice(self._groups)
+        lost = (self._use[known, :-1] > 0) & ~stay[self._task[known]]
+        for g in np.flatnonzero(lost.any(axis=1) & np.isfinite(self._cost[known])).tolist():
+            self._cost[g] = np.inf
+            self._highs.changeColBounds(g, 0.0, 0.0)
+        self._separation = ClusterSeparation(model, self._member)
 
     def solve(self) -> bool:
         """Solve; return whether that succeeded."""

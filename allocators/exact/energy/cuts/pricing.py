@@ -42,17 +42,18 @@ def price_groups(
     penalty : ndarray, shape (cuts,)
         >= 0.
     cost : ndarray, shape (t,)
-        Of the cheapest group known of each task.
+        Of the cheapest group known of each task; in the end what any group costs at least.
     group : ndarray of int, shape (p,)
         Zeros; stays so where no group is cheaper.
     """
     total, taken = 0.0, np.zeros(len(penalty), dtype=np.int64)
     for j in range(len(need)):
         a, b = first[j], first[j + 1]
-        total += cheapest_with_cuts(
+        cost[j] = cheapest_with_cuts(
             weight[a:b], price[a:b], copies[a:b], need[j], max_weight[j], whole,
             first_cut[a : b + 1], cut, penalty, taken, cost[j], group[a:b],
         )  # fmt: skip
+        total += cost[j]
     return total
 
 
