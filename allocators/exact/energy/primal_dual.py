@@ -7,6 +7,7 @@ import numpy as np
 
 from alloc.allocators.exact.demand import Demand
 from alloc.allocators.exact.energy.cuts.cutting_planes import CuttingPlanes
+from alloc.allocators.exact.energy.cuts.group_programme import GroupProgramme
 from alloc.allocators.exact.energy.energy_model import MAX_NEED, EnergyModel, round_demand
 from alloc.allocators.exact.energy.lagrangian import LagrangianBound
 from alloc.allocators.exact.energy.linear import class_prices
@@ -33,6 +34,15 @@ MAX_LEAD_S = 0.1
 
 MAX_CUT_ROUNDS = 5
 """Rounds of cutting planes in one call, of which one may take as long as many of subgradients."""
+
+FEW_GROUPS, MOST_GROUPS = 2500, 10_000
+"""Groups of all tasks up to which an integer programme picks among them: while bounds rise, and when they do not."""
+
+PARTS = 1.0, 0.7, 0.5, 0.35, 0.25
+"""Parts of the gap tried in turn, until the groups within are few enough."""
+
+LESS_GAP = 0.9
+"""Part of the last gap at which groups are counted again."""
 
 REPEATABLE_SLICES, REPEATABLE_ROUNDS = 60, 10
 """Slices, and rounds in each, where effort is counted."""
@@ -97,6 +107,7 @@ class PrimalDual:
         self._cuts: CuttingPlanes | None = None
         self._primal = _begin_primal(instance, model, demand, plan, task_distance, seed)
         self._reported = self._cost = _cost_of_plan(instance, plan)
+        self._gap_tried = np.inf
         self._primal_timer, self._dual_timer = Timer(), Timer()
         self._descended = self._primal is None
 
@@ -140,13 +151,44 @@ class PrimalDual:
             return self._cuts.converged
         return self._dual is None or (self._dual.is_rising_slowly and not self._dual.may_be_cut)
 
+    def few_groups(self) -> GroupProgramme | None:
+        """Return all groups of which better plans consist where they are few; else None, until the gap is less."""
+        if self._cuts is None:
+            return None
+        gap = self._cost - self._cuts.bound
+        if gap > LESS_GAP * self._gap_tried:
+            return None
+        self._gap_tried = gap
+        return self._cuts.all_groups(self._cost, FEW_GROUPS)
+
+    def groups_of_cheapest(self) -> GroupProgramme | None:
+        """Return all groups of which the better plans consist that close some part of the gap, as large as it can be.
+
+        If there is no such plan, or the best of them is known, the bound rises by that part.
+        """
+        for part in PARTS if self._cuts is not None else ():
+            assert self._cuts is not None
+            groups = self._cuts.all_groups(self._cuts.bound + part * (self._cost - self._cuts.bound), MOST_GROUPS)
+            if groups is not None:
+                return groups
+        return None
+
+    def allocation(self, programme: GroupProgramme, counts: IntArray) -> Allocation:
+        """Turn numbers of agents of the pairs of a programme by `few_groups` into an allocation."""
+        full = np.zeros(len(self._demand.class_of_pair), dtype=np.intp)
+        full[self._kept] = counts
+        return self._model.allocation(self._demand, full)
+
     @property
     def keep(self) -> IntArray:
         """Which pairs of the demand a better plan may have, sorted."""
-        if self._dual is None:
-            return self._pairs
-        kept = self._pairs[self._dual.kept]
-        return np.sort(kept if self._cuts is None else kept[self._cuts.kept])
+        return np.sort(self._kept)
+
+    @property
+    def _kept(self) -> IntArray:
+        """Pairs of the demand that the dual side has kept, in its order."""
+        kept = self._pairs if self._dual is None else self._pairs[self._dual.kept]
+        return kept if self._cuts is None else kept[self._cuts.kept]
 
     def run(self, progress: float, pool: Pool | None) -> Allocation | None:
         """Work on both sides for some 10 ms each; return a plan if a better one was found.

@@ -12,8 +12,11 @@ Dantzig-Wolfe decomposition for linear mixed-integer programming, doi:10.1016/S0
 """
 
 import numpy as np
+from scipy.sparse import csr_array, vstack
 
+from alloc.allocators.exact.energy.cuts.all_groups import write_groups
 from alloc.allocators.exact.energy.cuts.group_master import GroupMaster
+from alloc.allocators.exact.energy.cuts.group_programme import GroupProgramme
 from alloc.allocators.exact.energy.cuts.pricing import STEPS, price_groups
 from alloc.allocators.exact.energy.energy_model import EnergyModel, Mask
 from alloc.allocators.exact.energy.subproblems import solve_subproblems
@@ -88,12 +91,49 @@ class CuttingPlanes:
         if not plan[~self.kept].any() and self._master.add(plan[self.kept]):
             self.converged = False
 
+    def all_groups(self, cost: float, most: int) -> GroupProgramme | None:
+        """Return all groups of which plans that cost less than `cost` consist; None if they are more than `most`.
+
+        What the group of a task costs more than its cheapest one is at most what `cost` exceeds the bound by.
+        """
+        model = self._model
+        if not model.is_whole:
+            return None
+        penalty = self._known_penalty
+        value, _, least = self._relax(self._price, penalty)
+        gap = cost * (1 + 1e-9) - value
+        paid = model.cost + self._price[model.class_of_pair] + self._master.fees(penalty)
+        first, (first_cut, cut) = model.first, self._master.cuts_of_pairs(penalty)
+        task, group = [np.zeros(0, dtype=np.int64)], [csr_array((0, len(paid)), dtype=np.int64)]
+        for j in range(len(least)):
+            a, b, room = first[j], first[j + 1], most - sum(len(tasks) for tasks in task)
+            inside = np.zeros((room, b - a), dtype=np.int64)
+            found = write_groups(
+                self._weight[a:b], paid[a:b], model.copies[a:b], int(self._need[j]), model.max_weight[j],
+                first_cut[a : b + 1], cut, penalty, least[j] + gap, inside,
+            )  # fmt: skip
+            if found > room:
+                return None
+            rows, pairs = np.nonzero(inside[:found])
+            entries = (inside[rows, pairs], (rows, a + pairs))
+            task.append(np.full(found, j))
+            group.append(csr_array(entries, shape=(found, len(paid))))
+        all_tasks, groups = np.concatenate(task), csr_array(vstack(group))
+        on = penalty > 0
+        used = self._master.used(all_tasks, self._master.by_class(groups))[:, on]
+        return GroupProgramme(model, cost, all_tasks, groups, csr_array(used), self._master.limit[on])
+
+    @property
+    def _known_penalty(self) -> FloatArray:
+        """The best penalties so far, zero for the cuts since, shape (c,)."""
+        return np.append(self._penalty, np.zeros(len(self._master.limit) - len(self._penalty)))
+
     def _round(self, cost: float) -> None:
         master = self._master
         if not master.solve():
             self.converged = True
             return
-        known = np.append(self._penalty, np.zeros(len(master.penalty) - len(self._penalty)))
+        known = self._known_penalty
         smoothing = self._smoothing if np.isfinite(self.bound) else 1.0
         price = smoothing * self._price + (1 - smoothing) * master.price
         penalty = smoothing * known + (1 - smoothing) * master.penalty
@@ -113,8 +153,9 @@ class CuttingPlanes:
         penalties of cuts over classes, and the other tasks cost what they do in the bound.
         """
         model = self._model
-        value, _, least = self._relax(self._price, self._penalty)
-        paid = model.cost + self._price[model.class_of_pair] + self._master.fees(self._penalty)
+        penalty = self._known_penalty
+        value, _, least = self._relax(self._price, penalty)
+        paid = model.cost + self._price[model.class_of_pair] + self._master.fees(penalty)
         group, excess, total = solve_subproblems(model, paid)
         unpenalised = np.bincount(model.task_of_pair, group * paid, len(least))
         if not np.isfinite(total) or abs(total - unpenalised.sum()) > 1e-9 * np.abs(unpenalised).sum():

@@ -124,6 +124,21 @@ class GroupMaster:
         table = csr_array(entry, shape=(len(self._count), max(1, len(penalty))))[self._model.class_of_pair]
         return table.indptr.astype(np.int64), table.indices.astype(np.int64)
 
+    def by_class(self, group: csr_array) -> FloatArray:
+        """Return the agents of each class in groups given by pairs, shapes (g, k) and (g, p)."""
+        pairs = len(self._model.copies)
+        entry = (np.ones(pairs), (np.arange(pairs), self._model.class_of_pair))
+        return np.asarray((group @ csr_array(entry, shape=(pairs, len(self._model.count)))).toarray())
+
+    def used(self, task: IntArray, use: FloatArray) -> FloatArray:
+        """Return what groups use of each cut, given their tasks and agents of each class, shapes (g, c) and (g, k)."""
+        used, padded = np.zeros((len(task), len(self.limit))), np.hstack([use, np.zeros((len(task), 1))])
+        for at, members in zip(self._set_at.tolist(), self._sets, strict=True):
+            used[:, at] = padded[:, members].sum(axis=1) // 2
+        for at, cut in zip(self._cluster_at.tolist(), self._clusters, strict=True):
+            used[:, at] = cut.use(use, task)
+        return used
+
     def separate(self) -> bool:
         """Add the cuts that the mixture violates most; return whether there are any."""
         before = len(self.limit)
@@ -169,9 +184,7 @@ class GroupMaster:
         use = self._use[g]
         use[self._model.class_of_pair[pairs]] = agents
         self._task[g], self._cost[g] = task, self._model.cost[pairs] @ agents
-        self._used[g, self._set_at] = use[self._sets].sum(axis=1) // 2
-        for at, cut in zip(self._cluster_at.tolist(), self._clusters, strict=True):
-            self._used[g, at] = cut.factor @ use[:-1] if cut.inside[task] else 0.0
+        self._used[g, : len(self.limit)] = self.used(self._task[g : g + 1], use[None, :-1])
         self._groups += 1
         column = np.concatenate([use[:classes], self._used[g, : len(self.limit)]])
         rows = np.flatnonzero(column)
