@@ -21,6 +21,12 @@ SHARE_WITHOUT_SOLVER = 0.3
 SHARE_WITHOUT_GROUPS = 0.1
 """Share of the time before which groups are not counted, as better plans soon make them fewer."""
 
+MOST_GROUPS = 2500, 15_000
+"""Groups of tasks up to which, first and then, an integer programme picks among them where bounds rise no more."""
+
+PROVEN = 1e-7
+"""Relative gap that solvers leave by their tolerances."""
+
 SMALL_PAIRS = 3000
 """Pairs of class and task that a better plan may have, up to which the solver comes next even if bounds still rise."""
 
@@ -70,9 +76,12 @@ def _least_cost(state: EnergyState, solver: Solver) -> float:
     if both.closed or is_over(search):
         return both.bound
     bound = both.bound
-    if (groups := groups or both.groups_of_cheapest()) is not None:
-        bound = max(bound, _solve_groups(state, both, groups))
-    if bound < state.cost * (1 - 1e-9) and not is_over(search):
+    for most in MOST_GROUPS:
+        if bound < state.cost * (1 - PROVEN) and not is_over(search):
+            groups = groups or both.groups_of_cheapest(most)
+            bound = bound if groups is None else max(bound, _solve_groups(state, both, groups))
+            groups = None
+    if bound < state.cost * (1 - PROVEN) and not is_over(search):
         bound = max(bound, _solve_rest(state, solver).bound)
     return min(max(bound, both.bound), state.cost)
 

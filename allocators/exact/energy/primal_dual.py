@@ -1,8 +1,5 @@
 """Close the gap on the energy from both sides: plans by pairwise repartition, bounds by Lagrangian relaxation."""
 
-import time
-from collections.abc import Callable
-
 import numpy as np
 
 from alloc.allocators.exact.demand import Demand
@@ -12,6 +9,7 @@ from alloc.allocators.exact.energy.energy_model import MAX_NEED, EnergyModel, ro
 from alloc.allocators.exact.energy.lagrangian import LagrangianBound
 from alloc.allocators.exact.energy.linear import class_prices
 from alloc.allocators.exact.energy.pairwise_search import PairwiseSearch, Perturbation
+from alloc.allocators.exact.energy.timer import Timer
 from alloc.allocators.exact.model import ROUNDING, Model
 from alloc.allocators.parallel.pool import Pool
 from alloc.problems import IDLE, Allocation, Instance
@@ -26,17 +24,14 @@ STATES = 2000
 MAX_TASKS = 2000
 """Tasks above which neither side is used, for its memory."""
 
-SLICE_S = 0.01
-"""Time of each side in one call of `PrimalDual.run`."""
-
 MAX_LEAD_S = 0.1
 """How much more time one side may have had before it waits for the other."""
 
 MAX_CUT_ROUNDS = 5
 """Rounds of cutting planes in one call, of which one may take as long as many of subgradients."""
 
-FEW_GROUPS, MOST_GROUPS = 2500, 10_000
-"""Groups of all tasks up to which an integer programme picks among them: while bounds rise, and when they do not."""
+FEW_GROUPS = 2500
+"""Groups of all tasks up to which an integer programme picks among them while bounds rise."""
 
 PARTS = 1.0, 0.7, 0.5, 0.35, 0.25
 """Parts of the gap tried in turn, until the groups within are few enough."""
@@ -58,28 +53,9 @@ def compile_loops() -> None:
     for weight in (one, np.ones(2)):
         model = EnergyModel(two, two, weight, one, np.ones(2), weight, one, one, one, None)
         LagrangianBound(model, np.zeros((2, 2)), np.zeros(2)).ascend(1, 3.0)
-        CuttingPlanes(model, np.zeros((0, 2), dtype=bool), np.zeros(2), [one]).ascend(1, 3.0)
-
-
-class Timer:
-    """Adapts the number of rounds to a slice of time, by how long the last ones took.
-
-    Attributes
-    ----------
-    spent_s : float
-        Time of all rounds so far.
-    """
-
-    def __init__(self) -> None:
-        self._rounds, self.spent_s = 1, 0.0
-
-    def run(self, work: Callable[[int], None]) -> None:
-        """Do as many rounds as fit."""
-        begin = time.monotonic()
-        work(self._rounds)
-        took = max(time.monotonic() - begin, 1e-5)
-        self.spent_s += took
-        self._rounds = int(np.clip(self._rounds * np.clip(SLICE_S / took, 0.25, 2.0), 1, 100_000))
+        cuts = CuttingPlanes(model, np.zeros((0, 2), dtype=bool), np.zeros(2), [one])
+        cuts.ascend(1, 3.0)
+        cuts.all_groups(3.0, 10)
 
 
 class PrimalDual:
@@ -161,17 +137,16 @@ class PrimalDual:
         self._gap_tried = gap
         return self._cuts.all_groups(self._cost, FEW_GROUPS)
 
-    def groups_of_cheapest(self) -> GroupProgramme | None:
-        """Return all groups of which the better plans consist that close some part of the gap, as large as it can be.
+    def groups_of_cheapest(self, most: int) -> GroupProgramme | None:
+        """Return all groups of which the plans consist that cost less than a part of the gap above the bound.
 
-        If there is no such plan, or the best of them is known, the bound rises by that part.
+        The part is as large as it can be with at most so many groups; None if even the least has more.
         """
-        for part in PARTS if self._cuts is not None else ():
-            assert self._cuts is not None
-            groups = self._cuts.all_groups(self._cuts.bound + part * (self._cost - self._cuts.bound), MOST_GROUPS)
-            if groups is not None:
-                return groups
-        return None
+        if self._cuts is None:
+            return None
+        bound = self._cuts.bound
+        tried = (self._cuts.all_groups(bound + part * (self._cost - bound), most) for part in PARTS)
+        return next((groups for groups in tried if groups is not None), None)
 
     def allocation(self, programme: GroupProgramme, counts: IntArray) -> Allocation:
         """Turn numbers of agents of the pairs of a programme by `few_groups` into an allocation."""

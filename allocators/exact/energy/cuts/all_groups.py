@@ -7,7 +7,7 @@ from alloc.allocators.exact.knapsack import WholeArray
 from alloc.allocators.runtime.compiled import compiled
 from alloc.problems.instance import FloatArray
 
-MAX_NODES = 1_000_000
+MAX_NODES = 200_000
 """Nodes of the search for the groups of one task after which they count as too many."""
 
 

@@ -184,6 +184,6 @@ class CuttingPlanes:
             )  # fmt: skip
         else:
             group, _, value = solve_subproblems(model, paid, compare=False)
-            least = np.bincount(model.task_of_pair, group * paid, len(model.need))
+            least = np.asarray(np.bincount(model.task_of_pair, group * paid, len(model.need)), dtype=np.float64)
         value -= float(np.where(price >= 0, model.count, model.min_agents) @ price + master.limit @ penalty)
         return value, group, least

@@ -20,8 +20,15 @@ from alloc.problems.instance import FloatArray
 TOLERANCE = 1e-9
 """How far HiGHS may be off a row or an integer."""
 
+PROBING = 2**15
+"""Rule of presolving that HiGHS is to leave out: on a thousand groups or more it takes all the time."""
+
 REPEATABLE_NODES = 5_000
 """Limit in nodes of the search tree where runs must be repeatable."""
+
+
+NOTHING_BELOW = (highspy.HighsModelStatus.kInfeasible, highspy.HighsModelStatus.kObjectiveBound)
+"""What HiGHS says where no plan costs less than the bound on the objective."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,22 +61,23 @@ class GroupProgramme:
         """Return agents of each pair in the best plan found, shape (p,), or None, and what all plans cost at least."""
         highs = highspy.Highs()
         highs.HandleUserInterrupt = True
-        options = {
+        scale = 1 / max(1e-300, float(np.abs(self.model.cost).mean()))
+        options: dict[str, bool | int | float | str] = {
             "output_flag": False, "parallel": "off", "random_seed": seed % 2**31, "mip_rel_gap": 1e-8,
             "mip_abs_gap": 0.0, "mip_feasibility_tolerance": TOLERANCE, "primal_feasibility_tolerance": TOLERANCE,
-            "dual_feasibility_tolerance": TOLERANCE,
+            "dual_feasibility_tolerance": TOLERANCE, "presolve_rule_off": PROBING,
+            "objective_bound": self.below * scale * (1 + TOLERANCE),
         }  # fmt: skip
         if repeatable:
             options["mip_max_nodes"] = REPEATABLE_NODES
         for option, value in options.items():
             highs.setOptionValue(option, value)
-        scale = 1 / max(1e-300, float(np.abs(self.model.cost).mean()))
         highs.passModel(self._compile(scale))
 
         def work() -> tuple[WholeArray | None, float]:
             highs.solve()
             info, counts = highs.getInfo(), None
-            if highs.getModelStatus() == highspy.HighsModelStatus.kInfeasible:
+            if highs.getModelStatus() in NOTHING_BELOW:
                 return None, self.below
             bound = min(info.mip_dual_bound * (1 - 10 * TOLERANCE), info.mip_dual_bound - TOLERANCE) / scale
             if info.primal_solution_status == highspy.SolutionStatus.kSolutionStatusFeasible:
@@ -89,7 +97,11 @@ class GroupProgramme:
         matrix = csc_array(vstack([of_task, of_class @ self.group.T, self.used.T]))
         lp = highspy.HighsLp()
         lp.num_row_, lp.num_col_ = matrix.shape
-        lp.col_cost_, lp.col_lower_, lp.col_upper_ = scale * (self.group @ model.cost), np.zeros(groups), np.ones(groups)
+        lp.col_cost_, lp.col_lower_, lp.col_upper_ = (
+            scale * (self.group @ model.cost),
+            np.zeros(groups),
+            np.ones(groups),
+        )
         least = np.where(model.min_agents > 0, model.min_agents, -highspy.kHighsInf)
         lp.row_lower_ = np.concatenate([np.ones(tasks), least, np.full(len(self.limit), -highspy.kHighsInf)])
         lp.row_upper_ = np.concatenate([np.ones(tasks), model.count, self.limit + TOLERANCE])

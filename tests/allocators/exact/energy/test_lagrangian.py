@@ -1,6 +1,7 @@
 from dataclasses import replace
 from functools import cache
 from itertools import product
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -103,6 +104,26 @@ def test_bound_by_cutting_planes_is_below_the_best_plan(seed, kind, worse):
     assert cuts.converged or cuts.bound >= best * (1 - 1e-9)
     assert cuts.kept[group > 0].all()
     assert cuts.bound >= 0.9 * best
+
+
+@pytest.mark.parametrize("worse", [1.0, 1.2])
+@pytest.mark.parametrize("limited", [False, True])
+@pytest.mark.parametrize("seed", range(6))
+def test_the_best_of_all_groups_is_the_best_plan(seed, limited, worse):
+    """Groups of plans that cost less than a worse one are those of the best plan, too; none are cheaper than it."""
+    model, best, plan = model_of(seed, 4, limited=limited)
+    group = (model.task_of_pair == plan[model.class_of_pair]).astype(np.int64)
+    cuts = CuttingPlanes(model, overlapping_clusters(LINE), np.zeros(len(model.count)), [group])
+    cuts.ascend(20, best * worse)
+    monitor = SimpleNamespace(run=lambda work, stop: work())
+    programme = cuts.all_groups(best * worse, 1000)
+    counts, bound = programme.solve(monitor, 0, repeatable=True)
+    assert bound == pytest.approx(best, rel=1e-6)
+    assert counts is None or counts @ programme.model.cost == pytest.approx(best)
+    assert counts is not None or worse == 1.0
+    nothing, bound = cuts.all_groups(best * 0.999, 1000).solve(monitor, 0, repeatable=True)
+    assert nothing is None
+    assert bound <= best
 
 
 def has_float_weights(instance):
