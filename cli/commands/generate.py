@@ -27,7 +27,7 @@ EXAMPLES = examples(
 
 SEED = Annotated[int, typer.Option(min=0, help="Seed of all random numbers; with --count the first of several.")]
 SPREADS = ("communication_range", "battery", "speed", "priority")
-COVERING = ("agents", "tasks", "ability_min", "ability_max", "workload", "integer")
+COVERING = ("agents", "tasks", "ability_min", "ability_max", "workload", "integer", "choices")
 MISSION = {
     "agents": "agents",
     "tasks": "tasks",
@@ -104,6 +104,7 @@ def generate_command(
     speed: Annotated[str | None, _option("Distance per hour.", "none", metavar="SPREAD")] = None,
     priority: Annotated[str | None, _option("Weight of a task in the game.", "1", metavar="SPREAD")] = None,
     allowed_fraction: Annotated[float | None, _option("Share of the tasks that each agent may do.", "1")] = None,
+    choices: Annotated[int | None, _option("Tasks that each agent may take, for covering.", "all")] = None,
     energy_per_distance: Annotated[float | None, _option("Energy per unit of distance.", "6")] = None,
     tau: Annotated[float | None, _option("Base of the reward (3).", "0.5")] = None,
     mission_family: Annotated[MissionFamily | None, _option("Kind of mission.", "steady", "--family")] = None,

@@ -2,9 +2,9 @@
 
     python examples/clients/load.py --seconds 60
 
-Starts a server, and prints the times to answer, the excess over 50 ms + 15 ms for each request ahead, the processor time
-of an answer, and the memory of the server. Of the requests 5 % are malformed, too large, or given up after
-10 ms. On a busy machine look at the processor time: below 15 ms, a server with a processor of its own keeps to what is
+Starts a server, and prints the times to answer, the excess over 50 ms + 15 ms for each request ahead, the processor
+time of an answer, and the memory of the server. Of the requests 5 % are malformed, too large, or given up after 10 ms.
+On a busy machine look at the processor time: below 15 ms, a server with a processor of its own keeps to what is
 promised. Needs `pip install 'alloc-mrta[serve]' httpx`, and Linux.
 """
 

@@ -4,9 +4,8 @@ r"""Machine covering: the published tables of plans and bounds, made anew by run
     python tests/benchmarks/machine_covering.py docs/benchmarks/machine-covering-open.csv --methods auto local-search \
         --time-limit 10 --store runs.db
 
-A table says which instances it is of: its column `instance` as for `alloc compare`, or its family, one of `OPEN` in
-`kinds.py`, and seed; a new row needs no more. Figures are of the first method; of others there is the gap to its bound.
-`experiments.py covering` compares methods.
+The column `instance` of a table says what it is of, as for `alloc compare`; a new row needs no more. Figures are of the
+first method; of others there is the gap to its bound. `experiments.py covering` compares methods.
 """
 
 import argparse
@@ -16,7 +15,6 @@ import time
 from pathlib import Path
 
 from experiments import ran
-from kinds import OPEN
 
 from alloc.allocators import Budget
 from alloc.allocators.exact.makespan.configuration import ConfigurationProgramme
@@ -39,13 +37,6 @@ PROOF_S = 30.0
 """Seconds for prices and groups to prove a bound by themselves."""
 
 Row = dict[str, str]
-
-
-def instance_of(row: Row) -> Instance:
-    """Return the instance of a row."""
-    if "instance" in row:
-        return gather([row["instance"]])[0]
-    return OPEN[row["family"]](int(row["seed"]))
 
 
 def proof(instance: Instance, bound: float) -> str:
@@ -108,7 +99,7 @@ def main() -> None:
     with options.table.open(newline="") as text:
         table = list(csv.DictReader(text))
     rows = [row for row in table if options.families is None or row["family"] in options.families]
-    instances = [instance_of(row) for row in rows]
+    instances = gather([row["instance"] for row in rows])
     with Store(options.store) as store, sqlite3.connect(options.store) as kept:
         comparison, found = ran(store, instances, options.methods, Budget(options.time_limit))
         for number, (row, instance) in enumerate(zip(rows, instances, strict=True)):
