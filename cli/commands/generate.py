@@ -119,8 +119,7 @@ def generate_command(
     if count > 1 and output == STANDARD:
         raise typer.BadParameter("must name a folder for several instances", param_hint="'--output'")
     for number in range(seed, seed + count):
-        instance = _instance(family, wanted, number)
-        _write(instance, output, into_folder=count > 1)
+        _write(_instance(family, wanted, number), output, into_folder=count > 1)
     if output != STANDARD:
         what = "missions" if family in (Family.MISSION, Family.CFSTP) else "instances"
         say(f"wrote {output}" if count == 1 else f"wrote {count} {what} into {output}")
@@ -130,8 +129,9 @@ def _check_options(family: Family, wanted: dict[str, Any]) -> None:
     """Raise an error for an option that is not for this family."""
     for name in wanted:
         owner = "mission" if name in MISSION and name not in ("agents", "tasks") else "random"
+        owner = "covering" if name == "choices" else owner
         taken = {
-            Family.RANDOM: name not in MISSION or name in COVERING,
+            Family.RANDOM: name in ("agents", "tasks") or owner == "random",
             Family.COVERING: name in COVERING,
             Family.CFSTP: name in ("agents", "tasks"),
         }
