@@ -1,21 +1,13 @@
 """Simulated annealing over exchanges, compiled."""
 
-import numpy as np
-from numpy.typing import NDArray
-
 from alloc.allocators.heuristic.local_search.candidates import Candidates
+from alloc.allocators.heuristic.local_search.chains import FEW, chain, draw_candidate, draw_helper
 from alloc.allocators.heuristic.local_search.exchange import exchange
-from alloc.allocators.heuristic.local_search.instance_arrays import InstanceArrays, Int32Array
+from alloc.allocators.heuristic.local_search.instance_arrays import InstanceArrays
 from alloc.allocators.heuristic.local_search.moves import save_best
 from alloc.allocators.heuristic.local_search.plan import BEST, CURRENT, FULL_GROUP, N_SHORT, Plan, Weights, Workspace
 from alloc.allocators.runtime.compiled import compiled
 from alloc.allocators.runtime.random import draw
-
-TRIES = 30
-"""Agents that are drawn to find one that can reach a task."""
-
-ANY_TASK_PERIOD = 8
-"""One in so many exchanges is with any task, not with a candidate."""
 
 PRICE_GROWTH = 0.3
 """Relative rise of the price of a task with each exchange that leaves it short, per relative shortfall."""
@@ -25,40 +17,6 @@ HIGHEST_PRICE = 1e6
 
 SMALLEST_GAIN = 1e-10
 """Relative improvement of the cost from which on a plan is saved as the best."""
-
-
-@compiled
-def draw_candidate(random: NDArray[np.uint64], tasks: int, candidates: Int32Array) -> int:
-    """Return a random task of one row of candidates, now and then any task."""
-    if draw(random, ANY_TASK_PERIOD) == 0:
-        return draw(random, tasks)
-    candidate: int = candidates[draw(random, candidates.shape[0])]
-    return candidate
-
-
-@compiled
-def draw_helper(arrays: InstanceArrays, plan: Plan, candidates: Candidates, task: int) -> int:
-    """Return a random agent, one that can reach `task` if a few draws find any.
-
-    Without a table, mostly one of a task that some agent of `task` can do as well, or that is near it: of a million
-    agents hardly any reaches a given task.
-    """
-    agent = 0
-    table, origin, random, agents = arrays.distance, arrays.origin, plan.random, plan.group_of_agent.shape[0]
-    if table.shape[0] == 0 and plan.size[task] > 0 and draw(random, ANY_TASK_PERIOD) > 0:
-        row = origin[plan.slot[plan.begin[task] + draw(random, plan.size[task])]]
-        begin, count = arrays.list_begin[row], arrays.list_begin[row + 1] - arrays.list_begin[row]
-        if count > 0:
-            near = arrays.listed_task[begin + draw(random, count)]
-        else:
-            near = candidates.of_origin[candidates.row[row], draw(random, candidates.of_origin.shape[1])]
-        if 0 <= near < plan.demand.shape[0] - 1 and near != task and plan.size[near] > 0:
-            return int(plan.slot[plan.begin[near] + draw(random, plan.size[near])])
-    for _ in range(TRIES):
-        agent = draw(random, agents)
-        if table.shape[0] == 0 or table[origin[agent], task] < np.inf:
-            break
-    return agent
 
 
 @compiled
@@ -119,7 +77,9 @@ def anneal(
             continue
         if other < tasks and plan.demand[other] == 0.0:
             continue
-        exchange(arrays, plan, work, now, makespan, agent, task, other)
+        pool = exchange(arrays, plan, work, now, makespan, agent, task, other)
+        if weights.cost > 0.0 and pool <= FEW and agent >= 0 and plan.counter[FULL_GROUP] == 0:
+            chain(arrays, plan, work, now, candidates, makespan, agent, task)
         if plan.counter[FULL_GROUP] > 0:
             break
         if plan.group_ability[task] < plan.demand[task]:
