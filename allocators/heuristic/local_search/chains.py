@@ -141,7 +141,7 @@ def chain(
     Glover (2004), doi:10.1287/ijoc.1030.0036.
     """
     idle, since, cost = plan.demand.shape[0] - 1, plan.counter[N_LOGGED], plan.cost[CURRENT]
-    short = plan.group_of_agent[agent]
+    former = short = plan.group_of_agent[agent]
     if short == task or plan.demand[task] == 0.0 or plan.demand[short] == 0.0:  # as that of idle agents is
         return
     count = touch(plan, work, weights, touch(plan, work, weights, touch(plan, work, weights, 0, idle), short), task)
@@ -154,7 +154,8 @@ def chain(
             break
         helper = draw_helper(arrays, plan, candidates, short)
         third = plan.group_of_agent[helper]
-        if third != short and third != task and plan.demand[third] > 0.0:
+        is_way_back = third == task and short == former
+        if third != short and plan.demand[third] > 0.0 and not is_way_back:
             count = touch(plan, work, weights, count, third)
             exchange(arrays, plan, work, weights, makespan, helper, short, third)
             if plan.group_ability[third] < plan.demand[third]:
