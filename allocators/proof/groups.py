@@ -77,11 +77,11 @@ def _groups(instance: Instance) -> tuple[FloatArray, FloatArray]:
     with np.errstate(divide="ignore", over="ignore"):
         load = instance.workload[tasks] + member @ (instance.ability[:, None] * arrival)
         hours = (load / (member @ instance.ability)[:, None]).T
-        cost = (member @ np.where(able, price, 0.0)).T * reach.energy_per_distance
+        cost: FloatArray = (member @ np.where(able, price, 0.0)).T * reach.energy_per_distance
     for i in range(n if instance.has_travel_time else 0):
         with_it = np.flatnonzero(member[:, i])
         hours[:, with_it] = np.minimum(hours[:, with_it], hours[:, with_it - (1 << i)])
-    astray = (member @ ~able).T > 0
+    astray = (member @ np.logical_not(able)).T > 0
     hours[astray], cost[astray] = np.inf, np.inf
     cost[:, 0] = np.inf  # nobody serves no task
     return hours, cost

@@ -30,10 +30,10 @@ N_SHORT, N_MOVES, FULL_GROUP, N_LOGGED = 0, 1, 2, 3
 """Entries of `Plan.counter`."""
 
 LOG_SIZE = 256
-"""Last moves that are kept, more than those of one chain of exchanges; a power of two."""
+"""Last moves that are kept, more than those of one ejection chain; a power of two."""
 
 MOST_TOUCHED = 8
-"""Groups that a chain of exchanges changes, at most."""
+"""Groups that an ejection chain changes, at most."""
 
 CURRENT, BEST = 0, 1
 """Entries of `Plan.cost`."""
@@ -107,7 +107,7 @@ class Workspace(NamedTuple):
     subset_ability, subset_other_ability, subset_cost, subset_bits : ndarray
         Subsets of the pool, or of its halves.
     touched, touched_ability, touched_penalty : ndarray
-        Groups that a chain of exchanges changes, with their abilities and penalties before.
+        Groups that an ejection chain changes, with their abilities and penalties before.
     logistic : ndarray, shape (NOISE_SIZE,)
     """
 

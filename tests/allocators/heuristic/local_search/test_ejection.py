@@ -1,11 +1,11 @@
-"""Chains of exchanges, and covers of a task by idle agents with ability to spare."""
+"""Ejection chains, and covers of a task by idle agents with ability to spare."""
 
 import numpy as np
 import pytest
 from oracle import least_energy_within
 
+from alloc.allocators.heuristic.local_search.annealing import eject
 from alloc.allocators.heuristic.local_search.annealing_state import AnnealingState
-from alloc.allocators.heuristic.local_search.chains import chain
 from alloc.allocators.heuristic.local_search.plan import N_SHORT
 from alloc.problems import Allocation, Instance
 
@@ -30,24 +30,24 @@ def state_of(instance: Instance, plan: list[int]) -> AnnealingState:
     return state
 
 
-def test_a_chain_goes_around(ring: Instance) -> None:
-    """No two tasks share two agents, so that no exchange helps; one of some chains moves all three, and is kept."""
+def test_an_ejection_goes_around(ring: Instance) -> None:
+    """No two tasks share two agents, so that no exchange helps; one ejection chain moves all three, and is kept."""
     state = state_of(ring, [0, 1, 2])
     weights = state.weights(1.0, 0.0, 100.0, 100.0)
     for _ in range(10):  # helpers are drawn
-        chain(state.arrays, state.plan, state.workspace, weights, state.candidates, 1.0, 0, 1)
+        eject(state.arrays, state.plan, state.workspace, weights, state.candidates, 1.0, 0, 1)
     assert state.allocation == Allocation(np.array([1, 2, 0]))
     assert state.cost == pytest.approx(0.0, abs=1e-12)
     assert state.n_short == 0
 
 
-def test_a_chain_without_gain_is_taken_back(ring: Instance) -> None:
-    """From the best plan, every chain is undone: agents, abilities, cost and shortfalls are what they were."""
+def test_an_ejection_without_gain_is_taken_back(ring: Instance) -> None:
+    """From the best plan, every ejection chain is undone: agents, abilities, cost and shortfalls are what they were."""
     state = state_of(ring, [1, 2, 0])
     before = [array.copy() for array in (state.plan.group_of_agent, state.plan.group_ability, state.plan.cost)]
     weights = state.weights(1.0, 0.0, 100.0, 100.0)
     for agent, task in ((0, 0), (1, 1), (2, 2)) * 5:
-        chain(state.arrays, state.plan, state.workspace, weights, state.candidates, 1.0, agent, task)
+        eject(state.arrays, state.plan, state.workspace, weights, state.candidates, 1.0, agent, task)
         after = (state.plan.group_of_agent, state.plan.group_ability, state.plan.cost)
         assert all(np.array_equal(one, other) for one, other in zip(before, after, strict=True))
         assert state.plan.counter[N_SHORT] == 0
