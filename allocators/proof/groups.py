@@ -77,7 +77,7 @@ def _groups(instance: Instance) -> tuple[FloatArray, FloatArray]:
     with np.errstate(divide="ignore", over="ignore"):
         load = instance.workload[tasks] + member @ (instance.ability[:, None] * arrival)
         hours = (load / (member @ instance.ability)[:, None]).T
-        cost: FloatArray = (member @ np.where(able, price, 0.0)).T * reach.energy_per_distance
+        cost = (member @ np.where(able, price, 0.0)).T.astype(np.float64) * reach.energy_per_distance
     for i in range(n if instance.has_travel_time else 0):
         with_it = np.flatnonzero(member[:, i])
         hours[:, with_it] = np.minimum(hours[:, with_it], hours[:, with_it - (1 << i)])
