@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from alloc.allocators.auto import choose, has_whole_abilities
-from alloc.allocators.bounds import raise_bound_before
+from alloc.allocators.bounds import SHORT_S, raise_bound_before
 from alloc.allocators.conclusion import conclude
 from alloc.allocators.contract.base import Allocator, Proposal
 from alloc.allocators.contract.budget import Budget, StopReason
@@ -21,6 +21,7 @@ from alloc.allocators.contract.tolerance import EXACT
 from alloc.allocators.decomposition import Decomposition
 from alloc.allocators.heuristic.greedy.list_schedule import load_compiled
 from alloc.allocators.heuristic.task_prices.use import are_prices_used
+from alloc.allocators.proof.early import EarlyProof, needs_solver
 from alloc.allocators.refusal import refuse
 from alloc.allocators.registry import load
 from alloc.allocators.replanning.plan import concluded, replanning
@@ -193,8 +194,9 @@ def _prepared(
     load_compiled(request.instance)  # loading is not part of the run
     for library in ("scipy.spatial", "scipy.sparse.csgraph") if is_matched else ():
         importlib.import_module(library)
-    if request.budget.target_gap is not None:
-        importlib.import_module("scipy.optimize")  # for the bound before the run
+    is_early = _is_proven_early(allocator, request.budget) and needs_solver(request.instance, request.objective)
+    if is_early or request.budget.target_gap is not None:
+        importlib.import_module("scipy.optimize")  # for bounds before and during the run
     return allocator, notes, spent_s
 
 
@@ -217,6 +219,12 @@ def _is_matched(instance: Instance) -> bool:
     """Whether matchings are sought for sure, or likely, among so many pairs that loading takes little beside that."""
     many = instance.reach.pairs > MATCHED_PAIRS and not instance.reach.is_complete
     return many or instance.n < int(np.count_nonzero(instance.workload))
+
+
+def _is_proven_early(allocator: Allocator, budget: Budget) -> bool:
+    """Whether the method goes on until its time is up, or its plan is proven best; after short runs no proof is due."""
+    is_short = budget.time_limit_s is not None and budget.time_limit_s <= SHORT_S
+    return allocator.method.anytime and not allocator.method.proves and not is_short
 
 
 def _require_none(parameters: object, settings: dict[str, object]) -> None:
@@ -257,6 +265,7 @@ def _propose(allocator: Allocator, search: Search, stop: threading.Event) -> tup
     """Let the method run, submit its answer, and serve what it left unserved; return also why it stopped."""
     if search.budget.target_gap is not None and not allocator.method.proves:
         raise_bound_before(search)
+    proof = EarlyProof(search) if _is_proven_early(allocator, search.budget) else None
     proposal = allocator.allocate(search)
     require_wanted(stop)
     stop_reason = search.stop_reason()
@@ -265,6 +274,8 @@ def _propose(allocator: Allocator, search: Search, stop: threading.Event) -> tup
     if search.best is not None and search.best.evaluation.unserved_tasks:
         end = time.monotonic() + max(REPAIR_S, search.remaining_s)
         search.submit(serve_all(search.instance, search.best.allocation, lambda: end - time.monotonic()))
+    if proof is not None:
+        proposal = proof.added_to(proposal, search)
     search.raise_bound(proposal.makespan_lower_bound or 0.0)
     if search.best is not None and _is_repaired(search.instance):
         from alloc.allocators.heuristic.local_search.improve import repair

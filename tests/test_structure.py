@@ -103,7 +103,8 @@ OLD_NAMES = (
 """Words that are plain English in a sentence, but do not name anything in the field."""
 
 ALLOWED = (
-    r"Markov chains?",  # the term of the field
+    r"Markov chains?",  # the terms of the field
+    r"[Ee]jection chains?",
     r"ground[ _](station|truth)s?",  # likewise
     r"survey drones?",  # the agents of an example
     r"world[ _-]size",  # side of the square or cube of generated instances, an option
@@ -171,7 +172,7 @@ def test_help_uses_terms_of_the_field(command: str) -> None:
         ("the worth of a state", ["worth"]),
         ("it is searched in vain", ["in vain"]),
         ("background, a survey drone, planes", []),
-        ("a Markov chain", []),
+        ("a Markov chain, an ejection chain", []),
     ],
 )
 def test_old_words_are_found_as_whole_words(text: str, found: list[str]) -> None:

@@ -96,6 +96,8 @@ class Search:
         self.trace: list[TracePoint] = []
         self.notes: list[str] = []
         self._callback_failed = False  # whether `on_improvement` raised an exception
+        self._is_met: Callable[[Search], bool] = lambda _: False
+        self._is_proven = False
         self.lower_bound = makespan_lower_bound(instance)
         if start is not None:
             evaluate(instance, start)  # raises if the sizes do not fit
@@ -162,6 +164,11 @@ class Search:
         """End this run, from any thread, but not the one that it is a part of."""
         self._is_ended = True
 
+    def end_when(self, is_met: Callable[["Search"], bool]) -> None:
+        """End this run as soon as its best plan is proven best: `is_met` is asked now, and of every new best."""
+        self._is_met = is_met
+        self._is_proven = is_met(self)
+
     def submit(self, allocation: Allocation) -> Evaluation:
         """Score `allocation`, and keep and report it if it is the best so far.
 
@@ -186,6 +193,7 @@ class Search:
                 self.best = replace(candidate, time_s=found.time_s, lower_bound=found.lower_bound)
         if self.best is not None and self.best is not before:
             self._report(self.best)
+            self._is_proven = self._is_met(self)
         return evaluation
 
     def _report(self, best: Improvement) -> None:
@@ -253,6 +261,8 @@ class Search:
             return StopReason.ITERATIONS
         if self.budget.target_gap is not None and self.gap <= self.budget.target_gap:
             return StopReason.TARGET_GAP
+        if self._is_proven:
+            return StopReason.PROVEN
         if self.best is not None and self.fast_enough:
             energy_counts = self.objective is Objective.MAKESPAN_ENERGY
             if not energy_counts or self.best.evaluation.cost == 0:

@@ -155,7 +155,7 @@ def test_starts_that_break_rules_are_mended() -> None:
 def test_stop_from_outside(instance: Instance) -> None:
     """An event that is set ends a run that would have gone on for a minute, and says so."""
     stop = threading.Event()
-    hard = Instance(ability=[1.1, 1.7, 2.3, 3.1, 4.9], workload=[3.3, 5.9])
+    hard = Instance(ability=np.random.default_rng(0).uniform(1, 10, 40), workload=[3.3, 5.9, 7.1, 9.7])
     timer = threading.Timer(0.2, stop.set)
     timer.start()
     result = solve(hard, "ga", time_limit_s=60, stop=stop)

@@ -1,13 +1,26 @@
-"""Simulated annealing over exchanges, compiled."""
+"""Simulated annealing over exchanges and ejection chains, compiled."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from alloc.allocators.heuristic.local_search.candidates import Candidates
+from alloc.allocators.heuristic.local_search.distances import distance_and_cost, effective_ability
 from alloc.allocators.heuristic.local_search.exchange import exchange
 from alloc.allocators.heuristic.local_search.instance_arrays import InstanceArrays, Int32Array
-from alloc.allocators.heuristic.local_search.moves import save_best
-from alloc.allocators.heuristic.local_search.plan import BEST, CURRENT, FULL_GROUP, N_SHORT, Plan, Weights, Workspace
+from alloc.allocators.heuristic.local_search.moves import move, save_best, update_shortfall
+from alloc.allocators.heuristic.local_search.plan import (
+    BEST,
+    CURRENT,
+    FULL_GROUP,
+    LOG_SIZE,
+    N_LOGGED,
+    N_SHORT,
+    NOISE_SIZE,
+    Plan,
+    Weights,
+    Workspace,
+)
+from alloc.allocators.heuristic.local_search.subsets import penalty
 from alloc.allocators.runtime.compiled import compiled
 from alloc.allocators.runtime.random import draw
 
@@ -16,6 +29,12 @@ TRIES = 30
 
 ANY_TASK_PERIOD = 8
 """One in so many exchanges is with any task, not with a candidate."""
+
+FEW = 3
+"""Agents in an exchange up to which an ejection chain follows: hardly any agent can do both of its tasks."""
+
+LENGTH = 3
+"""Most tasks that a shortfall passes through in an ejection chain."""
 
 PRICE_GROWTH = 0.3
 """Relative rise of the price of a task with each exchange that leaves it short, per relative shortfall."""
@@ -59,6 +78,107 @@ def draw_helper(arrays: InstanceArrays, plan: Plan, candidates: Candidates, task
         if table.shape[0] == 0 or table[origin[agent], task] < np.inf:
             break
     return agent
+
+
+@compiled
+def touch(plan: Plan, work: Workspace, weights: Weights, count: int, group: int) -> int:
+    """Note the ability of a group and its penalty before it changes, unless that is done; return how many there are."""
+    for index in range(count):
+        if work.touched[index] == group:
+            return count
+    work.touched[count], work.touched_ability[count] = group, plan.group_ability[group]
+    work.touched_penalty[count] = shortfall_penalty(plan, weights, group)
+    return count + 1
+
+
+@compiled
+def shortfall_penalty(plan: Plan, weights: Weights, group: int) -> float:
+    """Return the penalty of a group as it is; the idle agents need nothing."""
+    missing = plan.demand[group] - plan.group_ability[group]
+    return penalty(weights, plan.price[group], missing, plan.size[group] == 0)
+
+
+@compiled
+def send(arrays: InstanceArrays, plan: Plan, makespan: float, agent: int, task: int) -> bool:
+    """Move an agent to another task, whatever follows; return whether it can go there."""
+    row, w, slow = arrays.origin[agent], arrays.ability[agent], arrays.hours_per_distance[agent]
+    other = plan.group_of_agent[agent]
+    here, cost_here = distance_and_cost(arrays, row, task)
+    if here == np.inf or plan.begin[task] + plan.size[task] == plan.begin[task + 1]:
+        return False
+    there, cost_there = distance_and_cost(arrays, row, other)
+    move(plan, agent, task)
+    plan.group_ability[task] += effective_ability(w, slow, makespan, here)
+    plan.group_ability[other] -= effective_ability(w, slow, makespan, there)
+    plan.cost[CURRENT] += cost_here - cost_there
+    update_shortfall(plan, task)
+    update_shortfall(plan, other)
+    return True
+
+
+@compiled
+def undo(plan: Plan, work: Workspace, since: int, count: int, cost: float) -> None:
+    """Take back the moves since the log had so many, and the changes of so many groups."""
+    idle = plan.demand.shape[0] - 1
+    for number in range(plan.counter[N_LOGGED] - 1, since - 1, -1):
+        move(plan, plan.moved[number % LOG_SIZE], plan.source[number % LOG_SIZE])
+    for index in range(count):
+        group = work.touched[index]
+        plan.group_ability[group] = work.touched_ability[index]
+        if group != idle:
+            update_shortfall(plan, group)
+    plan.cost[CURRENT] = cost
+
+
+@compiled
+def eject(
+    arrays: InstanceArrays,
+    plan: Plan,
+    work: Workspace,
+    weights: Weights,
+    candidates: Candidates,
+    makespan: float,
+    agent: int,
+    task: int,
+) -> None:
+    """Send an agent from its task to another one, let others make up for it, and keep what comes of it if cheaper.
+
+    Its former task takes idle agents, or agents of a third task, which is short then in its turn; in the end, `task`
+    lets go whom it no longer needs. Penalties of shortfalls on the way do not count.
+
+    References
+    ----------
+    Ejection chains: Glover (1996), doi:10.1016/0166-218X(94)00037-E; for generalised assignment Yagiura, Ibaraki and
+    Glover (2004), doi:10.1287/ijoc.1030.0036.
+    """
+    idle, since, cost = plan.demand.shape[0] - 1, plan.counter[N_LOGGED], plan.cost[CURRENT]
+    former = short = plan.group_of_agent[agent]
+    if short == task or plan.demand[task] == 0.0 or plan.demand[short] == 0.0:  # as that of idle agents is
+        return
+    count = touch(plan, work, weights, touch(plan, work, weights, touch(plan, work, weights, 0, idle), short), task)
+    if not send(arrays, plan, makespan, agent, task):
+        return
+    for _ in range(LENGTH):
+        if plan.size[idle] > 0:
+            exchange(arrays, plan, work, weights, makespan, -1, short, idle)
+        if plan.group_ability[short] >= plan.demand[short]:
+            break
+        helper = draw_helper(arrays, plan, candidates, short)
+        third = plan.group_of_agent[helper]
+        is_way_back = third == task and short == former
+        if third != short and plan.demand[third] > 0.0 and not is_way_back:
+            count = touch(plan, work, weights, count, third)
+            exchange(arrays, plan, work, weights, makespan, helper, short, third)
+            if plan.group_ability[third] < plan.demand[third]:
+                short = third
+    exchange(arrays, plan, work, weights, makespan, -1, task, idle)
+    gain = weights.cost * (cost - plan.cost[CURRENT])
+    for index in range(count):
+        gain += work.touched_penalty[index] - shortfall_penalty(plan, weights, work.touched[index])
+    noise = weights.noise * work.logistic[draw(plan.random, NOISE_SIZE)]
+    is_logged = plan.counter[N_LOGGED] - since <= LOG_SIZE // 2
+    if is_logged and (gain <= noise or plan.counter[FULL_GROUP] > 0):
+        undo(plan, work, since, count, cost)
 
 
 @compiled
@@ -119,7 +239,9 @@ def anneal(
             continue
         if other < tasks and plan.demand[other] == 0.0:
             continue
-        exchange(arrays, plan, work, now, makespan, agent, task, other)
+        pool = exchange(arrays, plan, work, now, makespan, agent, task, other)
+        if weights.cost > 0.0 and pool <= FEW and agent >= 0 and plan.counter[FULL_GROUP] == 0:
+            eject(arrays, plan, work, now, candidates, makespan, agent, task)
         if plan.counter[FULL_GROUP] > 0:
             break
         if plan.group_ability[task] < plan.demand[task]:

@@ -30,7 +30,7 @@ class Candidates(NamedTuple):
     row : ndarray of int, shape (origins,)
         Row of each origin in `of_origin`.
     of_origin : ndarray of int, shape (rows, k)
-        Tasks near an origin, -1 for none.
+        Tasks near an origin, -1 for none; with a table of distances, those within reach, as often as there is room.
     of_task : ndarray of int, shape (m, k)
         Tasks near a task, -1 for none.
     """
@@ -80,12 +80,18 @@ def mean_candidate_cost(arrays: InstanceArrays, candidates: Candidates) -> float
 
 
 def _nearest_by_table(table: FloatArray, count: int) -> Int32Array:
-    """Return the nearest tasks of each origin, ties broken at random, -1 where fewer are within reach."""
+    """Return the nearest tasks of each origin, ties broken at random; where fewer are within reach, these repeated.
+
+    -1 alone where none is: a draw from a row is lost on it.
+    """
     shuffle = np.random.default_rng(0).permutation(table.shape[1])
     shuffled = table[:, shuffle]
     order = np.argpartition(shuffled, count - 1, axis=1)[:, :count]
     unreachable = np.take_along_axis(shuffled, order, axis=1) == np.inf
-    return np.where(unreachable, -1, shuffle[order]).astype(np.int32)
+    within = np.where(unreachable, -1, shuffle[order])
+    number = np.maximum(1, (~unreachable).sum(axis=1, keepdims=True))
+    first = np.take_along_axis(within, np.argsort(unreachable, axis=1, kind="stable"), axis=1)
+    return np.take_along_axis(first, np.arange(count) % number, axis=1).astype(np.int32)
 
 
 def _nearest_by_position(position: FloatArray, task_position: FloatArray, count: int) -> Int32Array:

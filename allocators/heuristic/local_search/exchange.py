@@ -99,11 +99,11 @@ def exchange(
     agent: int,
     task: int,
     other: int,
-) -> None:
+) -> int:
     """Reassign the agents of two groups to them at the least cost: of flights, by weight, of noise and of shortfalls.
 
     Of large groups only some agents take part, from `agent` on where that is one of them, from a random one on else
-    (-1). `other` may be the group of idle agents.
+    (-1). `other` may be the group of idle agents. Returns how many agents took part.
     """
     if plan.demand[other] < plan.demand[task] and other != plan.demand.shape[0] - 1:
         task, other = other, task
@@ -123,9 +123,10 @@ def exchange(
             pool = add_to_pool(arrays, plan, work, weights, makespan, group, first, task, other, most, pool)
     missing = plan.demand[task] - plan.group_ability[task]
     other_missing = plan.demand[other] - plan.group_ability[other]
-    total, members = 0.0, 0
+    total, members, largest = 0.0, 0, 0.0
     for index in range(pool):
         total += work.ability[index]
+        largest = max(largest, work.ability[index])
         if plan.group_of_agent[work.agent[index]] == task:
             missing += work.ability[index]
             members += 1
@@ -139,8 +140,11 @@ def exchange(
         all_in_pool=members == plan.size[task] and plan.demand[task] > 0.0,
         other_all_in_pool=pool - members == plan.size[other] and plan.demand[other] > 0.0,
     )
-    most_needed = missing if other == plan.demand.shape[0] - 1 else max(missing, total - other_missing)
-    largest_sum = int(max(0.0, min(total, most_needed + weights.surplus)))
+    if other == plan.demand.shape[0] - 1:
+        most_needed = missing + largest  # a group that needs all its agents has less to spare than any of them
+    else:
+        most_needed = max(missing, total - other_missing) + weights.surplus
+    largest_sum = int(max(0.0, min(total, most_needed)))
     if by_sums and (pool > POOL_ENUMERATED or pool * largest_sum < 2 << pool):
         subset = best_by_sums(work, weights, pool, largest_sum, total, needs)
     elif pool > POOL_ENUMERATED:
@@ -148,3 +152,4 @@ def exchange(
     else:
         subset = best_by_enumeration(work, weights, pool, needs)
     apply_subset(plan, work, pool, subset, task, other)
+    return pool

@@ -4,7 +4,17 @@ import numpy as np
 
 from alloc.allocators.heuristic.local_search.distances import distance_and_cost, effective_ability
 from alloc.allocators.heuristic.local_search.instance_arrays import InstanceArrays
-from alloc.allocators.heuristic.local_search.plan import BEST, CURRENT, FULL_GROUP, N_MOVES, N_SHORT, Plan, Workspace
+from alloc.allocators.heuristic.local_search.plan import (
+    BEST,
+    CURRENT,
+    FULL_GROUP,
+    LOG_SIZE,
+    N_LOGGED,
+    N_MOVES,
+    N_SHORT,
+    Plan,
+    Workspace,
+)
 from alloc.allocators.runtime.compiled import compiled, inlined
 
 
@@ -59,6 +69,9 @@ def move(plan: Plan, agent: int, target: int) -> None:
     plan.position[agent] = plan.size[target]
     plan.size[target] += 1
     plan.group_of_agent[agent] = target
+    entry = plan.counter[N_LOGGED] % LOG_SIZE
+    plan.moved[entry], plan.source[entry] = agent, source
+    plan.counter[N_LOGGED] += 1
     if plan.counter[N_MOVES] < plan.journal.shape[0]:
         plan.journal[plan.counter[N_MOVES]] = agent
     plan.counter[N_MOVES] += 1

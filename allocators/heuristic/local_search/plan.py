@@ -26,8 +26,14 @@ NOISE_SIZE = 4096
 MOST_SUMS = 1 << 14
 """Sums of abilities that the dynamic programme distinguishes."""
 
-N_SHORT, N_MOVES, FULL_GROUP = 0, 1, 2
+N_SHORT, N_MOVES, FULL_GROUP, N_LOGGED = 0, 1, 2, 3
 """Entries of `Plan.counter`."""
+
+LOG_SIZE = 256
+"""Last moves that are kept, more than those of one ejection chain; a power of two."""
+
+MOST_TOUCHED = 8
+"""Groups that an ejection chain changes, at most."""
 
 CURRENT, BEST = 0, 1
 """Entries of `Plan.cost`."""
@@ -56,8 +62,10 @@ class Plan(NamedTuple):
         List of the tasks whose group ability is below their demand, and the position of each task on it, -1 for none.
     best_group, journal : ndarray of int, shape (n,)
         The best assignment so far, and the agents that have moved since it was saved.
-    counter : ndarray of int, shape (3,)
-        Tasks with a shortfall; moves since the best was saved; whether a group has run out of slots.
+    moved, source : ndarray of int, shape (LOG_SIZE,)
+        Log of the last moves, in a ring: agents, and the groups that they left.
+    counter : ndarray of int, shape (4,)
+        Tasks with a shortfall; moves since the best was saved; whether a group has run out of slots; moves in the log.
     cost : ndarray, shape (2,)
         Total cost of flights, of this plan and of the best.
     random : ndarray of uint64, shape (1,)
@@ -76,6 +84,8 @@ class Plan(NamedTuple):
     short_position: Int32Array
     best_group: Int32Array
     journal: Int32Array
+    moved: Int32Array
+    source: Int32Array
     counter: NDArray[np.int64]
     cost: FloatArray
     random: NDArray[np.uint64]
@@ -96,6 +106,8 @@ class Workspace(NamedTuple):
         Least cost for each sum of abilities, and a subset that has it, as bits; two rows of the dynamic programme.
     subset_ability, subset_other_ability, subset_cost, subset_bits : ndarray
         Subsets of the pool, or of its halves.
+    touched, touched_ability, touched_penalty : ndarray
+        Groups that an ejection chain changes, with their abilities and penalties before.
     logistic : ndarray, shape (NOISE_SIZE,)
     """
 
@@ -110,6 +122,9 @@ class Workspace(NamedTuple):
     subset_other_ability: FloatArray
     subset_cost: FloatArray
     subset_bits: NDArray[np.int64]
+    touched: Int32Array
+    touched_ability: FloatArray
+    touched_penalty: FloatArray
     logistic: FloatArray
 
 
@@ -190,7 +205,9 @@ def idle_plan(n: int, m: int, random: NDArray[np.uint64]) -> Plan:
         short_position=np.full(m, -1, dtype=int32),
         best_group=np.full(n, m, dtype=int32),
         journal=np.zeros(n, dtype=int32),
-        counter=np.zeros(3, dtype=np.int64),
+        moved=np.zeros(LOG_SIZE, dtype=int32),
+        source=np.zeros(LOG_SIZE, dtype=int32),
+        counter=np.zeros(4, dtype=np.int64),
         cost=np.zeros(2),
         random=random,
     )
@@ -213,5 +230,8 @@ def workspace(seed: int | list[int]) -> Workspace:
         subset_other_ability=subset_other_ability,
         subset_cost=subset_cost,
         subset_bits=np.empty(1 << POOL_ENUMERATED, dtype=np.int64),
+        touched=np.zeros(MOST_TOUCHED, dtype=np.int32),
+        touched_ability=np.zeros(MOST_TOUCHED),
+        touched_penalty=np.zeros(MOST_TOUCHED),
         logistic=np.log(uniform / (1 - uniform)),
     )

@@ -1,0 +1,99 @@
+"""Bounds before and during a run, where they cost little beside it; the run ends as soon as its plan meets them."""
+
+from dataclasses import replace
+
+from alloc.allocators.contract.base import Proposal
+from alloc.allocators.contract.search import Search
+from alloc.allocators.contract.tolerance import PROVEN, relative_gap
+from alloc.allocators.proof.groups import is_tiny, optimum
+from alloc.problems import Instance, Objective, energy_lower_bound, lp_makespan_lower_bound
+from alloc.problems.evaluation import last_equal
+
+SHARE, MOST_S = 0.02, 0.1
+"""Part of the time limit, and seconds, that a linear programme may take before or during the run."""
+
+MOST_AGENTS = 5000
+"""Agents up to which a linear programme bounds the makespan before the run."""
+
+MOST_PAIRS = 500
+"""Pairs of agent and task up to which one bounds the energy: where there are more, plans hardly ever meet it."""
+
+
+class EarlyProof:
+    """What is known of the least makespan and cost of a run before its end; the run asks whether its plan meets it.
+
+    Of tiny instances both are known, as all groups of agents are tried. Of others, the best fractional makespan, where
+    not every agent can take every task, and a bound on the energy, which plans meet where each task needs one agent.
+
+    Parameters
+    ----------
+    search : Search
+        At its begin. Where iterations are counted its bound is not raised, as methods go another way with another one.
+
+    Attributes
+    ----------
+    hours : float
+        Bound on the makespan.
+    """
+
+    def __init__(self, search: Search) -> None:
+        limit = search.budget.time_limit_s
+        self._seconds = MOST_S if limit is None else min(MOST_S, SHARE * limit)
+        self._within, self._cost = 0.0, 0.0
+        self.hours = self._makespan_bound(search)
+        if search.budget.iterations is None:
+            search.raise_bound(self.hours)
+        search.end_when(self._is_met)
+
+    def _makespan_bound(self, search: Search) -> float:
+        if is_tiny(search.instance):
+            least = optimum(search.instance, search.tolerance)
+            if least is None:
+                return 0.0
+            self._within, self._cost = least.within, least.cost
+            return least.hours
+        if search.budget.iterations is None and _is_restricted(search.instance):
+            return lp_makespan_lower_bound(search.instance, self._seconds) or 0.0
+        return 0.0
+
+    def _is_met(self, search: Search) -> bool:
+        """Whether the best plan of the run is proven to be the best there is."""
+        best, fastest = search.best, search.fastest
+        if best is None or fastest is None or fastest.evaluation.makespan is None:
+            return False
+        if not (search.fast_enough or relative_gap(fastest.evaluation.makespan, self.hours) <= PROVEN):
+            return False
+        if search.objective is Objective.MAKESPAN:
+            return True
+        limit = search.makespan_limit
+        if limit > self._within and _has_few_pairs(search.instance):
+            bound = energy_lower_bound(search.instance, limit, self._seconds)
+            self._within, self._cost = last_equal(limit), bound or 0.0
+        return relative_gap(best.evaluation.cost, self._bound(search)) <= PROVEN
+
+    def _bound(self, search: Search) -> float:
+        """Return what plans within the makespan limit of the run are known to cost at least."""
+        return self._cost if search.makespan_limit <= self._within else 0.0
+
+    def added_to(self, proposal: Proposal, search: Search) -> Proposal:
+        """Return what a method proposes at the end of a run, with these bounds where they are better."""
+        return replace(
+            proposal,
+            makespan_lower_bound=max(proposal.makespan_lower_bound or 0.0, self.hours),
+            energy_lower_bound=max(proposal.energy_lower_bound or 0.0, self._bound(search)) or None,
+        )
+
+
+def needs_solver(instance: Instance, objective: Objective) -> bool:
+    """Whether a linear programme may be solved during the run, so that its solver is to be loaded beforehand."""
+    energy = objective is Objective.MAKESPAN_ENERGY and _has_few_pairs(instance)
+    return not is_tiny(instance) and (energy or _is_restricted(instance))
+
+
+def _is_restricted(instance: Instance) -> bool:
+    """Whether agents are few, travel takes no time, and not every agent can take every task."""
+    return instance.n <= MOST_AGENTS and not instance.has_travel_time and not instance.reach.is_complete
+
+
+def _has_few_pairs(instance: Instance) -> bool:
+    return instance.n * instance.m <= MOST_PAIRS
