@@ -15,6 +15,7 @@ from alloc.problems.distances.reach import TOLERANCE
 from alloc.problems.fields import BoolArray, FloatArray
 from alloc.problems.missions.simulation.reports import AgentReport, TaskReport, View
 from alloc.problems.missions.simulation.state import STAY, AgentStatus, Order, TaskStatus
+from alloc.problems.vocabulary import MANHATTAN
 
 AT_ONCE = 32
 """Agents for whom the loop decides before it is asked whether there is time for more."""
@@ -112,7 +113,7 @@ def _own(view: View, agent: AgentReport, span: float, index: dict[str, int]) -> 
         NOBODY if agent.task is None else index.get(agent.task, len(index)),
         agent.status is AgentStatus.WORKING,
         agent.status is AgentStatus.FLYING,
-        known.OTHER_WAYS,  # by which nobody guesses what others will choose: each knows what those before it chose
+        known.MANHATTAN_WAYS if view.metric == MANHATTAN and not view.has_table else known.OTHER_WAYS,
     )
 
 
