@@ -225,10 +225,8 @@ def _events(mission: Mission) -> Records:
     for event in mission.timeline:
         agent = NOBODY if event.agent is None else agents[event.agent]
         task = NOBODY if event.task is None else tasks[event.task]
-        center, radius = (0.0, 0.0, 0.0), 0.0
-        if event.center is not None and event.radius is not None:
-            center, radius = event.center, event.radius
-        rows.append((event.hour, kinds[event.kind], agent, task, _amount(event), *center, radius, event.until or 0.0))
+        area = *(event.center or (0.0, 0.0, 0.0)), event.radius or 0.0
+        rows.append((event.hour, kinds[event.kind], agent, task, _amount(event), *area, event.until or 0.0))
     return np.array(rows, record_type(Happening))
 
 
