@@ -5,8 +5,7 @@ import math
 import numpy as np
 
 from alloc.allocators.missions.chance import fraction, keyed
-from alloc.allocators.missions.grid import cells_near, sort
-from alloc.allocators.missions.knowledge import length
+from alloc.allocators.missions.grid import cells_near, find_within, sort
 from alloc.allocators.missions.layout import IDLE, NOBODY, WORKING, MissionArrays, Numbers
 from alloc.allocators.missions.motion import distance_between, place_of
 from alloc.allocators.missions.records import Head
@@ -67,15 +66,19 @@ def count(hours: FloatArray) -> int:
 
 
 @compiled_in_place
+def copy(row: FloatArray, to: FloatArray) -> None:
+    """Copy a row on tasks."""
+    for one in range(len(row)):
+        to[one] = row[one]
+
+
+@compiled_in_place
 def keep(state: MissionArrays, slot: int, number: int) -> None:
     """Keep what an agent sends, but for what nobody uses any more."""
-    hours, left = state.task_hour[number], state.task_left[number]
-    sent_hours, sent_left = state.sent_task_hour[slot, number], state.sent_task_left[slot, number]
-    for one in range(len(hours)):
-        sent_hours[one], sent_left[one] = hours[one], left[one]
-    known, to_who, told = state.known[number], state.sent_agent[slot, number], state.sent_report[slot, number]
-    who, reports = state.known_agent[number], state.known_report[number]
-    state.sent[slot, number] = keep_recent(who, reports, known, state.head[0].oldest, to_who, told)
+    copy(state.task_hour[number], state.sent_task_hour[slot, number])
+    copy(state.task_left[number], state.sent_task_left[slot, number])
+    known, told = state.known_report[number], state.sent_report[slot, number]
+    state.sent[slot, number] = keep_recent(known, state.head[0].oldest, told)
     for word in range(state.heard_of.shape[1]):
         state.sent_of[slot, number, word] = state.heard_of[number, word]
 
@@ -105,23 +108,19 @@ def find_senders(state: MissionArrays, slot: int) -> bool:
 @compiled_in_place
 def find_near(state: MissionArrays, number: int, end: int, near: Numbers) -> int:
     """Fill in who sends within the radius of an agent, but for those that are lost; return where they end."""
-    head, at_x, at_y, at_z = state.head[0], state.places[0], state.places[1], state.places[2]
-    x, y, z = at_x[number], at_y[number], at_z[number]
-    radius, is_manhattan = head.radius + TOLERANCE, head.is_manhattan
-    first, last, low, high = cells_near(head, x, y, radius)
+    head, here, room = state.head[0], place_of(state.agents[number], state.head[0].hour), (state.is_near, state.near)
+    radius = head.radius + TOLERANCE
+    first, last, low, high = cells_near(head, here[0], here[1], radius)
     for row in range(low, high + 1):
-        for place in range(state.cells[row * head.columns + first], state.cells[row * head.columns + last + 1]):
-            other = state.in_cells[place]
-            if not state.speaks[other] or other == number:
-                continue
-            if length(is_manhattan, at_x[other] - x, at_y[other] - y, at_z[other] - z) > radius:
-                continue
+        begin, until = state.cells[row * head.columns + first], state.cells[row * head.columns + last + 1]
+        for place in range(find_within(head.is_manhattan, radius, here, state.places, begin, until, room)):
+            other = state.in_cells[state.near[place]]
+            is_heard = state.speaks[other] & (other != number)
             if head.loss > 0:
                 key = keyed(keyed(keyed(head.loss_key, other), number), head.tick)
-                if fraction(key) < head.loss:
-                    continue
+                is_heard &= fraction(key) >= head.loss
             near[end] = other
-            end += 1
+            end += is_heard  # without a branch, which nobody could foretell
     return end
 
 

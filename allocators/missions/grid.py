@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from alloc.allocators.missions.layout import Numbers
-from alloc.allocators.missions.motion import place_of
+from alloc.allocators.missions.motion import Point, place_of
 from alloc.allocators.missions.records import Agent, Head
 from alloc.allocators.runtime.compiled import compiled_in_place, inlined
-from alloc.problems.fields import FloatArray, IntArray
+from alloc.problems.fields import BoolArray, FloatArray, IntArray
 from alloc.problems.missions.mission import Mission
 
 FEW = 100
@@ -37,6 +37,10 @@ def divide(mission: Mission, head: NDArray[np.void]) -> Numbers:
     head["columns"], head["rows"] = columns, rows
     head["fastest"], head["located"] = mission.instance.speed.max(initial=0.0), -np.inf
     return np.array([0] * (columns * rows) + [n], np.int32)
+
+
+Found = tuple[BoolArray, Numbers]
+"""Room for which places are near: `is_near` and `near` of `MissionArrays`."""
 
 
 @inlined
@@ -64,29 +68,67 @@ def cells_near(head: Head, x: float, y: float, reach: float) -> tuple[int, int, 
 def locate(head: Head, agents: Sequence[Agent], places: FloatArray, cells: Numbers, in_cells: Numbers) -> None:
     """Fill in where all agents are now, by cells."""
     head.located = head.hour
-    for number in range(len(agents)):
-        places[0, number], places[1, number], places[2, number] = place_of(agents[number], head.hour)
     if len(cells) == 2:
+        for number in range(len(agents)):
+            places[0, number], places[1, number], places[2, number] = place_of(agents[number], head.hour)
         return
     cells[:] = 0
     for number in range(len(agents)):
-        cells[cell_of(head, places, number) + 1] += 1
+        cells[cell_of(head, place_of(agents[number], head.hour)) + 1] += 1
     for cell in range(1, len(cells)):
         cells[cell] += cells[cell - 1]
     for number in range(len(agents) - 1, -1, -1):
-        cell = cell_of(head, places, number)
+        here = place_of(agents[number], head.hour)
+        cell = cell_of(head, here)
         cells[cell + 1] -= 1
-        in_cells[cells[cell + 1]] = number
+        place = cells[cell + 1]
+        in_cells[place] = number
+        places[0, place], places[1, place], places[2, place] = here
     for cell in range(1, len(cells) - 1):
         cells[cell] = cells[cell + 1]
     cells[len(cells) - 1] = len(agents)
 
 
 @compiled_in_place
-def cell_of(head: Head, places: FloatArray, number: int) -> int:
-    """Return the cell of an agent."""
-    column = cell_along(places[0, number], head.left, head.side, head.columns)
-    return cell_along(places[1, number], head.low, head.side, head.rows) * head.columns + column
+def cell_of(head: Head, place: Point) -> int:
+    """Return the cell of a place."""
+    column = cell_along(place[0], head.left, head.side, head.columns)
+    return cell_along(place[1], head.low, head.side, head.rows) * head.columns + column
+
+
+@compiled_in_place
+def find_within(
+    is_manhattan: int, reach: float, to: Point, places: FloatArray, begin: int, end: int, room: Found
+) -> int:
+    """Find those of some places that lie within reach of one, or at unknown places; return how many there are.
+
+    Parameters
+    ----------
+    is_manhattan : int
+    reach : float
+    to : tuple of float
+    places : ndarray, shape (3, places)
+    begin, end : int
+        Which of these are looked at.
+    room : Found
+        The numbers of those found are filled in.
+    """
+    is_near, near = room
+    at_x, at_y, at_z = places[0], places[1], places[2]
+    x, y, z = to
+    for place in range(begin, end):
+        is_near[place] = not length(is_manhattan, at_x[place] - x, at_y[place] - y, at_z[place] - z) > reach
+    found = 0
+    for place in range(begin, end):
+        near[found] = place
+        found += is_near[place]
+    return found
+
+
+@inlined
+def length(is_manhattan: int, dx: float, dy: float, dz: float) -> float:
+    """Return the length of a way, NaN where an end is unknown."""
+    return abs(dx) + abs(dy) + abs(dz) if is_manhattan else math.sqrt(dx * dx + dy * dy + dz * dz)
 
 
 @compiled_in_place

@@ -1,16 +1,14 @@
 """What agents see, compiled: see `alloc.problems.missions.simulation.awareness`."""
 
-import math
 from collections.abc import Sequence
 
-from alloc.allocators.missions.grid import SLACK, cells_near, drift, locate
+from alloc.allocators.missions.grid import SLACK, cells_near, drift, find_within, length, locate
 from alloc.allocators.missions.layout import ABSENT, IDLE, OPEN, TO_COME, WORKING, MissionArrays
-from alloc.allocators.missions.motion import place_of, work_left
+from alloc.allocators.missions.motion import Point, place_of, work_left
 from alloc.allocators.missions.records import Agent, Head, Task
 from alloc.allocators.missions.reports import drop_unknown, learn, report_now, write_report
-from alloc.allocators.runtime.compiled import compiled_in_place, inlined
+from alloc.allocators.runtime.compiled import compiled_in_place
 from alloc.problems.distances.reach import TOLERANCE
-from alloc.problems.fields import BoolArray, FloatArray
 
 
 @compiled_in_place
@@ -32,40 +30,25 @@ def look_around(state: MissionArrays, is_located: bool) -> None:
         locate(head, state.agents, state.places, state.cells, state.in_cells)
     for place in range(head.lookers):
         number = state.lookers[place]
-        x, y, z = place_of(state.agents[number], head.hour)
-        find_near_tasks(head, x, y, z, state.sites, state.is_near)
-        see_tasks(state, number)
-        see_agents(state, number, (x, y, z), is_located)
+        here = place_of(state.agents[number], head.hour)
+        see_tasks(state, number, here)
+        see_agents(state, number, here, is_located)
     head.lookers = 0
 
 
-@inlined
-def length(is_manhattan: int, dx: float, dy: float, dz: float) -> float:
-    """Return the length of a way, NaN where an end is unknown."""
-    return abs(dx) + abs(dy) + abs(dz) if is_manhattan else math.sqrt(dx * dx + dy * dy + dz * dz)
-
-
 @compiled_in_place
-def find_near_tasks(head: Head, x: float, y: float, z: float, sites: FloatArray, is_near: BoolArray) -> None:
-    """Fill in which tasks lie within the sensing radius of a place."""
-    at_x, at_y, at_z = sites[0], sites[1], sites[2]
-    sensing, is_manhattan = head.sensing + TOLERANCE, head.is_manhattan
-    for task in range(len(is_near)):
-        is_near[task] = not length(is_manhattan, at_x[task] - x, at_y[task] - y, at_z[task] - z) > sensing
-
-
-@compiled_in_place
-def see_tasks(state: MissionArrays, number: int) -> None:
+def see_tasks(state: MissionArrays, number: int, here: Point) -> None:
     """Take notice of the tasks that an agent sees."""
     head, hours, left = state.head[0], state.task_hour[number], state.task_left[number]
-    for at in range(len(state.is_near)):
-        if state.is_near[at]:
-            task = state.tasks[at]
-            if task.status == TO_COME:
-                continue
-            if task.seen != head.looks:
-                task.seen, task.now = head.looks, seen_of(head, state.agents, task, at)
-            hours[at], left[at] = head.hour, task.now
+    room, sensing = (state.is_near, state.near), head.sensing + TOLERANCE
+    for place in range(find_within(head.is_manhattan, sensing, here, state.sites, 0, len(state.tasks), room)):
+        at = state.near[place]
+        task = state.tasks[at]
+        if task.status == TO_COME:
+            continue
+        if task.seen != head.looks:
+            task.seen, task.now = head.looks, seen_of(head, state.agents, task, at)
+        hours[at], left[at] = head.hour, task.now
 
 
 @compiled_in_place
@@ -75,25 +58,22 @@ def seen_of(head: Head, agents: Sequence[Agent], task: Task, number: int) -> flo
 
 
 @compiled_in_place
-def see_agents(state: MissionArrays, number: int, here: tuple[float, float, float], is_located: bool) -> None:
+def see_agents(state: MissionArrays, number: int, here: Point, is_located: bool) -> None:
     """Take notice of the agents that an agent sees; `is_located` if the grid says where they are now."""
-    head, at_x, at_y, at_z = state.head[0], state.places[0], state.places[1], state.places[2]
-    x, y, z = here
+    head, room = state.head[0], (state.is_near, state.near)
     sensing, is_manhattan = head.sensing + TOLERANCE, head.is_manhattan
     reach = sensing if is_located else (sensing + drift(head)) * (1 + SLACK)
-    first, last, low, high = cells_near(head, x, y, reach)
+    first, last, low, high = cells_near(head, here[0], here[1], reach)
     for row in range(low, high + 1):
         begin, end = state.cells[row * head.columns + first], state.cells[row * head.columns + last + 1]
-        for place in range(begin, end):
-            other = state.in_cells[place]
-            if length(is_manhattan, at_x[other] - x, at_y[other] - y, at_z[other] - z) > reach:
-                continue
+        for place in range(find_within(is_manhattan, reach, here, state.places, begin, end, room)):
+            other = state.in_cells[state.near[place]]
             agent = state.agents[other]
             if not IDLE <= agent.status <= WORKING:
                 continue
             if not is_located:
                 at = place_of(agent, head.hour)
-                if length(is_manhattan, at[0] - x, at[1] - y, at[2] - z) > sensing:
+                if length(is_manhattan, at[0] - here[0], at[1] - here[1], at[2] - here[2]) > sensing:
                     continue
             if agent.reported != head.looks:
                 report_now(state, agent)
@@ -116,5 +96,5 @@ def refresh(state: MissionArrays) -> None:
 @compiled_in_place
 def tell_all(state: MissionArrays, number: int) -> None:
     """Let all know what is so of an agent now."""
-    write_report(state, state.agents[number], state.reports[number])
-    learn(state, 0, number, number)
+    write_report(state, state.agents[number], state.reports[number + 1])
+    learn(state, 0, number, number + 1)

@@ -24,15 +24,15 @@ OVER, MESSAGES, ORDERS = range(3)
 """What a mission waits for: nothing any more, messages to be sent, or orders."""
 
 NOBODY = -1
-"""No agent, no task, no report; what is known of a closed task is minus its status instead of the work left."""
+"""No agent, no task; what is known of a closed task is minus its status instead of the work left."""
 
 
 class MissionArrays(NamedTuple):
     """A mission as it goes on, for compiled code.
 
     Row r of what is known is that of agent r, or the only one where all know all. n agents, m tasks, k messages of each
-    agent on the air at once at the most. Rows on tasks have columns behind these, of which nothing is known. Of rows
-    on agents only the beginning is filled, and only that takes up memory: what an agent knows, in the order of numbers.
+    agent on the air at once at the most. Rows on tasks have columns behind these, of which nothing is known. Report 0
+    is that of nobody: it stands where nothing is known of an agent.
 
     Attributes
     ----------
@@ -48,22 +48,22 @@ class MissionArrays(NamedTuple):
     sites : ndarray, shape (3, m)
         Where tasks are.
     places : ndarray, shape (3, n)
-        Where agents are at the hour of the grid.
+        Where agents are at the hour of the grid, in the order of `in_cells`.
     cells, in_cells : ndarray of int, shape (cells + 1,) and (n,)
         Agents by the cells of the grid, and where those of each cell begin.
-    is_near : ndarray of bool, shape (m,)
-        Which tasks an agent sees.
+    is_near : ndarray of bool, shape (n or m,)
+        Which places are near another one, of agents by cells or of tasks; as many as there are of the more numerous.
+    near : ndarray of int, shape (n or m,)
+        The numbers of those that are.
     speaks : ndarray of bool, shape (n,)
         Who sends a message.
-    newest : ndarray of int, shape (n,)
-        The newest report that an agent hears of each; nothing in between.
     task_hour, task_left : ndarray, shape (rows, m)
         Hour at which an agent's knowledge of a task was true, -1 where it knows nothing, and the work left then.
-    known, known_agent, known_report : ndarray of int, shape (rows,), (rows, n) and (rows, n)
-        Of how many agents an agent knows, which, and the number of the report of each.
+    known, known_report : ndarray of int, shape (rows,) and (rows, n)
+        Of how many agents an agent knows, and the number of the newest report of each.
     heard_of : ndarray of int, shape (rows, words)
         A bit for each agent of which an agent has ever known, where that may be forgotten.
-    sent_task_hour, sent_task_left, sent, sent_agent, sent_report, sent_of : ndarray
+    sent_task_hour, sent_task_left, sent, sent_report, sent_of : ndarray
         The same, as it was when it was sent, by message and agent.
     senders, first_sender, sender : ndarray of int, shape (k, n), (k, n) and (k, n * n)
         How many messages an agent hears, and who sent them: by number, from its first one on.
@@ -89,18 +89,16 @@ class MissionArrays(NamedTuple):
     cells: Numbers
     in_cells: Numbers
     is_near: BoolArray
+    near: Numbers
     speaks: BoolArray
-    newest: Numbers
     task_hour: FloatArray
     task_left: FloatArray
     known: Numbers
-    known_agent: Numbers
     known_report: Numbers
     heard_of: IntArray
     sent_task_hour: FloatArray
     sent_task_left: FloatArray
     sent: Numbers
-    sent_agent: Numbers
     sent_report: Numbers
     sent_of: IntArray
     senders: Numbers

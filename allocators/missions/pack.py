@@ -29,7 +29,7 @@ MOST_KNOWN = 50_000_000
 """Pairs of agents and tasks, each once for an agent and once for a message on the air, up to which missions are run."""
 
 MOST_PAIRS = 1_000_000_000
-"""Likewise of agents, that may know each other: 8 bytes of memory for each that does."""
+"""Likewise of agents, that may know each other: 4 bytes of memory for each that does."""
 
 MOST_REPORTS = 4_000_000
 """Reports of agents for which there is room, where `REPORTS_EACH` for each agent are not more."""
@@ -70,9 +70,9 @@ def pack(mission: Mission, knowledge: Knowledge | str | None = None, memory: flo
         raise RefusedError(f"{n} agents and {m} tasks are too many for the compiled simulation with local knowledge")
     tasks, events = _tasks(mission), _events(mission)
     deadlines = np.flatnonzero(np.isfinite(mission.deadline))
-    reports = n
+    reports = n + 1
     if known is Knowledge.LOCAL:
-        reports = min(2 * (rows + slots) * n + 2 * n + 1024, max(MOST_REPORTS, REPORTS_EACH * n))
+        reports = min(2 * (rows + slots) * n + 2 * n + 1025, max(MOST_REPORTS, REPORTS_EACH * n))
     head = _head(mission, known, len(events) + len(deadlines) + (known is Knowledge.LOCAL))
     head["memory"], head["limit"] = memory, min(reports, 32 * n + 1024)
     parts = {
@@ -89,9 +89,9 @@ def pack(mission: Mission, knowledge: Knowledge | str | None = None, memory: flo
         "places": np.ascontiguousarray(instance.start_position.T),
         "cells": divide(mission, head),
         "in_cells": np.arange(n, dtype=np.int32),
-        "is_near": np.zeros(m, np.bool_),
+        "is_near": np.zeros(max(n, m), np.bool_),
+        "near": np.zeros(max(n, m), np.int32),
         "speaks": np.zeros(n, np.bool_),
-        "newest": np.full(n, NOBODY, np.int32),
         **_knowledge(n, m, rows, slots, words=-(-n // 64) if memory < mission.end else 0),
         "links": np.zeros((n, n) if mission.radio.burst else (0, 0), np.int32),
         "silences": np.zeros(len(events), np.intp),
@@ -108,13 +108,11 @@ def _knowledge(n: int, m: int, rows: int, slots: int, words: int) -> dict[str, F
         "task_hour": np.full((rows, wide), -1.0),
         "task_left": np.zeros((rows, wide)),
         "known": np.zeros(rows, np.int32),
-        "known_agent": np.zeros((rows, n), np.int32),
         "known_report": np.zeros((rows, n), np.int32),
         "heard_of": np.zeros((rows, words), np.intp),
         "sent_task_hour": np.zeros((slots, n, wide)),
         "sent_task_left": np.zeros((slots, n, wide)),
         "sent": np.zeros((slots, n), np.int32),
-        "sent_agent": np.zeros((slots, n, n), np.int32),
         "sent_report": np.zeros((slots, n, n), np.int32),
         "sent_of": np.zeros((slots, n, words), np.intp),
         "senders": np.zeros((slots, n), np.int32),
@@ -178,6 +176,7 @@ def _head(mission: Mission, knowledge: Knowledge, entries: int) -> Records:
         "unfinished": mission.instance.m,
         "entries": entries,
         "count": entries,
+        "reports": 1,
     }
     if burst is not None:
         values |= {f"burst_{name}": getattr(burst, name) for name in ("good", "bad", "loss_good", "loss_bad")}
@@ -199,7 +198,7 @@ def _agents(mission: Mission, knowledge: Knowledge) -> Records:
         agents[name] = agents[f"home_{name}"] = instance.start_position[:, axis]
         agents[f"home_{name}"][has_base] = instance.bases.position[instance.return_base[has_base], axis]
     agents["battery"] = agents["capacity"] = instance.battery
-    for name in ("task", "previous", "next", "order_task", "report"):
+    for name in ("task", "previous", "next", "order_task"):
         agents[name] = NOBODY
     agents["speaks"], agents["seen"] = 1, -1.0
     agents["known"] = np.arange(instance.n) if knowledge is Knowledge.LOCAL else 0
@@ -220,19 +219,15 @@ def _tasks(mission: Mission) -> Records:
 
 
 def _events(mission: Mission) -> Records:
-    events = np.zeros(len(mission.timeline), record_type(Happening))
-    kinds = list(EventKind)
-    for row, event in zip(events, mission.timeline, strict=True):
-        row["hour"], row["kind"] = event.hour, kinds.index(event.kind)
-        row["agent"] = NOBODY if event.agent is None else mission.instance.agent_index[event.agent]
-        row["task"] = NOBODY if event.task is None else mission.instance.task_index[event.task]
-        row["amount"] = _amount(event)
-        if event.until is not None:
-            row["until"] = event.until
-        if event.center is not None and event.radius is not None:
-            row["x"], row["y"], row["z"] = event.center
-            row["radius"] = event.radius
-    return events
+    kinds = {kind: number for number, kind in enumerate(EventKind)}
+    agents, tasks = mission.instance.agent_index, mission.instance.task_index
+    rows = []
+    for event in mission.timeline:
+        agent = NOBODY if event.agent is None else agents[event.agent]
+        task = NOBODY if event.task is None else tasks[event.task]
+        area = *(event.center or (0.0, 0.0, 0.0)), event.radius or 0.0
+        rows.append((event.hour, kinds[event.kind], agent, task, _amount(event), *area, event.until or 0.0))
+    return np.array(rows, record_type(Happening))
 
 
 def _amount(event: Event) -> float:
@@ -249,8 +244,7 @@ def _agenda(mission: Mission, deadlines: NDArray[np.intp], knowledge: Knowledge,
     least = len(rows) + slots + mission.instance.n + mission.instance.m
     agenda = np.zeros(2 * least + 64, record_type(Entry))
     ordered = sorted((hour, turn, count, item) for count, (hour, turn, item) in enumerate(rows, 1))
-    for row, (hour, turn, count, item) in zip(agenda, ordered, strict=False):
-        row["hour"], row["turn"], row["count"], row["subject"] = hour, turn, count, item
+    agenda[: len(rows)] = np.array([(*entry, 0) for entry in ordered], agenda.dtype)
     return agenda
 
 

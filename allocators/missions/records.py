@@ -1,5 +1,7 @@
 """Records of a compiled mission: agents, tasks, what happens, and all that is neither."""
 
+from functools import cache
+
 import numpy as np
 
 
@@ -245,6 +247,7 @@ class Head:
     refused: int
 
 
+@cache
 def record_type(kind: type) -> np.dtype[np.void]:
     """Return the type of records with the fields of a class."""
     return np.dtype([(name, np.float64 if hint is float else np.int64) for name, hint in kind.__annotations__.items()])

@@ -1,7 +1,8 @@
 """Reports of agents, and who knows which, compiled.
 
-Reports are numbered in the order of time. An agent knows the newest one that it saw or heard of each other agent, or of
-few of these: its row has as many of them as it knows, in the order of the numbers of agents.
+Reports are numbered in the order of time. An agent knows the newest one that it saw or heard of each other agent: its
+row has the number of that, and `NOTHING` of those of whom it knows none. So what is newer of two rows is the larger
+number of each column, and processors compare many at once.
 """
 
 import numpy as np
@@ -15,6 +16,9 @@ from alloc.problems.fields import IntArray
 _ODD, _PAIRS = np.uint64(0x5555555555555555), np.uint64(0x3333333333333333)
 _FOURS, _BYTES = np.uint64(0x0F0F0F0F0F0F0F0F), np.uint64(0x0101010101010101)
 _1, _2, _4, _56 = np.uint64(1), np.uint64(2), np.uint64(4), np.uint64(56)
+
+NOTHING = 0
+"""The report where nothing is known of an agent."""
 
 SLACK = 1e-6
 """Part of the memory by which knowledge is kept longer, as hours are rounded."""
@@ -48,87 +52,56 @@ def write_report(state: MissionArrays, agent: Agent, report: Report) -> None:
             report.arrives = head.hour + way / agent.speed
 
 
-@compiled_in_place
+@inlined
 def learn(state: MissionArrays, row: int, agent: int, report: int) -> None:
     """Let the last report of an agent that is known in a row be another one."""
-    who, count = state.known_agent[row], state.known[row]
-    place = find(who, count, agent)
-    if place == count or who[place] != agent:
-        known = state.known_report[row]
-        for at in range(count, place, -1):
-            who[at], known[at] = who[at - 1], known[at - 1]
-        who[place] = agent
-        state.known[row] = count + 1
+    if state.known_report[row, agent] == NOTHING:
+        state.known[row] += 1
         if state.heard_of.shape[1]:
             state.heard_of[row, agent >> 6] |= 1 << (agent & 63)
-    state.known_report[row, place] = report
-
-
-@inlined
-def find(who: Numbers, count: int, agent: int) -> int:
-    """Return the place of an agent in a row, or where it is to be inserted."""
-    if agent < count and who[agent] == agent:  # all before it are known
-        return agent
-    low, high = 0, count
-    while low < high:
-        middle = (low + high) // 2
-        if who[middle] < agent:
-            low = middle + 1
-        else:
-            high = middle
-    return low
+    state.known_report[row, agent] = report
 
 
 @compiled_in_place
 def hear_of_agents(state: MissionArrays, slot: int, number: int) -> None:
     """Let an agent take over what is newer in the messages that it hears than what it knows of agents."""
-    head, newest = state.head[0], state.newest
-    who, known, count = state.known_agent[number], state.known_report[number], state.known[number]
-    for place in range(count):
-        newest[who[place]] = known[place]
-    first = state.first_sender[slot, number]
+    head, known, first = state.head[0], state.known_report[number], state.first_sender[slot, number]
     for place in range(first, first + state.senders[slot, number]):
         sender = state.sender[slot, place]
-        sent, told, told_of = state.sent[slot, sender], state.sent_report[slot, sender], state.sent_agent[slot, sender]
+        told = state.sent_report[slot, sender]
         if head.has_twins:
-            for at in range(sent):
-                if is_newer(state, told[at], newest[told_of[at]]):
-                    newest[told_of[at]] = told[at]
+            for agent in range(len(known)):
+                if is_newer(state, told[agent], known[agent]):
+                    known[agent] = told[agent]
         else:
-            for at in range(sent):
-                newest[told_of[at]] = max(newest[told_of[at]], told[at])
+            take_newer(told, known)
         for word in range(state.heard_of.shape[1]):
             state.heard_of[number, word] |= state.sent_of[slot, sender, word]
-    state.known[number] = gather(newest, who, known, head.oldest)
+    state.known[number] = keep_recent(known, head.oldest, known)
 
 
 @inlined
 def is_newer(state: MissionArrays, told: int, known: int) -> bool:
     """Whether a report is newer than another of the same agent, which may be from the same hour."""
-    return told > known and (known == NOBODY or state.reports[told].hour > state.reports[known].hour)
+    return told > known and (known == NOTHING or state.reports[told].hour > state.reports[known].hour)
 
 
 @compiled_in_place
-def gather(newest: Numbers, who: Numbers, known: Numbers, oldest: int) -> int:
-    """Fill a row with the newest reports of agents, but for old ones; return how many there are."""
-    count = 0
-    for agent in range(len(newest)):
-        report = newest[agent]
-        newest[agent] = NOBODY
-        who[count], known[count] = agent, report
-        count += report >= oldest
-    return count
+def take_newer(told: Numbers, known: Numbers) -> None:
+    """Take over the reports that are newer than those known of the same agents: the ones of higher numbers."""
+    for agent in range(len(known)):
+        known[agent] = max(known[agent], told[agent])
 
 
 @compiled_in_place
-def keep_recent(who: Numbers, known: Numbers, count: int, oldest: int, to_who: Numbers, to_known: Numbers) -> int:
+def keep_recent(known: Numbers, oldest: int, kept: Numbers) -> int:
     """Copy a row but for old reports; return how many are left."""
-    kept = 0
-    for place in range(count):
-        report = known[place]
-        to_who[kept], to_known[kept] = who[place], report
-        kept += report >= oldest
-    return kept
+    count = 0
+    for agent in range(len(kept)):
+        report = known[agent] if known[agent] >= oldest else NOTHING
+        kept[agent] = report
+        count += report != NOTHING
+    return count
 
 
 @compiled_in_place
@@ -146,31 +119,32 @@ def drop_unknown(state: MissionArrays) -> None:
     head, number = state.head[0], state.renumbered
     find_oldest(state)
     number[: head.reports] = NOBODY
+    number[NOTHING] = NOTHING
     for row in range(len(state.known)):
-        who, known = state.known_agent[row], state.known_report[row]
-        state.known[row] = mark(who, known, state.known[row], head.oldest, number)
+        state.known[row] = mark(state.known_report[row], head.oldest, number)
     for slot in range(len(state.sent)):
         for row in range(len(state.agents)):
-            who, known = state.sent_agent[slot, row], state.sent_report[slot, row]
-            state.sent[slot, row] = mark(who, known, state.sent[slot, row], head.oldest, number)
+            if state.sent[slot, row]:
+                state.sent[slot, row] = mark(state.sent_report[slot, row], head.oldest, number)
     kept = keep_marked(state)
     if kept + len(state.agents) > len(number):
         raise OverflowError("a compiled mission has no room for what agents know")
     head.reports, head.oldest = kept, 0
     head.limit = min(len(number), max(head.limit, 2 * (kept + len(state.agents))))
     for row in range(len(state.known)):
-        renumber(state.known_report[row, : state.known[row]], number)
+        renumber(state.known_report[row], number)
     for slot in range(len(state.sent)):
         for row in range(len(state.agents)):
-            renumber(state.sent_report[slot, row, : state.sent[slot, row]], number)
+            if state.sent[slot, row]:
+                renumber(state.sent_report[slot, row], number)
 
 
 @inlined
-def mark(who: Numbers, known: Numbers, count: int, oldest: int, number: Numbers) -> int:
+def mark(known: Numbers, oldest: int, number: Numbers) -> int:
     """Mark the reports of a row that are to be kept, and drop old ones; return how many are left."""
-    kept = keep_recent(who, known, count, oldest, who, known)
-    for place in range(kept):
-        number[known[place]] = 0
+    kept = keep_recent(known, oldest, known)
+    for agent in range(len(known)):
+        number[known[agent]] = 0
     return kept
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from alloc.allocators.learned.missions.feature_names import FEATURES
 from alloc.allocators.learned.missions.network_arrays import HIDDEN, MissionWeights, Singles
 from alloc.allocators.runtime.compiled import compiled_loosely_in_place
 
@@ -25,29 +26,30 @@ def score(
         Scratch.
     scores : ndarray, shape (most,)
     """
-    inner, own = weights.inner, weights.own
     largest = F(-np.inf)
     for row in range(count):
-        attention = F(0)
+        option, hidden = options[row], token[row]
         for k in range(HIDDEN):
             value = weights.inner_bias[k]
-            for feature in range(options.shape[1]):
-                value += options[row, feature] * inner[k, feature]
-            value = max(value, SLOPE * value)
-            token[row, k] = value
-            attention += value * weights.query[k]
+            for feature in range(FEATURES):
+                value += option[feature] * weights.inner[feature * HIDDEN + k]
+            hidden[k] = max(value, SLOPE * value)
+        attention = F(0)
+        for k in range(len(hidden)):
+            attention += hidden[k] * weights.query[k]
         scores[row] = attention
         largest = max(largest, attention)
     add_context(token, count, largest, weights, pooled, scores)
+    context = pooled[1]
     for row in range(count):
-        score = F(0)
+        option, hidden, score = options[row], token[row], F(0)
         for k in range(HIDDEN):
-            value = pooled[1, k]
+            value = context[k]
             for j in range(HIDDEN):
-                value += token[row, j] * own[k, j]
+                value += hidden[j] * weights.own[j * HIDDEN + k]
             score += max(value, SLOPE * value) * weights.out[k]
-        for feature in range(options.shape[1]):
-            score += options[row, feature] * weights.skip[feature]
+        for feature in range(len(option)):
+            score += option[feature] * weights.skip[feature]
         scores[row] = score
 
 

@@ -55,14 +55,17 @@ def compiled_weights(network: MissionNetwork) -> MissionWeights:
         weight = layer.weight.detach().numpy()
         return np.pad(weight, ((0, 0), (0, width - weight.shape[1]))).astype(np.float32)
 
+    def by_input(layer: nn.Linear) -> Singles:
+        return layer.weight.detach().numpy().T.astype(np.float32).ravel()
+
     def bias(layer: nn.Linear) -> Singles:
         return layer.bias.detach().numpy().astype(np.float32)
 
     return MissionWeights(
-        inner=matrix(network.inner, WIDTH),
+        inner=by_input(network.inner),
         inner_bias=bias(network.inner),
         query=matrix(network.query)[0],
-        own=matrix(network.own),
+        own=by_input(network.own),
         own_bias=bias(network.own),
         context=matrix(network.context),
         out=matrix(network.out)[0],

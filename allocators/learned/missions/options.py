@@ -7,6 +7,7 @@ from alloc.allocators.learned.missions import situation as known
 from alloc.allocators.learned.missions.network_arrays import Singles
 from alloc.allocators.learned.missions.situation import Coming, Situation
 from alloc.allocators.missions.layout import NOBODY
+from alloc.allocators.missions.motion import Point
 from alloc.allocators.runtime.compiled import compiled_in_place, inlined
 from alloc.problems.fields import FloatArray, IntArray
 
@@ -144,7 +145,7 @@ def fill_options(situation: Situation, look: FloatArray, options: Singles, choic
         if situation.can[j]:
             choice[count] = j
             count += 1
-    tasks = count
+    tasks, scale = count, time_scale(situation.own)
     if look[0]:
         choice[count] = LOOK
         count += 1
@@ -152,7 +153,7 @@ def fill_options(situation: Situation, look: FloatArray, options: Singles, choic
     count += 1
     options[:count] = 0
     for row in range(tasks):
-        fill_task(situation, choice[row], options[row], idle)
+        fill_task(situation, choice[row], options[row], idle, scale)
     fill_crowding(situation, choice[:tasks], options)
     for row in range(tasks, count):
         option = options[row]
@@ -166,11 +167,11 @@ def fill_options(situation: Situation, look: FloatArray, options: Singles, choic
 
 
 @inlined
-def fill_task(situation: Situation, j: int, option: Singles, idle: int) -> None:
-    """Fill the features of a task."""
+def fill_task(situation: Situation, j: int, option: Singles, idle: int, scale: float) -> None:
+    """Fill the features of a task; `scale` is that of times."""
     own, task = situation.own, situation.task
     others, without = situation.coming.others[j], situation.coming.without[j]
-    hour, scale = own[known.HOUR], time_scale(own)
+    hour = own[known.HOUR]
     is_order = own[known.TARGET] == j
     is_there = is_order and own[known.IS_WORKING] > 0
     distance = 0.0 if is_there else task[known.DISTANCE, j]
@@ -203,31 +204,34 @@ def fill_task(situation: Situation, j: int, option: Singles, idle: int) -> None:
 def rivals(situation: Situation, j: int, distance: float, idle: int) -> float:
     """Return how many others that have no task are nearer to one."""
     x, y, z = situation.task[known.TASK_X, j], situation.task[known.TASK_Y, j], situation.task[known.TASK_Z, j]
-    return nearer(situation.coming.idle_places, idle, x, y, z, distance * distance)
+    is_manhattan = situation.own[known.METRIC] == known.MANHATTAN_WAYS
+    return nearer(situation.coming.idle_places, idle, (x, y, z), distance, is_manhattan)
 
 
 @compiled_in_place
-def nearer(places: FloatArray, count: int, x: float, y: float, z: float, square: float) -> int:
-    """Return how many of the first places are nearer to one than a distance, whose square is given."""
+def nearer(places: FloatArray, count: int, to: Point, distance: float, is_manhattan: bool) -> int:
+    """Return how many of the first places are nearer to one than a distance; by straight lines, that is by squares."""
+    x, y, z = to
+    limit = distance if is_manhattan else distance * distance
     at_x, at_y, at_z = places[0], places[1], places[2]
     found = 0
     for place in range(count):
         dx, dy, dz = at_x[place] - x, at_y[place] - y, at_z[place] - z
-        found += dx * dx + dy * dy + dz * dz < square
+        found += (abs(dx) + abs(dy) + abs(dz) if is_manhattan else dx * dx + dy * dy + dz * dz) < limit
     return found
 
 
 @compiled_in_place
 def fill_crowding(situation: Situation, tasks: IntArray, options: Singles) -> None:
     """Fill in how much other work there is near each task."""
-    task, near = situation.task, (NEAR * situation.own[known.SPAN]) ** 2
+    task, near = situation.task, NEAR * situation.own[known.SPAN]
     places = situation.coming.task_places
     for row in range(len(tasks)):
         for axis in range(3):
             places[axis, row] = task[known.TASK_X + axis, tasks[row]]
     for row in range(len(tasks)):
         x, y, z = places[0, row], places[1, row], places[2, row]
-        found = nearer(places, len(tasks), x, y, z, near)
+        found = nearer(places, len(tasks), (x, y, z), near, False)
         is_near_itself = near > 0.0 and x == x
         options[row, names.CROWDING] = squashed((found - is_near_itself) / 3.0)
 
@@ -252,12 +256,13 @@ def fill_shared(
     for row in range(tasks):
         priority += situation.task[known.PRIORITY, choice[row]] / tasks
         work += situation.task[known.LEFT, choice[row]]
+    per_agent, agents_known = squashed(tasks / agents), squashed((agents - 1) / 5.0)
+    ahead, strength = squashed(work / ability / time_scale(own)), min(own[known.ABILITY] * agents / ability - 1, 3.0)
     for row in range(len(options)):
         option = options[row]
-        option[names.TASKS_PER_AGENT] = squashed(tasks / agents)
-        option[names.KNOWN_AGENTS] = squashed((agents - 1) / 5.0)
-        option[names.WORK_AHEAD] = squashed(work / ability / time_scale(own))
+        option[names.TASKS_PER_AGENT], option[names.KNOWN_AGENTS] = per_agent, agents_known
+        option[names.WORK_AHEAD] = ahead
         if row < tasks:
-            option[names.STRENGTH] = min(own[known.ABILITY] * agents / ability - 1, 3.0)
+            option[names.STRENGTH] = strength
             own_priority = situation.task[known.PRIORITY, choice[row]]
             option[names.PRIORITY] = own_priority / (own_priority + priority) - 0.5 if priority > 0 else 0.0

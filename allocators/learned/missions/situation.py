@@ -170,13 +170,13 @@ def does_count(report: Report, who: int, number: int, hour: float, memory: float
 def fill_others(state: MissionArrays, number: int, situation: Situation, memory: float) -> None:
     """Fill in what an agent knows of others, by what it heard at most `memory` hours ago; only those that count."""
     head, row, found = state.head[0], state.agents[number].known, 0
-    who, known, task_hours = state.known_agent[row], state.known_report[row], state.task_hour[row]
+    known, task_hours = state.known_report[row], state.task_hour[row]
     other, target, counts = situation.other, situation.target, situation.counts
-    for place in range(state.known[row]):
-        report = state.reports[known[place]]
-        if not does_count(report, who[place], number, head.hour, memory):
+    for who in range(len(known)):
+        report = state.reports[known[who]]
+        if not does_count(report, who, number, head.hour, memory):
             continue
-        agent = state.agents[who[place]]
+        agent = state.agents[who]
         other[STRENGTH, found], other[PACE, found] = report.ability, agent.speed
         other[CHARGE, found], other[PRICE, found] = report.battery, agent.energy_per_distance
         other[HEARD, found], other[IS_FREE, found] = report.hour, report.status == IDLE

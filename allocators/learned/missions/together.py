@@ -17,6 +17,7 @@ from alloc.allocators.learned.missions.options import (
     fill_task,
     queue,
     squashed,
+    time_scale,
 )
 from alloc.allocators.learned.missions.play import Room, is_due, room_for
 from alloc.allocators.learned.missions.situation import Situation
@@ -40,7 +41,7 @@ class Together(NamedTuple):
         Distance of each agent from each task.
     can : ndarray of bool, shape (n, m)
     gaps : ndarray, shape (m, n)
-        Squared distance of each task from the agents that have none, in the first columns.
+        Distance of each task from the agents that have none, in the first columns; its square by straight lines.
     idle : ndarray of int, shape (n + 1,)
         Those agents by column; last, how many they are.
     column : ndarray of int, shape (n,)
@@ -104,7 +105,7 @@ def meet(together: Together) -> None:
 def note_idle(together: Together, i: int) -> None:
     """Put an agent among those that have no task, or take it from them, by its target."""
     own, situation, gaps, column = together.own[i], together.room.situation, together.gaps, together.column
-    tasks, idle = situation.task, together.idle
+    tasks, idle, is_manhattan = situation.task, together.idle, own[known.METRIC] == known.MANHATTAN_WAYS
     has_none, place = situation.target[i] == NOBODY, column[i]
     if has_none and place == NOBODY:
         place = column[i] = idle[-1]
@@ -113,7 +114,7 @@ def note_idle(together: Together, i: int) -> None:
         for j in range(len(gaps)):
             x, y = own[known.X] - tasks[known.TASK_X, j], own[known.Y] - tasks[known.TASK_Y, j]
             z = own[known.Z] - tasks[known.TASK_Z, j]
-            gaps[j, place] = x * x + y * y + z * z
+            gaps[j, place] = abs(x) + abs(y) + abs(z) if is_manhattan else x * x + y * y + z * z
     elif not has_none and place != NOBODY:
         idle[-1] -= 1
         last = idle[-1]
@@ -227,9 +228,10 @@ def fill_turn(together: Together, i: int) -> int:
             together.crowded[j] = situation.can[j]
         fill_crowding(situation, choice[:count], together.crowding)
     options[: count + 1] = 0
+    scale = time_scale(situation.own)
     for row in range(count):
         j = choice[row]
-        fill_task(situation, j, options[row], 0)
+        fill_task(situation, j, options[row], 0, scale)
         options[row, names.CROWDING] = together.crowding[row, names.CROWDING]
         options[row, names.RIVALS] = squashed(nearer(together, i, j) / 3.0)
     choice[count] = WAIT
@@ -242,7 +244,9 @@ def fill_turn(together: Together, i: int) -> int:
 @inlined
 def nearer(together: Together, i: int, task: int) -> float:
     """Return how many others that have no task are nearer to one than an agent."""
-    gaps, limit, found = together.gaps[task], together.ways[i, task] ** 2, 0
+    gaps, limit, found = together.gaps[task], together.ways[i, task], 0
+    if together.own[i, known.METRIC] != known.MANHATTAN_WAYS:
+        limit = limit**2
     for place in range(together.idle[-1]):
         found += gaps[place] < limit
     place = together.column[i]

@@ -8,6 +8,7 @@ from alloc.allocators.learned.missions import situation as known
 from alloc.allocators.learned.missions.play import Room
 from alloc.allocators.learned.missions.situation import fill_own, fill_tasks
 from alloc.allocators.missions.layout import IDLE, NOBODY, WORKING, MissionArrays
+from alloc.allocators.missions.reports import NOTHING
 from alloc.allocators.online.compiled.notes import AMOUNT, HOUR, Notes, take_newer
 from alloc.allocators.runtime.compiled import compiled_in_place
 from alloc.problems.fields import FloatArray, IntArray
@@ -60,10 +61,10 @@ def bid(state: MissionArrays, number: int, room: Room, parameters: FloatArray, n
 def count_seats(state: MissionArrays, number: int, bids: FloatArray, factor: float) -> int:
     """Return the seats of a task; bids of those who were seen to go elsewhere since are forgotten."""
     row, agents, tasks, n = state.agents[number].known, 0, 0, len(state.agents)
-    for place in range(state.known[row]):
-        i, report = state.known_agent[row, place], state.reports[state.known_report[row, place]]
+    for i in range(n):
+        report = state.reports[state.known_report[row, i]]
         agents += IDLE <= report.status <= WORKING
-        if report.hour > bids[HOUR * n + i] and report.task != bids[i]:
+        if state.known_report[row, i] != NOTHING and report.hour > bids[HOUR * n + i] and report.task != bids[i]:
             bids[i] = NOBODY
     for j in range(len(state.tasks)):
         tasks += state.task_hour[row, j] >= 0 and state.task_left[row, j] >= 0

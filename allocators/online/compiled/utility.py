@@ -37,8 +37,8 @@ def fill_with(state: MissionArrays, number: int, situation: Situation, memory: f
 def redirect(state: MissionArrays, number: int, situation: Situation, memory: float, goals: FloatArray) -> None:
     """Let others whose tasks are agreed go to these, from where they were by the last that was heard."""
     head, row, found = state.head[0], state.agents[number].known, 0
-    for place in range(state.known[row]):
-        i, report = state.known_agent[row, place], state.reports[state.known_report[row, place]]
+    for i in range(len(state.agents)):
+        report = state.reports[state.known_report[row, i]]
         if not does_count(report, i, number, head.hour, memory):
             continue
         goal = int(goals[i])

@@ -14,21 +14,15 @@ from alloc.allocators.learned.missions.network_arrays import MissionWeights
 from alloc.allocators.learned.missions.options import WAIT
 from alloc.allocators.learned.missions.play import Room, consider, is_due, note_choice, room_for
 from alloc.allocators.learned.missions.policy_file import SHIPPED, SHIPPED_PPO, load_network
-from alloc.allocators.learned.missions.situation import (
-    EUCLIDEAN_WAYS,
-    MANHATTAN_WAYS,
-    MEMORY,
-    OTHER_WAYS,
-    Situation,
-)
+from alloc.allocators.learned.missions.situation import MEMORY, OTHER_WAYS, Situation
 from alloc.allocators.learned.missions.talking import is_to_send
 from alloc.allocators.missions.layout import NOBODY
 from alloc.allocators.missions.motion import distance_between
 from alloc.allocators.online.contract import AgentDecider, Briefing, Policy, PolicyInfo, TurnsDecider
-from alloc.allocators.online.policies.network_turns import NetworkTurns
+from alloc.allocators.online.policies.network_turns import NetworkTurns, ways_of
 from alloc.problems.missions.simulation.reports import AgentReport, Message, TaskReport, View
 from alloc.problems.missions.simulation.state import ACTIVE, STAY, AgentStatus, Order, TaskStatus
-from alloc.problems.vocabulary import GEOGRAPHIC, MANHATTAN, Knowledge
+from alloc.problems.vocabulary import MANHATTAN, Knowledge
 
 REMEMBERED = ("seen", "goal", "decided", "tasks", "periods", "saved", "counted", "news")
 """What a decider keeps from decision to decision; all else is scratch."""
@@ -188,7 +182,7 @@ def _fill(view: View, situation: Situation, tasks: list[TaskReport], span: float
         NOBODY if own.task is None else index.get(own.task, len(tasks)),
         is_at_work,
         is_flying,
-        _ways(view),
+        ways_of(view),
     )
     for j, task in enumerate(tasks):
         known = task.facts
@@ -206,17 +200,10 @@ def _fill(view: View, situation: Situation, tasks: list[TaskReport], span: float
             situation.other[:, i] = (_arrival(view, report), facts.ability, *place, *costs, report.hour, is_free)
 
 
-def _ways(view: View) -> int:
-    """Return by which metric distances are measured, see `situation`."""
-    if view.has_table or view.metric == GEOGRAPHIC:
-        return OTHER_WAYS
-    return MANHATTAN_WAYS if view.metric == MANHATTAN else EUCLIDEAN_WAYS
-
-
 def _distance(view: View, task: TaskReport) -> float:
     """Return how far off a task is, rounded as in the compiled simulation, where others at one place are as near."""
     here, there = view.own.place.position, task.facts.place.position
-    if here is None or there is None or _ways(view) == OTHER_WAYS:
+    if here is None or there is None or ways_of(view) == OTHER_WAYS:
         return view.distance(view.own, task)
     return distance_between(view.metric == MANHATTAN, here, there)
 

@@ -15,6 +15,7 @@ from alloc.problems.distances.reach import TOLERANCE
 from alloc.problems.fields import BoolArray, FloatArray
 from alloc.problems.missions.simulation.reports import AgentReport, TaskReport, View
 from alloc.problems.missions.simulation.state import STAY, AgentStatus, Order, TaskStatus
+from alloc.problems.vocabulary import GEOGRAPHIC, MANHATTAN
 
 AT_ONCE = 32
 """Agents for whom the loop decides before it is asked whether there is time for more."""
@@ -98,6 +99,13 @@ def _compile_loops(weights: MissionWeights) -> None:
     decide_together(together, weights, np.zeros(1, np.intp), 1.0, 0)
 
 
+def ways_of(view: View) -> int:
+    """Return by which metric distances are measured, see `situation`."""
+    if view.has_table or view.metric == GEOGRAPHIC:
+        return known.OTHER_WAYS
+    return known.MANHATTAN_WAYS if view.metric == MANHATTAN else known.EUCLIDEAN_WAYS
+
+
 def _own(view: View, agent: AgentReport, span: float, index: dict[str, int]) -> tuple[float, ...]:
     """Return what an agent knows of itself; a task that is over stands behind all open ones."""
     facts = agent.facts
@@ -112,7 +120,7 @@ def _own(view: View, agent: AgentReport, span: float, index: dict[str, int]) -> 
         NOBODY if agent.task is None else index.get(agent.task, len(index)),
         agent.status is AgentStatus.WORKING,
         agent.status is AgentStatus.FLYING,
-        known.OTHER_WAYS,  # by which nobody guesses what others will choose: each knows what those before it chose
+        ways_of(view),
     )
 
 

@@ -11,6 +11,7 @@ from alloc.allocators.missions.advance import advance
 from alloc.allocators.missions.layout import MESSAGES, NOBODY, ORDERS, OVER, STAY, TO_PLACE, TO_TASK, MissionArrays
 from alloc.allocators.missions.orders import order
 from alloc.allocators.missions.pack import begun, measure, pack
+from alloc.allocators.missions.reports import NOTHING
 from alloc.problems.instance import Instance
 from alloc.problems.missions.events import Event, EventKind
 from alloc.problems.missions.families.draw import random_mission as generated
@@ -127,8 +128,8 @@ def require_same_knowledge(view: View, state: MissionArrays, row: int, mission: 
             assert left[j] == pytest.approx(task.left, rel=1e-9, abs=1e-9)
         else:
             assert TASK_STATUS[int(-left[j])] is task.status
-    count = state.known[row]
-    reports = dict(zip(state.known_agent[row, :count].tolist(), state.known_report[row, :count].tolist(), strict=True))
+    reports = {i: report for i, report in enumerate(state.known_report[row].tolist()) if report != NOTHING}
+    assert state.known[row] == len(reports)
     assert {mission.instance.agent_index[name] for name in view.agents} == set(reports)
     for name, agent in view.agents.items():
         report = state.reports[reports[mission.instance.agent_index[name]]]

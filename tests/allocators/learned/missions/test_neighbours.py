@@ -2,10 +2,19 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from alloc.allocators.learned.missions import feature_names as names
+from alloc.allocators.learned.missions import situation as known
 from alloc.allocators.learned.missions.network import first_network
+from alloc.allocators.learned.missions.options import fill_options
+from alloc.allocators.learned.missions.play import room_for
 from alloc.allocators.learned.missions.policy_file import save_network
+from alloc.allocators.learned.missions.together import meet, nearer, together_for
+from alloc.allocators.missions.advance import advance
+from alloc.allocators.missions.layout import ORDERS
+from alloc.allocators.missions.pack import begun, pack
 from alloc.allocators.online.policies.gappo import NetworkPolicy
 from alloc.allocators.online.run import simulate
 from alloc.problems import Instance, Mission
@@ -36,3 +45,31 @@ def test_free_agents_at_one_place_part(tmp_path: Path, metric: str) -> None:
     assert sorted(orders) == ["a1", "a2"]
     assert orders["a1"] != orders["a2"]
     assert run.result.switches == 0
+
+
+PLACES = [[0.0, 0.0], [0.4, 0.6]]
+"""Of two agents: from a task at (1, 0) the second is 0.85 away in a straight line, and 1.2 along the axes."""
+
+
+@pytest.mark.parametrize(("metric", "rivals"), [("euclidean", 1), ("manhattan", 0)])
+def test_nearer_others_are_those_by_the_metric(metric: str, rivals: int) -> None:
+    """An agent is told of another without a task as nearer if it is so by the metric of the instance."""
+    instance = Instance(
+        ability=[1, 1], workload=[9], agent_position=PLACES, task_position=[[1.0, 0.0]], speed=[1, 1], metric=metric
+    )
+    state, room = begun(pack(Mission(instance, knowledge="full"))), room_for(2, 1)
+    assert advance(state) == ORDERS
+    known.fill(state, 0, room.situation)
+    fill_options(room.situation, room.look, room.options, room.choice)
+    assert room.options[0, names.RIVALS] == np.float32(1 - 1 / (1 + rivals / 3))
+
+
+@pytest.mark.parametrize(("ways", "rivals"), [(known.EUCLIDEAN_WAYS, 1), (known.MANHATTAN_WAYS, 0)])
+def test_nearer_others_are_those_by_the_metric_for_agents_in_turn(ways: int, rivals: int) -> None:
+    """Agents that decide in turn are told the same."""
+    together = together_for(2, 1)
+    together.own[:, [known.X, known.Y]] = PLACES
+    together.own[:, known.TARGET], together.own[:, known.METRIC], together.ways[0, 0] = -1, ways, 1.0
+    together.room.situation.task[known.TASK_X, 0] = 1.0
+    meet(together)
+    assert nearer(together, 0, 0) == rivals

@@ -6,7 +6,7 @@ from drawn_missions import random_mission_of_any_kind
 
 from alloc.allocators import MissionPlanner
 from alloc.allocators.learned.missions.situation import OTHER_WAYS
-from alloc.allocators.online.policies import gappo
+from alloc.allocators.online.policies import gappo, network_turns
 from alloc.allocators.online.policies.gappo import NetworkPolicy
 from alloc.problems import InputError, Instance
 from alloc.problems.missions.mission import Mission
@@ -62,7 +62,8 @@ def test_orders_are_those_of_each_by_itself(seed, monkeypatch):
 
     By itself an agent guesses what free neighbours will choose, which it need not where they choose in turn.
     """
-    monkeypatch.setattr(gappo, "_ways", lambda view: OTHER_WAYS)
+    for module in (gappo, network_turns):
+        monkeypatch.setattr(module, "ways_of", lambda view: OTHER_WAYS)
     rng = np.random.default_rng(seed)
     mission = crowd(rng) if seed % 2 else random_mission_of_any_kind(rng)
     with MissionPlanner(mission, "gappo", None) as fast, MissionPlanner(mission, OneByOne(), None) as slow:
