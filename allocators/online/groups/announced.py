@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence, Set
 from dataclasses import dataclass
-from itertools import islice
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,10 +41,14 @@ class Announced:
         self.routes: dict[str, Route] = {}
 
     def plan(self, agent: str, route: Route) -> None:
-        """Take notice of a route, unless a newer one is known; of two of one hour that of the first planner counts."""
-        known = self.routes.get(agent)
-        if known is None or (-route.hour, route.planner) < (-known.hour, known.planner):
+        """Take notice of a route, unless a newer one is known."""
+        if self._is_news(agent, route.hour, route.planner):
             self.routes[agent] = route
+
+    def _is_news(self, agent: str, hour: float, planner: str) -> bool:
+        """Whether a route is newer than the one that is known; of two of one hour that of the first planner counts."""
+        known = self.routes.get(agent)
+        return known is None or hour > known.hour or (hour == known.hour and planner < known.planner)
 
     def notes(self) -> tuple[str | float, ...]:
         """Return all routes as notes of a message."""
@@ -57,12 +60,15 @@ class Announced:
 
     def hear(self, notes: Sequence[str | float]) -> None:
         """Take over what is newer in the notes of a message."""
-        values = iter(notes)
-        for agent in values:
-            hour, planner, count = islice(values, 3)
-            parts = list(islice(values, 2 * int(count)))
-            visits = tuple((str(name), float(until)) for name, until in zip(parts[::2], parts[1::2], strict=True))
-            self.plan(str(agent), Route(float(hour), str(planner), visits))
+        begin = 0
+        while begin < len(notes):
+            agent, hour, planner, count = notes[begin : begin + 4]
+            begin, end = begin + 4, begin + 4 + 2 * int(count)
+            if self._is_news(str(agent), float(hour), str(planner)):
+                names, hours = notes[begin:end:2], notes[begin + 1 : end : 2]
+                visits = tuple((str(name), float(until)) for name, until in zip(names, hours, strict=True))
+                self.routes[str(agent)] = Route(float(hour), str(planner), visits)
+            begin = end
 
     def taken(self, group: Set[str], hour: float, patience: float) -> set[str]:
         """Return the tasks of agents outside a group: until the planned end, and `patience` times as long after it."""

@@ -6,6 +6,8 @@ import numpy as np
 
 from alloc.allocators.online.contract import Briefing
 from alloc.allocators.online.policies.exploring import BATTERY_SHARE, Explorer
+from alloc.allocators.online.routes.tables import positions
+from alloc.problems.distances.metric import distances
 from alloc.problems.fields import BoolArray, FloatArray
 from alloc.problems.missions.simulation.places import Place
 from alloc.problems.missions.simulation.reports import View
@@ -22,8 +24,9 @@ NEAR = 0.1
 class Lookout:
     """Where an agent looks around that has nothing to do.
 
-    The area is divided in cells, and each belongs to the agent that is nearest to it. An agent goes to that of its cells
-    that was not seen for longest over the hours that it takes to see it; where all were seen lately, to their middle.
+    The area is divided in cells, and each belongs to the agent that is nearest to it. An agent goes to that of its
+    cells that was not seen for longest over the hours that it takes to see it; where all were seen lately, to their
+    middle.
 
     Parameters
     ----------
@@ -46,10 +49,10 @@ class Lookout:
         """Take notice of what agents have seen, by what is known of where they were."""
         if not self._is_blind:
             return
-        for report in view.agents.values():
-            if report.place.position is not None:
-                near = self._distances(report.place.position) <= self._sensing
-                self._seen[near] = np.maximum(self._seen[near], report.hour)
+        reports = [report for report in view.agents.values() if report.place.position is not None]
+        near = self._distances([report.place for report in reports]) <= self._sensing
+        hours = np.array([report.hour for report in reports])
+        self._seen = np.maximum(self._seen, np.where(near, hours[:, None], -np.inf).max(axis=0, initial=-np.inf))
 
     def order(self, view: View, others: Iterable[Place]) -> Order | None:
         """Return where to look around, when others are at some places; None where the agent is on its way already."""
@@ -57,11 +60,8 @@ class Lookout:
         here = own.place.position
         if not self._is_blind or here is None or view.has_table or view.metric == GEOGRAPHIC:
             return self._explorer.order(view)
-        way = self._distances(here)
-        is_own = np.ones(len(way), np.bool_)
-        for place in others:
-            if place.position is not None:
-                is_own &= way <= self._distances(place.position)
+        ways = self._distances([own.place, *(place for place in others if place.position is not None)])
+        way, is_own = ways[0], ways[0] <= ways.min(axis=0)
         goal = self._place(view, way, is_own, own.facts.speed)
         distance = view.distance_to_place(own, Place(goal))
         energy = own.facts.energy_per_distance * distance
@@ -83,8 +83,9 @@ class Lookout:
         x, y, z = self._cells[is_own].mean(axis=0).tolist() if is_own.any() else self._cells[np.argmin(way)].tolist()
         return x, y, z
 
-    def _distances(self, position: tuple[float, float, float]) -> FloatArray:
-        return np.asarray(np.linalg.norm(self._cells - position, axis=1))
+    def _distances(self, places: list[Place]) -> FloatArray:
+        """Return how far places are from all cells, shape (places, cells)."""
+        return distances(positions(places)[:, None], self._cells)
 
 
 def _middles(low: float, high: float, side: float) -> FloatArray:

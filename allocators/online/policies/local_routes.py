@@ -2,7 +2,6 @@
 
 import math
 import time
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -50,7 +49,7 @@ class LocalRoutes(Policy):
         If a setting is out of range.
     """
 
-    info = PolicyInfo(name="local-routes", summary="sequences of tasks, planned by one agent for those that it hears of")
+    info = PolicyInfo(name="local-routes", summary="sequences of tasks, planned by one agent for all that it hears of")
     parameters_type: ClassVar[type] = LocalRoutesParameters
 
     def __init__(self, parameters: LocalRoutesParameters | None = None, **settings: object) -> None:
@@ -126,9 +125,7 @@ class _Planner(AgentDecider):
     def _open(self, view: View, group: set[str]) -> set[str]:
         """Return the tasks that are open and not left to others."""
         taken = self._announced.taken(group, view.hour, self._parameters.patience)
-        return {
-            name for name, task in view.tasks.items() if task.status is TaskStatus.OPEN and name not in taken
-        }
+        return {name for name, task in view.tasks.items() if task.status is TaskStatus.OPEN and name not in taken}
 
     def _end(self, view: View, name: str) -> Place:
         """Return where an agent will be free."""
@@ -144,9 +141,7 @@ class _Planner(AgentDecider):
         self._planned = news
         began = time.perf_counter()
         agents = {name: _advanced(view, view.agents[name]) for name in group}
-        known = {
-            name: task for name, task in view.tasks.items() if name in tasks or task.status is not TaskStatus.OPEN
-        }
+        known = {name: task for name, task in view.tasks.items() if name in tasks or task.status is not TaskStatus.OPEN}
         described = self._describer.describe(view.of(agents, known), Foresight())
         if described is None:
             return

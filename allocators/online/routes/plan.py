@@ -10,7 +10,17 @@ from alloc.allocators.online.routes.describe import Described
 from alloc.allocators.online.routes.evaluation import play
 from alloc.allocators.online.routes.record import Schedule, new_schedule
 from alloc.allocators.online.routes.search import improve
-from alloc.allocators.online.routes.situation import AGENT, EUCLIDEAN, EVENT, TASK, Bools, Floats, Ints, Situation, records
+from alloc.allocators.online.routes.situation import (
+    AGENT,
+    EUCLIDEAN,
+    EVENT,
+    TASK,
+    Bools,
+    Floats,
+    Ints,
+    Situation,
+    records,
+)
 
 PORTION, PORTION_S = 8, 0.001
 """Changes before the first look at the clock, and seconds between two looks that are aimed at."""
