@@ -1,5 +1,6 @@
 """Routes that were planned for agents, as messages tell of them."""
 
+import math
 from collections.abc import Sequence, Set
 from dataclasses import dataclass
 
@@ -21,6 +22,11 @@ class Route:
     hour: float
     planner: str
     visits: tuple[tuple[str, float], ...]
+
+    @property
+    def end(self) -> float:
+        """Hour at which it was to be over."""
+        return max((until for _, until in self.visits), default=self.hour)
 
     @property
     def tasks(self) -> list[str]:
@@ -71,11 +77,22 @@ class Announced:
             begin = end
 
     def taken(self, group: Set[str], hour: float, patience: float) -> set[str]:
-        """Return the tasks of agents outside a group: until the planned end, and `patience` times as long after it."""
+        """Return the tasks of agents outside a group: until their routes end, and `patience` times as long after it."""
         return {
             name
             for agent, route in self.routes.items()
-            if agent not in group
-            for name, until in route.visits
-            if hour <= until + patience * (until - route.hour)
+            if agent not in group and hour <= route.end + patience * (route.end - route.hour)
+            for name, _ in route.visits
+        }
+
+    def joined(self, group: Sequence[str]) -> dict[str, list[str]]:
+        """Return the routes of a group; of routes of several plans that have a task in common the earliest keeps it."""
+        routes = {agent: self.routes[agent] for agent in group if agent in self.routes}
+        first: dict[str, tuple[float, float, str]] = {}
+        for route in routes.values():
+            for name, until in route.visits:
+                first[name] = min(first.get(name, (math.inf, 0.0, "")), (until, route.hour, route.planner))
+        return {
+            agent: [name for name, _ in route.visits if first[name][1:] == (route.hour, route.planner)]
+            for agent, route in routes.items()
         }

@@ -149,7 +149,7 @@ class _Planner(AgentDecider):
         iterations = parameters.iterations if self._count else parameters.first_iterations
         self._count += 1
         until = None if self._time_limit_s is None else began + self._time_limit_s
-        before = {name: self._tasks_of(name) for name in group}
+        before = self._announced.joined(group)
         seed = (self._seed * 1_000_003 + self._count) % 2**31
         routes, lengths, untried = improved(described, before, iterations, seed, until, self._given_up)
         finish = finish_hours(described.situation, routes, lengths).tolist()
