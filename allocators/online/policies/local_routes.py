@@ -36,7 +36,7 @@ class LocalRoutesParameters(RoutesParameters):
     iterations: int = bounded(100, low=0)
     first_iterations: int = bounded(1000, low=0)
     contact: float = bounded(6.0, low=0)
-    patience: float = bounded(0.5, low=0)
+    patience: float = bounded(2.0, low=0)
     fresh: float = bounded(50.0, low=0)
 
 
