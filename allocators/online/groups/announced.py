@@ -76,14 +76,18 @@ class Announced:
                 self.routes[str(agent)] = Route(float(hour), str(planner), visits)
             begin = end
 
-    def taken(self, group: Set[str], hour: float, patience: float) -> set[str]:
-        """Return the tasks of agents outside a group: until their routes end, and `patience` times as long after it."""
-        return {
-            name
-            for agent, route in self.routes.items()
-            if agent not in group and hour <= route.end + patience * (route.end - route.hour)
-            for name, _ in route.visits
-        }
+    def taken(self, group: Set[str], hour: float, patience: float) -> dict[str, float]:
+        """Return the tasks that are left to agents outside a group, and when each is to be done.
+
+        A task belongs to the newest route that has it. A route counts until it ends, and `patience` times as long as it
+        was to take after that.
+        """
+        newest: dict[str, tuple[float, float, str]] = {}
+        for agent, route in self.routes.items():
+            if agent in group or hour <= route.end + patience * (route.end - route.hour):
+                for name, until in route.visits:
+                    newest[name] = max(newest.get(name, (-math.inf, 0.0, "")), (route.hour, until, agent))
+        return {name: until for name, (_, until, agent) in newest.items() if agent not in group}
 
     def joined(self, group: Sequence[str]) -> dict[str, list[str]]:
         """Return the routes of a group; of routes of several plans that have a task in common the earliest keeps it."""

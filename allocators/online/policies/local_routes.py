@@ -33,10 +33,10 @@ class LocalRoutesParameters(RoutesParameters):
         Radio periods after which a place is to be looked at again, where there is nothing to do.
     """
 
-    iterations: int = bounded(100, low=0)
+    iterations: int = bounded(300, low=0)
     first_iterations: int = bounded(1000, low=0)
     contact: float = bounded(6.0, low=0)
-    patience: float = bounded(2.0, low=0)
+    patience: float = bounded(3.0, low=0)
     fresh: float = bounded(50.0, low=0)
 
 
@@ -86,11 +86,25 @@ class _Planner(AgentDecider):
         group = self._group(view)
         if self._is_alone or group[0] == view.id or self._waits_in_vain(view, group):
             self._renew(view, group if self._is_alone or group[0] == view.id else [str(view.id)])
+        if not self._tasks_open(view, str(view.id)):
+            self._help(view, group)
         for name in self._tasks_of(str(view.id)):
             task = view.tasks.get(name)
             if task is not None and view.refusal(view.own, task) is None:
                 return Order(name)
         return self._lookout.order(view, [self._end(view, name) for name in group if name != view.id])
+
+    def _help(self, view: View, group: list[str]) -> None:
+        """Let an agent without a task take the nearest one of those out of hearing who are late, or later than it."""
+        taken = self._announced.taken(set(group), view.hour, self._parameters.patience)
+        best, least = None, math.inf
+        for task in view.open_tasks(view.own):
+            until, hours = taken.get(task.facts.id, math.nan), view.hours(view.own, task)
+            if hours < least and (until < view.hour or until > view.hour + hours + self._contact):
+                best, least = task, hours
+        if best is not None:
+            until = view.hour + view.hours(view.own, best) + best.left / view.own.facts.ability
+            self._announced.plan(str(view.id), Route(view.hour, str(view.id), ((best.facts.id, until),)))
 
     def message(self, view: View) -> Message | None:
         """Return all that is known, and all routes."""
