@@ -14,8 +14,8 @@ import pytest
 from alloc.cli.main import main
 
 HERE = Path(__file__).parent
-SLOW = ("notebooks", "own_policy", "tables")
-"""Journeys with trainings, or with many processes."""
+SLOW = ("drones", "notebooks", "own_policy", "tables")
+"""Journeys with trainings, many processes, or runs of many seconds; CI makes them."""
 
 JOURNEYS = [
     pytest.param(path.parent.name, marks=[pytest.mark.slow] * (path.parent.name in SLOW), id=path.parent.name)

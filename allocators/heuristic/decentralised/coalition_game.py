@@ -17,8 +17,8 @@ from alloc.problems.instance import FloatArray, IntArray
 MOST_CELLS = 30_000_000
 """Largest number of agents times agents and tasks: each agent stores a plan of all."""
 
-EVALUATIONS_PER_SLICE = 2_000_000
-"""Evaluations of a task, neighbour or partner between two checks of the clock; a few milliseconds."""
+EVALUATIONS_PER_SLICE = 500_000
+"""Evaluations of a task, neighbour or partner between two checks of the clock: some 2 ms."""
 
 TIE_BREAKING_NOISE = 1e-3
 """Noise on the stamps of the first game: decides between equals, and makes all stamps differ."""

@@ -50,7 +50,7 @@ def test_pairs_agree_with_the_table(seed: int) -> None:
 
 
 @pytest.mark.usefixtures("tableless")
-@pytest.mark.parametrize("method", ["greedy", "local-search"])
+@pytest.mark.parametrize("method", ["greedy", pytest.param("local-search", marks=pytest.mark.slow)])
 def test_methods_for_large_instances(method: str) -> None:
     """They serve what brute force serves, send nobody astray, and count the same energy."""
     allocator = load(method)
