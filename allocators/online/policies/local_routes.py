@@ -84,7 +84,7 @@ class _Planner(AgentDecider):
             self._announced.hear(message.notes)
         self._lookout.note(view)
         group = self._group(view)
-        if self._is_alone or group[0] == view.id or self._waits_in_vain(view, group):
+        if self._is_alone or group[0] == view.id or self._has_waited(view, group):
             self._renew(view, group if self._is_alone or group[0] == view.id else [str(view.id)])
         if not self._tasks_open(view, str(view.id)):
             self._help(view, group)
@@ -95,7 +95,7 @@ class _Planner(AgentDecider):
         return self._lookout.order(view, [self._end(view, name) for name in group if name != view.id])
 
     def _help(self, view: View, group: list[str]) -> None:
-        """Let an agent without a task take the nearest one of those out of hearing who are late, or later than it."""
+        """Let an agent without a task take the nearest one of others, out of contact, who are late, or later than it."""
         taken = self._announced.taken(set(group), view.hour, self._parameters.patience)
         best, least = None, math.inf
         for task in view.open_tasks(view.own):
@@ -118,7 +118,7 @@ class _Planner(AgentDecider):
             if name == view.id or (report.status in ACTIVE and view.hour - report.hour <= self._contact)
         )
 
-    def _waits_in_vain(self, view: View, group: list[str]) -> bool:
+    def _has_waited(self, view: View, group: list[str]) -> bool:
         """Whether there were tasks for longer than a plan takes to come, and none for the agent."""
         if self._tasks_open(view, str(view.id)) or not (self._open(view, set(group)) - self._planned_for(group)):
             self._waits_since = math.inf

@@ -98,12 +98,12 @@ def test_agents_look_around_in_parts_of_the_area():
 
 def test_who_sees_everything_stays():
     """There is nothing to look for."""
-    assert looked(drawn(sensing=None), []) == STAY
+    assert looked(drawn(sensing=np.inf), []) == STAY
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(300)
-def test_agents_out_of_hearing_do_all_tasks():
+def test_agents_out_of_contact_do_all_tasks():
     """Two agents that hear of each other, and one far away, find and do tasks that nobody sees at first."""
     result = simulate(drawn(), "local-routes", iterations=20, first_iterations=20).result
     assert result.status == "done"
