@@ -95,7 +95,7 @@ class _Planner(AgentDecider):
         return self._lookout.order(view, [self._end(view, name) for name in group if name != view.id])
 
     def _help(self, view: View, group: list[str]) -> None:
-        """Let an agent without a task take the nearest one of others, out of contact, who are late, or later than it."""
+        """Let an agent without a task take the nearest of others, out of contact, who are late, or later than it."""
         taken = self._announced.taken(set(group), view.hour, self._parameters.patience)
         best, least = None, math.inf
         for task in view.open_tasks(view.own):
