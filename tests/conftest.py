@@ -18,6 +18,12 @@ settings.register_profile(
 settings.load_profile("alloc")
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add an option that has answers compared with a reference more often than usual."""
+    text = "instances or missions that are drawn where answers are compared with a reference, instead of a few"
+    parser.addoption("--draws", type=int, metavar="N", help=text)
+
+
 def pytest_runtest_setup(item: pytest.Item) -> None:
     """Skip a test that is marked as in need of a package that is not there."""
     for mark in item.iter_markers("needs"):

@@ -84,7 +84,7 @@ def paired_differences(rows: Sequence[PolicyRow]) -> list[PolicyDifference]:
     for policy in policies[1:]:
         pairs = [_pairs(runs.get((policy, number), {}), runs.get((policies[0], number), {})) for number in missions]
         intervals = {
-            name: _interval([[_difference(name, *pair) for pair in some] for some in pairs]) for name in MEASURES
+            name: paired_interval([[_difference(name, *pair) for pair in some] for some in pairs]) for name in MEASURES
         }
         found.append(PolicyDifference(policy=policy, against=policies[0], **intervals))
     return found
@@ -106,7 +106,8 @@ def _difference(measure: str, one: MissionResult, other: MissionResult) -> float
     return float(ours / theirs - 1) if theirs > 0 else None
 
 
-def _interval(by_mission: Sequence[Sequence[float | None]]) -> Interval:
+def paired_interval(by_mission: Sequence[Sequence[float | None]]) -> Interval:
+    """Return the interval of differences, by mission and seed; None where a pair lacks the figure."""
     from scipy import stats
 
     known = [[value for value in values if value is not None] for values in by_mission]

@@ -27,7 +27,7 @@ EXAMPLES = examples(
 
 SEED = Annotated[int, typer.Option(min=0, help="Seed of all random numbers; with --count the first of several.")]
 SPREADS = ("communication_range", "battery", "speed", "priority")
-COVERING = ("agents", "tasks", "ability_min", "ability_max", "workload", "integer")
+COVERING = ("agents", "tasks", "ability_min", "ability_max", "workload", "integer", "choices")
 MISSION = {
     "agents": "agents",
     "tasks": "tasks",
@@ -104,6 +104,7 @@ def generate_command(
     speed: Annotated[str | None, _option("Distance per hour.", "none", metavar="SPREAD")] = None,
     priority: Annotated[str | None, _option("Weight of a task in the game.", "1", metavar="SPREAD")] = None,
     allowed_fraction: Annotated[float | None, _option("Share of the tasks that each agent may do.", "1")] = None,
+    choices: Annotated[int | None, _option("Tasks that each agent may take, for covering.", "all")] = None,
     energy_per_distance: Annotated[float | None, _option("Energy per unit of distance.", "6")] = None,
     tau: Annotated[float | None, _option("Base of the reward (3).", "0.5")] = None,
     mission_family: Annotated[MissionFamily | None, _option("Kind of mission.", "steady", "--family")] = None,
@@ -118,8 +119,7 @@ def generate_command(
     if count > 1 and output == STANDARD:
         raise typer.BadParameter("must name a folder for several instances", param_hint="'--output'")
     for number in range(seed, seed + count):
-        instance = _instance(family, wanted, number)
-        _write(instance, output, into_folder=count > 1)
+        _write(_instance(family, wanted, number), output, into_folder=count > 1)
     if output != STANDARD:
         what = "missions" if family in (Family.MISSION, Family.CFSTP) else "instances"
         say(f"wrote {output}" if count == 1 else f"wrote {count} {what} into {output}")
@@ -129,8 +129,9 @@ def _check_options(family: Family, wanted: dict[str, Any]) -> None:
     """Raise an error for an option that is not for this family."""
     for name in wanted:
         owner = "mission" if name in MISSION and name not in ("agents", "tasks") else "random"
+        owner = "covering" if name == "choices" else owner
         taken = {
-            Family.RANDOM: name not in MISSION or name in COVERING,
+            Family.RANDOM: name in ("agents", "tasks") or owner == "random",
             Family.COVERING: name in COVERING,
             Family.CFSTP: name in ("agents", "tasks"),
         }

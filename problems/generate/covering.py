@@ -3,6 +3,7 @@
 import numpy as np
 
 from alloc.problems import arguments
+from alloc.problems.fields import IntArray
 from alloc.problems.instance import Instance
 
 EQUAL_WORKLOAD = 1000
@@ -13,7 +14,15 @@ WORKLOADS = (200, 2000)
 
 
 def machine_covering(
-    agents: int, tasks: int, low: int, high: int, seed: int, *, equal: bool = True, whole: bool = True
+    agents: int,
+    tasks: int,
+    low: int,
+    high: int,
+    seed: int,
+    *,
+    equal: bool = True,
+    whole: bool = True,
+    choices: int | None = None,
 ) -> Instance:
     """Return an instance without places: abilities U[low, high], and workloads all 1000, or U[200, 2000].
 
@@ -33,6 +42,9 @@ def machine_covering(
         Whether all workloads are 1000.
     whole : bool
         Whether abilities are whole numbers.
+    choices : int, optional
+        How many tasks each agent may take, all by default: agent i takes task i modulo m, and others that
+        ``numpy.random.default_rng([agents, tasks, seed])`` draws, among which that one may be again.
 
     Raises
     ------
@@ -48,12 +60,20 @@ def machine_covering(
     low = arguments.whole(low, "low", 1)
     high, seed = arguments.whole(high, "high", low), arguments.whole(seed, "seed")
     equal, whole = arguments.flag(equal, "equal"), arguments.flag(whole, "whole")
+    others = None if choices is None else arguments.whole(choices, "choices", 1, tasks) - 1
     rng = np.random.default_rng([agents, tasks, low, high, seed])
     ability = rng.integers(low, high, agents, endpoint=True) if whole else rng.uniform(low, high, agents)
     unequal = rng.integers(*WORKLOADS, tasks, endpoint=True)
     kind = f"{'' if whole else 'real-'}{'equal' if equal else 'unequal'}"
+    prefix = "" if others is None else "restricted-"
     return Instance(
-        name=f"covering-{agents}x{tasks}-{low}-{high}-{kind}-seed-{seed}",
+        name=f"{prefix}covering-{agents}x{tasks}-{low}-{high}-{kind}-seed-{seed}",
         ability=ability,
         workload=np.full(tasks, EQUAL_WORKLOAD) if equal else unequal,
+        allowed_tasks=None if others is None else _lists(agents, tasks, others, seed),
     )
+
+
+def _lists(agents: int, tasks: int, others: int, seed: int) -> list[IntArray]:
+    rng = np.random.default_rng([agents, tasks, seed])
+    return [np.unique(np.append(i % tasks, rng.choice(tasks, others, replace=False))) for i in range(agents)]

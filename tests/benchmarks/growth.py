@@ -107,15 +107,14 @@ def draw(rows: list[Row], path: str) -> None:
 
     figure = new_figure(7.5, 5)
     axes = figure.subplots()
-    colours = dict(zip(CASES, ("#0072b2", "#e69f00", "#009e73", "#cc79a7"), strict=True))
-    styles = dict(zip(dict.fromkeys(row.method for row in rows), ("-", "--", ":"), strict=False))
+    methods = list(dict.fromkeys(row.method for row in rows))
     for (case, method), group in series(rows).items():
         x, y = [row.agents for row in group], [row.wall_s - row.start_s for row in group]
-        axes.loglog(x, y, styles[method], marker="o", markersize=4, color=colours[case], label=f"{method}, {case}")
+        look = {"linestyle": ("-", "--", ":", "-.")[methods.index(method) % 4], "color": f"C{list(CASES).index(case)}"}
+        axes.loglog(x, y, marker="o", markersize=4, label=f"{method}, {case}", **look)
     ends = np.array([min(row.agents for row in rows), max(row.agents for row in rows)])
     axes.loglog(ends, ends * 8e-6, color="0.6", linewidth=1, label="linear")
-    axes.set_xlabel("agents (100 per task)")
-    axes.set_ylabel("seconds, npz file to result file, without the program's start")
+    axes.set(xlabel="agents (100 per task)", ylabel="seconds, npz file to result file, without the program's start")
     axes.grid(color="0.9", which="major")
     axes.spines[["top", "right"]].set_visible(False)
     axes.legend(frameon=False, fontsize=8)

@@ -5,7 +5,6 @@ from collections.abc import Callable
 import numpy as np
 
 from alloc.problems import Instance, machine_covering, paper_like
-from alloc.problems.generate import paper
 
 Ends = tuple[float, float]
 Maker = Callable[[int], Instance]
@@ -32,20 +31,6 @@ def plane(kind: str, agents: int, tasks: int, *, reach: Ends | None = None, batt
     return make
 
 
-def restricted(*shape: int, equal: bool = True, whole: bool = True) -> Maker:
-    """Return a maker of machine covering in which each agent may take three tasks, all open to about as many agents."""
-    agents, tasks, low, high = shape
-
-    def make(seed: int) -> Instance:
-        plain = machine_covering(agents, tasks, low, high, seed, equal=equal, whole=whole)
-        rng = np.random.default_rng([agents, tasks, seed])
-        lists = [np.unique(np.append(i % tasks, rng.choice(tasks, 2, replace=False))) for i in range(agents)]
-        name = f"restricted-{plain.name}"
-        return Instance(name=name, ability=plain.ability, workload=plain.workload, allowed_tasks=lists)
-
-    return make
-
-
 VARIANTS: dict[str, Maker] = {
     "reach": plane("reach", 300, 40, reach=(0.15, 0.35)),
     "battery": plane("battery", 300, 40, battery=(0.1, 0.4)),
@@ -54,23 +39,11 @@ VARIANTS: dict[str, Maker] = {
     "slow": plane("slow", 200, 30, speed=(0.1, 0.5)),
     "real-equal": lambda seed: machine_covering(100, 40, 20, 50, seed, whole=False),
     "real": lambda seed: machine_covering(90, 30, 1, 100, seed, equal=False, whole=False),
-    "paper-1": lambda seed: paper(1, seed),
-    "paper-3": lambda seed: paper(3, seed),
     "covering": lambda seed: machine_covering(200, 50, 1, 1000, seed, equal=False),
     "many": plane("many", 5000, 100),
     "few": plane("few", 200, 5, speed=(0.5, 2.0)),
     "mixed": plane("mixed", 300, 30, reach=(0.3, 0.6), speed=(0.5, 2.0), battery=(0.3, 1.0), most_listed=12),
 }
-
-OPEN: dict[str, Maker] = {
-    "real (100,40) U[20,50] equal": VARIANTS["real-equal"],
-    "real (100,40) U[20,50] unequal": lambda seed: machine_covering(100, 40, 20, 50, seed, equal=False, whole=False),
-    "real (90,30) U[1,100] unequal": VARIANTS["real"],
-    "restricted (100,40) U[20,50] equal": restricted(100, 40, 20, 50),
-    "restricted (150,30) U[1,100] unequal": restricted(150, 30, 1, 100, equal=False),
-    "restricted real (100,25) U[1,100] unequal": restricted(100, 25, 1, 100, equal=False, whole=False),
-}
-"""Families of machine covering that stay open."""
 
 LARGE: dict[str, Maker] = {
     "2000/100": lambda seed: paper_like(2000, 100, 9600, seed, battery=30.0),
@@ -78,4 +51,4 @@ LARGE: dict[str, Maker] = {
 }
 """Like the paper's scenarios 3 and 4: 4.8 units of ability per agent."""
 
-KINDS = VARIANTS | OPEN | LARGE
+KINDS = VARIANTS | LARGE

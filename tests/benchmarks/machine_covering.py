@@ -1,27 +1,20 @@
-r"""Machine covering: the published tables of plans and bounds, of runs as `alloc compare --store` makes them.
+r"""Machine covering: the published tables of plans and bounds, made anew by runs as `alloc compare --store` makes them.
 
-    python tests/benchmarks/machine_covering.py target large --seeds 10 --store runs.db \
-        --publish docs/benchmarks/machine-covering.csv
-    python tests/benchmarks/machine_covering.py open --seeds 1 --methods auto local-search --time-limit 10 \
-        --store runs.db --publish docs/benchmarks/machine-covering-open.csv
+    python tests/benchmarks/machine_covering.py docs/benchmarks/machine-covering.csv --families target --store runs.db
+    python tests/benchmarks/machine_covering.py docs/benchmarks/machine-covering-open.csv --methods auto local-search \
+        --time-limit 10 --store runs.db
 
-Rows are of the first method; of others they have the gap to its bound, where families are `open`. Rows of other
-instances stay in the file. `target` are families that this project has set itself figures for; the others are of the
-kinds in the literature: `small` with n = 2m, 3m, 5m; `narrow` with n = 3m + 1 to 5m + 2; `large` with U[1, 1000];
-`tight` with n / m = 2.5 and U[n/5, n/2]; `open` ones are those of `kinds.py`. `experiments.py covering` compares
-methods on `target`.
+The column `instance` of a table says what it is of, as for `alloc compare`; a new row needs no more. Figures are of the
+first method; of others there is the gap to its bound. `experiments.py covering` compares methods.
 """
 
 import argparse
 import csv
 import sqlite3
 import time
-from collections.abc import Iterator
-from functools import partial
 from pathlib import Path
 
 from experiments import ran
-from kinds import OPEN, Maker
 
 from alloc.allocators import Budget
 from alloc.allocators.exact.makespan.configuration import ConfigurationProgramme
@@ -33,7 +26,8 @@ from alloc.allocators.exact.solver_model import Verdict
 from alloc.allocators.experiments.store.outcome import Ending
 from alloc.allocators.experiments.store.plan import unpacked
 from alloc.allocators.experiments.store.store import Store
-from alloc.problems import Instance, agent_classes, machine_covering, makespan_lower_bound
+from alloc.cli.commands.experiments.sources import gather
+from alloc.problems import Instance, agent_classes, makespan_lower_bound
 from alloc.problems.generate.covering import EQUAL_WORKLOAD
 
 CLOSE = 1e-7
@@ -42,34 +36,7 @@ CLOSE = 1e-7
 PROOF_S = 30.0
 """Seconds for prices and groups to prove a bound by themselves."""
 
-SHAPES: dict[str, list[tuple[int, int, int, int]]] = {
-    "target": [(100, 25, 1, 1000), (200, 50, 1, 1000), (400, 100, 1, 1000), (100, 40, 20, 50), (40, 16, 1, 100),
-               (60, 20, 1, 100), (30, 10, 100, 800)],
-    "small": [(k * m, m, *ends) for m in (3, 4, 5) for k in (2, 3, 5) for ends in ((1, 20), (20, 50))],
-    "narrow": [(k * m + more, m, *ends) for m in (3, 5, 7, 10) for k in (3, 4, 5) for more in (1, 2)
-               for ends in ((1, 100), (100, 200))],
-    "large": [(n, n // 4, 1, 1000) for n in (100, 200, 300, 400)],
-    "tight": [(n, 2 * n // 5, n // 5, n // 2) for n in (20, 40, 60, 100, 140)],
-}  # fmt: skip
-"""Agents, tasks, and the range of the abilities."""
-
-
-def families(names: list[str]) -> Iterator[tuple[dict[str, object], Maker]]:
-    """Yield columns of the published table, and instances of each family."""
-    for name in names:
-        if name == "open":
-            yield from (({"family": title}, maker) for title, maker in OPEN.items())
-            continue
-        for shape in SHAPES[name]:
-            owner = next(family for family, shapes in SHAPES.items() if shape in shapes)
-            for equal in (True, False):
-                columns = dict(zip(("agents", "tasks", "low", "high"), shape, strict=True))
-                workloads = "equal" if equal else "unequal"
-                yield {"family": owner, **columns, "workloads": workloads}, partial(_covering, shape, equal)
-
-
-def _covering(shape: tuple[int, int, int, int], equal: bool, seed: int) -> Instance:
-    return machine_covering(*shape, seed, equal=equal)
+Row = dict[str, str]
 
 
 def proof(instance: Instance, bound: float) -> str:
@@ -103,67 +70,49 @@ def proof(instance: Instance, bound: float) -> str:
     return "search"
 
 
-def published(
-    columns: dict[str, object], seed: int, instance: Instance, runs: dict[str, Ending], plan: str
-) -> dict[str, object]:
-    """Return the row of an instance: of the first method, and of other ones the gap to its bound."""
+def figures(row: Row, instance: Instance, runs: dict[str, Ending], plan: str) -> Row:
+    """Return all figures of an instance that a table may have."""
     first, *_ = runs.values()
     makespan, bound = first.makespan, first.lower_bound
-    row = {**columns, "seed": seed, "makespan": makespan, "lower_bound": bound}
-    end = {"seconds": round(first.runtime_s, 2), "proof": proof(instance, bound)}
-    if "agents" not in columns:
-        others = {
-            name: f"{1 - bound / run.makespan:.2e}" if run.makespan else "" for name, run in list(runs.items())[1:]
-        }
-        return {**row, "gap": f"{(makespan - bound) / makespan:.2e}", **end, **others, "plan": plan}
-    equal = columns["workloads"] == "equal"  # the figures of the literature: the least load, and its upper bound
-    loads = (round(EQUAL_WORKLOAD / makespan), int(EQUAL_WORKLOAD / bound * (1 + 1e-9))) if equal else ("", "")
-    return {**row, "min_load": loads[0], "min_load_bound": loads[1], "status": first.status, **end, "plan": plan}
-
-
-def write(rows: list[dict[str, object]], file: Path) -> None:
-    """Write rows, and what the file had of other instances, in the order of family and size."""
-    known = {key(row): row for row in rows}
-    if file.exists():
-        with file.open(newline="") as text:
-            known = {key(row): row for row in csv.DictReader(text)} | known
-    fields = list(dict.fromkeys(name for row in (rows[0], *known.values()) for name in row))
-    with file.open("w", newline="") as text:
-        writer = csv.DictWriter(text, fields, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(known[place] for place in sorted(known))
-
-
-def key(row: dict[str, object]) -> tuple[str, str, tuple[int, ...]]:
-    """Return what tells instances apart, in the order of the table."""
-    sizes = (int(str(row[name])) for name in ("tasks", "agents", "low", "high", "seed") if name in row)
-    return str(row["family"]), str(row.get("workloads", "")), tuple(sizes)
+    assert makespan is not None, f"{instance.name}: {first}"
+    assert bound is not None
+    found: dict[str, object] = {
+        name: f"{1 - bound / run.makespan:.2e}" if run.makespan else "" for name, run in runs.items()
+    }
+    found |= {"makespan": makespan, "lower_bound": bound, "gap": f"{(makespan - bound) / makespan:.2e}"}
+    found |= {"status": first.status, "seconds": round(first.runtime_s or 0.0, 2), "proof": proof(instance, bound)}
+    found["plan"] = plan
+    if row.get("workloads") == "equal":  # the figures of the literature: the least load, and its upper bound
+        found["min_load"] = round(EQUAL_WORKLOAD / makespan)
+        found["min_load_bound"] = int(EQUAL_WORKLOAD / bound * (1 + 1e-9))
+    return {name: str(value) for name, value in found.items()}
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("families", nargs="+", choices=[*SHAPES, "open"])
+    parser.add_argument("table", type=Path)
+    parser.add_argument("--families", nargs="+", help="of the table; all by default")
     parser.add_argument("--methods", nargs="+", default=["cpsat"])
     parser.add_argument("--time-limit", type=float, default=30.0)
-    parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--store", type=Path, required=True, metavar="FILE", help="where runs are kept")
-    parser.add_argument("--publish", type=Path, required=True, metavar="FILE", help="the table")
     options = parser.parse_args()
+    with options.table.open(newline="") as text:
+        table = list(csv.DictReader(text))
+    rows = [row for row in table if options.families is None or row["family"] in options.families]
+    instances = gather([row["instance"] for row in rows])
     with Store(options.store) as store, sqlite3.connect(options.store) as kept:
-        for columns, maker in families(options.families):
-            instances = [maker(seed) for seed in range(options.seeds)]
-            comparison, found = ran(store, instances, options.methods, Budget(options.time_limit))
-            rows = []
-            for seed, instance in enumerate(instances):
-                runs = {method: endings[seed] for method, endings in found.items()}
-                key = comparison.jobs[seed, options.methods[0], 0].run.key
-                tasks = unpacked(
-                    kept.execute("SELECT plan FROM plans WHERE key = ?", [key]).fetchone()[0]
-                ).task_of_agent
-                plan = " ".join("-" if task < 0 else str(task) for task in tasks)
-                rows.append(published(columns, seed, instance, runs, plan))
-            write(rows, options.publish)
-            print(f"{len(rows)} rows of {columns}", flush=True)
+        comparison, found = ran(store, instances, options.methods, Budget(options.time_limit))
+        for number, (row, instance) in enumerate(zip(rows, instances, strict=True)):
+            runs = {method: endings[number][0] for method, endings in found.items()}
+            key = comparison.jobs[number, options.methods[0], 0].run.key
+            (packed,) = kept.execute("SELECT plan FROM plans WHERE key = ?", [key]).fetchone()
+            plan = " ".join("-" if task < 0 else str(task) for task in unpacked(packed).task_of_agent)
+            row |= {name: value for name, value in figures(row, instance, runs, plan).items() if name in row}
+    with options.table.open("w", newline="") as text:
+        writer = csv.DictWriter(text, list(table[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(table)
+    print(f"{len(rows)} rows of {options.table}")
 
 
 if __name__ == "__main__":

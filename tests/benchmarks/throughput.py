@@ -20,6 +20,7 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import torch
@@ -52,19 +53,23 @@ def lay_out(size: tuple[int, int, int], instances: int, weight: float) -> tuple[
     return drawn, make_board(drawn, [1.0] * instances, [weight] * instances, np.random.default_rng(0))
 
 
-def batched(board: Board, rules: Rules, network: ActorCritic | None, seed: int, steps: int) -> tuple[int, int]:
-    """Play all games on `board` side by side."""
-    generator = torch.Generator().manual_seed(seed)
+def batched(
+    board: Board, rules: Rules, network: ActorCritic | None, steps: int, *, temperature: float = 1.0, again: bool = True
+) -> tuple[int, int]:
+    """Play games side by side, `again` once all have ended; without a network scores are random."""
+    generator = torch.Generator().manual_seed(0)
     state, decisions, bids = reset(board), 0, 0
     batch, n, c = board.shape
     for _ in range(steps):
         if bool(state.done.all()):
+            if not again:
+                break
             state = reset(board)
         if network is None:
             scores = Scores(torch.randn(batch, n, c, generator=generator), torch.zeros(batch), torch.zeros(batch))
         else:
             scores = network(board, state)
-        actions, slot = sample_actions(board, state, scores, rules, 1.0, generator)
+        actions, slot = sample_actions(board, state, scores, rules, temperature, generator)
         decisions += int((actions >= 0).sum())
         bids += int((~state.done).sum()) * n * c
         state = step(board, state, slot)
@@ -178,30 +183,20 @@ def ways(counts: Sequence[int]) -> None:
             ("at once, random", AT_ONCE, None),
             ("the paper's game (flying), random", PAPER, None),
         ):
-            games[name] = lambda b=board, r=rules, n=scored: batched(b, r, n, 0, 8)
+            games[name] = lambda b=board, r=rules, n=scored: batched(b, r, n, 8)
         rates = fastest(games)
         loop, sketch = (rate for rate, _ in list(rates.values())[:2])
         for name, (rate, bids) in rates.items():
-            at = f"{size[0]}/{size[1]}"
-            print(
-                f"| {at} | {name} | {rate:,.0f} | {rate / loop:.1f} | {rate / sketch:.1f} | {bids:,.0f} |", flush=True
-            )
+            against = f"{rate / loop:.1f} | {rate / sketch:.1f}"
+            print(f"| {size[0]}/{size[1]} | {name} | {rate:,.0f} | {against} | {bids:,.0f} |", flush=True)
 
 
 @torch.no_grad()
 def decisions(network: ActorCritic, board: Board) -> int:
     """Count the decisions in the games on a board, so many games at once as there are instances."""
-    count = 0
-    for rows in torch.arange(len(board.energy_weight), device=board.energy_weight.device).split(INSTANCES):
-        part = board[rows]
-        state = reset(part)
-        for _ in range(ROUNDS):
-            if bool(state.done.all()):
-                break
-            actions, slot = sample_actions(part, state, network(part, state))
-            count += int((actions >= 0).sum())
-            state = step(part, state, slot)
-    return count
+    parts = torch.arange(len(board.energy_weight), device=board.energy_weight.device).split(INSTANCES)
+    greedy = {"temperature": 0.0, "again": False}
+    return sum(batched(board[rows], PLANNING, network, ROUNDS, **greedy)[0] for rows in parts)
 
 
 def loops(network: ActorCritic, board: Board, threads: int) -> None:
@@ -235,25 +230,22 @@ def seconds(work: Callable[[], None], repeats: int = 3) -> float:
 
 def devices(counts: Sequence[int]) -> None:
     """Print the table of devices, for so many games at once."""
-    network = load("gappo").networks[0]  # type: ignore[attr-defined]
-    here: dict[str, Callable[[Board], None]] = {}
-    for threads in sorted({1, CORES}):
-        here[f"compiled loops, {threads} threads"] = lambda board, t=threads: loops(network, board, t)
-        here[f"torch, {threads} threads"] = lambda board, t=threads: by_torch(network, board, t)
-    where, far, there = "cpu", network, dict[str, Callable[[Board], None]]()
+    ways = [(f"{name}, {threads} threads", "cpu", way, threads) for threads in sorted({1, CORES})
+            for name, way in (("compiled loops", loops), ("torch", by_torch))]  # fmt: skip
     if torch.cuda.is_available():
-        where, far = "cuda", load("gappo", device="cuda").networks[0]  # type: ignore[attr-defined]
-        there[torch.cuda.get_device_name()] = lambda board: by_torch(far, board, 1)
+        ways.append((torch.cuda.get_device_name(), "cuda", by_torch, 1))
+    where = ways[-1][1]
+    network = {device: load("gappo", device=device).networks[0] for _, device, _, _ in ways}  # type: ignore[attr-defined]
     print("| games | by | seconds | decisions/s |\n|--:|---|--:|--:|")
     _, board = lay_out(SIZES[1], INSTANCES, 1.0)
     for games in counts:
         near = replace(board[torch.arange(games) % INSTANCES], energy_weight=torch.linspace(0.2, 3.0, games))
-        away = near.to(where)
-        count = decisions(far, away)
-        played = [(name, way, near) for name, way in here.items() if games <= MOST_HERE]
-        for name, way, own in [*played, *((name, way, away) for name, way in there.items())]:
-            spent = seconds(lambda way=way, own=own: way(own))
-            print(f"| {games} | {name} | {spent:.3f} | {count / spent:,.0f} |", flush=True)
+        boards = {"cpu": near, where: near.to(where)}
+        count = decisions(network[where], boards[where])
+        for name, device, way, threads in ways:
+            if device == "cuda" or games <= MOST_HERE:
+                spent = seconds(partial(way, network[device], boards[device], threads))
+                print(f"| {games} | {name} | {spent:.3f} | {count / spent:,.0f} |", flush=True)
 
 
 def main() -> None:

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from alloc.allocators.experiments.report.runs import require_pyarrow, runs_csv, runs_parquet
-from alloc.allocators.experiments.report.tables import Table
+from alloc.allocators.experiments.report.table import Table
 from alloc.allocators.experiments.stored import Comparison, Endings
 from alloc.problems import InputError
 from alloc.problems.formats import check_writable, write_bytes_atomically

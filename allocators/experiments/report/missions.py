@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from alloc.allocators.experiments.differences import Interval, PolicyDifference, paired_differences
 from alloc.allocators.experiments.policies import PolicyRow
-from alloc.allocators.experiments.report.tables import Table
+from alloc.allocators.experiments.report.table import Table
 from alloc.allocators.experiments.stored import Comparison, Endings, doubts
 from alloc.allocators.experiments.sweep import mean
 from alloc.problems.text import counted, number, percent

@@ -2,11 +2,13 @@
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from alloc.allocators.experiments.compare import Row
+from alloc.allocators.experiments.report.standing import standing_tables
+from alloc.allocators.experiments.report.table import Table
+from alloc.allocators.experiments.standings import best_known, standings
 from alloc.allocators.experiments.statistics import (
     CONFIDENCE,
     FACTORS,
@@ -25,27 +27,8 @@ from alloc.problems import Objective
 from alloc.problems.text import counted, number, percent
 
 
-@dataclass(frozen=True)
-class Table:
-    """A table with a title, and notes that belong to it.
-
-    Attributes
-    ----------
-    title : str
-    header : list of str
-        The first column is text, all others are numbers.
-    rows : list of list of str
-    notes : list of str
-    """
-
-    title: str
-    header: list[str]
-    rows: list[list[str]]
-    notes: list[str]
-
-
 def report_tables(comparison: Comparison, endings: Endings, rows: Sequence[Row]) -> list[Table]:
-    """Return the tables of a report: methods, outcomes, differences, profiles, and targets over time.
+    """Return the tables of a report: methods, outcomes, differences, profiles, standings, and targets over time.
 
     Parameters
     ----------
@@ -60,6 +43,9 @@ def report_tables(comparison: Comparison, endings: Endings, rows: Sequence[Row])
         tables.append(_outcome_table(endings))
     if len(endings) > 1:
         tables += [*difference_tables(comparison, endings), _profile_table(endings)]
+    run = next(iter(comparison.jobs.values())).run
+    energy = run.objective == Objective.MAKESPAN_ENERGY
+    tables += standing_tables(standings(endings, best_known(endings), run.time_limit_s, energy=energy))
     return [*tables, _target_table(comparison, endings)]
 
 

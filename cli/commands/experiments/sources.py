@@ -104,6 +104,7 @@ def covering(
     ability_max: float = 1000,
     workload: str = "equal",
     integer: bool = True,
+    choices: int | None = None,
 ) -> "Instance":
     """Return an instance of machine covering, by the parameters of ``alloc generate covering``.
 
@@ -121,4 +122,4 @@ def covering(
         if real(value, name) != int(value):
             raise InputError(f"must be a whole number here, got {value}", name)
     equal, ends = workload == "equal", (int(ability_min), int(ability_max))
-    return machine_covering(agents, tasks, *ends, seed, equal=equal, whole=integer)
+    return machine_covering(agents, tasks, *ends, seed, equal=equal, whole=integer, choices=choices)

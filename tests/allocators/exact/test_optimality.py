@@ -14,19 +14,30 @@ def exact(request: pytest.FixtureRequest) -> Allocator:
     return load(request.param)
 
 
-@pytest.mark.parametrize("seed", [pytest.param(one, marks=[pytest.mark.slow] * (one >= 24)) for one in range(60)])
-def test_answer_is_that_of_brute_force(exact, seed):
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Compare 60 tiny instances, each with one of the objectives; with --draws that many, with both."""
+    if "objective" in metafunc.fixturenames:
+        draws = metafunc.config.getoption("--draws")
+        cases = [
+            pytest.param(seed, goal, marks=[pytest.mark.slow] * (seed >= 24))
+            for seed in range(draws or 60)
+            for goal in ("makespan", "makespan-energy")
+            if draws or (goal == "makespan") == (seed % 3 == 0)
+        ]
+        metafunc.parametrize(("seed", "objective"), cases)
+
+
+def test_answer_is_that_of_brute_force(exact, seed, objective):
     """On tiny instances of every sort the answer is the optimum, or the best partial plan, and is known to be."""
     instance = tiny_instance(seed)
     best = brute_force(instance)
-    energy_counts = (seed % 3) > 0
-    result = solve(instance, exact, objective="makespan-energy" if energy_counts else "makespan", time_limit_s=60)
+    result = solve(instance, exact, objective=objective, time_limit_s=60)
     assert result.evaluation is not None
     assert not result.evaluation.violations
     assert result.status is (Status.INFEASIBLE if best.unserved else Status.OPTIMAL)
     assert len(result.evaluation.unserved_tasks) == best.unserved == fewest_unserved(instance)
     assert result.evaluation.served_makespan == pytest.approx(best.makespan, rel=1e-6)
-    if energy_counts:
+    if objective == "makespan-energy":
         assert result.evaluation.energy == pytest.approx(best.energy, rel=1e-6)
 
 

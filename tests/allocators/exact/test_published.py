@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from alloc.cli.commands.experiments.sources import gather
 from alloc.problems import Allocation, evaluate, machine_covering, makespan_lower_bound
 
 TABLE = Path(__file__).parents[3] / "docs" / "benchmarks" / "machine-covering.csv"
@@ -25,6 +26,11 @@ def test_every_plan_has_the_published_makespan_and_no_bound_is_above_it() -> Non
     for row in rows():
         shape = (int(row[name]) for name in ("agents", "tasks", "low", "high", "seed"))
         instance = machine_covering(*shape, equal=row["workloads"] == "equal")
+        (named,) = gather([row["instance"]])
+        assert (named.ability.tolist(), named.workload.tolist()) == (
+            instance.ability.tolist(),
+            instance.workload.tolist(),
+        )
         plan = Allocation(np.array([-1 if task == "-" else int(task) for task in row["plan"].split()]))
         score, bound = evaluate(instance, plan), float(row["lower_bound"])
         assert len(score.unserved_tasks) == 0

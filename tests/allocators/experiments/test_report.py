@@ -10,7 +10,9 @@ import pytest
 from alloc.allocators import Budget
 from alloc.allocators.experiments.report import runs as runs_module
 from alloc.allocators.experiments.report.files import check_report, latex, write_report
-from alloc.allocators.experiments.report.tables import Table, report_tables
+from alloc.allocators.experiments.report.table import Table
+from alloc.allocators.experiments.report.tables import report_tables
+from alloc.allocators.experiments.standings import best_known, standings
 from alloc.allocators.experiments.store.key import Run
 from alloc.allocators.experiments.store.outcome import Ending, Outcome
 from alloc.allocators.experiments.store.store import Store
@@ -21,7 +23,15 @@ TRACE = ((0.25, None, 3.0, None), (0.5, 1.0, 2.0, 1.0))
 
 
 def ending(makespan, **others):
-    figures = {"makespan": makespan, "energy": 2.0, "gap": 0.1, "runtime_s": 0.5, "unserved": 0, "status": "feasible"}
+    figures = {
+        "makespan": makespan,
+        "served_makespan": makespan,
+        "energy": 2.0,
+        "gap": 0.1,
+        "runtime_s": 0.5,
+        "unserved": 0,
+        "status": "feasible",
+    }
     return Ending(outcome=Outcome.SOLVED, trace=TRACE, **{**figures, **others})
 
 
@@ -51,6 +61,8 @@ def test_tables_tell_what_was_compared_and_how_it_ended(compared):
         "Against a_1: T",
         "Against a_1: energy",
         "Performance profiles",
+        "Against the best known",
+        "Beside the others",
         "Targets over time",
     ]
     assert tables["Methods"].rows == [
@@ -66,6 +78,22 @@ def test_tables_tell_what_was_compared_and_how_it_ended(compared):
     assert "Up to 1 instance left out" in notes
     assert tables["Performance profiles"].rows[1][1:] == ["0 %"] * 6 + ["75 %"] * 2
     assert tables["Targets over time"].rows[0][-1] == "100 %"
+
+
+def test_standings_tell_who_is_first_and_how_far_behind_the_others_are(compared):
+    """Who has the best answer, or shares it, is first; late runs never are; behind is told of what served all tasks."""
+    tables = {table.title: table for table in report_tables(*compared)}
+    (best, other), beside = tables["Against the best known"].rows, tables["Beside the others"].rows
+    assert best[:5] == ["a_1", "1", "1", "8 of 8", "0"]
+    assert other[:4] == ["b", "1.5", "1.5", "0 of 8"]
+    assert best[7:10] == ["1.000", "1.000", "1.000"]
+    assert beside[0][1:3] == ["-33.333%", "-33.333%"]
+    assert beside[1][1:3] == ["+50.000%", "+50.000%"]
+    assert [row[5] for row in beside] == ["8", "0"]
+    assert [row[-1] for row in beside] == ["0", "1"]
+    late = {"a": [[ending(1.0, runtime_s=1.3)]], "b": [[ending(2.0)]]}
+    assert [one.first for one in standings(late, best_known(late), 1.0, energy=True).values()] == [0, 1]
+    assert [one.first for one in standings(late, best_known(late), 2.0, energy=True).values()] == [1, 0]
 
 
 def test_runs_that_had_to_share_processors_are_told():

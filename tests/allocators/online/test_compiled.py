@@ -1,6 +1,8 @@
 """Policies that are no networks in compiled loops, against the reference, and their tuning."""
 
+import dataclasses
 import math
+import random
 from pathlib import Path
 
 import pytest
@@ -11,7 +13,7 @@ from alloc.allocators.online.compiled.run import run_compiled
 from alloc.allocators.online.compiled.tuning import tune
 from alloc.problems import InputError, MissionParameters, random_mission
 from alloc.problems.missions.mission import Mission
-from alloc.problems.missions.radio import Burst, Radio
+from alloc.problems.missions.radio import Burst, Pace, Radio
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]  # loops are compiled first: half a minute, more under load
 
@@ -49,6 +51,40 @@ def test_compiled_runs_have_the_measures_of_the_reference(name: str, settings: d
         for kind in ("mission_time", "tasks_done", "energy", "switches", "messages", "bytes"):
             value = getattr(expected, kind)
             assert getattr(found, kind) == (None if value is None else pytest.approx(value, rel=1e-9)), (seed, kind)
+
+
+LOOPS = ("nearest", "greedy", "hedonic", "auction", "gappo")
+FAMILIES = ("steady", "waves", "hot-spots", "failures", "recharging", "growth", "deadlines", "silence")
+
+
+def drawn_mission(seed: int) -> Mission:
+    """Return a small mission of any family, with any radio."""
+    rng, family = random.Random(seed), FAMILIES[seed % len(FAMILIES)]
+    knowledge = rng.choice(["local"] * 9 + ["full"])
+    mission = random_mission(MissionParameters(family, rng.randint(2, 6), rng.randint(2, 8), knowledge=knowledge), seed)
+    burst = Burst(rng.uniform(0.1, 2), rng.uniform(0.1, 2), rng.uniform(0, 0.3), rng.uniform(0.5, 1))
+    radio = Radio(
+        radius=rng.choice([0.15, 0.3, 0.6, math.inf]),
+        period=rng.choice([0.1, 0.25, 0.37]),
+        loss=rng.choice([0.0, 0.2, 0.8]),
+        delay=rng.choice([0.0, 0.0, 0.05, 0.31]),
+        burst=rng.choice([None, None, burst]),
+    )
+    kept = {name: getattr(mission, name) for name in KEPT if name != "sensing"}
+    pace = rng.choice([None, None, None, Pace(1, 2, 1)])
+    return Mission(mission.instance, **kept, radio=radio, pace=pace, sensing=rng.choice([0.15, 0.3, 0.6, math.inf]))
+
+
+def test_drawn_missions_have_all_measures_of_the_reference(request: pytest.FixtureRequest) -> None:
+    """In small missions of all families and radios all measures agree, but for the times of decisions."""
+    for seed in range(request.config.getoption("--draws") or 40):
+        mission, policy = drawn_mission(seed), load_policy(LOOPS[seed // len(FAMILIES) % len(LOOPS)])
+        expected = dataclasses.asdict(simulate(mission, policy, seed=seed).result)
+        found = dataclasses.asdict(run_compiled(mission, policy, seed))
+        for name, value in expected.items():
+            if not name.startswith(("decision", "runtime")):
+                same = pytest.approx(value, rel=1e-9, abs=1e-9) if isinstance(value, float) else value
+                assert found[name] == same, (seed, policy.info.name, name)
 
 
 def test_a_grid_finds_who_is_near() -> None:

@@ -38,6 +38,11 @@ def test_machine_covering_is_the_generator_s(alloc):
     options = ("--agents", "9", "--tasks", "4", "--ability-min", "20", "--ability-max", "50", "--workload", "uniform")
     assert alloc("generate", "covering", *options, "--seed", "1", "--output", "u.json").code == 0
     assert to_document(read_instance("u.json")) == to_document(machine_covering(9, 4, 20, 50, 1, equal=False))
+    assert alloc("generate", "covering", "--choices", "3", "--output", "r.json").code == 0
+    assert to_document(read_instance("r.json")) == to_document(machine_covering(100, 25, 1, 1000, 0, choices=3))
+    refused = alloc("generate", "random", "--choices", "3")
+    assert refused.code == 2
+    assert "is for covering, not for random" in refused.err
 
 
 @pytest.mark.parametrize(

@@ -30,6 +30,18 @@ def test_real_abilities():
     assert ((ability >= 1) & (ability <= 100)).all()
 
 
+def test_restricted_agents_have_few_choices():
+    """With choices abilities are the same, and agents may take up to so many tasks, one of them by their number."""
+    free, restricted = machine_covering(20, 6, 1, 9, 0), machine_covering(20, 6, 1, 9, 0, choices=3)
+    assert np.array_equal(free.ability, restricted.ability)
+    assert free.allowed_tasks is None
+    assert all(i % 6 in tasks and 2 <= len(tasks) <= 3 for i, tasks in enumerate(restricted.allowed_tasks))
+    assert len({tuple(tasks) for tasks in restricted.allowed_tasks}) > 10
+    for choices in (0, 7):
+        with pytest.raises(InputError, match="must be"):
+            machine_covering(20, 6, 1, 9, 0, choices=choices)
+
+
 @pytest.mark.parametrize(
     "arguments", [(0, 1, 1, 9, 0), (1, 0, 1, 9, 0), (1, 1, 0, 9, 0), (1, 1, 5, 4, 0), (1, 1, 1, 9, -1)]
 )

@@ -1,13 +1,4 @@
-r"""Published programs and a plain model as methods of `alloc compare`.
-
-    export PYTHONPATH=tests/benchmarks:FOLDER    # with peers-1.0.dist-info and, for pygrape, pyGRAPE.py
-    alloc compare paper-1:0-4 'covering[agents=9,tasks=3,ability_max=20]:0-4' --time-limit 3 \
-        --methods cpsat,'milp[plain=true]','cpsat[plain=true]',prtpy --store peers.db --report peers.md
-
-`classes` is one maximisation of 1 / T by CP-SAT over classes of agents alike, for whole abilities and workloads;
-`prtpy` its integer programme for the weighted largest smallest sum (pip install alloc-mrta[bench]); `pygrape` is
-github.com/inmo-jang/pyGRAPE, in which agents hear each other up to `communication_radius`.
-"""
+"""Published programs and a plain model as methods: `prtpy`, `pygrape` and `classes`; README.md says what they are."""
 
 import sys
 import types

@@ -1,0 +1,167 @@
+"""How methods stand: against the best known of each instance, and beside each other on the same one."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from alloc.allocators.experiments.statistics import EQUAL
+from alloc.allocators.experiments.store.outcome import Ending, Outcome
+from alloc.allocators.experiments.stored import Endings
+
+ALIKE = 1e-4
+"""Relative difference up to which makespans allow to compare energies."""
+
+LATE, LATE_S = 1.2, 0.02
+"""A run is late when it takes longer than this factor times its time limit and so many seconds more."""
+
+Score = tuple[float, float, float]
+WORST: Score = (np.inf, np.inf, np.inf)
+
+
+@dataclass(frozen=True)
+class Best:
+    """What is known of an instance.
+
+    Attributes
+    ----------
+    bound : float
+        The greatest that was proven of the makespan.
+    makespan : float
+        The least that was found; infinite where there is none.
+    energy : float
+        The least at a makespan that is at most 0.01 % more; NaN where there is none.
+    """
+
+    bound: float
+    makespan: float
+    energy: float
+
+    @classmethod
+    def of(cls, endings: Sequence[Ending]) -> "Best":
+        """Return the best of all runs on one instance."""
+        solved = [(one.makespan, one.energy) for one in endings if one.makespan is not None and one.energy is not None]
+        makespan = min((one for one, _ in solved), default=np.inf)
+        energies = [energy for one, energy in solved if one <= makespan * (1 + ALIKE)]
+        bound = max((one.lower_bound or 0.0 for one in endings), default=0.0)
+        return cls(bound, makespan, min(energies, default=np.nan))
+
+
+@dataclass(frozen=True)
+class Stand:
+    """A run that served what it could, against the best known of its instance and beside the others there.
+
+    Attributes
+    ----------
+    ending : Ending
+    beyond_bound : float
+        By which part its makespan is above the bound.
+    is_least : bool
+        Whether no makespan is known that is less.
+    energy_ratio : float
+        Of its energy to the least known; NaN where there is none.
+    behind, energy_behind : float
+        By which part its makespan, and its energy at no less makespan, are above the least of the others; below 0 it
+        leads. NaN where there is none to compare with.
+    """
+
+    ending: Ending
+    beyond_bound: float
+    is_least: bool
+    energy_ratio: float
+    behind: float
+    energy_behind: float
+
+
+@dataclass(frozen=True)
+class Standing:
+    """How a method stands on some instances.
+
+    Attributes
+    ----------
+    stands : list of Stand
+        Of the runs that have a makespan.
+    runs : int
+        How many there are of it.
+    first : int
+        Runs that no other method had a better answer than: fewer tasks unserved, then less makespan, then, if that is
+        an objective, less energy; several can be. Late runs are never first.
+    """
+
+    stands: list[Stand]
+    runs: int
+    first: int
+
+
+def best_known(endings: Endings) -> list[Best]:
+    """Return the best of each instance that a comparison has."""
+    by_instance = zip(*endings.values(), strict=True)
+    return [Best.of([one for runs in lists for one in runs if one is not None]) for lists in by_instance]
+
+
+def standings(
+    endings: Endings, bests: Sequence[Best], time_limit_s: float | None, *, energy: bool
+) -> dict[str, Standing]:
+    """Return how each method stands.
+
+    Parameters
+    ----------
+    endings : mapping
+        How runs ended, by method, instance and seed.
+    bests : sequence of Best
+        By instance.
+    time_limit_s : float, optional
+        Of each run.
+    energy : bool
+        Whether the energy is an objective.
+    """
+    limit_s = np.inf if time_limit_s is None else LATE * time_limit_s + LATE_S
+    runs = {label: [one for seeds in lists for one in seeds] for label, lists in endings.items()}
+    of_run = [best for best, seeds in zip(bests, next(iter(endings.values())), strict=True) for _ in seeds]
+    scores = {label: [_score(one, limit_s, energy=energy) for one in some] for label, some in runs.items()}
+    least = [min(together) for together in zip(*scores.values(), strict=True)]
+    found = {}
+    for label, own in runs.items():
+        others = [[some[number] for rival, some in runs.items() if rival != label] for number in range(len(own))]
+        stands = [
+            _stand(one, best, rivals)
+            for one, best, rivals in zip(own, of_run, others, strict=True)
+            if one is not None and one.served_makespan is not None
+        ]
+        first = sum(one == best < WORST for one, best in zip(scores[label], least, strict=True))
+        found[label] = Standing(stands, len(own), first)
+    return found
+
+
+def _score(ending: Ending | None, limit_s: float, *, energy: bool) -> Score:
+    """Return what is compared, the less the better: figures that are equal are made so, late answers are the worst."""
+    if ending is None or ending.outcome is not Outcome.SOLVED or ending.served_makespan is None:
+        return WORST
+    if (ending.runtime_s or 0.0) > limit_s:
+        return WORST
+    figures = (float(ending.unserved or 0), ending.served_makespan, ending.energy or 0.0 if energy else 0.0)
+    unserved, makespan, least = (float(f"{figure:.9g}") for figure in figures)
+    return unserved, makespan, least
+
+
+def _stand(ending: Ending, best: Best, others: Sequence[Ending | None]) -> Stand:
+    makespan = np.nan if ending.served_makespan is None else ending.served_makespan
+    behind, energy_behind = _behind(ending, others)
+    return Stand(
+        ending,
+        beyond_bound=makespan / best.bound - 1 if best.bound else np.nan,
+        is_least=makespan <= best.makespan * (1 + EQUAL),
+        energy_ratio=(ending.energy or 0.0) / best.energy if best.energy else np.nan,
+        behind=behind,
+        energy_behind=energy_behind,
+    )
+
+
+def _behind(own: Ending, others: Sequence[Ending | None]) -> tuple[float, float]:
+    served = [(one.makespan, one.energy) for one in others if one is not None and one.makespan is not None]
+    if own.makespan is None or not served:
+        return np.nan, np.nan
+    energies = [energy for makespan, energy in served if energy is not None and makespan <= own.makespan * (1 + EQUAL)]
+    least, fastest = min(energies, default=0.0), min(makespan for makespan, _ in served)
+    behind = own.makespan / fastest - 1 if fastest else np.nan
+    return behind, (own.energy or 0.0) / least - 1 if least else np.nan
