@@ -1,1 +1,1 @@
-"""Groups of agents that hear of each other: what was planned for whom, and where each looks around."""
+"""Groups of agents that hear of each other: what was planned for whom."""

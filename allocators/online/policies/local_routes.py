@@ -8,8 +8,8 @@ from typing import ClassVar
 from alloc.allocators.contract.parameters import bounded
 from alloc.allocators.online.contract import AgentDecider, Briefing, Policy, PolicyInfo
 from alloc.allocators.online.groups.announced import Announced, Route
-from alloc.allocators.online.groups.spreading import Lookout
 from alloc.allocators.online.policies.routes import DEADLINE_SHARE, RoutesParameters
+from alloc.allocators.online.policies.spreading import Lookout
 from alloc.allocators.online.routes.describe import Describer, Foresight
 from alloc.allocators.online.routes.plan import finish_hours, improved, warm_up
 from alloc.problems.missions.simulation.places import Place

@@ -6,7 +6,7 @@ import pytest
 from alloc.allocators import simulate
 from alloc.allocators.online.contract import Briefing
 from alloc.allocators.online.groups.announced import Announced, Route
-from alloc.allocators.online.groups.spreading import Lookout
+from alloc.allocators.online.policies.spreading import Lookout
 from alloc.problems import Instance, Mission, Radio
 from alloc.problems.missions.simulation.places import Place
 from alloc.problems.missions.simulation.simulation import Simulation
