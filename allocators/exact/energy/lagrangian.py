@@ -15,11 +15,11 @@ Geoffrion (1974), Lagrangean relaxation for integer programming, doi:10.1007/BFb
 """
 
 from collections import deque
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from alloc.allocators.exact.energy.clusters import Clusters, cluster_tasks
+from alloc.allocators.exact.energy.clusters import Clusters, cluster_tasks, overlapping_clusters
 from alloc.allocators.exact.energy.cuts.cutting_planes import CuttingPlanes, is_small
 from alloc.allocators.exact.energy.energy_model import EnergyModel
 from alloc.allocators.exact.energy.subproblems import solve_subproblems
@@ -116,8 +116,12 @@ class LagrangianBound:
         self.bound, self._model = 0.0, model
         self._member = None
         links = len(model.need) * len(model.class_of_pair)
+        self._cut_member = np.zeros((0, len(model.need)), dtype=bool)
         if model.ability is not None and len(model.need) > 3 and links <= MAX_LINKS:
-            self._member = cluster_tasks(task_distance)
+            if self.may_be_cut:  # then prices that clusters pay would only converge more slowly than their cuts
+                self._cut_member = overlapping_clusters(task_distance)
+            else:
+                self._member = cluster_tasks(task_distance)
         self._clusters: Clusters | None = None
         self._price, self._cluster_price = price, np.zeros(0)
         self._direction = (np.zeros(len(model.count)), np.zeros(0))
@@ -151,12 +155,7 @@ class LagrangianBound:
 
     def cutting_planes(self, plan: WholeArray) -> CuttingPlanes:
         """Return an ascent that goes on from here, given the agents of each pair of a plan, shape (p,)."""
-        model, clusters, cost, constant = self._model, self._clusters, self._model.cost, 0.0
-        if clusters is not None:
-            cost = cost + clusters.link @ self._cluster_price
-            _, _, constant = solve_subproblems(clusters.model, -self._cluster_price, compare=False)
-        groups = [plan[self.kept], *self._groups]
-        return CuttingPlanes(replace(model, cost=cost), constant, self._price, groups)
+        return CuttingPlanes(self._model, self._cut_member, self._price, [plan[self.kept], *self._groups])
 
     def ascend(self, rounds: int, cost: float) -> None:
         """Change prices `rounds` times, given the cost of a plan at hand."""

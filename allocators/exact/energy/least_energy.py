@@ -4,6 +4,7 @@ import sys
 from contextlib import nullcontext
 
 from alloc.allocators.contract.search import Search
+from alloc.allocators.exact.energy.cuts.group_programme import GroupProgramme
 from alloc.allocators.exact.energy.places import nearest_places, without_idlers
 from alloc.allocators.exact.energy.primal_dual import REPEATABLE_SLICES, PrimalDual
 from alloc.allocators.exact.energy.state import EnergyState
@@ -16,6 +17,15 @@ from alloc.problems.evaluation import last_equal
 
 SHARE_WITHOUT_SOLVER = 0.3
 """Share of the time before which the solver does not run."""
+
+SHARE_WITHOUT_GROUPS = 0.1
+"""Share of the time before which groups are not counted, as better plans soon make them fewer."""
+
+MOST_GROUPS = 2500, 15_000
+"""Groups of tasks up to which, first and then, an integer programme picks among them where bounds rise no more."""
+
+PROVEN = 1e-7
+"""Relative gap that solvers leave by their tolerances."""
 
 SMALL_PAIRS = 3000
 """Pairs of class and task that a better plan may have, up to which the solver comes next even if bounds still rise."""
@@ -62,29 +72,49 @@ def _least_cost(state: EnergyState, solver: Solver) -> float:
         state.submit(None)
     if both is None:
         return _solve_rest(state, solver).bound
-    _close_gap(state, both)
+    groups = _close_gap(state, both)
     if both.closed or is_over(search):
         return both.bound
-    answer = _solve_rest(state, solver)
-    return max(both.bound, min(answer.bound, state.cost))
+    bound = both.bound
+    for most in MOST_GROUPS:
+        if bound < state.cost * (1 - PROVEN) and not is_over(search):
+            groups = groups or both.groups_of_cheapest(most)
+            bound = bound if groups is None else max(bound, _solve_groups(state, both, groups))
+            groups = None
+    if bound < state.cost * (1 - PROVEN) and not is_over(search):
+        bound = max(bound, _solve_rest(state, solver).bound)
+    return min(max(bound, both.bound), state.cost)
 
 
-def _close_gap(state: EnergyState, both: PrimalDual) -> None:
-    """Work on both sides until bounds hardly rise any more, and a part of the time has passed."""
+def _close_gap(state: EnergyState, both: PrimalDual) -> GroupProgramme | None:
+    """Work on both sides until better plans have few groups, or bounds hardly rise any more; return these groups."""
     search = state.search
     if state.repeatable:
         for number in range(REPEATABLE_SLICES):
             if both.closed or search.interrupted:
-                return
+                return None
             state.submit(both.repeat(number))
-        return
+        return None
     with Pool(1) as pool:
         while not (is_over(search) or both.closed):
             progress = state.progress
             is_ready = both.converged or (both.is_rising_slowly and len(both.keep) <= SMALL_PAIRS)
-            if progress >= 1 or (is_ready and progress >= SHARE_WITHOUT_SOLVER):
-                return
+            groups = None if progress < SHARE_WITHOUT_GROUPS else both.few_groups()
+            if groups is not None or progress >= 1 or (is_ready and progress >= SHARE_WITHOUT_SOLVER):
+                return groups
             state.submit(both.run(min(1.0, progress), pool if state.spare_threads else None))
+    return None
+
+
+def _solve_groups(state: EnergyState, both: PrimalDual, groups: GroupProgramme) -> float:
+    """Pick the best of the groups that a better plan may have; return a bound."""
+    search = state.search
+    monitor = SolverMonitor(search, state.model, state.demand, state.until_s)
+    counts, bound = groups.solve(monitor, search.seed, repeatable=state.repeatable)
+    search.iteration += 1
+    if counts is not None:
+        search.submit(both.allocation(groups, counts))
+    return bound
 
 
 def _solve_rest(state: EnergyState, solver: Solver) -> Answer:

@@ -1,16 +1,15 @@
 """Close the gap on the energy from both sides: plans by pairwise repartition, bounds by Lagrangian relaxation."""
 
-import time
-from collections.abc import Callable
-
 import numpy as np
 
 from alloc.allocators.exact.demand import Demand
 from alloc.allocators.exact.energy.cuts.cutting_planes import CuttingPlanes
+from alloc.allocators.exact.energy.cuts.group_programme import GroupProgramme
 from alloc.allocators.exact.energy.energy_model import MAX_NEED, EnergyModel, round_demand
 from alloc.allocators.exact.energy.lagrangian import LagrangianBound
 from alloc.allocators.exact.energy.linear import class_prices
 from alloc.allocators.exact.energy.pairwise_search import PairwiseSearch, Perturbation
+from alloc.allocators.exact.energy.timer import Timer
 from alloc.allocators.exact.model import ROUNDING, Model
 from alloc.allocators.parallel.pool import Pool
 from alloc.problems import IDLE, Allocation, Instance
@@ -25,14 +24,20 @@ STATES = 2000
 MAX_TASKS = 2000
 """Tasks above which neither side is used, for its memory."""
 
-SLICE_S = 0.01
-"""Time of each side in one call of `PrimalDual.run`."""
-
 MAX_LEAD_S = 0.1
 """How much more time one side may have had before it waits for the other."""
 
 MAX_CUT_ROUNDS = 5
 """Rounds of cutting planes in one call, of which one may take as long as many of subgradients."""
+
+FEW_GROUPS = 2500
+"""Groups of all tasks up to which an integer programme picks among them while bounds rise."""
+
+PARTS = 1.0, 0.7, 0.5, 0.35, 0.25
+"""Parts of the gap tried in turn, until the groups within are few enough."""
+
+LESS_GAP = 0.9
+"""Part of the last gap at which groups are counted again."""
 
 REPEATABLE_SLICES, REPEATABLE_ROUNDS = 60, 10
 """Slices, and rounds in each, where effort is counted."""
@@ -48,28 +53,9 @@ def compile_loops() -> None:
     for weight in (one, np.ones(2)):
         model = EnergyModel(two, two, weight, one, np.ones(2), weight, one, one, one, None)
         LagrangianBound(model, np.zeros((2, 2)), np.zeros(2)).ascend(1, 3.0)
-        CuttingPlanes(model, 0.0, np.zeros(2), [one]).ascend(1)
-
-
-class Timer:
-    """Adapts the number of rounds to a slice of time, by how long the last ones took.
-
-    Attributes
-    ----------
-    spent_s : float
-        Time of all rounds so far.
-    """
-
-    def __init__(self) -> None:
-        self._rounds, self.spent_s = 1, 0.0
-
-    def run(self, work: Callable[[int], None]) -> None:
-        """Do as many rounds as fit."""
-        begin = time.monotonic()
-        work(self._rounds)
-        took = max(time.monotonic() - begin, 1e-5)
-        self.spent_s += took
-        self._rounds = int(np.clip(self._rounds * np.clip(SLICE_S / took, 0.25, 2.0), 1, 100_000))
+        cuts = CuttingPlanes(model, np.zeros((0, 2), dtype=bool), np.zeros(2), [one])
+        cuts.ascend(1, 3.0)
+        cuts.all_groups(3.0, 10)
 
 
 class PrimalDual:
@@ -97,6 +83,7 @@ class PrimalDual:
         self._cuts: CuttingPlanes | None = None
         self._primal = _begin_primal(instance, model, demand, plan, task_distance, seed)
         self._reported = self._cost = _cost_of_plan(instance, plan)
+        self._gap_tried = np.inf
         self._primal_timer, self._dual_timer = Timer(), Timer()
         self._descended = self._primal is None
 
@@ -140,10 +127,43 @@ class PrimalDual:
             return self._cuts.converged
         return self._dual is None or (self._dual.is_rising_slowly and not self._dual.may_be_cut)
 
+    def few_groups(self) -> GroupProgramme | None:
+        """Return all groups of which better plans consist where they are few; else None, until the gap is less."""
+        if self._cuts is None:
+            return None
+        gap = self._cost - self._cuts.bound
+        if gap > LESS_GAP * self._gap_tried:
+            return None
+        self._gap_tried = gap
+        return self._cuts.all_groups(self._cost, FEW_GROUPS)
+
+    def groups_of_cheapest(self, most: int) -> GroupProgramme | None:
+        """Return all groups of which the plans consist that cost less than a part of the gap above the bound.
+
+        The part is as large as it can be with at most so many groups; None if even the least has more.
+        """
+        if self._cuts is None:
+            return None
+        bound = self._cuts.bound
+        tried = (self._cuts.all_groups(bound + part * (self._cost - bound), most) for part in PARTS)
+        return next((groups for groups in tried if groups is not None), None)
+
+    def allocation(self, programme: GroupProgramme, counts: IntArray) -> Allocation:
+        """Turn numbers of agents of the pairs of a programme by `few_groups` into an allocation."""
+        full = np.zeros(len(self._demand.class_of_pair), dtype=np.intp)
+        full[self._kept] = counts
+        return self._model.allocation(self._demand, full)
+
     @property
     def keep(self) -> IntArray:
         """Which pairs of the demand a better plan may have, sorted."""
-        return self._pairs if self._dual is None else np.sort(self._pairs[self._dual.kept])
+        return np.sort(self._kept)
+
+    @property
+    def _kept(self) -> IntArray:
+        """Pairs of the demand that the dual side has kept, in its order."""
+        kept = self._pairs if self._dual is None else self._pairs[self._dual.kept]
+        return kept if self._cuts is None else kept[self._cuts.kept]
 
     def run(self, progress: float, pool: Pool | None) -> Allocation | None:
         """Work on both sides for some 10 ms each; return a plan if a better one was found.
@@ -180,7 +200,10 @@ class PrimalDual:
     def note_plan(self, plan: Allocation, cost: float) -> None:
         """Take note of a plan that was submitted, and of its cost."""
         if cost <= self._cost:
+            is_better = cost < self._cost * (1 - 1e-9)
             self._plan, self._cost = plan, cost
+            if self._dual is not None and self._cuts is not None and is_better:
+                self._cuts.note_plan(self._counts[self._dual.kept])
 
     def _descend(self) -> Allocation | None:
         """Descend before prices change, as their steps depend on the cost of the plan at hand."""
@@ -196,12 +219,12 @@ class PrimalDual:
         if self._dual is None:
             return
         if self._cuts is None and self._dual.is_nearly_optimal and self._dual.may_be_cut:
-            self._cuts = self._dual.cutting_planes(self._model.counts(self._demand, self._plan)[self._pairs])
-            self._cuts.ascend(1)  # no more, as this turn also takes the time to build them
+            self._cuts = self._dual.cutting_planes(self._counts)
+            self._cuts.ascend(1, self._cost)  # no more, as this turn also takes the time to build them
         elif self._cuts is None:
             self._dual.ascend(rounds, self._cost)
         else:
-            self._cuts.ascend(min(rounds, MAX_CUT_ROUNDS))
+            self._cuts.ascend(min(rounds, MAX_CUT_ROUNDS), self._cost)
 
     def _better(self) -> Allocation | None:
         """Return the best plan if it has not been returned yet."""
@@ -210,6 +233,11 @@ class PrimalDual:
         self._reported = self._primal.cost
         tasks = np.append(self._model.tasks, IDLE)
         return Allocation(tasks[self._primal.best])
+
+    @property
+    def _counts(self) -> IntArray:
+        """Agents of each pair of the dual side in the best plan."""
+        return self._model.counts(self._demand, self._plan)[self._pairs]
 
     def _begin_dual(self, task_distance: FloatArray, seconds: float) -> LagrangianBound | None:
         """Start the dual side; None where its tables are too large."""

@@ -12,10 +12,13 @@ Dantzig-Wolfe decomposition for linear mixed-integer programming, doi:10.1016/S0
 """
 
 import numpy as np
+from scipy.sparse import csr_array, vstack
 
+from alloc.allocators.exact.energy.cuts.all_groups import write_groups
 from alloc.allocators.exact.energy.cuts.group_master import GroupMaster
+from alloc.allocators.exact.energy.cuts.group_programme import GroupProgramme
 from alloc.allocators.exact.energy.cuts.pricing import STEPS, price_groups
-from alloc.allocators.exact.energy.energy_model import EnergyModel
+from alloc.allocators.exact.energy.energy_model import EnergyModel, Mask
 from alloc.allocators.exact.energy.subproblems import solve_subproblems
 from alloc.allocators.exact.knapsack import WholeArray
 from alloc.problems.instance import FloatArray
@@ -25,6 +28,9 @@ SMOOTHING = 0.7
 
 PRECISION = 1e-5
 """Relative difference between bound and programme at which cuts are added."""
+
+MOST_KEPT = 0.95
+"""Part of the pairs that are left at the most where some are dropped."""
 
 MAX_PAIRS, MAX_CLASSES, MAX_CELLS, MAX_USES = 30_000, 1000, 20_000_000, 200_000
 """Pairs of class and task, classes, cells of all tables of a round, and tasks times classes, above which all this takes
@@ -46,9 +52,8 @@ class CuttingPlanes:
     Parameters
     ----------
     model : EnergyModel
-        Its costs include what clusters are paid.
-    constant : float
-        Added to all costs and bounds: what the clusters cost.
+    member : ndarray of bool, shape (f, t)
+        Clusters of tasks.
     price : ndarray, shape (k,)
         To begin with.
     groups : list of ndarray of int, shape (p,)
@@ -58,55 +63,127 @@ class CuttingPlanes:
     ----------
     bound : float
         No plan costs less.
+    kept : ndarray of bool, shape (p,)
+        Pairs that have not been dropped, as no better plan has them.
     converged : bool
         Whether the mixture violates no cut, or the programme could not be solved.
     """
 
-    def __init__(self, model: EnergyModel, constant: float, price: FloatArray, groups: list[WholeArray]) -> None:
-        self._model, self._constant = model, constant
+    def __init__(self, model: EnergyModel, member: Mask, price: FloatArray, groups: list[WholeArray]) -> None:
+        self._model = model
         self._weight, self._need = model.weight.astype(np.float64), model.need.astype(np.float64)
-        self._master, self._smoothing = GroupMaster(model), SMOOTHING
+        self._master, self._smoothing = GroupMaster(model, member), SMOOTHING
         for group in groups:
             self._master.add(group)
         self._price, self._penalty = price, np.zeros(0)
         self.bound, self.converged = -np.inf, False
+        self.kept = np.ones(len(model.copies), dtype=bool)
 
-    def ascend(self, rounds: int) -> None:
-        """Do so many rounds of pricing."""
+    def ascend(self, rounds: int, cost: float) -> None:
+        """Do so many rounds of pricing, given the cost of a plan at hand."""
         for _ in range(rounds):
-            if not self.converged:
-                self._round()
+            if self.converged or self.bound >= cost * (1 - 1e-12):
+                return
+            self._round(cost)
 
-    def _round(self) -> None:
+    def note_plan(self, plan: WholeArray) -> None:
+        """Take note of a better plan, by its agents of each pair that there was to begin with."""
+        if not plan[~self.kept].any() and self._master.add(plan[self.kept]):
+            self.converged = False
+
+    def all_groups(self, cost: float, most: int) -> GroupProgramme | None:
+        """Return all groups of which plans that cost less than `cost` consist; None if they are more than `most`.
+
+        What the group of a task costs more than its cheapest one is at most what `cost` exceeds the bound by.
+        """
+        model = self._model
+        if not model.is_whole:
+            return None
+        penalty = self._known_penalty
+        value, _, least = self._relax(self._price, penalty)
+        gap = cost * (1 + 1e-9) - value
+        paid = model.cost + self._price[model.class_of_pair] + self._master.fees(penalty)
+        first, (first_cut, cut) = model.first, self._master.cuts_of_pairs(penalty)
+        task, group = [np.zeros(0, dtype=np.int64)], [csr_array((0, len(paid)), dtype=np.int64)]
+        for j in range(len(least)):
+            a, b, room = first[j], first[j + 1], most - sum(len(tasks) for tasks in task)
+            inside = np.zeros((room, b - a), dtype=np.int64)
+            found = write_groups(
+                self._weight[a:b], paid[a:b], model.copies[a:b], int(self._need[j]), model.max_weight[j],
+                first_cut[a : b + 1], cut, penalty, least[j] + gap, inside,
+            )  # fmt: skip
+            if found > room:
+                return None
+            rows, pairs = np.nonzero(inside[:found])
+            entries = (inside[rows, pairs], (rows, a + pairs))
+            task.append(np.full(found, j))
+            group.append(csr_array(entries, shape=(found, len(paid))))
+        all_tasks, groups = np.concatenate(task), csr_array(vstack(group))
+        on = penalty > 0
+        used = self._master.used(all_tasks, self._master.by_class(groups))[:, on]
+        return GroupProgramme(model, cost, all_tasks, groups, csr_array(used), self._master.limit[on])
+
+    @property
+    def _known_penalty(self) -> FloatArray:
+        """The best penalties so far, zero for the cuts since, shape (c,)."""
+        return np.append(self._penalty, np.zeros(len(self._master.limit) - len(self._penalty)))
+
+    def _round(self, cost: float) -> None:
         master = self._master
         if not master.solve():
             self.converged = True
             return
-        known = np.append(self._penalty, np.zeros(len(master.penalty) - len(self._penalty)))
+        known = self._known_penalty
         smoothing = self._smoothing if np.isfinite(self.bound) else 1.0
         price = smoothing * self._price + (1 - smoothing) * master.price
         penalty = smoothing * known + (1 - smoothing) * master.penalty
-        value, group = self._relax(price, penalty)
+        value, group, _ = self._relax(price, penalty)
         if value > self.bound:
             self.bound, self._price, self._penalty = value, price, penalty
         is_new = master.add(group)
-        if self.bound >= (master.value + self._constant) * (1 - PRECISION) or not (is_new or self._smoothing):
-            self.converged = not master.separate()
+        if self.bound >= master.value * (1 - PRECISION) or not (is_new or self._smoothing):
+            self.converged = not (self._drop_pairs(cost) or master.separate())
             is_new = True
         self._smoothing = SMOOTHING if is_new else (self._smoothing / 2 if self._smoothing > 0.2 else 0.0)
 
-    def _relax(self, price: FloatArray, penalty: FloatArray) -> tuple[float, WholeArray]:
-        """Return the Lagrangian bound at some prices, and groups that are cheaper there than those known."""
+    def _drop_pairs(self, cost: float) -> bool:
+        """Drop the pairs that no plan that costs less has, if they are many; return whether they are.
+
+        With an agent of a pair, its task costs at least as much as its best group with the agent does without the
+        penalties of cuts over classes, and the other tasks cost what they do in the bound.
+        """
+        model = self._model
+        penalty = self._known_penalty
+        value, _, least = self._relax(self._price, penalty)
+        paid = model.cost + self._price[model.class_of_pair] + self._master.fees(penalty)
+        group, excess, total = solve_subproblems(model, paid)
+        unpenalised = np.bincount(model.task_of_pair, group * paid, len(least))
+        if not np.isfinite(total) or abs(total - unpenalised.sum()) > 1e-9 * np.abs(unpenalised).sum():
+            return False  # a search for a group ended early
+        more = excess + (unpenalised - least)[model.task_of_pair]
+        stay = value + more <= cost * (1 + 1e-9)
+        if stay.mean() > MOST_KEPT:
+            return False
+        self.kept[self.kept] = stay
+        self._model = model.only(stay)
+        self._weight = self._weight[stay]
+        self._master.restrict(self._model)
+        return True
+
+    def _relax(self, price: FloatArray, penalty: FloatArray) -> tuple[float, WholeArray, FloatArray]:
+        """Return the Lagrangian bound at some prices, groups that are cheaper there than those known, and all costs."""
         model, master = self._model, self._master
-        whole, paid = model.is_whole, model.cost + price[model.class_of_pair]
+        whole, paid = model.is_whole, model.cost + price[model.class_of_pair] + master.fees(penalty)
         if penalty.any() or whole:
             group = np.zeros(len(paid), dtype=np.int64)
             first_cut, cut = master.cuts_of_pairs(penalty)
+            least = master.cheapest(price, penalty)
             value = price_groups(
                 model.first, self._weight, paid, model.copies, self._need, model.max_weight, whole,
-                first_cut, cut, penalty, master.cheapest(price, penalty), group,
+                first_cut, cut, penalty, least, group,
             )  # fmt: skip
         else:
             group, _, value = solve_subproblems(model, paid, compare=False)
-        value -= float(np.where(price >= 0, model.count, model.min_agents) @ price + master.limit_of_cut @ penalty)
-        return value + self._constant, group
+            least = np.asarray(np.bincount(model.task_of_pair, group * paid, len(model.need)), dtype=np.float64)
+        value -= float(np.where(price >= 0, model.count, model.min_agents) @ price + master.limit @ penalty)
+        return value, group, least

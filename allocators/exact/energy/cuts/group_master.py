@@ -1,22 +1,23 @@
-"""The linear programme that mixes the groups of each task found so far, with cuts over sets of classes, by HiGHS."""
+"""The linear programme that mixes the groups of each task found so far, with cuts, by HiGHS."""
 
 import highspy
 import numpy as np
 from scipy.sparse import csr_array
 
+from alloc.allocators.exact.energy.cuts.cluster_cuts import ClusterCut, ClusterSeparation
 from alloc.allocators.exact.energy.cuts.subset_rows import violated_sets
-from alloc.allocators.exact.energy.energy_model import EnergyModel
+from alloc.allocators.exact.energy.energy_model import EnergyModel, Mask
 from alloc.allocators.exact.knapsack import WholeArray
 from alloc.problems.instance import FloatArray, IntArray
 
 LEAST_VIOLATION, MOST_FOUND = 0.05, 5000
-"""Violation from which a cut is added, and how many such are looked at."""
+"""Violation from which a cut over classes is added, and how many such are looked at."""
 
 MOST_CUTS, MOST_OF_CLASS = 60, 4
-"""Cuts added at once, and of these how many with the same class."""
+"""Cuts over classes added at once, and of these how many with the same class."""
 
-ROOM = 1024
-"""Groups for which there is room at first."""
+ROOM, ROOM_FOR_CUTS = 1024, 64
+"""Groups and cuts for which there is room at first."""
 
 
 class GroupMaster:
@@ -25,7 +26,8 @@ class GroupMaster:
     Parameters
     ----------
     model : EnergyModel
-        Costs may be any, also below 0.
+    member : ndarray of bool, shape (f, t)
+        Clusters of tasks, of which cuts are sought.
 
     Attributes
     ----------
@@ -35,19 +37,25 @@ class GroupMaster:
         Of one agent of each class.
     penalty : ndarray, shape (c,)
         Of each cut.
+    limit : ndarray, shape (c,)
+        How much all groups together can use of each cut.
     """
 
-    def __init__(self, model: EnergyModel) -> None:
+    def __init__(self, model: EnergyModel, member: Mask) -> None:
         self._model, self._first = model, model.first
         self._tasks, classes = len(model.need), len(model.count)
         self._count = np.append(model.count, 0)
-        self._use = np.zeros((ROOM, classes + 1))
+        self._use, self._used = np.zeros((ROOM, classes + 1)), np.zeros((ROOM, ROOM_FOR_CUTS))
         self._task, self._cost, self._groups = np.zeros(ROOM, dtype=np.intp), np.zeros(ROOM), 0
-        self._seen: set[bytes] = set()
-        self._sets = np.zeros((0, 3), dtype=np.int64)
+        self._seen: set[tuple[int, bytes, bytes]] = set()
+        self._sets, self._set_at = np.zeros((0, 3), dtype=np.int64), np.zeros(0, dtype=np.intp)
+        self._clusters: list[ClusterCut] = []
+        self._cluster_at, self._member = np.zeros(0, dtype=np.intp), member
+        self._separation = ClusterSeparation(model, member)
         self._part = np.zeros(0)
         self._scale = 1 / max(1e-300, float(np.abs(model.cost).mean()))
-        self.value, self.price, self.penalty = np.inf, np.zeros(classes), np.zeros(0)
+        self.value, self.price = np.inf, np.zeros(classes)
+        self.penalty, self.limit = np.zeros(0), np.zeros(0)
         self._highs = highspy.Highs()
         for option, value in (("output_flag", False), ("threads", 1), ("presolve", "off")):
             self._highs.setOptionValue(option, value)
@@ -56,22 +64,29 @@ class GroupMaster:
         for least, most in zip(model.min_agents.tolist(), model.count.tolist(), strict=True):
             self._add_row(least if least > 0 else -highspy.kHighsInf, most, np.zeros(0))
 
-    @property
-    def limit_of_cut(self) -> IntArray:
-        """How many pairs of agents all groups can have of the set of each cut, shape (c,)."""
-        return np.asarray(self._count[self._sets].sum(axis=1) // 2)
-
     def add(self, group: WholeArray) -> bool:
         """Add the group of each task, given by pairs, shape (p,), unless it is empty; return whether any is new."""
         before = self._groups
         for j in range(self._tasks):
             a, b = self._first[j], self._first[j + 1]
             inside = a + np.flatnonzero(group[a:b])
-            key = inside.tobytes() + group[inside].tobytes()
+            key = j, self._model.class_of_pair[inside].tobytes(), group[inside].tobytes()
             if len(inside) and key not in self._seen:
                 self._seen.add(key)
                 self._add_group(j, inside, group[inside])
         return self._groups > before
+
+    def restrict(self, model: EnergyModel) -> None:
+        """Go on with a model that has only some of the pairs, and without the groups that have others."""
+        self._model, self._first = model, model.first
+        stay = np.zeros((self._tasks, len(model.count)), dtype=bool)
+        stay[model.task_of_pair, model.class_of_pair] = True
+        known = slice(self._groups)
+        lost = (self._use[known, :-1] > 0) & ~stay[self._task[known]]
+        for g in np.flatnonzero(lost.any(axis=1) & np.isfinite(self._cost[known])).tolist():
+            self._cost[g] = np.inf
+            self._highs.changeColBounds(g, 0.0, 0.0)
+        self._separation = ClusterSeparation(model, self._member)
 
     def solve(self) -> bool:
         """Solve; return whether that succeeded."""
@@ -89,40 +104,72 @@ class GroupMaster:
 
     def cheapest(self, price: FloatArray, penalty: FloatArray) -> FloatArray:
         """Return the cost of the cheapest group known of each task at some prices, shape (t,)."""
-        use, least = self._use[: self._groups], np.full(self._tasks, np.inf)
-        cost = self._cost[: self._groups] + use[:, :-1] @ price
-        on = np.flatnonzero(penalty)
-        for members, fine in zip(self._sets[on], penalty[on].tolist(), strict=True):
-            cost += fine * (use[:, members].sum(axis=1) // 2)
-        np.minimum.at(least, self._task[: self._groups], cost)
+        known, least = slice(self._groups), np.full(self._tasks, np.inf)
+        cost = self._cost[known] + self._use[known, :-1] @ price + self._used[known, : len(penalty)] @ penalty
+        np.minimum.at(least, self._task[known], cost)
         return least
 
+    def fees(self, penalty: FloatArray) -> FloatArray:
+        """Return what the cuts of clusters cost an agent of each pair, shape (p,)."""
+        model, fee = self._model, np.zeros((self._tasks, len(self._model.count)))
+        for at, cut in zip(self._cluster_at.tolist(), self._clusters, strict=True):
+            if penalty[at] > 0:
+                fee[cut.inside] += penalty[at] * cut.factor
+        return fee[model.task_of_pair, model.class_of_pair]
+
     def cuts_of_pairs(self, penalty: FloatArray) -> tuple[WholeArray, WholeArray]:
-        """Return where the cuts of each pair begin, shape (p + 1,), and these cuts, if they have a penalty."""
-        on = np.flatnonzero(penalty)
-        entry = (np.ones(3 * len(on)), (self._sets[on].ravel(), np.repeat(on, 3)))
+        """Return where the cuts over classes begin of each pair, shape (p + 1,), and these, if they have a penalty."""
+        on = np.flatnonzero(penalty[self._set_at])
+        entry = (np.ones(3 * len(on)), (self._sets[on].ravel(), np.repeat(self._set_at[on], 3)))
         table = csr_array(entry, shape=(len(self._count), max(1, len(penalty))))[self._model.class_of_pair]
         return table.indptr.astype(np.int64), table.indices.astype(np.int64)
 
+    def by_class(self, group: csr_array) -> FloatArray:
+        """Return the agents of each class in groups given by pairs, shapes (g, k) and (g, p)."""
+        pairs = len(self._model.copies)
+        entry = (np.ones(pairs), (np.arange(pairs), self._model.class_of_pair))
+        return np.asarray((group @ csr_array(entry, shape=(pairs, len(self._model.count)))).toarray())
+
+    def used(self, task: IntArray, use: FloatArray) -> FloatArray:
+        """Return what groups use of each cut, given their tasks and agents of each class, shapes (g, c) and (g, k)."""
+        used, padded = np.zeros((len(task), len(self.limit))), np.hstack([use, np.zeros((len(task), 1))])
+        for at, members in zip(self._set_at.tolist(), self._sets, strict=True):
+            used[:, at] = padded[:, members].sum(axis=1) // 2
+        for at, cut in zip(self._cluster_at.tolist(), self._clusters, strict=True):
+            used[:, at] = cut.use(use, task)
+        return used
+
     def separate(self) -> bool:
         """Add the cuts that the mixture violates most; return whether there are any."""
+        before = len(self.limit)
         on = np.flatnonzero(self._part > 1e-6)
+        for cut in self._separation.violated(self._use[on, :-1], self._task[on], self._part[on]):
+            self._cluster_at = np.append(self._cluster_at, len(self.limit))
+            self._clusters.append(cut)
+            self._add_cut(cut.limit, cut.use(self._use[: self._groups, :-1], self._task[: self._groups]))
+        self._separate_sets(on)
+        return len(self.limit) > before
+
+    def _separate_sets(self, on: IntArray) -> None:
         use = np.ascontiguousarray(self._use[on].T.astype(np.int64))
         sets, excess = violated_sets(use, self._part[on], self._count, LEAST_VIOLATION, MOST_FOUND)
-        times = np.zeros(len(self._count))
-        new: list[WholeArray] = []
+        times, new = np.zeros(len(self._count)), 0
         for row in np.argsort(-excess, kind="stable").tolist():
             members = sets[row][self._count[sets[row]] > 0]
-            if len(new) < MOST_CUTS and (times[members] < MOST_OF_CLASS).all():
+            if new < MOST_CUTS and (times[members] < MOST_OF_CLASS).all():
                 times[members] += 1
-                new.append(sets[row])
-        for members in new:
-            halves = self._use[: self._groups, members].sum(axis=1) // 2
-            self._add_row(-highspy.kHighsInf, self._count[members].sum() // 2, halves)
-        self._sets = np.vstack([self._sets, *new])
-        return len(new) > 0
+                new += 1
+                self._sets, self._set_at = np.vstack([self._sets, sets[row]]), np.append(self._set_at, len(self.limit))
+                self._add_cut(self._count[members].sum() // 2, self._use[: self._groups, members].sum(axis=1) // 2)
 
-    def _add_row(self, least: float, most: float, entries: FloatArray | IntArray) -> None:
+    def _add_cut(self, limit: float, used: FloatArray) -> None:
+        if len(self.limit) == self._used.shape[1]:
+            self._used = np.hstack([self._used, np.zeros_like(self._used)])
+        self._used[: self._groups, len(self.limit)] = used
+        self.limit = np.append(self.limit, limit)
+        self._add_row(-highspy.kHighsInf, limit, used)
+
+    def _add_row(self, least: float, most: float, entries: FloatArray) -> None:
         columns = np.flatnonzero(entries)
         value = entries[columns].astype(float)
         self._highs.addRow(float(least), float(most), len(columns), columns.astype(np.int32), value)
@@ -130,14 +177,16 @@ class GroupMaster:
     def _add_group(self, task: int, pairs: IntArray, agents: WholeArray) -> None:
         g, classes = self._groups, len(self._model.count)
         if g == len(self._use):
-            self._use, self._task, self._cost = (
-                np.concatenate([known, np.zeros_like(known)]) for known in (self._use, self._task, self._cost)
+            self._use, self._used, self._task, self._cost = (
+                np.concatenate([known, np.zeros_like(known)])
+                for known in (self._use, self._used, self._task, self._cost)
             )
         use = self._use[g]
         use[self._model.class_of_pair[pairs]] = agents
         self._task[g], self._cost[g] = task, self._model.cost[pairs] @ agents
+        self._used[g, : len(self.limit)] = self.used(self._task[g : g + 1], use[None, :-1])
         self._groups += 1
-        column = np.concatenate([use[:classes], use[self._sets].sum(axis=1) // 2])
+        column = np.concatenate([use[:classes], self._used[g, : len(self.limit)]])
         rows = np.flatnonzero(column)
         index = np.append(task, self._tasks + rows).astype(np.int32)
         value = np.append(1, column[rows]).astype(float)

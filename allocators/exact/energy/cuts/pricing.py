@@ -16,8 +16,8 @@ from alloc.problems.instance import FloatArray
 MAX_NODES = 20_000
 """Nodes of the search for one group after which it ends with the bound of the nodes still open."""
 
-STEPS = 1000
-"""Steps of a need to which the table rounds where weights are not whole."""
+STEPS, MOST_STEPS, CELLS = 1000, 10_000, 200_000
+"""Steps of a need to which the table rounds where weights are not whole, at least and at most, and cells in between."""
 
 
 @compiled
@@ -42,17 +42,18 @@ def price_groups(
     penalty : ndarray, shape (cuts,)
         >= 0.
     cost : ndarray, shape (t,)
-        Of the cheapest group known of each task.
+        Of the cheapest group known of each task; in the end what any group costs at least.
     group : ndarray of int, shape (p,)
         Zeros; stays so where no group is cheaper.
     """
     total, taken = 0.0, np.zeros(len(penalty), dtype=np.int64)
     for j in range(len(need)):
         a, b = first[j], first[j + 1]
-        total += cheapest_with_cuts(
+        cost[j] = cheapest_with_cuts(
             weight[a:b], price[a:b], copies[a:b], need[j], max_weight[j], whole,
             first_cut[a : b + 1], cut, penalty, taken, cost[j], group[a:b],
         )  # fmt: skip
+        total += cost[j]
     return total
 
 
@@ -62,14 +63,17 @@ def cheapest_with_cuts(
     first_cut: WholeArray, cut: WholeArray, penalty: FloatArray, taken: WholeArray, best: float, group: WholeArray,
 ) -> float:  # fmt: skip
     """Do the work of `price_groups` for one task; `taken` counts agents in each cut, 0 before and after."""
+    exact, slack = max_weight >= 0, 1e-9 * (abs(best) + (np.abs(price).max() if len(price) else 0.0))
+    if not exact:
+        copies = of_interest(weight, price, copies, need, best - slack)
     item, searched = list_items(weight, price, copies, first_cut, whole)
-    scale = 1.0 if whole else STEPS * (1 - 1e-9) / need
-    least, exact = int(np.floor(need * scale)), max_weight >= 0
+    steps = min(MOST_STEPS, max(STEPS, CELLS // (1 + len(item))))
+    scale = 1.0 if whole else steps * (1 - 1e-9) / need
+    least = int(np.floor(need * scale))
     rest = tabulate_rest(weight, price, item, scale, least, max(least, max_weight), exact)
     top, still_open, nodes, q = rest.shape[1] - 1, np.inf, 0, 0
     done, paid = np.zeros(searched + 1), np.zeros(searched + 1)
     branches, take = np.zeros(searched + 1, dtype=np.int64), np.zeros(searched + 1, dtype=np.bool_)
-    slack = 1e-9 * (abs(best) + (np.abs(price).max() if len(price) else 0.0))
     while q >= 0:
         here = min(top, int(np.ceil(done[q] * scale)))
         if branches[q] == 0:
@@ -106,6 +110,28 @@ def cheapest_with_cuts(
             count_cuts(k, 1, first_cut, cut, taken)
         q += 1
     return min(best - slack, still_open)
+
+
+@compiled
+def of_interest(weight: FloatArray, price: FloatArray, copies: WholeArray, need: float, best: float) -> WholeArray:
+    """Return the copies of classes of which a group can have agents that costs less than `best`, zero of the others.
+
+    By the linear relaxation without penalties, for prices >= 0 and sums of weights without a limit.
+    """
+    ratio, total, relaxed, rate = price / weight, 0.0, 0.0, 0.0
+    if len(price) == 0 or price.min() < 0:
+        return copies
+    for k in order_of(ratio):
+        rate = ratio[k]
+        taken = min(copies[k] * weight[k], need - total)
+        total, relaxed = total + taken, relaxed + taken * rate
+        if total >= need:
+            break
+    kept = copies.copy()
+    for k in range(len(kept)):
+        if relaxed + price[k] - rate * weight[k] >= best:
+            kept[k] = 0
+    return kept
 
 
 @compiled

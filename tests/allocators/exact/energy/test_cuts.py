@@ -3,8 +3,10 @@ from itertools import product
 import numpy as np
 import pytest
 
+from alloc.allocators.exact.energy.cuts.cluster_cuts import ClusterSeparation
 from alloc.allocators.exact.energy.cuts.pricing import price_groups
 from alloc.allocators.exact.energy.cuts.subset_rows import violated_sets
+from alloc.allocators.exact.energy.energy_model import EnergyModel
 
 
 @pytest.mark.parametrize("kind", ["whole", "limited", "real"])
@@ -36,3 +38,23 @@ def test_a_cut_closes_the_gap_of_three_agents_for_two_tasks():
     sets, excess = violated_sets(use, np.array([0.5, 0.5, 0.5]), np.array([1, 1, 1, 0]), 0.05, 10)
     assert sets.tolist() == [[0, 1, 2]]
     assert excess == pytest.approx([0.5])
+
+
+@pytest.mark.parametrize("limited", [False, True])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_cut_of_a_cluster_holds_for_all_solutions_and_not_for_the_mixture(seed, limited):
+    """Agents of 5 and 10 for two tasks of 13 in all give 15, or more: parts of agents that give 13 break the cut."""
+    ability = np.append([5, 10], 5 * np.random.default_rng(seed).integers(1, 2, 4, endpoint=True))
+    need = np.array([7, 6])
+    model = EnergyModel(
+        class_of_pair=np.tile(np.arange(6), 2), task_of_pair=np.repeat([0, 1], 6), weight=np.tile(ability, 2),
+        copies=np.ones(12, dtype=np.int64), cost=np.zeros(12), need=need,
+        max_weight=need + 4 if limited else np.full(2, -1), count=np.ones(6, dtype=np.int64),
+        min_agents=np.zeros(6, dtype=np.int64), ability=ability,
+    )  # fmt: skip
+    use, task, part = np.ones((1, 6)), np.array([0]), np.array([13 / ability.sum()])
+    (cut,) = ClusterSeparation(model, np.ones((1, 2), dtype=bool)).violated(use, task, part)
+    whole = np.array(list(product((0, 1), repeat=6)))
+    done = whole @ ability
+    assert (whole[(done >= 13) & ((done <= 17) | (not limited))] @ cut.factor <= cut.limit).all()
+    assert part @ cut.use(use, task) > cut.limit + 0.01

@@ -1,12 +1,15 @@
 from dataclasses import replace
 from functools import cache
 from itertools import product
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from oracle import brute_force, least_energy_within
 from tiny_instances import all_can_be_served, seeds_where, tiny_instance
 
+from alloc.allocators.exact.energy import lagrangian
+from alloc.allocators.exact.energy.clusters import overlapping_clusters
 from alloc.allocators.exact.energy.cuts.cutting_planes import CuttingPlanes
 from alloc.allocators.exact.energy.energy_model import EnergyModel, round_demand
 from alloc.allocators.exact.energy.lagrangian import LagrangianBound
@@ -14,6 +17,8 @@ from alloc.allocators.exact.energy.subproblems import solve_subproblems
 from alloc.allocators.exact.model import Model
 from alloc.problems import agent_classes
 from alloc.problems.evaluation import last_equal
+
+LINE = np.abs(np.subtract.outer(np.arange(4.0), np.arange(4.0)))
 
 
 @cache
@@ -51,11 +56,11 @@ def model_of(seed: int, tasks: int, *, limited: bool) -> tuple[EnergyModel, floa
 @pytest.mark.parametrize("worse", [1.0001, 1.3])
 @pytest.mark.parametrize("limited", [False, True])
 @pytest.mark.parametrize("seed", range(4))
-def test_bound_is_below_the_best_plan_and_its_pairs_are_kept(seed, limited, worse):
+def test_bound_is_below_the_best_plan_and_its_pairs_are_kept(seed, limited, worse, monkeypatch):
     """However long prices move towards the cost of a worse plan, the best one bounds the bound and loses no pair."""
+    monkeypatch.setattr(lagrangian, "is_small", lambda model: False)  # small models have no prices of clusters
     model, best, plan = model_of(seed, 4, limited=limited)
-    distance = np.abs(np.subtract.outer(np.arange(4.0), np.arange(4.0)))
-    bound = LagrangianBound(model, distance, np.zeros(len(model.count)))
+    bound = LagrangianBound(model, LINE, np.zeros(len(model.count)))
     bound.ascend(1000, best * worse)
     assert 0.5 * best < bound.bound <= best * (1 + 1e-9)
     used = model.task_of_pair == plan[model.class_of_pair]
@@ -81,21 +86,44 @@ def test_excess_is_what_a_pair_costs_more(seed, limited):
             assert excess[pair] <= best_with - cost.min() + 1e-9
 
 
+@pytest.mark.parametrize("worse", [1.0, 1.2])
 @pytest.mark.parametrize("kind", ["whole", "limited", "real"])
 @pytest.mark.parametrize("seed", range(8))
-def test_bound_by_cutting_planes_is_below_the_best_plan(seed, kind):
-    """Until no cut is violated any more, the best plan of all bounds the bound, which is not far below."""
+def test_bound_by_cutting_planes_is_below_the_best_plan(seed, kind, worse):
+    """Until no cut is violated any more, the best plan of all bounds the bound, and loses no pair."""
     model, best, plan = model_of(seed, 4, limited=kind == "limited")
     if kind == "real":
         part, need = model.weight / model.need[model.task_of_pair], np.full(len(model.need), 1 - 1e-10)
         model = replace(model, weight=part, need=need, ability=None)
     group = (model.task_of_pair == plan[model.class_of_pair]).astype(np.int64)
-    cuts = CuttingPlanes(model, 0.0, np.zeros(len(model.count)), [group])
+    member = overlapping_clusters(LINE) if model.ability is not None else np.zeros((0, 4), dtype=bool)
+    cuts = CuttingPlanes(model, member, np.zeros(len(model.count)), [group])
     for _ in range(200):
-        cuts.ascend(1)
+        cuts.ascend(1, best * worse)
         assert cuts.bound <= best * (1 + 1e-9)
-    assert cuts.converged
+    assert cuts.converged or cuts.bound >= best * (1 - 1e-9)
+    assert cuts.kept[group > 0].all()
     assert cuts.bound >= 0.9 * best
+
+
+@pytest.mark.parametrize("worse", [1.0, 1.2])
+@pytest.mark.parametrize("limited", [False, True])
+@pytest.mark.parametrize("seed", range(6))
+def test_the_best_of_all_groups_is_the_best_plan(seed, limited, worse):
+    """Groups of plans that cost less than a worse one are those of the best plan, too; none are cheaper than it."""
+    model, best, plan = model_of(seed, 4, limited=limited)
+    group = (model.task_of_pair == plan[model.class_of_pair]).astype(np.int64)
+    cuts = CuttingPlanes(model, overlapping_clusters(LINE), np.zeros(len(model.count)), [group])
+    cuts.ascend(20, best * worse)
+    monitor = SimpleNamespace(run=lambda work, stop: work())
+    programme = cuts.all_groups(best * worse, 1000)
+    counts, bound = programme.solve(monitor, 0, repeatable=True)
+    assert bound == pytest.approx(best, rel=1e-6)
+    assert counts is None or counts @ programme.model.cost == pytest.approx(best)
+    assert counts is not None or worse == 1.0
+    nothing, bound = cuts.all_groups(best * 0.999, 1000).solve(monitor, 0, repeatable=True)
+    assert nothing is None
+    assert bound <= best
 
 
 def has_float_weights(instance):

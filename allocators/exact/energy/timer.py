@@ -1,0 +1,30 @@
+"""Rounds of work by slices of time."""
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+SLICE_S = 0.01
+"""Time of each side in one call of `PrimalDual.run`."""
+
+
+class Timer:
+    """Adapts the number of rounds to a slice of time, by how long the last ones took.
+
+    Attributes
+    ----------
+    spent_s : float
+        Time of all rounds so far.
+    """
+
+    def __init__(self) -> None:
+        self._rounds, self.spent_s = 1, 0.0
+
+    def run(self, work: Callable[[int], None]) -> None:
+        """Do as many rounds as fit."""
+        begin = time.monotonic()
+        work(self._rounds)
+        took = max(time.monotonic() - begin, 1e-5)
+        self.spent_s += took
+        self._rounds = int(np.clip(self._rounds * np.clip(SLICE_S / took, 0.25, 2.0), 1, 100_000))
