@@ -40,6 +40,7 @@ BUILT_IN_POLICIES = (
     "ppo",
     "replan",
     "routes",
+    "local-routes",
     "clairvoyant",
 )
 """For completion, likewise."""

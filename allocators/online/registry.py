@@ -22,6 +22,7 @@ POLICIES = {
     "ppo": "alloc.allocators.online.policies.gappo:PpoPolicy",
     "replan": "alloc.allocators.online.policies.replan:Replan",
     "routes": "alloc.allocators.online.policies.routes:Routes",
+    "local-routes": "alloc.allocators.online.policies.local_routes:LocalRoutes",
     "clairvoyant": "alloc.allocators.online.policies.clairvoyant:Clairvoyant",
 }
 

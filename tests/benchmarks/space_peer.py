@@ -65,7 +65,11 @@ POLICIES: dict[str, dict[str, float]] = {
     "nearest": {},
 }
 
-ROUTES = "routes[iterations=100], full knowledge"
+SIMULATED: dict[str, dict[str, Any]] = {
+    "local-routes": {"policy": "local-routes"},
+    "routes[iterations=100], full knowledge": {"policy": "routes", "knowledge": "full", "iterations": 100},
+}
+"""Policies without compiled loops."""
 
 
 def run(given: argparse.Namespace) -> None:
@@ -148,7 +152,7 @@ def compare(given: argparse.Namespace) -> None:
     runs = Path(given.runs)
     policies = {name: load_policy(name.split("[")[0], **settings) for name, settings in POLICIES.items()}
     for radius in given.radii:
-        times: dict[str, list[float]] = {name: [] for name in (*PLUGINS, *POLICIES, ROUTES)}
+        times: dict[str, list[float]] = {name: [] for name in (*PLUGINS, *POLICIES, *SIMULATED)}
         for path in sorted(runs.glob(f"CBBA-{radius}-*.json")):
             seed = int(path.stem.split("-")[2])
             others = [runs / f"{name}-{radius}-{seed}.json" for name in PLUGINS]
@@ -159,8 +163,8 @@ def compare(given: argparse.Namespace) -> None:
             mission = mission_of(path, seed)
             for name, policy in policies.items():
                 times[name].append(run_compiled(mission, policy, seed).mission_time or math.inf)
-            leads = simulate(mission, "routes", knowledge="full", seed=seed, iterations=100)
-            times[ROUTES].append(leads.result.mission_time or math.inf)
+            for name, settings in SIMULATED.items():
+                times[name].append(simulate(mission, seed=seed, **settings).result.mission_time or math.inf)
         show(radius, times)
 
 

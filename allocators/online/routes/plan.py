@@ -10,7 +10,17 @@ from alloc.allocators.online.routes.describe import Described
 from alloc.allocators.online.routes.evaluation import play
 from alloc.allocators.online.routes.record import Schedule, new_schedule
 from alloc.allocators.online.routes.search import improve
-from alloc.allocators.online.routes.situation import AGENT, EUCLIDEAN, EVENT, TASK, Bools, Ints, Situation, records
+from alloc.allocators.online.routes.situation import (
+    AGENT,
+    EUCLIDEAN,
+    EVENT,
+    TASK,
+    Bools,
+    Floats,
+    Ints,
+    Situation,
+    records,
+)
 
 PORTION, PORTION_S = 8, 0.001
 """Changes before the first look at the clock, and seconds between two looks that are aimed at."""
@@ -103,6 +113,13 @@ def first_tasks(situation: Situation, routes: Ints, lengths: Ints) -> Ints:
     schedule, _ = _new_schedules(situation, routes)
     play(situation, schedule, routes, lengths)
     return schedule.agents["first"]
+
+
+def finish_hours(situation: Situation, routes: Ints, lengths: Ints) -> Floats:
+    """Return when each task is done, ``inf`` where it is not."""
+    schedule, _ = _new_schedules(situation, routes)
+    play(situation, schedule, routes, lengths)
+    return schedule.tasks["finish"]
 
 
 def warm_up() -> None:

@@ -171,6 +171,10 @@ class View:
         """Return the tasks that an agent can take, by what is known, in the order in which they became known."""
         return [task for task in self.tasks.values() if self.refusal(agent, task) is None]
 
+    def of(self, agents: Mapping[str, AgentReport], tasks: Mapping[str, TaskReport]) -> "View":
+        """Return the view of who leads some agents, with reports of these agents and tasks in place of all."""
+        return View(self.hour, None, agents, tasks, self._distances)
+
     def message(self, notes: tuple[str | float, ...] = ()) -> Message:
         """Return a message that tells all that is known, and `notes`."""
         assert self.id is not None

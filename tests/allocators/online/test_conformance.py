@@ -53,6 +53,12 @@ class TestReplan(PolicyConformance):
     settings = {"method": "greedy", "iterations": 1}  # noqa: RUF012
 
 
+class TestLocalRoutes(PolicyConformance):
+    pytestmark = COMPILED
+    name = "local-routes"
+    settings = {"iterations": 20, "first_iterations": 20}  # noqa: RUF012
+
+
 class TestRoutes(PolicyConformance):
     pytestmark = COMPILED
     name = "routes"

@@ -1,0 +1,1 @@
+"""Groups of agents that hear of each other: what was planned for whom."""

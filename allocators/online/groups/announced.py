@@ -1,0 +1,102 @@
+"""Routes that were planned for agents, as messages tell of them."""
+
+import math
+from collections.abc import Sequence, Set
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Route:
+    """What was planned for one agent.
+
+    Attributes
+    ----------
+    hour : float
+        When it was planned.
+    planner : str
+        By whom.
+    visits : tuple of (str, float)
+        Tasks in their order, and the hour at which each was to be done.
+    """
+
+    hour: float
+    planner: str
+    visits: tuple[tuple[str, float], ...]
+
+    @property
+    def end(self) -> float:
+        """Hour at which it was to be over."""
+        return max((until for _, until in self.visits), default=self.hour)
+
+    @property
+    def tasks(self) -> list[str]:
+        """Ids of its tasks, in their order."""
+        return [name for name, _ in self.visits]
+
+
+class Announced:
+    """The newest route of each agent that an agent has planned or heard of.
+
+    Attributes
+    ----------
+    routes : dict of str to Route
+        By agent.
+    """
+
+    def __init__(self) -> None:
+        self.routes: dict[str, Route] = {}
+
+    def plan(self, agent: str, route: Route) -> None:
+        """Take notice of a route, unless a newer one is known."""
+        if self._is_news(agent, route.hour, route.planner):
+            self.routes[agent] = route
+
+    def _is_news(self, agent: str, hour: float, planner: str) -> bool:
+        """Whether a route is newer than the one that is known; of two of one hour that of the first planner counts."""
+        known = self.routes.get(agent)
+        return known is None or hour > known.hour or (hour == known.hour and planner < known.planner)
+
+    def notes(self) -> tuple[str | float, ...]:
+        """Return all routes as notes of a message."""
+        values: list[str | float] = []
+        for agent, route in self.routes.items():
+            values += [agent, route.hour, route.planner, float(len(route.visits))]
+            values += [value for visit in route.visits for value in visit]
+        return tuple(values)
+
+    def hear(self, notes: Sequence[str | float]) -> None:
+        """Take over what is newer in the notes of a message."""
+        begin = 0
+        while begin < len(notes):
+            agent, hour, planner, count = notes[begin : begin + 4]
+            begin, end = begin + 4, begin + 4 + 2 * int(count)
+            if self._is_news(str(agent), float(hour), str(planner)):
+                names, hours = notes[begin:end:2], notes[begin + 1 : end : 2]
+                visits = tuple((str(name), float(until)) for name, until in zip(names, hours, strict=True))
+                self.routes[str(agent)] = Route(float(hour), str(planner), visits)
+            begin = end
+
+    def taken(self, group: Set[str], hour: float, patience: float) -> dict[str, float]:
+        """Return the tasks that are left to agents outside a group, and when each is to be done.
+
+        A task belongs to the newest route that has it. A route counts until it ends, and `patience` times as long as it
+        was to take after that.
+        """
+        newest: dict[str, tuple[float, float, str]] = {}
+        for agent, route in self.routes.items():
+            if agent in group or hour <= route.end + patience * (route.end - route.hour):
+                for name, until in route.visits:
+                    newest[name] = max(newest.get(name, (-math.inf, 0.0, "")), (route.hour, until, agent))
+        return {name: until for name, (_, until, agent) in newest.items() if agent not in group}
+
+    def joined(self, group: Sequence[str]) -> dict[str, list[str]]:
+        """Return the routes of a group; of routes of several plans that have a task in common the earliest keeps it."""
+        routes = {agent: self.routes[agent] for agent in group if agent in self.routes}
+        first: dict[str, tuple[float, float, str]] = {}
+        for route in routes.values():
+            for name, until in route.visits:
+                first[name] = min(first.get(name, (math.inf, 0.0, "")), (until, route.hour, route.planner))
+        return {
+            agent: [name for name, _ in route.visits if first[name][1:] == (route.hour, route.planner)]
+            for agent, route in routes.items()
+        }

@@ -1,0 +1,193 @@
+"""The policy `local-routes`: routes for agents that hear of each other, planned by one of them for all."""
+
+import math
+import time
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+from alloc.allocators.contract.parameters import bounded
+from alloc.allocators.online.contract import AgentDecider, Briefing, Policy, PolicyInfo
+from alloc.allocators.online.groups.announced import Announced, Route
+from alloc.allocators.online.policies.routes import DEADLINE_SHARE, RoutesParameters
+from alloc.allocators.online.policies.spreading import Lookout
+from alloc.allocators.online.routes.describe import Describer, Foresight
+from alloc.allocators.online.routes.plan import finish_hours, improved, warm_up
+from alloc.problems.missions.simulation.places import Place
+from alloc.problems.missions.simulation.reports import AgentReport, Message, View
+from alloc.problems.missions.simulation.state import ACTIVE, AgentStatus, Order, TaskStatus
+from alloc.problems.vocabulary import Knowledge
+
+
+@dataclass(frozen=True)
+class LocalRoutesParameters(RoutesParameters):
+    """Parameters of routes that agents plan for each other.
+
+    Attributes
+    ----------
+    contact : float
+        Radio periods after which who was not heard of is no longer planned for.
+    patience : float
+        How much longer than planned others have for their tasks, over the time that they were to take, before these
+        tasks are planned anew.
+    fresh : float
+        Radio periods after which a place is to be looked at again, where there is nothing to do.
+    """
+
+    iterations: int = bounded(300, low=0)
+    first_iterations: int = bounded(1000, low=0)
+    contact: float = bounded(6.0, low=0)
+    patience: float = bounded(3.0, low=0)
+    fresh: float = bounded(50.0, low=0)
+
+
+class LocalRoutes(Policy):
+    """Of the agents that hear of each other the first plans routes for all; messages tell of them.
+
+    Raises
+    ------
+    InputError
+        If a setting is out of range.
+    """
+
+    info = PolicyInfo(name="local-routes", summary="sequences of tasks, planned by one agent for all that it hears of")
+    parameters_type: ClassVar[type] = LocalRoutesParameters
+
+    def __init__(self, parameters: LocalRoutesParameters | None = None, **settings: object) -> None:
+        super().__init__(parameters, **settings)
+        warm_up()
+
+    def begin(self, briefing: Briefing) -> AgentDecider:
+        """Return who plans routes, or follows them."""
+        return _Planner(self.parameters, briefing)
+
+
+class _Planner(AgentDecider):
+    def __init__(self, parameters: LocalRoutesParameters, briefing: Briefing) -> None:
+        pace = 1.0 if briefing.pace is None else (briefing.pace.low + briefing.pace.high) / 2
+        period = briefing.radio.period
+        self._parameters, self._seed = parameters, briefing.seed[0]
+        self._describer = Describer(briefing.end, max(pace, 1e-9), parameters.switch_price)
+        limit = briefing.deadline_s
+        self._time_limit_s = None if limit is None else DEADLINE_SHARE * limit
+        self._contact = parameters.contact * period + briefing.radio.delay
+        self._lookout = Lookout(briefing, parameters.fresh * period)
+        self._is_alone = briefing.knowledge is Knowledge.FULL
+        self._announced = Announced()
+        self._planned: tuple[object, ...] = ()
+        self._given_up: set[str] = set()
+        self._waits_since = math.inf
+        self._count = 0
+
+    def decide(self, view: View) -> Order | None:
+        """Return the first task of the agent's route; a new plan is made where there is news."""
+        for message in view.heard:
+            self._announced.hear(message.notes)
+        self._lookout.note(view)
+        group = self._group(view)
+        if self._is_alone or group[0] == view.id or self._has_waited(view, group):
+            self._renew(view, group if self._is_alone or group[0] == view.id else [str(view.id)])
+        if not self._tasks_open(view, str(view.id)):
+            self._help(view, group)
+        for name in self._tasks_of(str(view.id)):
+            task = view.tasks.get(name)
+            if task is not None and view.refusal(view.own, task) is None:
+                return Order(name)
+        return self._lookout.order(view, [self._end(view, name) for name in group if name != view.id])
+
+    def _help(self, view: View, group: list[str]) -> None:
+        """Let an agent without a task take the nearest of others, out of contact, who are late, or later than it."""
+        taken = self._announced.taken(set(group), view.hour, self._parameters.patience)
+        best, least = None, math.inf
+        for task in view.open_tasks(view.own):
+            until, hours = taken.get(task.facts.id, math.nan), view.hours(view.own, task)
+            if hours < least and (until < view.hour or until > view.hour + hours + self._contact):
+                best, least = task, hours
+        if best is not None:
+            until = view.hour + view.hours(view.own, best) + best.left / view.own.facts.ability
+            self._announced.plan(str(view.id), Route(view.hour, str(view.id), ((best.facts.id, until),)))
+
+    def message(self, view: View) -> Message | None:
+        """Return all that is known, and all routes."""
+        return view.message(self._announced.notes())
+
+    def _group(self, view: View) -> list[str]:
+        """Return the agents that are heard of, in the order of their ids, the agent itself included."""
+        return sorted(
+            name
+            for name, report in view.agents.items()
+            if name == view.id or (report.status in ACTIVE and view.hour - report.hour <= self._contact)
+        )
+
+    def _has_waited(self, view: View, group: list[str]) -> bool:
+        """Whether there were tasks for longer than a plan takes to come, and none for the agent."""
+        if self._tasks_open(view, str(view.id)) or not (self._open(view, set(group)) - self._planned_for(group)):
+            self._waits_since = math.inf
+        self._waits_since = min(self._waits_since, view.hour)
+        return view.hour - self._waits_since > self._contact
+
+    def _tasks_of(self, name: str) -> list[str]:
+        route = self._announced.routes.get(name)
+        return [] if route is None else route.tasks
+
+    def _tasks_open(self, view: View, name: str) -> list[str]:
+        tasks = ((task, view.tasks.get(task)) for task in self._tasks_of(name))
+        return [task for task, report in tasks if report is not None and report.status is TaskStatus.OPEN]
+
+    def _planned_for(self, group: list[str]) -> set[str]:
+        return {task for name in group for task in self._tasks_of(name)}
+
+    def _open(self, view: View, group: set[str]) -> set[str]:
+        """Return the tasks that are open and not left to others."""
+        taken = self._announced.taken(group, view.hour, self._parameters.patience)
+        return {name for name, task in view.tasks.items() if task.status is TaskStatus.OPEN and name not in taken}
+
+    def _end(self, view: View, name: str) -> Place:
+        """Return where an agent will be free."""
+        tasks = self._tasks_open(view, name)
+        return view.tasks[tasks[-1]].facts.place if tasks else view.agents[name].place
+
+    def _renew(self, view: View, group: list[str]) -> None:
+        """Plan routes for some agents, if agents or tasks are not those of the last plan."""
+        tasks = self._open(view, set(group))
+        news = (*group, frozenset(tasks))
+        if news == self._planned:
+            return
+        self._planned = news
+        began = time.perf_counter()
+        agents = {name: _advanced(view, view.agents[name]) for name in group}
+        known = {name: task for name, task in view.tasks.items() if name in tasks or task.status is not TaskStatus.OPEN}
+        described = self._describer.describe(view.of(agents, known), Foresight())
+        if described is None:
+            return
+        parameters = self._parameters
+        iterations = parameters.iterations if self._count else parameters.first_iterations
+        self._count += 1
+        until = None if self._time_limit_s is None else began + self._time_limit_s
+        before = self._announced.joined(group)
+        seed = (self._seed * 1_000_003 + self._count) % 2**31
+        routes, lengths, untried = improved(described, before, iterations, seed, until, self._given_up)
+        finish = finish_hours(described.situation, routes, lengths).tolist()
+        names = [task.facts.id for task in described.tasks]
+        for i, agent in enumerate(described.agents):
+            visits = tuple(
+                (names[j], finish[j] if finish[j] < math.inf else view.hour) for j in routes[i, : lengths[i]].tolist()
+            )
+            self._announced.plan(agent.facts.id, Route(view.hour, str(view.id), visits))
+        tried = {name for name, is_untried in zip(names, untried.tolist(), strict=True) if not is_untried}
+        self._given_up = tried.difference(self._planned_for(group))
+
+
+def _advanced(view: View, report: AgentReport) -> AgentReport:
+    """Return an agent that flies as it is now, if it has gone on as it went when it was heard of."""
+    goal = view.tasks.get(report.task or "")
+    age = view.hour - report.hour
+    here = report.place.position
+    if report.status is not AgentStatus.FLYING or goal is None or age <= 0 or here is None or view.has_table:
+        return report
+    there, distance = goal.facts.place.position, view.distance(report, goal)
+    if there is None or distance <= 0:
+        return report
+    share = min(1.0, age * report.facts.speed / distance)
+    x, y, z = (a + share * (b - a) for a, b in zip(here, there, strict=True))
+    battery = report.battery - report.facts.energy_per_distance * share * distance
+    return replace(report, place=Place((x, y, z)), battery=max(0.0, battery))

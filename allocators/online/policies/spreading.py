@@ -1,0 +1,94 @@
+"""Looking around together: each where nobody was for long, and else spread out over the area."""
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from alloc.allocators.online.contract import Briefing
+from alloc.allocators.online.policies.exploring import BATTERY_SHARE, Explorer
+from alloc.allocators.online.routes.tables import positions
+from alloc.problems.distances.metric import distances
+from alloc.problems.fields import BoolArray, FloatArray
+from alloc.problems.missions.simulation.places import Place
+from alloc.problems.missions.simulation.reports import View
+from alloc.problems.missions.simulation.state import STAY, Order
+from alloc.problems.vocabulary import GEOGRAPHIC, Knowledge
+
+CELLS = 20
+"""Cells along the longer side of the area."""
+
+NEAR = 0.1
+"""Part of the sensing radius within which an agent is where it is to be."""
+
+
+class Lookout:
+    """Where an agent looks around that has nothing to do.
+
+    The area is divided in cells, and each belongs to the agent that is nearest to it. An agent goes to that of its
+    cells that was not seen for longest over the hours that it takes to see it; where all were seen lately, to their
+    middle.
+
+    Parameters
+    ----------
+    briefing : Briefing
+    fresh : float
+        Hours after which a cell is to be seen again.
+    """
+
+    def __init__(self, briefing: Briefing, fresh: float) -> None:
+        self._explorer, self._sensing, self._fresh = Explorer(briefing), briefing.sensing, fresh
+        self._is_blind = briefing.knowledge is Knowledge.LOCAL and briefing.sensing < np.inf
+        low, high = np.array(briefing.area)
+        side = max(float((high - low).max()) / CELLS, 1e-12)
+        axes = [_middles(a, b, side) for a, b in zip(low.tolist(), high.tolist(), strict=True)]
+        self._cells = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+        self._seen = np.full(len(self._cells), -np.inf)
+        self._goal = -1
+
+    def note(self, view: View) -> None:
+        """Take notice of what agents have seen, by what is known of where they were."""
+        if not self._is_blind:
+            return
+        reports = [report for report in view.agents.values() if report.place.position is not None]
+        near = self._distances([report.place for report in reports]) <= self._sensing
+        hours = np.array([report.hour for report in reports])
+        self._seen = np.maximum(self._seen, np.where(near, hours[:, None], -np.inf).max(axis=0, initial=-np.inf))
+
+    def order(self, view: View, others: Iterable[Place]) -> Order | None:
+        """Return where to look around, when others are at some places; None where the agent is on its way already."""
+        own = view.own
+        here = own.place.position
+        if not self._is_blind or here is None or view.has_table or view.metric == GEOGRAPHIC:
+            return self._explorer.order(view)
+        ways = self._distances([own.place, *(place for place in others if place.position is not None)])
+        way, is_own = ways[0], ways[0] <= ways.min(axis=0)
+        goal = self._place(view, way, is_own, own.facts.speed)
+        distance = view.distance_to_place(own, Place(goal))
+        energy = own.facts.energy_per_distance * distance
+        is_cheap = own.battery == np.inf or energy <= BATTERY_SHARE * own.battery
+        if distance <= NEAR * self._sensing or not is_cheap or view.refusal_of_place(own, Place(goal)) is not None:
+            return STAY
+        return Order(position=goal)
+
+    def _place(self, view: View, way: FloatArray, is_own: BoolArray, speed: float) -> tuple[float, float, float]:
+        age = view.hour - np.maximum(self._seen, -1e9)
+        old = is_own & (age > self._fresh)
+        if old.any():
+            if self._goal < 0 or not old[self._goal]:
+                hours = np.maximum(way - self._sensing / 2, NEAR * self._sensing) / speed
+                self._goal = int(np.argmax(np.where(old, age / hours, -np.inf)))
+            x, y, z = self._cells[self._goal].tolist()
+            return x, y, z
+        self._goal = -1
+        x, y, z = self._cells[is_own].mean(axis=0).tolist() if is_own.any() else self._cells[np.argmin(way)].tolist()
+        return x, y, z
+
+    def _distances(self, places: list[Place]) -> FloatArray:
+        """Return how far places are from all cells, shape (places, cells)."""
+        return distances(positions(places)[:, None], self._cells)
+
+
+def _middles(low: float, high: float, side: float) -> FloatArray:
+    """Return the middles of cells along an axis."""
+    count = max(1, round((high - low) / side))
+    return low + (high - low) * (np.arange(count) + 0.5) / count

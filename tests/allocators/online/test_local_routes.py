@@ -1,0 +1,109 @@
+"""Routes by local knowledge: what agents agree on by messages, and where they look around."""
+
+import numpy as np
+import pytest
+
+from alloc.allocators import simulate
+from alloc.allocators.online.contract import Briefing
+from alloc.allocators.online.groups.announced import Announced, Route
+from alloc.allocators.online.policies.spreading import Lookout
+from alloc.problems import Instance, Mission, Radio
+from alloc.problems.missions.simulation.places import Place
+from alloc.problems.missions.simulation.simulation import Simulation
+from alloc.problems.missions.simulation.state import STAY
+
+EARLY = Route(1.0, "a1", (("t1", 3.0), ("t2", 5.0)))
+LATE = Route(2.0, "a2", (("t2", 4.0),))
+
+
+def announced(**routes):
+    found = Announced()
+    for agent, route in routes.items():
+        found.plan(agent, route)
+    return found
+
+
+def drawn(sensing=0.3):
+    instance = Instance(
+        ability=[1, 1, 1],
+        workload=[1, 1, 1, 1],
+        agent_position=[[0, 0], [0.1, 0], [1, 1]],
+        task_position=[[0.2, 0], [0, 0.2], [0.9, 1], [1, 0.1]],
+        speed=[0.5] * 3,
+    )
+    radio = Radio(radius=0.3, period=0.1)
+    return Mission(instance, knowledge="local", sensing=sensing, radio=radio, horizon=40.0, seed=1)
+
+
+def test_notes_tell_all_routes():
+    """Who hears the notes of another knows what it knows, whatever it knew before."""
+    one, other = announced(a1=EARLY, a2=LATE), announced(a1=Route(0.5, "a1", (("t9", 1.0),)))
+    other.hear(one.notes())
+    assert other.routes == one.routes
+
+
+@pytest.mark.parametrize("order", [(EARLY, LATE), (LATE, EARLY)])
+def test_the_newer_route_counts(order):
+    """It does not matter in which order two routes of an agent are heard."""
+    known = announced()
+    for route in order:
+        known.plan("a3", route)
+    assert known.routes == {"a3": LATE}
+
+
+def test_of_two_routes_of_one_hour_that_of_the_first_planner_counts():
+    """All agents settle on the same one of two plans that were made at the same time."""
+    one, other = Route(1.0, "a1", ()), Route(1.0, "a2", (("t1", 2.0),))
+    for order in ((one, other), (other, one)):
+        known = announced()
+        for route in order:
+            known.plan("a3", route)
+        assert known.routes["a3"] == one
+
+
+def test_tasks_are_left_to_others_while_their_routes_last():
+    """A task belongs to the newest route that has it; a route that is long over counts no more."""
+    known = announced(a1=EARLY, a2=LATE)
+    assert known.taken({"a3"}, 3.0, 1.0) == {"t1": 3.0, "t2": 4.0}
+    assert known.taken({"a2"}, 3.0, 1.0) == {"t1": 3.0}
+    assert known.taken({"a3"}, 8.0, 1.0) == {"t1": 3.0, "t2": 5.0}
+    assert known.taken({"a3"}, 10.0, 1.0) == {}
+
+
+def test_a_task_planned_twice_stays_with_the_earliest():
+    """Agents that meet drop what another plan does earlier; a coalition of one plan stays."""
+    known = announced(a1=EARLY, a2=LATE)
+    assert known.joined(["a1", "a2"]) == {"a1": ["t1"], "a2": ["t2"]}
+    together = announced(a1=EARLY, a2=EARLY)
+    assert together.joined(["a1", "a2"]) == {"a1": ["t1", "t2"], "a2": ["t1", "t2"]}
+
+
+def looked(mission, others):
+    """Return where the first agent is sent to look around before it has gone anywhere."""
+    simulation = Simulation(mission)
+    simulation.advance()
+    view = simulation.view("a1")
+    lookout = Lookout(Briefing.of(mission, mission.knowledge, 0, None, "a1"), 5.0)
+    lookout.note(view)
+    return lookout.order(view, others)
+
+
+def test_agents_look_around_in_parts_of_the_area():
+    """An agent looks at places that it has not seen and to which no other one is nearer."""
+    for other in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)):
+        goal = looked(drawn(), [Place(other)]).position
+        assert np.linalg.norm(goal) > 0.3
+        assert np.linalg.norm(goal) <= np.linalg.norm(np.subtract(goal, other)) + 1e-9
+
+
+def test_who_sees_everything_stays():
+    """There is nothing to look for."""
+    assert looked(drawn(sensing=np.inf), []) == STAY
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+def test_agents_out_of_contact_do_all_tasks():
+    """Two agents that hear of each other, and one far away, find and do tasks that nobody sees at first."""
+    result = simulate(drawn(), "local-routes", iterations=20, first_iterations=20).result
+    assert result.status == "done"
