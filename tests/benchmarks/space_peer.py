@@ -71,6 +71,9 @@ SIMULATED: dict[str, dict[str, Any]] = {
 }
 """Policies without compiled loops."""
 
+Drawn = tuple[Any, list[float], float | None]
+"""A task or an agent, with its place and amount as they were drawn; an agent has no amount."""
+
 
 def run(given: argparse.Namespace) -> None:
     """Run SPACE as it is, but for tasks and agents: the seed draws the same whatever the policy."""
@@ -86,19 +89,10 @@ def run(given: argparse.Namespace) -> None:
     from modules import agent, task
 
     first = given.seed * 1_000_003
-    tasks: list[dict[str, object]] = []
-    agents: list[Any] = []
-    places: list[list[float]] = []
-
-    def note_tasks(drawn: list[Any]) -> None:
-        tasks.extend({"position": list(one.position), "workload": one.amount} for one in drawn)
-
-    def note_agents(drawn: list[Any]) -> None:
-        agents.extend(drawn)
-        places.extend(list(one.position) for one in drawn)
-
-    task.generate_tasks = seeded(task.generate_tasks, first, note_tasks)
-    agent.generate_agents = seeded(agent.generate_agents, first + 500_000, note_agents)
+    tasks: list[Drawn] = []
+    agents: list[Drawn] = []
+    task.generate_tasks = seeded(task.generate_tasks, first, tasks)
+    agent.generate_agents = seeded(agent.generate_agents, first + 500_000, agents)
     sys.argv = ["main.py", "--config", str(path)]
     random.seed(first + 999)
     with contextlib.redirect_stdout(io.StringIO()) as said:
@@ -106,9 +100,9 @@ def run(given: argparse.Namespace) -> None:
     end = re.search(r"\[([\d.]+)\] MISSION COMPLETED", said.getvalue())
     result = {
         "mission_time": float(end[1]) if end else None,
-        "distance": sum(one.distance_moved for one in agents),
-        "agents": places,
-        "tasks": tasks,
+        "distance": sum(one.distance_moved for one, _, _ in agents),
+        "agents": [place for _, place, _ in agents],
+        "tasks": [{"position": place, "workload": amount} for _, place, amount in tasks],
     }
     path.with_suffix(".json").write_text(json.dumps(result), encoding="utf-8")
 
@@ -130,15 +124,15 @@ def configured(given: argparse.Namespace) -> Path:
     return path
 
 
-def seeded(draw: Callable[..., list[Any]], seed: int, note: Callable[[list[Any]], None]) -> Callable[..., list[Any]]:
-    """Return a function that draws by a seed of its own, and leaves all other chance as it was."""
+def seeded(draw: Callable[..., list[Any]], seed: int, notes: list[Drawn]) -> Callable[..., list[Any]]:
+    """Return a function that draws by a seed of its own, notes what, and leaves all other chance as it was."""
 
     def drawn(*arguments: object, **named: int) -> list[Any]:
         state = random.getstate()
         random.seed(seed + named.get("task_id_start", 0))
         found = draw(*arguments, **named)
         random.setstate(state)
-        note(found)
+        notes.extend((one, list(one.position), getattr(one, "amount", None)) for one in found)
         return found
 
     return drawn
