@@ -6,13 +6,12 @@ import numpy as np
 
 from alloc.allocators.online.contract import Briefing
 from alloc.allocators.online.policies.exploring import BATTERY_SHARE, Explorer
-from alloc.allocators.online.routes.tables import positions
-from alloc.problems.distances.metric import distances
+from alloc.allocators.online.routes.tables import by_metric, is_fixed, positions
 from alloc.problems.fields import BoolArray, FloatArray
 from alloc.problems.missions.simulation.places import Place
 from alloc.problems.missions.simulation.reports import View
 from alloc.problems.missions.simulation.state import STAY, Order
-from alloc.problems.vocabulary import GEOGRAPHIC, Knowledge
+from alloc.problems.vocabulary import Knowledge
 
 CELLS = 20
 """Cells along the longer side of the area."""
@@ -47,10 +46,10 @@ class Lookout:
 
     def note(self, view: View) -> None:
         """Take notice of what agents have seen, by what is known of where they were."""
-        if not self._is_blind:
+        if not self._is_blind or is_fixed(view):
             return
         reports = [report for report in view.agents.values() if report.place.position is not None]
-        near = self._distances([report.place for report in reports]) <= self._sensing
+        near = self._distances(view, [report.place for report in reports]) <= self._sensing
         hours = np.array([report.hour for report in reports])
         self._seen = np.maximum(self._seen, np.where(near, hours[:, None], -np.inf).max(axis=0, initial=-np.inf))
 
@@ -58,9 +57,9 @@ class Lookout:
         """Return where to look around, when others are at some places; None where the agent is on its way already."""
         own = view.own
         here = own.place.position
-        if not self._is_blind or here is None or view.has_table or view.metric == GEOGRAPHIC:
+        if not self._is_blind or here is None or is_fixed(view):
             return self._explorer.order(view)
-        ways = self._distances([own.place, *(place for place in others if place.position is not None)])
+        ways = self._distances(view, [own.place, *(place for place in others if place.position is not None)])
         way, is_own = ways[0], ways[0] <= ways.min(axis=0)
         goal = self._place(view, way, is_own, own.facts.speed)
         distance = view.distance_to_place(own, Place(goal))
@@ -83,9 +82,9 @@ class Lookout:
         x, y, z = self._cells[is_own].mean(axis=0).tolist() if is_own.any() else self._cells[np.argmin(way)].tolist()
         return x, y, z
 
-    def _distances(self, places: list[Place]) -> FloatArray:
+    def _distances(self, view: View, places: list[Place]) -> FloatArray:
         """Return how far places are from all cells, shape (places, cells)."""
-        return distances(positions(places)[:, None], self._cells)
+        return by_metric(view.metric, positions(places), self._cells)
 
 
 def _middles(low: float, high: float, side: float) -> FloatArray:
