@@ -47,14 +47,15 @@ class Announced:
         self.routes: dict[str, Route] = {}
 
     def plan(self, agent: str, route: Route) -> None:
-        """Take notice of a route, unless a newer one is known."""
-        if self._is_news(agent, route.hour, route.planner):
+        """Take notice of a route, unless a newer one is known; of two of one hour and planner the last counts."""
+        known = self.routes.get(agent)
+        if known is None or (route.hour, known.planner) >= (known.hour, route.planner):
             self.routes[agent] = route
 
     def _is_news(self, agent: str, hour: float, planner: str) -> bool:
         """Whether a route is newer than the one that is known; of two of one hour that of the first planner counts."""
         known = self.routes.get(agent)
-        return known is None or hour > known.hour or (hour == known.hour and planner < known.planner)
+        return known is None or (hour, known.planner) > (known.hour, planner)
 
     def notes(self) -> tuple[str | float, ...]:
         """Return all routes as notes of a message."""

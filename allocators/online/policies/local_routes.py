@@ -92,10 +92,12 @@ class _Planner(AgentDecider):
             task = view.tasks.get(name)
             if task is not None and view.refusal(view.own, task) is None:
                 return Order(name)
+        if self._tasks_open(view, str(view.id)):  # for which its battery no longer lasts: others are to do them
+            self._announced.plan(str(view.id), Route(view.hour, str(view.id), ()))
         return self._lookout.order(view, [self._end(view, name) for name in group if name != view.id])
 
     def _help(self, view: View, group: list[str]) -> None:
-        """Let an agent without a task take the nearest of others, out of contact, who are late, or later than it."""
+        """Let an agent without a task take the nearest one of others out of contact who are late, or come later."""
         taken = self._announced.taken(set(group), view.hour, self._parameters.patience)
         best, least = None, math.inf
         for task in view.open_tasks(view.own):
@@ -147,10 +149,10 @@ class _Planner(AgentDecider):
         return view.tasks[tasks[-1]].facts.place if tasks else view.agents[name].place
 
     def _renew(self, view: View, group: list[str]) -> None:
-        """Plan routes for some agents, if agents or tasks are not those of the last plan."""
+        """Plan routes for some agents, if agents or tasks are not those of the last plan, or it has tasks no more."""
         tasks = self._open(view, set(group))
         news = (*group, frozenset(tasks))
-        if news == self._planned:
+        if news == self._planned and tasks - self._planned_for(group) <= self._given_up:
             return
         self._planned = news
         began = time.perf_counter()

@@ -6,9 +6,11 @@ import pytest
 from alloc.allocators import simulate
 from alloc.allocators.online.contract import Briefing
 from alloc.allocators.online.groups.announced import Announced, Route
+from alloc.allocators.online.policies.local_routes import LocalRoutes
 from alloc.allocators.online.policies.spreading import Lookout
 from alloc.problems import Instance, Mission, Radio
 from alloc.problems.missions.simulation.places import Place
+from alloc.problems.missions.simulation.reports import Message
 from alloc.problems.missions.simulation.simulation import Simulation
 from alloc.problems.missions.simulation.state import STAY
 
@@ -23,13 +25,14 @@ def announced(**routes):
     return found
 
 
-def drawn(sensing=0.3):
+def drawn(sensing=0.3, **more):
     instance = Instance(
         ability=[1, 1, 1],
         workload=[1, 1, 1, 1],
         agent_position=[[0, 0], [0.1, 0], [1, 1]],
         task_position=[[0.2, 0], [0, 0.2], [0.9, 1], [1, 0.1]],
         speed=[0.5] * 3,
+        **more,
     )
     radio = Radio(radius=0.3, period=0.1)
     return Mission(instance, knowledge="local", sensing=sensing, radio=radio, horizon=40.0, seed=1)
@@ -59,6 +62,13 @@ def test_of_two_routes_of_one_hour_that_of_the_first_planner_counts():
         for route in order:
             known.plan("a3", route)
         assert known.routes["a3"] == one
+
+
+def test_a_planner_may_change_its_mind_at_once():
+    """Of two routes that it planned in the same hour the last counts."""
+    known = announced(a1=EARLY)
+    known.plan("a1", Route(1.0, "a1", (("t3", 2.0),)))
+    assert known.routes["a1"].tasks == ["t3"]
 
 
 def test_tasks_are_left_to_others_while_their_routes_last():
@@ -103,7 +113,26 @@ def test_who_sees_everything_stays():
 
 @pytest.mark.slow
 @pytest.mark.timeout(300)
-def test_agents_out_of_contact_do_all_tasks():
+def test_who_can_take_no_task_of_its_route_gives_them_back():
+    """A plan that others made may ask for more than an agent's battery has by now."""
+    mission = drawn(energy_per_distance=1, battery=[1, 1e-3, 1])
+    simulation = Simulation(mission)
+    simulation.advance()
+    view, route = simulation.view("a2"), Route(-1.0, "a1", (("t1", 1.0),))
+    view.heard = (Message("a1", 0.0, notes=announced(a2=route).notes()),)
+    decider = LocalRoutes(iterations=0, first_iterations=0).begin(
+        Briefing.of(mission, mission.knowledge, 0, None, "a2")
+    )
+    decider.decide(view)
+    told = Announced()
+    told.hear(decider.message(view).notes)
+    assert told.routes["a2"].tasks == []
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+@pytest.mark.parametrize("metric", ["euclidean", "manhattan"])
+def test_agents_out_of_contact_do_all_tasks(metric):
     """Two agents that hear of each other, and one far away, find and do tasks that nobody sees at first."""
-    result = simulate(drawn(), "local-routes", iterations=20, first_iterations=20).result
+    result = simulate(drawn(metric=metric), "local-routes", iterations=20, first_iterations=20).result
     assert result.status == "done"
