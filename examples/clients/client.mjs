@@ -18,6 +18,10 @@ const instance = {
     { id: "station", workload: 6, position: [4, 3] },
   ],
 };
+const fleet = { // too large to be done at once
+  agents: Array.from({ length: 80 }, (_, i) => ({ id: `agent ${i}`, ability: 1 + ((7 * i) % 10), position: [(13 * i) % 17, (5 * i) % 11] })),
+  tasks: Array.from({ length: 15 }, (_, j) => ({ id: `task ${j}`, workload: 10 + ((9 * j) % 40), position: [(3 * j) % 17, (7 * j) % 11] })),
+};
 const request = { id: "first", instance, method: "local-search", objective: "makespan-energy", limit_ms: 200 };
 
 const show = ({ id, result, error }) =>
@@ -35,7 +39,7 @@ async function overLines() {
   });
   const send = (line) => server.stdin.write(`${JSON.stringify(line)}\n`);
   send(request);
-  send({ ...request, id: "second", limit_ms: 10000 });
+  send({ ...request, id: "second", instance: fleet, limit_ms: 10000 });
   for await (const line of createInterface({ input: server.stdout })) {
     const answer = JSON.parse(line);
     show(answer);
