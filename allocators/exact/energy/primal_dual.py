@@ -1,5 +1,7 @@
 """Close the gap on the energy from both sides: plans by pairwise repartition, bounds by Lagrangian relaxation."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from alloc.allocators.exact.demand import Demand
@@ -137,19 +139,23 @@ class PrimalDual:
         self._gap_tried = gap
         return self._cuts.all_groups(self._cost, FEW_GROUPS)
 
-    def groups_of_cheapest(self, most: int) -> GroupProgramme | None:
+    def groups_of_cheapest(self, most: int, stopped: Callable[[], bool]) -> GroupProgramme | None:
         """Return all groups of which the plans consist that cost less than a part of the gap above the bound.
 
-        The part is as large as it can be with at most so many groups; None if even the least has more.
+        The part is as large as it can be with at most so many groups; None if even the least has more, or the run is to
+        stop: to count them for one part may take a second.
         """
         if self._cuts is None:
             return None
         bound = self._cuts.bound
-        tried = (self._cuts.all_groups(bound + part * (self._cost - bound), most) for part in PARTS)
-        return next((groups for groups in tried if groups is not None), None)
+        for part in PARTS:
+            groups = None if stopped() else self._cuts.all_groups(bound + part * (self._cost - bound), most)
+            if groups is not None:
+                return groups
+        return None
 
     def allocation(self, programme: GroupProgramme, counts: IntArray) -> Allocation:
-        """Turn numbers of agents of the pairs of a programme by `few_groups` into an allocation."""
+        """Turn numbers of agents of the pairs of a programme of groups into an allocation."""
         full = np.zeros(len(self._demand.class_of_pair), dtype=np.intp)
         full[self._kept] = counts
         return self._model.allocation(self._demand, full)

@@ -3,7 +3,7 @@
 The mixtures of groups for each task, of which the Lagrangian relaxation gives the least cost in the end, are a linear
 programme. Column generation solves it in few rounds from prices that are nearly the best, and then shows which
 mixtures there are: cuts over sets of classes rule some out. At any prices and penalties the cheapest groups, less what
-the agents and cuts cost, bound the cost of every plan from below. Prices that clusters pay stay as they are.
+the agents and cuts cost, bound the cost of every plan from below.
 
 References
 ----------
