@@ -15,6 +15,7 @@ Geoffrion (1974), Lagrangean relaxation for integer programming, doi:10.1007/BFb
 """
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -154,9 +155,10 @@ class LagrangianBound:
         """Whether prices are so good that cutting planes raise the bound faster."""
         return self._decays >= DECAYS_WITHOUT_CLUSTERS if self._member is None else self.converged
 
-    def cutting_planes(self, plan: WholeArray) -> CuttingPlanes:
+    def cutting_planes(self, plan: WholeArray, should_stop: Callable[[], bool]) -> CuttingPlanes:
         """Return an ascent that goes on from here, given the agents of each pair of a plan, shape (p,)."""
-        return CuttingPlanes(self._model, self._cut_member, self._price, [plan[self.kept], *self._groups])
+        groups = [plan[self.kept], *self._groups]
+        return CuttingPlanes(self._model, self._cut_member, self._price, groups, should_stop)
 
     def ascend(self, rounds: int, cost: float) -> None:
         """Change prices `rounds` times, given the cost of a plan at hand."""

@@ -73,16 +73,26 @@ class PrimalDual:
     seed : int
     seconds : float
         Time limit of the linear programme to begin with.
+    should_stop : callable
+        Asked while cuts are sought.
     """
 
     def __init__(
-        self, instance: Instance, model: Model, demand: Demand, plan: Allocation, seed: int, seconds: float
+        self,
+        instance: Instance,
+        model: Model,
+        demand: Demand,
+        plan: Allocation,
+        seed: int,
+        seconds: float,
+        should_stop: Callable[[], bool] = lambda: False,
     ) -> None:
         self._model, self._demand, self._plan = model, demand, plan
         task_distance = pairwise_distance(instance.reach.goal[model.tasks])
         self._pairs: IntArray = np.arange(len(demand.class_of_pair))
         self._dual = None if demand.partial else self._begin_dual(task_distance, seconds)
         self._cuts: CuttingPlanes | None = None
+        self._should_stop = should_stop
         self._primal = _begin_primal(instance, model, demand, plan, task_distance, seed)
         self._reported = self._cost = _cost_of_plan(instance, plan)
         self._gap_tried = np.inf
@@ -225,7 +235,7 @@ class PrimalDual:
         if self._dual is None:
             return
         if self._cuts is None and self._dual.is_nearly_optimal and self._dual.may_be_cut:
-            self._cuts = self._dual.cutting_planes(self._counts)
+            self._cuts = self._dual.cutting_planes(self._counts, self._should_stop)
             self._cuts.ascend(1, self._cost)  # no more, as this turn also takes the time to build them
         elif self._cuts is None:
             self._dual.ascend(rounds, self._cost)

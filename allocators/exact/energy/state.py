@@ -58,7 +58,8 @@ class EnergyState:
         until_s = np.inf if limit_s is None else limit_s
         if len(demand.class_of_pair) > FEW_PAIRS and len(demand.need) <= MAX_TASKS:
             seconds = np.inf if is_repeatable(search) else LINEAR_SHARE * min(STAGE_S, search.remaining_s)
-            both = PrimalDual(search.instance, model, demand, search.best.allocation, search.seed, seconds)
+            plan = search.best.allocation
+            both = PrimalDual(search.instance, model, demand, plan, search.seed, seconds, search.should_stop)
             primal_dual = None if both.is_empty else both
         # the primal side rounds weights, and so has few plans at the very least makespan where they are no integers
         enough = primal_dual is not None and primal_dual.finds_plans and demand.integral

@@ -9,6 +9,7 @@ References
 Boyd (1994), Fenchel cutting planes for integer programs, doi:10.1287/opre.42.1.53.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import highspy
@@ -69,7 +70,9 @@ class ClusterSeparation:
         self._points: dict[int, FloatArray] = {}
         self._next = 0
 
-    def violated(self, use: FloatArray, task: IntArray, part: FloatArray) -> list[ClusterCut]:
+    def violated(
+        self, use: FloatArray, task: IntArray, part: FloatArray, should_stop: Callable[[], bool] = lambda: False
+    ) -> list[ClusterCut]:
         """Return cuts that a mixture violates; clusters take turns, and if those of this turn have none, more do.
 
         Parameters
@@ -78,11 +81,15 @@ class ClusterSeparation:
             Agents of each class in each group.
         task : ndarray of int, shape (g,)
         part : ndarray, shape (g,)
+        should_stop : callable
+            Asked between clusters.
         """
         cuts: list[ClusterCut] = []
         turn = [(self._next + f) % len(self._member) for f in range(len(self._member))]
         for begin in range(0, len(turn), TURN):
             for f in turn[begin : begin + TURN]:
+                if should_stop():
+                    return cuts
                 here = self._member[f][task]
                 if (part[here] < 1 - 1e-6).any() and self._knapsack(f).need[0] > 0:
                     cuts += self._cut_of(f, part[here] @ use[here])

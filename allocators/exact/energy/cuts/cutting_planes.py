@@ -11,6 +11,8 @@ Desaulniers, Desrosiers and Solomon, eds. (2005), Column Generation, doi:10.1007
 Dantzig-Wolfe decomposition for linear mixed-integer programming, doi:10.1016/S0969-6016(97)00001-4.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy.sparse import csr_array, vstack
 
@@ -58,6 +60,8 @@ class CuttingPlanes:
         To begin with.
     groups : list of ndarray of int, shape (p,)
         Groups of all tasks to begin with, by pairs, those of a plan among them.
+    should_stop : callable
+        Asked while cuts are sought.
 
     Attributes
     ----------
@@ -69,8 +73,15 @@ class CuttingPlanes:
         Whether the mixture violates no cut, or the programme could not be solved.
     """
 
-    def __init__(self, model: EnergyModel, member: Mask, price: FloatArray, groups: list[WholeArray]) -> None:
-        self._model = model
+    def __init__(
+        self,
+        model: EnergyModel,
+        member: Mask,
+        price: FloatArray,
+        groups: list[WholeArray],
+        should_stop: Callable[[], bool] = lambda: False,
+    ) -> None:
+        self._model, self._should_stop = model, should_stop
         self._weight, self._need = model.weight.astype(np.float64), model.need.astype(np.float64)
         self._master, self._smoothing = GroupMaster(model, member), SMOOTHING
         for group in groups:
@@ -142,7 +153,7 @@ class CuttingPlanes:
             self.bound, self._price, self._penalty = value, price, penalty
         is_new = master.add(group)
         if self.bound >= master.value * (1 - PRECISION) or not (is_new or self._smoothing):
-            self.converged = not (self._drop_pairs(cost) or master.separate())
+            self.converged = not (self._drop_pairs(cost) or master.separate(self._should_stop))
             is_new = True
         self._smoothing = SMOOTHING if is_new else (self._smoothing / 2 if self._smoothing > 0.2 else 0.0)
 

@@ -1,5 +1,7 @@
 """The linear programme that mixes the groups of each task found so far, with cuts, by HiGHS."""
 
+from collections.abc import Callable
+
 import highspy
 import numpy as np
 from scipy.sparse import csr_array
@@ -139,11 +141,11 @@ class GroupMaster:
             used[:, at] = cut.use(use, task)
         return used
 
-    def separate(self) -> bool:
-        """Add the cuts that the mixture violates most; return whether there are any."""
+    def separate(self, should_stop: Callable[[], bool] = lambda: False) -> bool:
+        """Add the cuts that the mixture violates most; return whether there are any, as far as there was time."""
         before = len(self.limit)
         on = np.flatnonzero(self._part > 1e-6)
-        for cut in self._separation.violated(self._use[on, :-1], self._task[on], self._part[on]):
+        for cut in self._separation.violated(self._use[on, :-1], self._task[on], self._part[on], should_stop):
             self._cluster_at = np.append(self._cluster_at, len(self.limit))
             self._clusters.append(cut)
             self._add_cut(cut.limit, cut.use(self._use[: self._groups, :-1], self._task[: self._groups]))
