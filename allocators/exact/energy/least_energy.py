@@ -78,7 +78,7 @@ def _least_cost(state: EnergyState, solver: Solver) -> float:
     bound = both.bound
     for most in MOST_GROUPS:
         if bound < state.cost * (1 - PROVEN) and not is_over(search):
-            groups = groups or both.groups_of_cheapest(most, lambda: is_over(search))
+            groups = groups or both.groups_of_cheapest(most)
             bound = bound if groups is None else max(bound, _solve_groups(state, both, groups))
             groups = None
     if bound < state.cost * (1 - PROVEN) and not is_over(search):

@@ -74,7 +74,7 @@ class PrimalDual:
     seconds : float
         Time limit of the linear programme to begin with.
     should_stop : callable
-        Asked while cuts are sought.
+        Asked while cuts are sought, and while groups are counted.
     """
 
     def __init__(
@@ -149,20 +149,16 @@ class PrimalDual:
         self._gap_tried = gap
         return self._cuts.all_groups(self._cost, FEW_GROUPS)
 
-    def groups_of_cheapest(self, most: int, stopped: Callable[[], bool]) -> GroupProgramme | None:
+    def groups_of_cheapest(self, most: int) -> GroupProgramme | None:
         """Return all groups of which the plans consist that cost less than a part of the gap above the bound.
 
-        The part is as large as it can be with at most so many groups; None if even the least has more, or the run is to
-        stop: to count them for one part may take a second.
+        The part is as large as it can be with at most so many groups; None if even the least has more.
         """
         if self._cuts is None:
             return None
         bound = self._cuts.bound
-        for part in PARTS:
-            groups = None if stopped() else self._cuts.all_groups(bound + part * (self._cost - bound), most)
-            if groups is not None:
-                return groups
-        return None
+        tried = (self._cuts.all_groups(bound + part * (self._cost - bound), most) for part in PARTS)
+        return next((groups for groups in tried if groups is not None), None)
 
     def allocation(self, programme: GroupProgramme, counts: IntArray) -> Allocation:
         """Turn numbers of agents of the pairs of a programme of groups into an allocation."""
