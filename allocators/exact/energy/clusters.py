@@ -27,16 +27,21 @@ def cluster_tasks(task_distance: FloatArray) -> Mask:
     return np.asarray(member[small])
 
 
-def overlapping_clusters(task_distance: FloatArray) -> Mask:
-    """Return the clusters of `cluster_tasks`, and each task with its nearest ones, up to as many, shape (f, t)."""
+def overlapping_clusters(task_distance: FloatArray, most: int) -> Mask:
+    """Return the clusters of `cluster_tasks`, and each task with its nearest ones, up to as many, shape (f, t).
+
+    At most `most` clusters, which leaves out those of many nearest tasks first.
+    """
     nested, near = cluster_tasks(task_distance), np.argsort(task_distance, axis=1, kind="stable")
     tasks, rows = len(task_distance), []
     for size in range(2, int(nested.sum(axis=1).max(initial=0)) + 1):
         row = np.zeros((tasks, tasks), dtype=bool)
         np.put_along_axis(row, near[:, :size], True, axis=1)
         rows.append(row)
+        if size * tasks >= 2 * most:  # of which some are the same
+            break
     together = np.vstack([nested, *rows])
-    return np.asarray(together[np.sort(np.unique(together, axis=0, return_index=True)[1])])
+    return np.asarray(together[np.sort(np.unique(together, axis=0, return_index=True)[1])][:most])
 
 
 @dataclass(frozen=True, eq=False)

@@ -68,17 +68,6 @@ class EnergyModel:
             cost=self.cost[keep],
         )
 
-    def of_task(self, task: int) -> "EnergyModel":
-        """Return the model of one task alone."""
-        alone = self.only(self.task_of_pair == task)
-        here = slice(task, task + 1)
-        return replace(
-            alone,
-            task_of_pair=np.zeros_like(alone.task_of_pair),
-            need=self.need[here],
-            max_weight=self.max_weight[here],
-        )
-
     @property
     def is_whole(self) -> bool:
         """Whether weights and needs are whole numbers."""

@@ -61,8 +61,9 @@ CONVERGED_STEP, CONVERGED_ALONE = 0.02, 0.005
 """Steps shorter than this, where 1 is the step that would reach the plan's cost, hardly raise the bound: with clusters,
 after which a solver does better, and without."""
 
-MAX_LINKS = 5_000_000
-"""Clusters times pairs of class and task above which there are no clusters."""
+MAX_LINKS, MAX_CUT_LINKS = 5_000_000, 20_000_000
+"""Tasks times pairs of class and task above which there are no clusters, and clusters times pairs up to which there are
+overlapping ones."""
 
 DECAYS_ALONE, DECAYS_WITHOUT_CLUSTERS = 4, 1
 """Shortenings of the step after which clusters are added, and where there are none, cutting planes take over."""
@@ -120,7 +121,7 @@ class LagrangianBound:
         self._cut_member = np.zeros((0, len(model.need)), dtype=bool)
         if model.ability is not None and len(model.need) > 3 and links <= MAX_LINKS:
             if self.may_be_cut:  # then prices that clusters pay would only converge more slowly than their cuts
-                self._cut_member = overlapping_clusters(task_distance)
+                self._cut_member = overlapping_clusters(task_distance, MAX_CUT_LINKS // len(model.class_of_pair))
             else:
                 self._member = cluster_tasks(task_distance)
         self._clusters: Clusters | None = None

@@ -74,7 +74,7 @@ class PrimalDual:
     seconds : float
         Time limit of the linear programme to begin with.
     should_stop : callable
-        Asked while cuts are sought.
+        Asked while cuts are sought, and while groups are counted.
     """
 
     def __init__(
@@ -161,7 +161,7 @@ class PrimalDual:
         return next((groups for groups in tried if groups is not None), None)
 
     def allocation(self, programme: GroupProgramme, counts: IntArray) -> Allocation:
-        """Turn numbers of agents of the pairs of a programme by `few_groups` into an allocation."""
+        """Turn numbers of agents of the pairs of a programme of groups into an allocation."""
         full = np.zeros(len(self._demand.class_of_pair), dtype=np.intp)
         full[self._kept] = counts
         return self._model.allocation(self._demand, full)

@@ -65,12 +65,9 @@ class ClusterSeparation:
     """
 
     def __init__(self, model: EnergyModel, member: Mask) -> None:
-        self._member, self._classes = member, len(model.count)
-        self._knapsacks: list[EnergyModel] = []
-        if len(member):
-            entries = Clusters.build(model, member).model
-            self._knapsacks = [entries.of_task(f) for f in range(len(member))]
-        self._points = [one.copies[None].astype(float) for one in self._knapsacks]
+        self._model, self._member = model, member
+        self._knapsacks: dict[int, EnergyModel] = {}
+        self._points: dict[int, FloatArray] = {}
         self._next = 0
 
     def violated(
@@ -94,16 +91,23 @@ class ClusterSeparation:
                 if should_stop():
                     return cuts
                 here = self._member[f][task]
-                if self._knapsacks[f].need[0] > 0 and (part[here] < 1 - 1e-6).any():
+                if (part[here] < 1 - 1e-6).any() and self._knapsack(f).need[0] > 0:
                     cuts += self._cut_of(f, part[here] @ use[here])
             self._next += TURN
             if cuts:
                 break
         return cuts
 
+    def _knapsack(self, f: int) -> EnergyModel:
+        """Return the knapsack of a cluster; built when it is first asked for, as there are many."""
+        if f not in self._knapsacks:
+            self._knapsacks[f] = Clusters.build(self._model, self._member[f : f + 1]).model
+            self._points[f] = self._knapsacks[f].copies[None].astype(float)
+        return self._knapsacks[f]
+
     def _cut_of(self, f: int, mixed: FloatArray) -> list[ClusterCut]:
         """Return a cut of a cluster that has `mixed` agents of each class, shape (k,); none if none is violated."""
-        knapsack = self._knapsacks[f]
+        knapsack = self._knapsack(f)
         inside = mixed[knapsack.class_of_pair]
         function = _Separator(inside, self._points[f], is_exact=bool(knapsack.max_weight[0] >= 0))
         best, cuts = LEAST_VIOLATION, []

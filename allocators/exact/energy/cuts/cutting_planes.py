@@ -3,7 +3,7 @@
 The mixtures of groups for each task, of which the Lagrangian relaxation gives the least cost in the end, are a linear
 programme. Column generation solves it in few rounds from prices that are nearly the best, and then shows which
 mixtures there are: cuts over sets of classes rule some out. At any prices and penalties the cheapest groups, less what
-the agents and cuts cost, bound the cost of every plan from below. Prices that clusters pay stay as they are.
+the agents and cuts cost, bound the cost of every plan from below.
 
 References
 ----------
@@ -61,7 +61,7 @@ class CuttingPlanes:
     groups : list of ndarray of int, shape (p,)
         Groups of all tasks to begin with, by pairs, those of a plan among them.
     should_stop : callable
-        Asked while cuts are sought.
+        Asked while cuts are sought, and while groups are counted.
 
     Attributes
     ----------
@@ -105,6 +105,7 @@ class CuttingPlanes:
     def all_groups(self, cost: float, most: int) -> GroupProgramme | None:
         """Return all groups of which plans that cost less than `cost` consist; None if they are more than `most`.
 
+        None as well if the run should stop meanwhile: all tasks together may take a second.
         What the group of a task costs more than its cheapest one is at most what `cost` exceeds the bound by.
         """
         model = self._model
@@ -117,6 +118,8 @@ class CuttingPlanes:
         first, (first_cut, cut) = model.first, self._master.cuts_of_pairs(penalty)
         task, group = [np.zeros(0, dtype=np.int64)], [csr_array((0, len(paid)), dtype=np.int64)]
         for j in range(len(least)):
+            if self._should_stop():
+                return None
             a, b, room = first[j], first[j + 1], most - sum(len(tasks) for tasks in task)
             inside = np.zeros((room, b - a), dtype=np.int64)
             found = write_groups(

@@ -96,7 +96,7 @@ def test_bound_by_cutting_planes_is_below_the_best_plan(seed, kind, worse):
         part, need = model.weight / model.need[model.task_of_pair], np.full(len(model.need), 1 - 1e-10)
         model = replace(model, weight=part, need=need, ability=None)
     group = (model.task_of_pair == plan[model.class_of_pair]).astype(np.int64)
-    member = overlapping_clusters(LINE) if model.ability is not None else np.zeros((0, 4), dtype=bool)
+    member = overlapping_clusters(LINE, 100) if model.ability is not None else np.zeros((0, 4), dtype=bool)
     cuts = CuttingPlanes(model, member, np.zeros(len(model.count)), [group])
     for _ in range(200):
         cuts.ascend(1, best * worse)
@@ -113,7 +113,7 @@ def test_the_best_of_all_groups_is_the_best_plan(seed, limited, worse):
     """Groups of plans that cost less than a worse one are those of the best plan, too; none are cheaper than it."""
     model, best, plan = model_of(seed, 4, limited=limited)
     group = (model.task_of_pair == plan[model.class_of_pair]).astype(np.int64)
-    cuts = CuttingPlanes(model, overlapping_clusters(LINE), np.zeros(len(model.count)), [group])
+    cuts = CuttingPlanes(model, overlapping_clusters(LINE, 100), np.zeros(len(model.count)), [group])
     cuts.ascend(20, best * worse)
     monitor = SimpleNamespace(run=lambda work, stop: work())
     programme = cuts.all_groups(best * worse, 1000)
