@@ -61,7 +61,7 @@ class CuttingPlanes:
     groups : list of ndarray of int, shape (p,)
         Groups of all tasks to begin with, by pairs, those of a plan among them.
     should_stop : callable
-        Asked while cuts are sought, and while groups are counted.
+        Asked while cuts are sought, groups counted and programmes solved.
 
     Attributes
     ----------
@@ -144,7 +144,7 @@ class CuttingPlanes:
 
     def _round(self, cost: float) -> None:
         master = self._master
-        if not master.solve():
+        if not master.solve(self._should_stop):
             self.converged = True
             return
         known = self._known_penalty

@@ -10,6 +10,7 @@ from alloc.allocators.exact.energy.cuts.cluster_cuts import ClusterCut, ClusterS
 from alloc.allocators.exact.energy.cuts.subset_rows import violated_sets
 from alloc.allocators.exact.energy.energy_model import EnergyModel, Mask
 from alloc.allocators.exact.knapsack import WholeArray
+from alloc.allocators.runtime.interrupts import run_native
 from alloc.problems.instance import FloatArray, IntArray
 
 LEAST_VIOLATION, MOST_FOUND = 0.05, 5000
@@ -59,6 +60,7 @@ class GroupMaster:
         self.value, self.price = np.inf, np.zeros(classes)
         self.penalty, self.limit = np.zeros(0), np.zeros(0)
         self._highs = highspy.Highs()
+        self._highs.HandleUserInterrupt = True
         for option, value in (("output_flag", False), ("threads", 1), ("presolve", "off")):
             self._highs.setOptionValue(option, value)
         for _ in range(self._tasks):
@@ -90,9 +92,9 @@ class GroupMaster:
             self._highs.changeColBounds(g, 0.0, 0.0)
         self._separation = ClusterSeparation(model, self._member)
 
-    def solve(self) -> bool:
-        """Solve; return whether that succeeded."""
-        self._highs.run()
+    def solve(self, should_stop: Callable[[], bool] = lambda: False) -> bool:
+        """Solve; return whether that succeeded, as it does not where it is stopped."""
+        run_native(self._highs.solve, should_stop, self._highs.cancelSolve)
         if self._highs.getModelStatus() != highspy.HighsModelStatus.kOptimal:
             return False
         solution, model = self._highs.getSolution(), self._model
