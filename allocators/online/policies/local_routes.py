@@ -1,17 +1,16 @@
 """The policy `local-routes`: routes for agents that hear of each other, planned by one of them for all."""
 
 import math
-import time
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from alloc.allocators.contract.parameters import bounded
 from alloc.allocators.online.contract import AgentDecider, Briefing, Policy, PolicyInfo
 from alloc.allocators.online.groups.announced import Announced, Route
-from alloc.allocators.online.policies.routes import DEADLINE_SHARE, RoutesParameters
+from alloc.allocators.online.policies.routes import RouteSearch, RoutesParameters
 from alloc.allocators.online.policies.spreading import Lookout
-from alloc.allocators.online.routes.describe import Describer, Foresight
-from alloc.allocators.online.routes.plan import finish_hours, improved, warm_up
+from alloc.allocators.online.routes.describe import Foresight
+from alloc.allocators.online.routes.plan import finish_hours, warm_up
 from alloc.problems.missions.simulation.places import Place
 from alloc.problems.missions.simulation.reports import AgentReport, Message, View
 from alloc.problems.missions.simulation.state import ACTIVE, AgentStatus, Order, TaskStatus
@@ -63,20 +62,14 @@ class LocalRoutes(Policy):
 
 class _Planner(AgentDecider):
     def __init__(self, parameters: LocalRoutesParameters, briefing: Briefing) -> None:
-        pace = 1.0 if briefing.pace is None else (briefing.pace.low + briefing.pace.high) / 2
         period = briefing.radio.period
-        self._parameters, self._seed = parameters, briefing.seed[0]
-        self._describer = Describer(briefing.end, max(pace, 1e-9), parameters.switch_price)
-        limit = briefing.deadline_s
-        self._time_limit_s = None if limit is None else DEADLINE_SHARE * limit
+        self._parameters, self._search = parameters, RouteSearch(parameters, briefing)
         self._contact = parameters.contact * period + briefing.radio.delay
         self._lookout = Lookout(briefing, parameters.fresh * period)
         self._is_alone = briefing.knowledge is Knowledge.FULL
         self._announced = Announced()
         self._planned: tuple[object, ...] = ()
-        self._given_up: set[str] = set()
         self._waits_since = math.inf
-        self._count = 0
 
     def decide(self, view: View) -> Order | None:
         """Return the first task of the agent's route; a new plan is made where there is news."""
@@ -84,8 +77,9 @@ class _Planner(AgentDecider):
             self._announced.hear(message.notes)
         self._lookout.note(view)
         group = self._group(view)
-        if self._is_alone or group[0] == view.id or self._has_waited(view, group):
-            self._renew(view, group if self._is_alone or group[0] == view.id else [str(view.id)])
+        is_planner = self._is_alone or group[0] == view.id
+        if is_planner or self._has_waited(view, group):
+            self._renew(view, group if is_planner else [str(view.id)])
         if not self._tasks_open(view, str(view.id)):
             self._help(view, group)
         for name in self._tasks_of(str(view.id)):
@@ -152,31 +146,21 @@ class _Planner(AgentDecider):
         """Plan routes for some agents, if agents or tasks are not those of the last plan, or it has tasks no more."""
         tasks = self._open(view, set(group))
         news = (*group, frozenset(tasks))
-        if news == self._planned and tasks - self._planned_for(group) <= self._given_up:
+        if news == self._planned and tasks - self._planned_for(group) <= self._search.given_up:
             return
         self._planned = news
-        began = time.perf_counter()
         agents = {name: _advanced(view, view.agents[name]) for name in group}
         known = {name: task for name, task in view.tasks.items() if name in tasks or task.status is not TaskStatus.OPEN}
-        described = self._describer.describe(view.of(agents, known), Foresight())
-        if described is None:
+        found = self._search.improve(view.of(agents, known), Foresight(), self._announced.joined(group))
+        if found is None:
             return
-        parameters = self._parameters
-        iterations = parameters.iterations if self._count else parameters.first_iterations
-        self._count += 1
-        until = None if self._time_limit_s is None else began + self._time_limit_s
-        before = self._announced.joined(group)
-        seed = (self._seed * 1_000_003 + self._count) % 2**31
-        routes, lengths, untried = improved(described, before, iterations, seed, until, self._given_up)
-        finish = finish_hours(described.situation, routes, lengths).tolist()
-        names = [task.facts.id for task in described.tasks]
-        for i, agent in enumerate(described.agents):
-            visits = tuple(
-                (names[j], finish[j] if finish[j] < math.inf else view.hour) for j in routes[i, : lengths[i]].tolist()
-            )
-            self._announced.plan(agent.facts.id, Route(view.hour, str(view.id), visits))
-        tried = {name for name, is_untried in zip(names, untried.tolist(), strict=True) if not is_untried}
-        self._given_up = tried.difference(self._planned_for(group))
+        finish = finish_hours(found.described.situation, found.routes, found.lengths).tolist()
+        names = [task.facts.id for task in found.described.tasks]
+        until = {name: hour if hour < math.inf else view.hour for name, hour in zip(names, finish, strict=True)}
+        for agent, route in found.names.items():
+            visits = tuple((name, until[name]) for name in route)
+            self._announced.plan(agent, Route(view.hour, str(view.id), visits))
+        self._search.given_up = found.tried.difference(self._planned_for(group))
 
 
 def _advanced(view: View, report: AgentReport) -> AgentReport:

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 from alloc.allocators.contract.parameters import CheckedParameters, bounded
 from alloc.allocators.online.contract import Briefing, FleetDecider, Policy, PolicyInfo
@@ -63,6 +63,70 @@ class Routes(Policy):
         return RoutePlanner(self.parameters, briefing)
 
 
+class ImprovedRoutes(NamedTuple):
+    """Routes of all agents of a situation.
+
+    Attributes
+    ----------
+    described : Described
+    routes, lengths : ndarray of int, shapes (n, c) and (n,)
+        Tasks of each agent by number, and how many there are.
+    names : dict of str to list of str
+        Ids of these tasks, by agent.
+    tried : set of str
+        Tasks that there was time to try.
+    """
+
+    described: Described
+    routes: Ints
+    lengths: Ints
+    names: dict[str, list[str]]
+    tried: set[str]
+
+
+class RouteSearch:
+    """Improves routes each time that the situation has changed.
+
+    Parameters
+    ----------
+    parameters : RoutesParameters
+    briefing : Briefing
+
+    Attributes
+    ----------
+    describer : Describer
+    given_up : set of str
+        Tasks that are in no route, although they were tried.
+    """
+
+    def __init__(self, parameters: RoutesParameters, briefing: Briefing) -> None:
+        pace = 1.0 if briefing.pace is None else (briefing.pace.low + briefing.pace.high) / 2
+        self._parameters, self._seed, self._count = parameters, briefing.seed[0], 0
+        self.describer = Describer(briefing.end, max(pace, 1e-9), parameters.switch_price)
+        limit = briefing.deadline_s
+        self._time_limit_s = None if limit is None else DEADLINE_SHARE * limit
+        self.given_up: set[str] = set()
+
+    def improve(self, view: View, foresight: Foresight, before: Mapping[str, list[str]]) -> ImprovedRoutes | None:
+        """Return routes that go on from those before; None where there is nothing to plan."""
+        began = time.perf_counter()
+        described = self.describer.describe(view, foresight)
+        if described is None:
+            return None
+        iterations = self._parameters.iterations if self._count else self._parameters.first_iterations
+        self._count += 1
+        until = None if self._time_limit_s is None else began + self._time_limit_s
+        seed = (self._seed * 1_000_003 + self._count) % 2**31
+        routes, lengths, untried = improved(described, before, iterations, seed, until, self.given_up)
+        ids = [task.facts.id for task in described.tasks]
+        names = {
+            agent.facts.id: [ids[j] for j in routes[i, : lengths[i]].tolist()]
+            for i, agent in enumerate(described.agents)
+        }
+        tried = {name for name, is_untried in zip(ids, untried.tolist(), strict=True) if not is_untried}
+        return ImprovedRoutes(described, routes, lengths, names, tried)
+
+
 class RoutePlanner(FleetDecider):
     """Leads all agents by routes.
 
@@ -73,14 +137,8 @@ class RoutePlanner(FleetDecider):
     """
 
     def __init__(self, parameters: RoutesParameters, briefing: Briefing) -> None:
-        pace = 1.0 if briefing.pace is None else (briefing.pace.low + briefing.pace.high) / 2
-        self._parameters, self._seed = parameters, briefing.seed[0]
-        self._describer = Describer(briefing.end, max(pace, 1e-9), parameters.switch_price)
-        limit = briefing.deadline_s
-        self._time_limit_s = None if limit is None else DEADLINE_SHARE * limit
+        self._search = RouteSearch(parameters, briefing)
         self._routes: dict[str, list[str]] = {}
-        self._given_up: set[str] = set()
-        self._count = 0
 
     def foresight(self, view: View) -> Foresight:
         """Return what is known to come: nothing."""
@@ -88,24 +146,13 @@ class RoutePlanner(FleetDecider):
 
     def decide(self, view: View) -> Mapping[str, Order]:
         """Return the first task of each route, after it was improved."""
-        began = time.perf_counter()
-        described = self._describer.describe(view, self.foresight(view))
-        if described is None:
+        found = self._search.improve(view, self.foresight(view), self._routes)
+        if found is None:
             return {}
-        parameters = self._parameters
-        iterations = parameters.iterations if self._count else parameters.first_iterations
-        self._count += 1
-        until = None if self._time_limit_s is None else began + self._time_limit_s
-        seed = (self._seed * 1_000_003 + self._count) % 2**31
-        routes, lengths, untried = improved(described, self._routes, iterations, seed, until, self._given_up)
-        names = [task.facts.id for task in described.tasks]
-        self._routes = {
-            agent.facts.id: [names[j] for j in routes[i, : lengths[i]].tolist()]
-            for i, agent in enumerate(described.agents)
-        }
-        tried = {name for name, is_untried in zip(names, untried.tolist(), strict=True) if not is_untried}
-        self._given_up = tried.difference(*self._routes.values())
-        return dict(self._orders(view, described, first_tasks(described.situation, routes, lengths)))
+        self._routes = found.names
+        self._search.given_up = found.tried.difference(*self._routes.values())
+        first = first_tasks(found.described.situation, found.routes, found.lengths)
+        return dict(self._orders(view, found.described, first))
 
     def _orders(self, view: View, described: Described, first: Ints) -> list[tuple[str, Order]]:
         orders = []

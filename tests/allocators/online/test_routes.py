@@ -58,7 +58,7 @@ def test_the_schedule_is_what_comes_of_the_plan(family, seed):
         view = simulation.view(None)
         orders = decider.decide(view)
         if planned is None:
-            known = decider._describer.describe(view, decider.foresight(view))
+            known = decider._search.describer.describe(view, decider.foresight(view))
             column = {task.facts.id: j for j, task in enumerate(known.tasks)}
             plan = [[column[name] for name in decider._routes[agent.facts.id]] for agent in known.agents]
             planned = dict(zip(column, worth(known, plan)[1].tasks["finish"], strict=True))
@@ -93,7 +93,7 @@ def test_changed_plans_are_scheduled_as_whole_ones(family):
     simulation.advance()
     view = simulation.view(None)
     for foresight in (Foresight(), decider.foresight(view)):
-        known = decider._describer.describe(view, foresight)
+        known = decider._search.describer.describe(view, foresight)
         n, m = known.situation.start_distance.shape
         size = n, m, m, len(known.situation.events)
         kept, whole = new_schedule(*size), new_schedule(*size)
