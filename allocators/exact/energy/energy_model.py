@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from alloc.allocators.exact.demand import Demand
 from alloc.allocators.exact.knapsack import WholeArray
@@ -67,6 +68,12 @@ class EnergyModel:
             copies=self.copies[keep],
             cost=self.cost[keep],
         )
+
+    def by_class(self, group: csr_array) -> csr_array:
+        """Return the agents of each class in groups given by pairs, shapes (g, k) and (g, p)."""
+        pairs = len(self.class_of_pair)
+        entry = (np.ones(pairs), (np.arange(pairs), self.class_of_pair))
+        return csr_array(group @ csr_array(entry, shape=(pairs, len(self.count))))
 
     @property
     def is_whole(self) -> bool:

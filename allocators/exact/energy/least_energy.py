@@ -6,7 +6,7 @@ from contextlib import nullcontext
 from alloc.allocators.contract.search import Search
 from alloc.allocators.exact.energy.cuts.group_programme import GroupProgramme
 from alloc.allocators.exact.energy.places import nearest_places, without_idlers
-from alloc.allocators.exact.energy.primal_dual import REPEATABLE_SLICES, PrimalDual
+from alloc.allocators.exact.energy.primal_dual import FEW_GROUPS, REPEATABLE_SLICES, PrimalDual
 from alloc.allocators.exact.energy.state import EnergyState
 from alloc.allocators.exact.model import Model
 from alloc.allocators.exact.monitor import SolverMonitor, is_over
@@ -21,10 +21,10 @@ SHARE_WITHOUT_SOLVER = 0.3
 SHARE_WITHOUT_GROUPS = 0.1
 """Share of the time before which groups are not counted, as better plans soon make them fewer."""
 
-MOST_GROUPS = 2500, 15_000
+MOST_GROUPS = FEW_GROUPS, 15_000
 """Groups of tasks up to which, first and then, an integer programme picks among them where bounds rise no more."""
 
-PROVEN = 1e-7
+SOLVER_GAP = 1e-7
 """Relative gap that solvers leave by their tolerances."""
 
 SMALL_PAIRS = 3000
@@ -77,11 +77,11 @@ def _least_cost(state: EnergyState, solver: Solver) -> float:
         return both.bound
     bound = both.bound
     for most in MOST_GROUPS:
-        if bound < state.cost * (1 - PROVEN) and not is_over(search):
+        if bound < state.cost * (1 - SOLVER_GAP) and not is_over(search):
             groups = groups or both.groups_of_cheapest(most)
             bound = bound if groups is None else max(bound, _solve_groups(state, both, groups))
             groups = None
-    if bound < state.cost * (1 - PROVEN) and not is_over(search):
+    if bound < state.cost * (1 - SOLVER_GAP) and not is_over(search):
         bound = max(bound, _solve_rest(state, solver).bound)
     return min(max(bound, both.bound), state.cost)
 

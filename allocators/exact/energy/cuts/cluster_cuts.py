@@ -71,7 +71,7 @@ class ClusterSeparation:
         self._next = 0
 
     def violated(
-        self, use: FloatArray, task: IntArray, part: FloatArray, should_stop: Callable[[], bool] = lambda: False
+        self, use: FloatArray, task: IntArray, part: FloatArray, should_stop: Callable[[], bool]
     ) -> list[ClusterCut]:
         """Return cuts that a mixture violates; clusters take turns, and if those of this turn have none, more do.
 

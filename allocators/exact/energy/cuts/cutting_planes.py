@@ -113,8 +113,7 @@ class CuttingPlanes:
             return None
         penalty = self._known_penalty
         value, _, least = self._relax(self._price, penalty)
-        gap = cost * (1 + 1e-9) - value
-        paid = model.cost + self._price[model.class_of_pair] + self._master.fees(penalty)
+        gap, paid = cost * (1 + 1e-9) - value, self._paid(self._price, penalty)
         first, (first_cut, cut) = model.first, self._master.cuts_of_pairs(penalty)
         task, group = [np.zeros(0, dtype=np.int64)], [csr_array((0, len(paid)), dtype=np.int64)]
         for j in range(len(least)):
@@ -134,7 +133,7 @@ class CuttingPlanes:
             group.append(csr_array(entries, shape=(found, len(paid))))
         all_tasks, groups = np.concatenate(task), csr_array(vstack(group))
         on = penalty > 0
-        used = self._master.used(all_tasks, self._master.by_class(groups))[:, on]
+        used = self._master.used(all_tasks, model.by_class(groups).toarray())[:, on]
         return GroupProgramme(model, cost, all_tasks, groups, csr_array(used), self._master.limit[on])
 
     @property
@@ -169,7 +168,7 @@ class CuttingPlanes:
         model = self._model
         penalty = self._known_penalty
         value, _, least = self._relax(self._price, penalty)
-        paid = model.cost + self._price[model.class_of_pair] + self._master.fees(penalty)
+        paid = self._paid(self._price, penalty)
         group, excess, total = solve_subproblems(model, paid)
         unpenalised = np.bincount(model.task_of_pair, group * paid, len(least))
         if not np.isfinite(total) or abs(total - unpenalised.sum()) > 1e-9 * np.abs(unpenalised).sum():
@@ -184,10 +183,14 @@ class CuttingPlanes:
         self._master.restrict(self._model)
         return True
 
+    def _paid(self, price: FloatArray, penalty: FloatArray) -> FloatArray:
+        """Return what an agent of each pair costs with its price and the cuts of clusters, shape (p,)."""
+        return np.asarray(self._model.cost + price[self._model.class_of_pair] + self._master.fees(penalty))
+
     def _relax(self, price: FloatArray, penalty: FloatArray) -> tuple[float, WholeArray, FloatArray]:
         """Return the Lagrangian bound at some prices, groups that are cheaper there than those known, and all costs."""
         model, master = self._model, self._master
-        whole, paid = model.is_whole, model.cost + price[model.class_of_pair] + master.fees(penalty)
+        whole, paid = model.is_whole, self._paid(price, penalty)
         if penalty.any() or whole:
             group = np.zeros(len(paid), dtype=np.int64)
             first_cut, cut = master.cuts_of_pairs(penalty)

@@ -92,7 +92,7 @@ class GroupMaster:
             self._highs.changeColBounds(g, 0.0, 0.0)
         self._separation = ClusterSeparation(model, self._member)
 
-    def solve(self, should_stop: Callable[[], bool] = lambda: False) -> bool:
+    def solve(self, should_stop: Callable[[], bool]) -> bool:
         """Solve; return whether that succeeded, as it does not where it is stopped."""
         run_native(self._highs.solve, should_stop, self._highs.cancelSolve)
         if self._highs.getModelStatus() != highspy.HighsModelStatus.kOptimal:
@@ -128,12 +128,6 @@ class GroupMaster:
         table = csr_array(entry, shape=(len(self._count), max(1, len(penalty))))[self._model.class_of_pair]
         return table.indptr.astype(np.int64), table.indices.astype(np.int64)
 
-    def by_class(self, group: csr_array) -> FloatArray:
-        """Return the agents of each class in groups given by pairs, shapes (g, k) and (g, p)."""
-        pairs = len(self._model.copies)
-        entry = (np.ones(pairs), (np.arange(pairs), self._model.class_of_pair))
-        return np.asarray((group @ csr_array(entry, shape=(pairs, len(self._model.count)))).toarray())
-
     def used(self, task: IntArray, use: FloatArray) -> FloatArray:
         """Return what groups use of each cut, given their tasks and agents of each class, shapes (g, c) and (g, k)."""
         used, padded = np.zeros((len(task), len(self.limit))), np.hstack([use, np.zeros((len(task), 1))])
@@ -143,7 +137,7 @@ class GroupMaster:
             used[:, at] = cut.use(use, task)
         return used
 
-    def separate(self, should_stop: Callable[[], bool] = lambda: False) -> bool:
+    def separate(self, should_stop: Callable[[], bool]) -> bool:
         """Add the cuts that the mixture violates most; return whether there are any, as far as there was time."""
         before = len(self.limit)
         on = np.flatnonzero(self._part > 1e-6)

@@ -92,9 +92,7 @@ class GroupProgramme:
         model, groups, tasks = self.model, len(self.task), len(self.model.need)
         columns = np.arange(groups)
         of_task = csr_array((np.ones(groups), (self.task, columns)), shape=(tasks, groups))
-        pairs = len(model.copies)
-        of_class = csr_array((np.ones(pairs), (model.class_of_pair, np.arange(pairs))), shape=(len(model.count), pairs))
-        matrix = csc_array(vstack([of_task, of_class @ self.group.T, self.used.T]))
+        matrix = csc_array(vstack([of_task, model.by_class(self.group).T, self.used.T]))
         lp = highspy.HighsLp()
         lp.num_row_, lp.num_col_ = matrix.shape
         lp.col_cost_, lp.col_lower_, lp.col_upper_ = (

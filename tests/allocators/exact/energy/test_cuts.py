@@ -53,7 +53,7 @@ def test_a_cut_of_a_cluster_holds_for_all_solutions_and_not_for_the_mixture(seed
         min_agents=np.zeros(6, dtype=np.int64), ability=ability,
     )  # fmt: skip
     use, task, part = np.ones((1, 6)), np.array([0]), np.array([13 / ability.sum()])
-    (cut,) = ClusterSeparation(model, np.ones((1, 2), dtype=bool)).violated(use, task, part)
+    (cut,) = ClusterSeparation(model, np.ones((1, 2), dtype=bool)).violated(use, task, part, lambda: False)
     whole = np.array(list(product((0, 1), repeat=6)))
     done = whole @ ability
     assert (whole[(done >= 13) & ((done <= 17) | (not limited))] @ cut.factor <= cut.limit).all()
