@@ -13,7 +13,6 @@ from alloc.allocators.experiments.reproduction.protocol import (
     DRAWN,
     ENERGY_WEIGHT,
     INSTANCE_SEED,
-    ITERATIONS,
     POINTS,
     TEST_GAMES,
     TEST_SEED,
@@ -23,6 +22,7 @@ from alloc.allocators.experiments.reproduction.protocol import (
     Job,
     Variant,
     judged,
+    scenarios_of,
 )
 from alloc.allocators.experiments.reproduction.rows import Learned
 from alloc.allocators.learned.algorithms.genes import GeneticPpo
@@ -117,8 +117,8 @@ def _test_games() -> _Judged:
 
 
 def _judged_by(run: int) -> Mapping[int, _Judged]:
-    """Return the test games, and a run's instance of each scenario, by their numbers in the rows."""
-    own = {scenario: _judged([paper(scenario, INSTANCE_SEED + run)]) for scenario in ITERATIONS}
+    """Return the test games, and a run's instances, by the numbers of their scenarios in the rows."""
+    own = {scenario: _judged([paper(scenario, INSTANCE_SEED + run)]) for scenario in scenarios_of(run)}
     return {TESTS: _test_games(), **own}
 
 

@@ -1,6 +1,6 @@
 """What methods that learn nothing make of the same instances."""
 
-from alloc.allocators.experiments.reproduction.protocol import INSTANCE_SEED, SCENARIOS, Job
+from alloc.allocators.experiments.reproduction.protocol import INSTANCE_SEED, Job, scenarios_of
 from alloc.allocators.experiments.reproduction.rows import Solved
 from alloc.allocators.solve import solve
 from alloc.problems import Objective
@@ -9,7 +9,7 @@ from alloc.problems.generate import paper
 
 def solve_all(job: Job) -> list[Solved]:
     """Solve a run's instance of each scenario, the makespan first and then the energy, and return a row for each."""
-    return [_solved(job, scenario) for scenario in SCENARIOS]
+    return [_solved(job, scenario) for scenario in scenarios_of(job.run)]
 
 
 def _solved(job: Job, scenario: int) -> Solved:

@@ -183,6 +183,7 @@ def _scenarios(rows: Sequence[Learned]) -> str:
                 [
                     str(scenario),
                     f"`{name}`",
+                    str(len(last)),
                     f"{np.median([row.makespan for row in last]):.3f}",
                     _mean([row.makespan for row in last], ".3f"),
                     _mean([row.battery for row in last], ".1f"),
@@ -191,7 +192,7 @@ def _scenarios(rows: Sequence[Learned]) -> str:
                     f"{np.mean([row.unserved for row in last]):.2f}",
                 ]
             )
-    header = ["scenario", "method", "median T", "mean T", "battery (%)", "in the paper", "hops", "unserved"]
+    header = ["scenario", "method", "runs", "median T", "mean T", "battery (%)", "in the paper", "hops", "unserved"]
     return table(header, lines, left=2)
 
 

@@ -36,7 +36,8 @@ PROCEDURE = """## How it is measured
   means or medians, and want eight runs of both sides for either verdict; *holds* wants them of every rival in every
   scenario. Two claims are about every run (*consistently* optimal, and T below 1.1 in scenarios 2 to 4): a single run
   refutes them, and *holds* wants eight in each scenario.
-- **Scenarios**: each run has an instance of its own of each, the policy plays one greedy game there. T is infinite
+- **Scenarios**: the first ten runs of a method have an instance of each scenario, later ones of scenario 1 alone (some
+  were made before that rule, with all four). The policy plays one greedy game on each. T is infinite
   while a task has no agent; means and differences are of the others, with the
   number of those left out, medians of all.
 - **Decisions** are those of agents in the games that are learned from, of all members of a population together.

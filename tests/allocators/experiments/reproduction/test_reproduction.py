@@ -329,7 +329,7 @@ def test_every_method_makes_its_rows(tmp_path: Path, monkeypatch: pytest.MonkeyP
     small = learning._judged([paper_like(8, 3, 24, 1)])
     monkeypatch.setattr(learning, "DECISIONS", 10)
     monkeypatch.setattr(learning, "_judged_by", lambda run: {TESTS: small, 4: small})
-    monkeypatch.setattr(others, "SCENARIOS", (1,))
+    monkeypatch.setattr(others, "scenarios_of", lambda run: (1,))
     monkeypatch.setattr(
         module, "expected", lambda job: {(TESTS, 0), (4, 0), (TESTS, 5), (4, 5)} if job.learns else {(1, 0)}
     )
