@@ -21,7 +21,7 @@ EXAMPLES = examples(
     "alloc import-mission cfstp printed.txt --output mission.json",
     "alloc import-mission london animal_rescues.csv --from 2019-07-01 --until 2019-07-14 --compress 24 --output m.json",
     "alloc import-mission new-brunswick nbfires.csv --agents 20 --compress 100 --output mission.json",
-    closing="The files are not part of alloc: docs/missions/missions.md says where they are and what is made of them.",
+    closing="The files are not part of alloc: docs/missions/records.md says where they are and what is made of them.",
 )
 DAY = "%Y-%m-%d"
 
