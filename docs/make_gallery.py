@@ -1,11 +1,32 @@
-"""Draws the pictures of docs/data/gallery.md, and the map beside them: ``python docs/make_gallery.py``."""
+"""Draws the pictures of docs/data/gallery.md, and the pages beside them: ``python docs/make_gallery.py``."""
 
 from collections.abc import Callable
 from pathlib import Path
 
-from alloc.allocators import Result, pareto, plot, plot_convergence, solve, write_result
+from alloc.allocators import (
+    Result,
+    animate_mission,
+    pareto,
+    plot,
+    plot_convergence,
+    plot_mission,
+    simulate,
+    solve,
+    write_result,
+)
 from alloc.allocators.plotting import plot_front
-from alloc.problems import Family, Instance, Units, paper, random_instance, read_instance
+from alloc.problems import (
+    Course,
+    Family,
+    Instance,
+    MissionParameters,
+    Recorder,
+    Units,
+    paper,
+    random_instance,
+    random_mission,
+    read_instance,
+)
 
 FOLDER = Path(__file__).parent / "data" / "gallery"
 ALASKA = Path(__file__).parents[1] / "examples" / "earthquakes" / "alaska.json"
@@ -66,28 +87,35 @@ def runs() -> list[Result]:
     return [solve(alaska, method, objective="makespan-energy", seed=seed, time_limit_s=1) for method, seed in wanted]
 
 
+def mission() -> Course:
+    """Return the course of a mission of six agents, some of which fail, each with local knowledge."""
+    recorder = Recorder(with_knowledge=True)
+    drawn = random_mission(MissionParameters(family="failures", agents=6, tasks=12), seed=3)
+    return recorder.course(simulate(drawn, "gappo", deadline_ms=None, observe=recorder).result)
+
+
 PICTURES: dict[str, Callable[[str], object]] = {
     "north": lambda path: plot(answer(north(), "milp"), path),
     "unserved": lambda path: plot(answer(north(battery=[15] * 9), "milp"), path),
     "paper": lambda path: plot(answer(paper(1, seed=7), "milp"), path),
     "alaska": lambda path: plot(answer(read_instance(ALASKA), "local-search", iterations=200_000), path),
-    "large": lambda path: plot(
-        answer(random_instance(Family(agents=5_000, tasks=300, starts="depots"), 0), "greedy"), path
-    ),
+    "large": lambda path: plot(answer(large(), "greedy"), path),
     "times": lambda path: plot(answer(Instance(name="times", ability=[4, 3, 2, 2], workload=[9, 7, 3]), "milp"), path),
     "front": lambda path: plot_front(pareto(north(), "milp", points=6, iterations=30), path),
     "runs": lambda path: plot_convergence(runs(), path),
+    "mission": lambda path: plot_mission(mission(), path),
 }
 
 
 def main() -> None:
-    """Write all pictures and the map."""
+    """Write all pictures, a map of a plan and a page that plays a mission."""
     FOLDER.mkdir(exist_ok=True)
     for name, draw in PICTURES.items():
         path = FOLDER / f"{name}.png"
         draw(str(path))
         reduce_colours(path)
     write_result(answer(north(), "milp"), FOLDER / "north.html")
+    animate_mission(mission(), str(FOLDER / "mission.html"))
 
 
 def reduce_colours(path: Path) -> None:
