@@ -64,9 +64,9 @@ plan.bases.forEach((base, b) => {
   const group = element(byId("starts"), "g");
   const size = Math.min(9 + 2 * Math.sqrt(startsAt[b].length), 20);
   const square = { d: dot(base.place), style: startsAt[b].length ? "stroke-linecap: square" : "" };
-  element(group, "path", { ...square, "stroke-width": size + 3, stroke: "#fff" });
-  element(group, "path", { ...square, "stroke-width": size, stroke: "#56606b" });
-  base.inner = element(group, "path", { ...square, "stroke-width": size - 5, stroke: "#fff" });
+  element(group, "path", { ...square, "stroke-width": size + 3, class: "ring" });
+  element(group, "path", { ...square, "stroke-width": size, class: "start" });
+  base.inner = element(group, "path", { ...square, "stroke-width": size - 5, class: "hole" });
   base.group = group;
   group.onpointerenter = (event) => {
     const only = startsAt[b].length === 1;
@@ -83,9 +83,9 @@ for (const j of order) {
   const group = element(byId("sites"), "g", { style: "cursor: pointer" });
   const size = 9 + 25 * task.size * Math.min(1, Math.sqrt(40 / plan.tasks.length));
   const colour = task.unserved ? "#d55e00" : mix(task.late === null ? 0.75 : task.late);
-  element(group, "path", { d: dot(task.place), "stroke-width": size + 3, stroke: "#fff" });
+  element(group, "path", { d: dot(task.place), "stroke-width": size + 3, class: "ring" });
   element(group, "path", { d: dot(task.place), "stroke-width": size, stroke: colour });
-  if (task.unserved) element(group, "path", { d: dot(task.place), "stroke-width": size - 5, stroke: "#fff" });
+  if (task.unserved) element(group, "path", { d: dot(task.place), "stroke-width": size - 5, class: "hole" });
   Object.assign(task, { group, radius: size / 2 });
   group.onpointerenter = (event) => show(event, `${lines(plan.taskHeadings, task.cells)}\n${
     task.unserved ? "unserved" : listed(agentsOf[j].map((agent) => agent.id))}`);

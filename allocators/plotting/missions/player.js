@@ -355,7 +355,9 @@ document.addEventListener("keydown", (event) => {
 window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
 window.addEventListener("resize", draw);
 
-byId("summary").textContent = mission.summary.join("\n");
+const [heading, ...below] = mission.summary;
+byId("heading").textContent = heading;
+byId("summary").textContent = below.join("\n");
 agents.forEach((agent, i) => byId("follow").add(new Option(agent.id, i)));
 const legend = d3.select("#legend");
 for (const [kind, states] of [["task", taskStates], ["agent", agentStates]]) {

@@ -101,3 +101,28 @@ document.body.replaceChildren(JSON.stringify(out));
 def test_a_browser_zooms_filters_and_names(page: Path, tmp_path: Path) -> None:
     """Two moves, two bases, three tasks; zooming moves them, filters and the search hide them, hovering names them."""
     assert run_in_browser(page, SCRIPT, tmp_path) == [2, 2, 3, 3, True, 0, 1, 1, 2, 0, 1, "task: t2", 5, 0]
+
+
+LOOK = """
+<script>
+const height = (what) => document.querySelector(what).getBoundingClientRect().height;
+const colour = (what, name) => getComputedStyle(document.querySelector(what))[name];
+const scale = Number(/scale\\(([^)]+)/.exec(document.getElementById("moving").getAttribute("transform"))[1]);
+const found = [height("#map") / innerHeight > 0.6, scale * 1000 > 300, document.documentElement.scrollWidth <= innerWidth];
+const colours = [colour("body", "color"), colour("#search", "color"), colour("#labels text", "fill")];
+document.body.replaceChildren(JSON.stringify([...found, colour("#map", "backgroundColor"), ...new Set(colours)]));
+</script>
+"""
+WHITE, BLACK = "rgb(255, 255, 255)", "rgb(34, 34, 34)"
+
+
+@needs_browser
+@pytest.mark.parametrize(
+    ("size", "flags", "colours"),
+    [("500,900", [], [WHITE, BLACK]), ("1200,800", ["--force-dark-mode"], ["rgb(20, 24, 28)", "rgb(230, 233, 236)"])],
+)
+def test_the_map_is_legible_on_a_phone_and_in_the_dark(
+    page: Path, tmp_path: Path, size: str, flags: list[str], colours: list[str]
+) -> None:
+    """The map takes most of the height, fits the width, and all text has one colour that contrasts with the map's."""
+    assert run_in_browser(page, LOOK, tmp_path, size, flags) == [True, True, True, *colours]

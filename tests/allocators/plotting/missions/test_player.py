@@ -9,6 +9,7 @@ from browser import needs_browser, run_in_browser
 
 from alloc.allocators import animate_mission, simulate
 from alloc.allocators.plotting import check_animation
+from alloc.allocators.plotting.missions.picture import title
 from alloc.allocators.plotting.missions.player import STEPS, document
 from alloc.problems import Course, Event, InputError, Instance, Mission, Radio, Recorder, course_of
 
@@ -87,6 +88,7 @@ SCRIPT = """
 {
 const out = [];
 const clock = () => parseFloat(document.getElementById("clock").textContent);
+out.push(document.querySelector("h1").textContent, document.getElementById("summary").textContent.split("\\n").length);
 out.push(clock());
 const slider = document.getElementById("hour");
 const before = document.getElementById("map").toDataURL();
@@ -114,10 +116,11 @@ document.body.replaceChildren(JSON.stringify(out));
 
 
 @needs_browser
-def test_a_browser_plays_scrubs_and_follows(page: Path, tmp_path: Path) -> None:
-    """The page begins at 0, shows another hour when the slider moves, goes on while it plays, and stops; no errors."""
+def test_a_browser_plays_scrubs_and_follows(page: Path, course: Course, tmp_path: Path) -> None:
+    """The page has a heading, begins at 0, shows another hour when the slider moves, plays, and stops; no errors."""
     failed = "<b> has failed."
-    expected = [0, 2, True, failed, False, True, True, "pause", True, "play", 0]
+    heading = title(course).split("\n")[0]
+    expected = [heading, 1, 0, 2, True, failed, False, True, True, "pause", True, "play", 0]
     assert run_in_browser(page, SCRIPT, tmp_path) == expected
 
 
