@@ -1,6 +1,7 @@
 """The command `alloc`: its commands, and the line and exit code of each error."""
 
 import contextlib
+import errno
 import gc
 import os
 import sys
@@ -27,7 +28,7 @@ from alloc.cli.commands.missions import import_mission, plan, replay, simulate
 from alloc.cli.commands.serving import serve
 from alloc.cli.commands.training import train, tune
 from alloc.cli.options import Parameter, examples, option_of
-from alloc.cli.output.console import INTERRUPTED, complain, flush, interrupted, write_out
+from alloc.cli.output.console import INTERRUPTED, OUTPUT, complain, flush, interrupted, write_out
 
 SERVED, UNSERVED, BAD_INPUT = 0, 1, 2
 """Exit codes: every task is served; a task is unserved; bad usage or bad input."""
@@ -159,7 +160,9 @@ def _explain(error: Exception, arguments: Sequence[str]) -> int:
     elif isinstance(error, MemoryError):
         complain("there is not enough memory for this")
     elif isinstance(error, OSError):
-        complain(f"{error.filename or 'a file'}: {error.strerror or error}")
+        # our own code names its files: no space without a name is that of the help, which typer prints
+        unnamed = OUTPUT if error.errno == errno.ENOSPC else "the operating system"
+        complain(f"{error.filename or unnamed}: {error.strerror or error}")
     else:
         complain(
             f"defect in alloc or a plugin: {type(error).__name__}: {error};"

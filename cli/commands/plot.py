@@ -37,7 +37,7 @@ def plot_command(
     ],
     result: Annotated[
         str | None,
-        typer.Argument(metavar="[RESULT]", help=f"{options.PLAN}; - is standard input."),
+        typer.Argument(metavar="RESULT", help=f"{options.PLAN}; - is standard input."),
     ] = None,
 ) -> None:
     """Draw a stored result or allocation: sites and moves, when each task is done; or the log of a mission."""

@@ -12,6 +12,9 @@ from alloc.problems.text import one_line
 STANDARD = "-"
 """The file name that stands for standard input and standard output."""
 
+OUTPUT = "standard output"
+"""What standard output is called in messages."""
+
 INTERRUPTED = 130
 """Exit code after Ctrl-C, unless it ended a run that has an answer."""
 
@@ -25,7 +28,7 @@ def write_out(text: str) -> None:
         If standard output is closed, or its device is full.
     """
     if sys.stdout is None:
-        raise OSError(errno.EBADF, "is closed", "standard output")
+        raise OSError(errno.EBADF, "is closed", OUTPUT)
     _write(sys.stdout, text)
 
 
@@ -115,8 +118,10 @@ def _write(stream: TextIO | None, text: str) -> None:
     except (OSError, ValueError) as error:
         _silence(stream)  # avoids a second failure when the interpreter flushes at exit
         if stream is sys.stdout:
-            number, words = (error.errno, error.strerror) if isinstance(error, OSError) else (errno.EBADF, "is closed")
-            raise OSError(number, words, "standard output") from error
+            number, words = (
+                (error.errno, error.strerror) if isinstance(error, OSError) else (errno.EBADF, "it is closed")
+            )
+            raise OSError(number, f"cannot be written: {words[:1].lower()}{words[1:]}", OUTPUT) from error
 
 
 def flush(stream: TextIO) -> None:

@@ -1,3 +1,4 @@
+import ctypes
 import json
 import os
 import signal
@@ -8,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from alloc.cli.start import repeat_lost_interrupts
 from alloc.problems import Family, random_instance
 from alloc.problems.formats import write_instance
 
@@ -122,3 +124,35 @@ def test_ctrl_c_while_modules_are_loaded_is_one_line(tmp_path, module):
         env={**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])},
     )
     assert (ran.returncode, ran.stdout, ran.stderr) == (130, "", INTERRUPTED)
+
+
+def test_an_interrupt_in_a_callback_is_not_lost(monkeypatch):
+    """Native code that calls Python, as a compiler does, cannot pass on the exception of Ctrl-C: it comes again."""
+    monkeypatch.setattr(sys, "unraisablehook", sys.unraisablehook)
+    repeat_lost_interrupts()
+
+    @ctypes.CFUNCTYPE(None)
+    def interrupted():
+        raise KeyboardInterrupt
+
+    def called():
+        interrupted()
+        for _ in range(500):
+            time.sleep(0.01)
+
+    with pytest.raises(KeyboardInterrupt):
+        called()
+
+
+def test_other_errors_in_a_callback_are_reported(monkeypatch):
+    """Only Ctrl-C is repeated; what else is lost in a callback is reported as before."""
+    reported = []
+    monkeypatch.setattr(sys, "unraisablehook", lambda unraisable: reported.append(unraisable.exc_type))
+    repeat_lost_interrupts()
+
+    @ctypes.CFUNCTYPE(None)
+    def failing():
+        raise ZeroDivisionError
+
+    failing()
+    assert reported == [ZeroDivisionError]

@@ -108,7 +108,8 @@ LOOK = """
 const height = (what) => document.querySelector(what).getBoundingClientRect().height;
 const colour = (what, name) => getComputedStyle(document.querySelector(what))[name];
 const scale = Number(/scale\\(([^)]+)/.exec(document.getElementById("moving").getAttribute("transform"))[1]);
-const found = [height("#map") / innerHeight > 0.6, scale * 1000 > 300, document.documentElement.scrollWidth <= innerWidth];
+const fits = document.documentElement.scrollWidth <= innerWidth;
+const found = [height("#map") / innerHeight > 0.6, scale * 1000 > 300, fits];
 const colours = [colour("body", "color"), colour("#search", "color"), colour("#labels text", "fill")];
 document.body.replaceChildren(JSON.stringify([...found, colour("#map", "backgroundColor"), ...new Set(colours)]));
 </script>

@@ -119,7 +119,10 @@ def test_full_standard_output_leaves_standard_error(small, tmp_path):
         ran = subprocess.run([*command, "--json"], stdout=full, stderr=subprocess.PIPE, text=True, cwd=tmp_path)
     found, end = json.JSONDecoder().raw_decode(ran.stderr)
     assert (ran.returncode, found["format"]) == (2, "alloc-result/1")
-    assert ran.stderr[end:].strip() == "alloc: standard output: No space left on device"
+    assert ran.stderr[end:].strip() == "alloc: standard output: cannot be written: no space left on device"
+    with open("/dev/full", "w") as full:
+        ran = subprocess.run([*command, "--help"], stdout=full, stderr=subprocess.PIPE, text=True, cwd=tmp_path)
+    assert (ran.returncode, ran.stderr) == (2, "alloc: standard output: No space left on device\n")
     ran = subprocess.run([*command, "--output", "/dev/full"], capture_output=True, text=True, cwd=tmp_path)
     assert (ran.returncode, json.loads(ran.stdout)["format"], ran.stderr.count("\n")) == (2, "alloc-result/1", 1)
 
