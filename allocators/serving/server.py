@@ -1,6 +1,8 @@
 """The process that serves over HTTP: uvicorn, which a signal ends cleanly."""
 
+import logging
 import math
+import os
 import socket
 import sys
 import time
@@ -47,6 +49,23 @@ class Server(uvicorn.Server):
         self.should_exit = True
 
 
+class _Reason(logging.Filter):
+    """Keeps why uvicorn could not listen, which it logs before it exits, for the one line that is said of it."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.text = "it does not start"
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        """Take an error of the operating system out of the log."""
+        error = record.msg
+        if not isinstance(error, OSError):
+            return True
+        known = error.errno is not None and error.errno > 0  # a host that is not found has numbers below 0
+        self.text = os.strerror(error.errno) if known else error.strerror or str(error)
+        return False
+
+
 def run_server(service: Service, host: str, port: int, most_bytes: int, tell: Callable[[str], object]) -> None:
     """Serve until a signal comes.
 
@@ -75,9 +94,15 @@ def run_server(service: Service, host: str, port: int, most_bytes: int, tell: Ca
         timeout_graceful_shutdown=GRACE_S,
         server_header=False,
     )
-    sys.setswitchinterval(SWITCH_S)
     server = Server(config, service, tell)
+    log, reason, interval_s = logging.getLogger("uvicorn.error"), _Reason(), sys.getswitchinterval()
+    log.addFilter(reason)
+    sys.setswitchinterval(SWITCH_S)
     try:
         server.run()
-    except SystemExit as error:  # uvicorn has logged why
-        raise InputError(f"cannot listen on {host}:{port}; is the port taken?", "http") from error
+    except SystemExit as error:
+        words = f"{reason.text[:1].lower()}{reason.text[1:]}"
+        raise InputError(f"cannot listen on {host}:{port}: {words}; name another place", "http") from error
+    finally:
+        sys.setswitchinterval(interval_s)
+        log.removeFilter(reason)

@@ -64,6 +64,7 @@ def serve_command(
     from alloc.allocators.parallel.processors import available_threads
     from alloc.allocators.serving.request import ServiceLimits
     from alloc.allocators.serving.service import Service
+    from alloc.problems import InputError
 
     if stdio == (http is not None):
         raise typer.BadParameter("is needed, or --http, but not both", param_hint="'--stdio'")
@@ -76,7 +77,12 @@ def serve_command(
         queue=queue,
         strangers=not stdio,
     )
-    service = Service(limits, {} if load is None else _methods(load))
+    methods = {} if load is None else _methods(load)
+    try:
+        service = Service(limits, methods)
+    except InputError as error:
+        place = "--load" if error.place == "method" else f"--load: {error.place}"
+        raise (error if error.source else InputError(error.message, place)) from error.__cause__
     if stdio:
         serve_lines(service)
     else:
