@@ -4,6 +4,7 @@ import contextlib
 import errno
 import gc
 import os
+import re
 import sys
 import threading
 from collections.abc import Sequence
@@ -143,12 +144,18 @@ def _leave(code: int) -> NoReturn:
     os._exit(code)
 
 
+def _usage(message: str) -> str:
+    """Return what is wrong with the usage in the words of all other errors: the option, and what it must be."""
+    words = re.sub("^Invalid value for '([^']+)': ", r"\1: ", message.rstrip("."))
+    words = re.sub(", unable to parse string as an? [a-z]+$", "", words)
+    return words.replace(": Value error, ", ": ").replace(": Input should be ", ": must be ")
+
+
 def _explain(error: Exception, arguments: Sequence[str]) -> int:
     """Turn `error` into one line on standard error and an exit code."""
     if isinstance(error, _USAGE_ERROR):
         command = error.ctx.command_path if error.ctx else "alloc"  # type: ignore[attr-defined]
-        words = error.format_message().rstrip(".").replace(": Value error, ", ": ")  # type: ignore[attr-defined]
-        complain(f"{words}; see {command!r} --help".replace("'" + " --help", " --help'"))
+        complain(f"{_usage(error.format_message())}; see '{command} --help'")  # type: ignore[attr-defined]
         return BAD_INPUT
     from alloc.problems import AllocError, InputError
 

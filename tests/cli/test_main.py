@@ -179,8 +179,11 @@ def test_bad_usage_is_one_line(alloc, small, arguments):
         (("train", "ppo", "--output", "p", "--set", "clip_coef=x"), "--set: clip_coef must be like"),
         (("train", "ppo", "--output", "p", "--workers", "2"), "--workers: belongs to the engine processes"),
         (("train", "ppo", "--output", "p", "--family", "x"), "--family: no such family"),
-        (("solve", "small.json", "--set", "hearing"), "Invalid value for '--set': 'hearing' is not NAME=VALUE"),
-        (("solve", "small.json", "--set", "seed=3"), "Invalid value for '--set': 'seed' is no parameter of a method"),
+        (("solve", "small.json", "--seed", "x"), "--seed: "),
+        (("solve", "small.json", "--threads", "0"), "--threads: "),
+        (("generate", "paper-5"), "FAMILY: 'paper-5' is not one of"),
+        (("solve", "small.json", "--set", "hearing"), "--set: 'hearing' is not NAME=VALUE"),
+        (("solve", "small.json", "--set", "seed=3"), "--set: 'seed' is no parameter of a method"),
         (("solve", "small.json", "--method", "ga", "--set", "hearing=3"), "--set hearing: method 'ga' takes no"),
     ],
 )
