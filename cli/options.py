@@ -87,7 +87,6 @@ def complete_policy_list(incomplete: str) -> list[str]:
 
 
 InstanceArgument = Annotated[str, typer.Argument(metavar="INSTANCE", help=f"The instance: {READABLE}.")]
-InstancesArgument = Annotated[list[str], typer.Argument(metavar="INSTANCE...", help=f"Instances, each {READABLE}.")]
 
 
 class PlainObjective(StrEnum):

@@ -4,8 +4,8 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from alloc.allocators.online.contract import AgentDecider, Briefing, FleetDecider, Policy, PolicyError
-from alloc.allocators.online.registry import load_policy
+from alloc.allocators.online.contract import AgentDecider, Briefing, FleetDecider, Policy, PolicyError, PolicyInfo
+from alloc.allocators.online.registry import describe_policy, load_policy
 from alloc.allocators.parallel.engine import never_stop
 from alloc.problems import InputError, RefusedError
 from alloc.problems.arguments import choice, of_type, real, whole
@@ -105,9 +105,8 @@ def simulate_until(
     deadline_s = None if deadline_ms is None else real(deadline_ms, "deadline_ms", above=True) / 1000
     if isinstance(policy, Policy) and (settings or parameters is not None):
         raise InputError("is an object with its own parameters; set them where it is made", "policy")
+    require_knowledge(describe_policy(policy) if isinstance(policy, str) else policy.info, known)
     leader = load_policy(policy, parameters, **settings) if isinstance(policy, str) else policy
-    if leader.info.central and known is Knowledge.LOCAL:
-        raise RefusedError(f"policy {leader.info.name!r} leads all agents, and needs full knowledge (--knowledge full)")
     simulation = Simulation(mission, known, number)
     if observe is not None:
         observe(simulation)
@@ -119,6 +118,23 @@ def simulate_until(
     times = DecisionTimes.of(control.seconds, control.late, time.perf_counter() - began)
     result = measured(simulation, leader.info.name, number, times)
     return MissionRun(result, log_of(simulation, result))
+
+
+def require_knowledge(policy: PolicyInfo, knowledge: Knowledge) -> None:
+    """Raise an error where a policy needs to know more; before it is loaded, as some compile loops for a minute then.
+
+    Parameters
+    ----------
+    policy : PolicyInfo
+    knowledge : Knowledge
+
+    Raises
+    ------
+    RefusedError
+        If the policy leads all agents, and knowledge is local.
+    """
+    if policy.central and knowledge is Knowledge.LOCAL:
+        raise RefusedError(f"policy {policy.name!r} leads all agents, and needs full knowledge (--knowledge full)")
 
 
 class _Control:

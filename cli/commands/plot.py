@@ -62,15 +62,18 @@ def plot_command(
 def _draw_log(log: str, output: str) -> None:
     """Draw or animate the mission of a log."""
     from alloc.allocators.plotting import animate_mission, plot_mission
-    from alloc.problems import InputError, course_of, read_log
-    from alloc.problems.formats.files import named
+    from alloc.problems import InputError, course_of
+    from alloc.problems.formats.files import named, read_text
     from alloc.problems.formats.messages import told
+    from alloc.problems.missions.files.log_file import is_log, log_from_text
 
     is_film = output.lower().endswith((".html", ".gif", ".mp4"))
     (check_film if is_film else check_picture)(output)
-    recorded = read_log(log)
+    text = read_text(log)
+    if not is_log(text):
+        raise InputError("is no log of a mission; to draw a plan, give the instance and the plan", source=named(log))
     try:
-        course = course_of(recorded)
+        course = course_of(log_from_text(text))
     except InputError as error:
         raise told(error, named(log)) from error
     (animate_mission if is_film else plot_mission)(course, output)

@@ -141,7 +141,9 @@ def check_outputs(*written: Named, read: Iterable[Named] = ()) -> None:
 
 def _parts(name: str) -> list[str]:
     """Return the paths that an instance may be read from: itself, and its tables if it is a folder."""
-    tables = ("agents.csv", "tasks.csv", "distances.csv", "instance.json") if os.path.isdir(name) else ()
+    from alloc.problems.formats.csv_folder import FILES
+
+    tables = FILES if os.path.isdir(name) else ()
     return [os.path.realpath(name), *(os.path.realpath(os.path.join(name, table)) for table in tables)]
 
 

@@ -15,6 +15,7 @@ from alloc.problems.formats.columns import unknown_field
 from alloc.problems.formats.files import read_text
 from alloc.problems.formats.messages import quoted
 from alloc.problems.instance import FloatArray
+from alloc.problems.text import counted
 
 LONGEST_CELL = 131_072
 """What Python's csv module reads; spreadsheets stop earlier."""
@@ -130,7 +131,9 @@ def parse_table(text: str, required: Sequence[str], known: Sequence[str] | None 
     _check_names(names, known, required, _line(file, lines[0]))
     if set(map(len, rows)) != {len(names)}:
         row, line = next((r, n) for r, n in zip(rows, lines, strict=True) if len(r) != len(names))
-        raise InputError(f"has {len(row)} cells, but there are {len(names)} columns", _line(file, line))
+        raise InputError(
+            f"has {counted(len(row), 'cell')}, but there are {counted(len(names), 'column')}", _line(file, line)
+        )
     cells = [list(column) for column in zip(*rows[1:], strict=True)] or [[] for _ in names]
     return Table(file, dict(zip(names, cells, strict=True)), lines[1:])
 

@@ -226,11 +226,6 @@ class Store:
             rows = self._connection.execute(f"SELECT {columns}, count(*) FROM runs GROUP BY {columns}").fetchall()
         return {tuple(row[:-1]): int(row[-1]) for row in rows}
 
-    def instance_names(self) -> dict[str, str]:
-        """Return the name under which each instance was last seen, by its hash."""
-        with explained(self.path):
-            return dict(self._connection.execute("SELECT instance, name FROM instances").fetchall())
-
     def leases(self) -> dict[str, str]:
         """Return who works on what: owners by key, also of leases that have ended."""
         with explained(self.path):

@@ -102,7 +102,7 @@ def compare_command(
     written = [("--csv", csv), *(("--report", file) for file in report or ())]
     check_outputs(*written, read=[("--store", store), *(("INSTANCE", instance) for instance in instances)])
     if json and csv is not None and is_standard_output(csv):
-        raise typer.BadParameter("and --json cannot both be standard output", param_hint="'--csv'")
+        raise typer.BadParameter("cannot be standard output together with --json", param_hint="'--csv'")
     of_methods: dict[str, object] = {
         "--time-limit": time_limit,
         "--iterations": iterations,

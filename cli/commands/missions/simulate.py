@@ -11,6 +11,7 @@ from alloc.cli.output.files import check_film, check_outputs, check_picture
 from alloc.problems.vocabulary import Knowledge
 
 if TYPE_CHECKING:
+    from alloc.allocators import Policy
     from alloc.problems import Course, Mission, MissionResult
 
 EXAMPLES = examples(
@@ -66,14 +67,14 @@ def simulate_command(
     quiet: options.QuietOption = False,
 ) -> None:
     """Let a policy lead the agents of a mission: allocation that goes on in time."""
-    from alloc.allocators import load_policy, simulate
+    from alloc.allocators import simulate
     from alloc.problems import Recorder, read_mission, write_log
 
     check_files(mission, runs, {"--log": log, "--plot": plot, "--animate": animate})
     if log == STANDARD and json:
         raise typer.BadParameter("cannot go to standard output together with --json", param_hint="'--log'")
-    leader = load_policy(policy, **options.values(settings))
     problem = read_mission(mission)
+    leader = load(policy, settings, knowledge or problem.knowledge)
     results: list[MissionResult] = []
     recorder = Recorder(with_knowledge=animate is not None) if plot or animate else None
     for number in range(seed, seed + runs):
@@ -90,6 +91,15 @@ def simulate_command(
     if recorder is not None:
         draw(recorder.course(results[0]), plot, animate)
     raise typer.Exit(0 if all(result.is_done for result in results) else 1)
+
+
+def load(policy: str, settings: list[str] | None, knowledge: Knowledge) -> "Policy":
+    """Return a policy that can lead by such knowledge; what it lacks is told before its loops are compiled."""
+    from alloc.allocators import describe_policy, load_policy
+    from alloc.allocators.online.run import require_knowledge
+
+    require_knowledge(describe_policy(policy), knowledge)
+    return load_policy(policy, **options.values(settings))
 
 
 def check_files(mission: str, runs: int, written: dict[str, str | None]) -> None:

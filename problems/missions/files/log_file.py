@@ -105,6 +105,7 @@ def log_from_text(text: str) -> MissionLog:
     InputError
         If it is no log.
     """
+    _refuse_document(text)
     documents = [_line(line, number) for number, line in enumerate(text.split("\n"), 1) if line.strip()]
     if len(documents) < 2:
         raise InputError("is no log of a mission: it needs a header, and a result as its last line; is it cut off?")
@@ -120,6 +121,17 @@ def log_from_text(text: str) -> MissionLog:
     if not str(result.get("format")).startswith("alloc-mission-result/"):
         raise InputError("must be the result of the mission; is the log cut off?", f"line {len(documents)}")
     return MissionLog(header, tuple(records), result)
+
+
+def _refuse_document(text: str) -> None:
+    """Raise an error for one JSON object, such as a mission: its first line alone is no JSON, but that is not wrong."""
+    try:
+        found = json.loads(text)
+    except (ValueError, RecursionError):
+        return
+    if isinstance(found, dict) and found.get("format") != LOG_FORMAT:
+        kind = f", but of the format {found['format']!r}" if "format" in found else ""
+        raise InputError(f"is no log of a mission{kind}; `alloc simulate --log` writes logs")
 
 
 def _line(text: str, number: int) -> Record:

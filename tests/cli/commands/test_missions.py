@@ -66,7 +66,31 @@ def test_faults_of_files_are_told(alloc):
     assert (ran.code, ran.err) == (2, "alloc: bad.json: tasks: an instance needs at least one agent and one task\n")
     ran = alloc("replay", "bad.json")
     assert (ran.code, ran.err.count("\n")) == (2, 1)
-    assert "bad.json: is no log of a mission" in ran.err
+    assert "bad.json: is no log of a mission, but of the format 'alloc-mission/1'" in ran.err
+
+
+def test_one_document_over_many_lines_is_no_log(alloc, mission):
+    """A mission, whose first line alone is no JSON, is told as what it is; to draw a plan takes two files."""
+    ran = alloc("replay", mission)
+    assert (ran.code, ran.out) == (2, "")
+    told = "is no log of a mission, but of the format 'alloc-mission/1'; `alloc simulate --log` writes logs"
+    assert ran.err == f"alloc: {mission}: {told}\n"
+    ran = alloc("plot", mission, "--output", "x.png")
+    assert (ran.code, ran.out, Path("x.png").exists()) == (2, "", False)
+    told = "is no log of a mission; to draw a plan, give the instance and the plan"
+    assert ran.err == f"alloc: {mission}: {told}\n"
+
+
+def test_knowledge_is_checked_before_loops_are_compiled(alloc, mission, monkeypatch):
+    """A policy that needs full knowledge is refused at once where there is none, not after a minute of compiling."""
+
+    def compiled():
+        raise AssertionError
+
+    monkeypatch.setattr("alloc.allocators.online.policies.routes.warm_up", compiled)
+    ran = alloc("simulate", mission, "--policy", "routes", "--knowledge", "local")
+    assert (ran.code, ran.err.count("\n")) == (2, 1)
+    assert "needs full knowledge (--knowledge full)" in ran.err
 
 
 def test_an_instance_is_simulated(alloc):
@@ -134,8 +158,8 @@ def test_policies_and_methods_are_not_mixed(alloc, mission, small):
         ((mission, "--methods", "greedy"), "`alloc compare --policies` take missions"),
         ((mission,), "give either --methods, for instances, or --policies, for missions"),
         ((mission, "--methods", "greedy", "--policies", "greedy"), "give either --methods"),
-        ((mission, "--policies", "greedy", "--iterations", "3"), "'--iterations': goes with --methods only"),
-        (("small.json", "--methods", "greedy", "--knowledge", "full"), "'--knowledge': goes with --policies only"),
+        ((mission, "--policies", "greedy", "--iterations", "3"), "--iterations: goes with --methods only"),
+        (("small.json", "--methods", "greedy", "--knowledge", "full"), "--knowledge: goes with --policies only"),
         ((mission, "--policies", "gredy"), "--policies: there is no policy 'gredy'"),
     ):
         ran = alloc("compare", *arguments)
@@ -188,7 +212,7 @@ def test_cfstp_is_generated(alloc):
     assert (len(ran.json["agents"]), len(ran.json["tasks"]), ran.json["metric"]) == (2, 3, "manhattan")
     ran = alloc("generate", "cfstp", "--loss", "0.1")
     assert (ran.code, ran.err.count("\n")) == (2, 1)
-    assert "'--loss': is for mission, not for cfstp" in ran.err
+    assert "--loss: is for mission, not for cfstp" in ran.err
 
 
 def test_files_of_others_are_imported(alloc):
@@ -208,8 +232,8 @@ def test_files_of_others_are_imported(alloc):
     ran = alloc("import-mission", "london", str(folder / "calls.csv"), *dated)
     assert len(ran.json["tasks"]) == 3
     for arguments, told in (
-        (("space", str(folder / "space.yaml"), "--compress", "2"), "'--compress': is for records, not for space"),
-        (("london", str(folder / "calls.csv"), "--until", "soon"), "'--until'"),
+        (("space", str(folder / "space.yaml"), "--compress", "2"), "--compress: is for records, not for space"),
+        (("london", str(folder / "calls.csv"), "--until", "soon"), "--until"),
         (("london", str(folder / "calls.csv"), "--compress", "0"), "--compress: must be a finite number > 0"),
         (("london", str(folder / "calls.csv"), "--from", "2022-01-01", "--until", "2021-01-01"), "--until: must not"),
         (("london", str(folder / "cfstp.txt")), "has no column 'IncidentNumber'"),

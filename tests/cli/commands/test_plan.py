@@ -122,7 +122,7 @@ def test_it_goes_on_from_its_state(alloc, pair):
 def test_wrong_arguments_are_told_before_any_line(alloc, pair):
     """A policy or a file that there is not is one line and exit code 2."""
     for arguments, told in (
-        (("pair.json",), "'--stdio': is needed"),
+        (("pair.json",), "--stdio: is needed"),
         (("pair.json", "--stdio", "--policy", "gredy"), "did you mean 'greedy'?"),
         (("none.json", "--stdio"), "none.json"),
         (("-", "--stdio"), "leave it out"),

@@ -25,6 +25,7 @@ from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSi
         ("pareto", "small.json", "--output", "small.json"),
         ("pareto", "small.json", "--output", "same.png", "--plot", "same.png"),
         ("compare", "other.json", "small.json", "--methods", "greedy", "--csv", "small.json"),
+        ("compare", "tables", "--methods", "greedy", "--csv", "tables/bases.csv"),
     ],
 )
 def test_outputs_that_clash_are_refused(alloc, small, arguments):
@@ -53,7 +54,7 @@ def test_standard_output_holds_one_thing(alloc, small):
     """A table as CSV and as JSON cannot both go to standard output."""
     ran = alloc("compare", "small.json", "--methods", "greedy", "--csv", "-", "--json")
     assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
-    assert "'--csv': and --json cannot both be standard output" in ran.err
+    assert "--csv: cannot be standard output together with --json" in ran.err
 
 
 RUNS = [

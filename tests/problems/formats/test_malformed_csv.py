@@ -30,7 +30,7 @@ TABLES: list[tuple[dict[str, str | bytes], str, str]] = [
     ({"tasks.csv": "workload\n3\n"}, "tasks.csv line 1", "the column 'id' is missing"),
     ({"agents.csv": "id,ability,id\na,1,b\n"}, "agents.csv line 1", "the column 'id' occurs twice"),
     ({"agents.csv": "a1,4\na2,5\n"}, "agents.csv line 1", "unknown column 'a1'"),
-    ({"agents.csv": "id,ability\na,1\nb\n"}, "agents.csv line 3", "has 1 cells, but there are 2 columns"),
+    ({"agents.csv": "id,ability\na,1\nb\n"}, "agents.csv line 3", "has 1 cell, but there are 2 columns"),
     ({"agents.csv": "id,ability\na,1,2\n"}, "agents.csv line 2", "has 3 cells, but there are 2 columns"),
     ({"agents.csv": 'id,ability\n"a,1\n'}, "agents.csv line 2", "is not CSV: unexpected end of data"),
     ({"agents.csv": 'id,ability\n"a"b,1\n'}, "agents.csv line 2", "is not CSV"),

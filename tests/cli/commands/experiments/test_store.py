@@ -197,10 +197,10 @@ def test_a_full_disk_is_one_line_and_loses_nothing(alloc, plugin):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("--memory", "4G"), "'--memory': goes with --store only"),
-        (("--retry",), "'--retry': goes with --store only"),
-        (("--engine", "ray"), "'--engine': goes with --store only"),
-        (("--store", "runs.db", "--address", "here:1"), "'--address': goes with --engine ray only"),
+        (("--memory", "4G"), "--memory: goes with --store only"),
+        (("--retry",), "--retry: goes with --store only"),
+        (("--engine", "ray"), "--engine: goes with --store only"),
+        (("--store", "runs.db", "--address", "here:1"), "--address: goes with --engine ray only"),
         (("--store", "runs.db", "--memory", "4"), "'4' is not like 800M or 4G"),
         (("--store", "runs.db", "--memory", "4M"), "must be at least 100M"),
         (("--store", "runs.db", "--kill-after", "0"), "must be more than 0 seconds"),
