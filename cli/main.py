@@ -146,7 +146,7 @@ def _leave(code: int) -> NoReturn:
 
 def _usage(message: str) -> str:
     """Return what is wrong with the usage in the words of all other errors: the option, and what it must be."""
-    words = re.sub("^Invalid value for '([^']+)': ", r"\1: ", message.rstrip("."))
+    words = re.sub("^Invalid value for '?([^':]+)'?: ", r"\1: ", message.rstrip("."))
     words = re.sub(", unable to parse string as an? [a-z]+$", "", words)
     return words.replace(": Value error, ", ": ").replace(": Input should be ", ": must be ")
 

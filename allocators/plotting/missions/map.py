@@ -179,9 +179,16 @@ def name_tasks(axes: "Axes", course: Course, plane: Plane) -> None:
     names = [plain_text(name) for name in short_names(instance.task_ids, 18)]
     centre = axes.transData.transform(place) * 72 / axes.figure.dpi
     width = np.array([0.62 * size * len(name) for name in names])
-    middle = place_labels(centre, np.sqrt(task_areas(course) / np.pi), width, 1.1 * size, np.empty((0, 2, 2)))
+    middle = place_labels(centre, np.sqrt(task_areas(course) / np.pi), width, 1.1 * size, _frame(axes))
     for j in np.flatnonzero(~np.isnan(middle[:, 0])):
         write(axes, names[j], place[j], middle[j] - centre[j], size)
+
+
+def _frame(axes: "Axes") -> FloatArray:
+    """Return both ends of the four lines around a map, in points: names are rather beside them than on them."""
+    (left, bottom), (right, top) = axes.bbox.get_points() * 72 / axes.figure.dpi
+    corners = np.array([(left, bottom), (right, bottom), (right, top), (left, top)])
+    return np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
 
 
 def write(axes: "Axes", text: str, place: FloatArray, offset: FloatArray, size: float) -> None:

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from alloc.cli.options import examples
-from alloc.cli.output.console import is_terminal, say
+from alloc.cli.output.console import is_terminal, note, say
 from alloc.cli.output.files import check_outputs
 
 EXAMPLES = examples(
@@ -46,7 +46,8 @@ def report_command(
     from alloc.allocators import report_html
 
     check_outputs(("--output", output), read=[("STORE", store) for store in stores])
-    report_html(stores, output, title=title, against=against, progress=_Progress().tell)
+    if not report_html(stores, output, title=title, against=against, progress=_Progress().tell):
+        note(f"there are no runs in {', '.join(stores)}: {output} is empty")
 
 
 class _Progress:

@@ -55,7 +55,7 @@ def report_html(
     title: str | None = None,
     against: str | None = None,
     progress: Progress = lambda words: None,
-) -> None:
+) -> int:
     """Write what stores of runs hold as one page, which a browser opens from disk without a network.
 
     It has tables of runs and methods, paired statistics, performance profiles, convergence, trade-offs, scaling, gaps,
@@ -75,6 +75,11 @@ def report_html(
     progress : callable, optional
         Called now and then with what is done, in words.
 
+    Returns
+    -------
+    int
+        How many runs there are.
+
     Raises
     ------
     InputError
@@ -91,6 +96,7 @@ def report_html(
         raise InputError(f"{against!r} is not among the methods {', '.join(layout.labels) or '(none)'}", "against")
     heading = one_line(title) if title else "Runs of " + ", ".join(os.path.basename(named(path)) for path in stores)
     write_text_atomically(output, _rendered(heading, _contents(archive, layout, heading, against, progress)))
+    return len(archive.records)
 
 
 def _contents(

@@ -24,6 +24,13 @@ def test_the_page_is_written_and_nothing_is_printed(tmp_path, capsys):
     assert capsys.readouterr() == ("", "")
 
 
+def test_a_page_without_runs_has_a_note(tmp_path, capsys):
+    """A store that holds no runs yet is no error, but it is said."""
+    (tmp_path / "none.db").touch()
+    assert main(["report", "none.db", "-o", "report.html"]) == 0
+    assert capsys.readouterr() == ("", "note: there are no runs in none.db: report.html is empty\n")
+
+
 def test_progress_is_shown_on_a_terminal(monkeypatch, capsys):
     """Who waits at a terminal is told how far it is, at most once a second."""
     monkeypatch.setattr(report, "is_terminal", lambda stream: True)
