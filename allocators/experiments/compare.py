@@ -227,6 +227,6 @@ def _load(name: str) -> str | Allocator | Exception:
         return load(name)
     except InputError as error:
         return error
-    except Exception as error:  # as above
+    except Exception as error:  # the figures of the others do not depend on a faulty plugin
         LOG.warning("method %r cannot be loaded", name, exc_info=error)
         return ImportError(f"cannot be loaded: {type(error).__name__}: {error}")

@@ -1,5 +1,7 @@
 """``alloc simulate``."""
 
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -11,7 +13,7 @@ from alloc.cli.output.files import check_film, check_outputs, check_picture
 from alloc.problems.vocabulary import Knowledge
 
 if TYPE_CHECKING:
-    from alloc.allocators import Policy
+    from alloc.allocators import MissionRun, Policy
     from alloc.problems import Course, Mission, MissionResult
 
 EXAMPLES = examples(
@@ -21,7 +23,8 @@ EXAMPLES = examples(
     "alloc simulate mission.json --policy greedy --plot run.png --animate run.html",
     "alloc simulate mission.json --policy auction --runs 10 --json",
     "alloc generate mission --seed 7 --output - | alloc simulate - --policy hedonic",
-    closing="Exit code 0 if all tasks are done in all runs, 1 if not. An instance is a mission in which nothing comes.",
+    closing="Exit code 0 if all tasks are done in all runs, 1 if not. An instance is a mission in which "
+    "nothing comes. Ctrl-C ends --runs: those that are complete are printed, with exit code 1.",
 )
 
 
@@ -77,10 +80,8 @@ def simulate_command(
     leader = load(policy, settings, knowledge or problem.knowledge)
     results: list[MissionResult] = []
     recorder = Recorder(with_knowledge=animate is not None) if plot or animate else None
-    for number in range(seed, seed + runs):
-        run = simulate(
-            problem, leader, knowledge=knowledge, seed=number, deadline_ms=deadline_ms or None, observe=recorder
-        )
+    lead = partial(simulate, problem, leader, knowledge=knowledge, deadline_ms=deadline_ms or None, observe=recorder)
+    for run in until_interrupted(lead, range(seed, seed + runs)):
         results.append(run.result)
         if log is not None:
             write_log(run.log, log)
@@ -88,9 +89,23 @@ def simulate_command(
         write_json(results[0].to_dict() if runs == 1 else [result.to_dict() for result in results])
     if not quiet:
         tell(results, problem, summary=not json)
+        if len(results) < runs:
+            note(f"interrupted after {len(results)} of {runs} runs")
     if recorder is not None:
         draw(recorder.course(results[0]), plot, animate)
-    raise typer.Exit(0 if all(result.is_done for result in results) else 1)
+    raise typer.Exit(0 if len(results) == runs and all(result.is_done for result in results) else 1)
+
+
+def until_interrupted(lead: "Callable[..., MissionRun]", seeds: Sequence[int]) -> "Iterator[MissionRun]":
+    """Make a run with each seed; Ctrl-C ends them once there is one, and those that are complete count."""
+    for done, seed in enumerate(seeds):
+        try:
+            run = lead(seed=seed)
+        except KeyboardInterrupt:
+            if not done:
+                raise
+            return
+        yield run
 
 
 def load(policy: str, settings: list[str] | None, knowledge: Knowledge) -> "Policy":

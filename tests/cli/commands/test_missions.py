@@ -1,3 +1,4 @@
+import importlib
 import json
 from pathlib import Path
 
@@ -40,6 +41,26 @@ def test_several_runs_are_a_list(alloc, mission):
     """With --runs the JSON is a list of results, one for each seed."""
     ran = alloc("simulate", mission, "--policy", "random", "--runs", "3", "--json")
     assert [result["seed"] for result in ran.json] == [0, 1, 2]
+
+
+def test_ctrl_c_keeps_the_runs_that_are_complete(alloc, mission, monkeypatch):
+    """Of several runs those before it are printed, with exit code 1; in the first there is nothing to print."""
+    module = importlib.import_module("alloc.allocators.online.run")
+    inner = module.simulate_until
+
+    def until_third(*arguments, **settings):
+        if arguments[4] == last:
+            raise KeyboardInterrupt
+        return inner(*arguments, **settings)
+
+    monkeypatch.setattr(module, "simulate_until", until_third)
+    last = 2
+    ran = alloc("simulate", mission, "--policy", "greedy", "--runs", "5", "--json")
+    assert [result["seed"] for result in ran.json] == [0, 1]
+    assert (ran.code, ran.err) == (1, "note: interrupted after 2 of 5 runs\n")
+    last = 0
+    ran = alloc("simulate", mission, "--policy", "greedy", "--runs", "5", "--json")
+    assert (ran.code, ran.out) == (130, "")
 
 
 def test_exit_codes_are_those_of_solve(alloc, mission):
