@@ -83,14 +83,14 @@ def simulate_command(
     lead = partial(simulate, problem, leader, knowledge=knowledge, deadline_ms=deadline_ms or None, observe=recorder)
     for run in until_interrupted(lead, range(seed, seed + runs)):
         results.append(run.result)
-        if log is not None:
-            write_log(run.log, log)
     if json:
         write_json(results[0].to_dict() if runs == 1 else [result.to_dict() for result in results])
     if not quiet:
         tell(results, problem, summary=not json)
         if len(results) < runs:
             note(f"interrupted after {len(results)} of {runs} runs")
+    if log is not None:  # of a single run
+        write_log(run.log, log)
     if recorder is not None:
         draw(recorder.course(results[0]), plot, animate)
     raise typer.Exit(0 if len(results) == runs and all(result.is_done for result in results) else 1)

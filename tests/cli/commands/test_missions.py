@@ -63,6 +63,18 @@ def test_ctrl_c_keeps_the_runs_that_are_complete(alloc, mission, monkeypatch):
     assert (ran.code, ran.out) == (130, "")
 
 
+def test_a_log_that_cannot_be_written_costs_no_figures(alloc, mission, monkeypatch):
+    """A disk that is full by the end of a run leaves its result on standard output, with exit code 2."""
+
+    def fail(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.replace", fail)
+    ran = alloc("simulate", mission, "--policy", "greedy", "--json", "--log", "run.jsonl")
+    assert (ran.code, ran.json["status"], Path("run.jsonl").exists()) == (2, "done", False)
+    assert ran.err == "alloc: run.jsonl: cannot be written: no space left on device\n"
+
+
 def test_exit_codes_are_those_of_solve(alloc, mission):
     """1 if not all is done, 2 with one line for what is wrong."""
     assert alloc("simulate", mission, "--policy", "idle").code == 1
