@@ -108,7 +108,9 @@ LOOK = """
 const height = (what) => document.querySelector(what).getBoundingClientRect().height;
 const colour = (what, name) => getComputedStyle(document.querySelector(what))[name];
 const scale = Number(/scale\\(([^)]+)/.exec(document.getElementById("moving").getAttribute("transform"))[1]);
-const fits = document.documentElement.scrollWidth <= innerWidth;
+const axis = [...document.querySelectorAll("#grid text")].at(-2).getBoundingClientRect();
+const isFree = document.getElementById("legend").getBoundingClientRect().bottom <= axis.top;
+const fits = document.documentElement.scrollWidth <= innerWidth && isFree;
 const found = [height("#map") / innerHeight > 0.6, scale * 1000 > 300, fits];
 const colours = [colour("body", "color"), colour("#search", "color"), colour("#labels text", "fill")];
 document.body.replaceChildren(JSON.stringify([...found, colour("#map", "backgroundColor"), ...new Set(colours)]));
@@ -125,5 +127,5 @@ WHITE, BLACK = "rgb(255, 255, 255)", "rgb(34, 34, 34)"
 def test_the_map_is_legible_on_a_phone_and_in_the_dark(
     page: Path, tmp_path: Path, size: str, flags: list[str], colours: list[str]
 ) -> None:
-    """The map takes most of the height, fits the width, and all text has one colour that contrasts with the map's."""
+    """The map takes most of the height, fits the width, nothing is under the legend, and all text contrasts with it."""
     assert run_in_browser(page, LOOK, tmp_path, size, flags) == [True, True, True, *colours]
