@@ -52,7 +52,7 @@ def test_lists_are_lists_in_the_site() -> None:
     found = {}
     for path in [*DOCS.rglob("*.md"), ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md"]:
         text = re.sub(r"^```.*?^```", "", path.read_text("utf-8"), flags=re.MULTILINE | re.DOTALL)
-        found[path.name] = re.findall(r"^(?!- |\d+\. |#| |\||<!--).+\n(?=- |1\. )", text, re.MULTILINE)
+        found[str(path)] = re.findall(r"^(?!- |\d+\. |#| |\||<!--).+\n(?=- |1\. )", text, re.MULTILINE)
     assert {name: lines for name, lines in found.items() if lines} == {}
 
 
