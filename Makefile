@@ -68,16 +68,17 @@ $(VENV)/.installed: $(VENV)/bin/python $(CODE)
 	$(BIN)/alloc methods --prepare
 	@touch $@
 
-# An installation anew makes compiled loops stale: on a fresh machine, one for the tests is all that they need.
+# An installation anew makes compiled loops stale: on a fresh machine, one for the tests is all that they need, and
+# what else is needed then comes without it.
 $(VENV)/.tested: $(VENV)/bin/python $(CODE)
 	$(INSTALL) --editable '.[test]'
 	$(BIN)/alloc methods --prepare
 	@touch $(VENV)/.installed $@
 
 $(VENV)/.documented: $(VENV)/.installed
-	$(INSTALL) --editable '.[docs]'
+	$(INSTALL) 'alloc-mrta[docs]'
 	@touch $@
 
 $(VENV)/.checked: $(VENV)/.tested
-	$(INSTALL) --editable '.[dev]'
+	$(INSTALL) 'alloc-mrta[dev]'
 	@touch $@
