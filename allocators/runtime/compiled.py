@@ -43,8 +43,8 @@ def _compiled_once(loop: Function) -> Function:
 
 def _whole_type(argument: Type) -> Type:
     """Return the type of a constant, and 64 bits for integers of 32."""
-    argument = numba.types.unliteral(argument)
-    return numba.types.int64 if argument == numba.types.int32 else argument
+    whole = cast(Callable[[Type], Type], numba.types.unliteral)(argument)
+    return numba.types.int64 if whole == numba.types.int32 else whole
 
 
 def compiled(function: Function) -> Function:
