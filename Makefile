@@ -2,9 +2,9 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-# pip compiles modules one by one; here all processors do. Some packages hold files that no Python 3 compiles.
-COMPILE := $(BIN)/python -m compileall -q -j 0 $(VENV)/lib > /dev/null || true
+# A quarter of all installed modules is ever imported: pip compiles none of them, and Python those, when it first does.
 INSTALL := PYTHONWARNINGS=ignore $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
+export PYTHONDONTWRITEBYTECODE :=  # where it is set, every process would compile all that it imports anew
 # A process of tests for each processor, each with one thread in torch, and most of a gigabyte of memory.
 PARALLEL := -n logical --maxprocesses 8 --dist worksteal
 CODE := pyproject.toml $(shell find problems allocators cli -name '*.py' -o -name '*.safetensors')
@@ -65,23 +65,20 @@ $(VENV)/bin/python:
 
 $(VENV)/.installed: $(VENV)/bin/python $(CODE)
 	$(INSTALL) --editable .
-	$(COMPILE)
 	$(BIN)/alloc methods --prepare
 	@touch $@
 
-# An installation anew makes compiled loops stale: on a fresh machine, one for the tests is all that they need.
+# An installation anew makes compiled loops stale: on a fresh machine, one for the tests is all that they need, and
+# what else is needed then comes without it.
 $(VENV)/.tested: $(VENV)/bin/python $(CODE)
 	$(INSTALL) --editable '.[test]'
-	$(COMPILE)
 	$(BIN)/alloc methods --prepare
 	@touch $(VENV)/.installed $@
 
 $(VENV)/.documented: $(VENV)/.installed
-	$(INSTALL) --editable '.[docs]'
-	$(COMPILE)
+	$(INSTALL) 'alloc-mrta[docs]'
 	@touch $@
 
 $(VENV)/.checked: $(VENV)/.tested
-	$(INSTALL) --editable '.[dev]'
-	$(COMPILE)
+	$(INSTALL) 'alloc-mrta[dev]'
 	@touch $@

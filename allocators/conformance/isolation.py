@@ -28,7 +28,7 @@ class IsolationChecks(Runner):
         def run(job: tuple[Instance, int]) -> Allocation | None:
             return self.solve(subject, job[0], seed=job[1]).allocation
 
-        alone = [run(job) for job in jobs]
+        alone = self._once((subject, "alone"), lambda: [run(job) for job in jobs])
         before = process_state()
         with ThreadPoolExecutor(threads) as pool:
             runs = [pool.submit(run, job) for job in jobs]

@@ -2,15 +2,16 @@
 
 import re
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
 import pytest
 
-from alloc.allocators.conformance.cases import CASES
+from alloc.allocators.conformance.cases import CASES, medium_case
 from alloc.allocators.contract.base import Allocator
 from alloc.allocators.contract.budget import Budget
+from alloc.allocators.contract.improvement import Improvement
 from alloc.allocators.contract.search import STANDS
 from alloc.allocators.contract.tolerance import MakespanTolerance
 from alloc.allocators.refusal import refuse
@@ -19,6 +20,8 @@ from alloc.allocators.result import Result
 from alloc.allocators.solve import solve
 from alloc.problems import Instance, Objective, RefusedError
 from alloc.problems.vocabulary import OBJECTIVES
+
+Answer = TypeVar("Answer")
 
 TOLERANCE = 1 + 1e-9
 every_case = pytest.mark.parametrize("case", CASES)
@@ -63,13 +66,27 @@ class Runner:
 
     def answer(self, subject: Allocator, case: str, objective: Objective) -> Result:
         """Return the answer of `subject` to a case, solved once for all checks."""
+        return self._once((subject, case, objective), lambda: self.solve(subject, CASES[case], objective=objective))
+
+    def seeded_answer(self, subject: Allocator, objective: Objective) -> tuple[Result, list[Improvement]]:
+        """Return the answer of `subject` to the medium case, with seed 7, and what it told meanwhile, likewise once."""
+
+        def solve() -> tuple[Result, list[Improvement]]:
+            told: list[Improvement] = []
+            settings = {"objective": objective, "seed": 7, "on_improvement": told.append}
+            return self.solve(subject, medium_case(), **settings), told
+
+        return self._once((subject, objective), solve)
+
+    def _once(self, key: tuple[object, ...], make: Callable[[], Answer]) -> Answer:
+        """Return what `make` returned for this key when this class first asked."""
         cls = type(self)
         if "_answers" not in vars(cls):
             cls._answers = {}  # type: ignore[attr-defined]
-        answers: dict[tuple[Allocator, str, Objective], Result] = cls._answers  # type: ignore[attr-defined]
-        if (subject, case, objective) not in answers:
-            answers[subject, case, objective] = self.solve(subject, CASES[case], objective=objective)
-        return answers[subject, case, objective]
+        answers: dict[tuple[object, ...], Answer] = cls._answers  # type: ignore[attr-defined]
+        if key not in answers:
+            answers[key] = make()
+        return answers[key]
 
     @contextmanager
     def guard(self, stop: threading.Event) -> Iterator[None]:

@@ -11,6 +11,7 @@ from alloc.allocators.conformance.cases import CASES, large_case, medium_case
 from alloc.allocators.conformance.runner import Runner, every_objective
 from alloc.allocators.contract.base import Allocator
 from alloc.allocators.contract.improvement import Improvement
+from alloc.allocators.result import Result
 from alloc.problems import Allocation, Objective
 
 
@@ -21,14 +22,17 @@ class RunChecks(Runner):
     @pytest.mark.parametrize("threads", [1, 2])
     def test_same_seed_gives_same_answer(self, subject: Allocator, objective: Objective, threads: int) -> None:
         """With a budget in iterations, the seed and the number of threads decide; the clock does not."""
-        first = self.solve(subject, medium_case(), objective=objective, seed=7, threads=threads)
-        again = self.solve(subject, medium_case(), objective=objective, seed=7, threads=threads)
-        assert first.allocation == again.allocation
+
+        def solve() -> Result:
+            return self.solve(subject, medium_case(), objective=objective, seed=7, threads=threads)
+
+        first = self.seeded_answer(subject, objective)[0] if threads == 1 else solve()
+        assert solve().allocation == first.allocation
 
     @every_objective
     def test_start_is_never_lost(self, subject: Allocator, objective: Objective) -> None:
         """The answer is no worse than the allocation that the run starts from."""
-        good = self.solve(subject, medium_case(), objective=objective, seed=1)
+        good, _ = self.seeded_answer(subject, objective)
         assert good.allocation is not None
         assert good.evaluation is not None
         warm = self.solve(subject, medium_case(), objective=objective, start=good.allocation, iterations=1, seed=2)
@@ -51,8 +55,7 @@ class RunChecks(Runner):
     @every_objective
     def test_improvements_improve(self, subject: Allocator, objective: Objective) -> None:
         """Every improvement is better and later than the one before; the last is the answer, the trace has all."""
-        told: list[Improvement] = []
-        result = self.solve(subject, medium_case(), objective=objective, on_improvement=told.append)
+        result, told = self.seeded_answer(subject, objective)
         assert told, "no improvement was reported"
         assert tuple(step.figures for step in told) == result.trace
         assert told[-1].allocation == result.allocation

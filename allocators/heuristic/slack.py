@@ -17,7 +17,7 @@ TIME_SHARE, MOST_S = 0.02, 0.5
 """Seconds of each search: a share of the time limit, and at most so many."""
 
 ITERATIONS = 20
-"""Iterations of each where no time is counted."""
+"""Most iterations of each where no time is counted; one for each agent is enough in any case."""
 
 
 def note_saving(search: Search) -> None:
@@ -46,8 +46,10 @@ def note_saving(search: Search) -> None:
 
 def _within(search: Search, makespan: float) -> Evaluation:
     """Return the scores of a plan with little energy that takes no longer than so many hours."""
-    limit = search.budget.time_limit_s
-    budget = Budget(None, ITERATIONS) if limit is None else Budget(search.elapsed_s + min(MOST_S, TIME_SHARE * limit))
+    limit, enough = search.budget.time_limit_s, search.instance.n
+    budget = Budget(None, min(ITERATIONS, enough))
+    if limit is not None:
+        budget = Budget(search.elapsed_s + min(MOST_S, TIME_SHARE * limit), enough)
     part = search.part(search.objective, MakespanTolerance(limit=makespan), budget=budget)
     improve(part)
     assert part.best is not None

@@ -1,11 +1,12 @@
 """Decorators for functions that numba compiles to machine code, at their first call or from its cache."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import TypeVar, cast
 
 import numba
 
 Function = TypeVar("Function", bound=Callable[..., object])
+Type = object  # those of numba have no stubs
 
 
 _LOOSELY = {"error_model": "numpy", "fastmath": {"contract", "reassoc", "arcp", "nsz", "afn"}}
@@ -22,13 +23,37 @@ def _cached(function: Function, **options: object) -> Function:
         return njit(nogil=True, **options)(function)
 
 
+def _compiled_once(loop: Function) -> Function:
+    """Let compiled callers share one compilation of `loop`, whatever constants and integers they call it with.
+
+    Numba compiles a function anew for each constant that is an argument, also for the value that a variable has at
+    first, and for integers of 32 and of 64 bits: a tenth of the time that all loops took.
+    """
+    resolve = getattr(loop, "get_call_template", None)  # not where numba is told to compile nothing
+
+    def resolve_alike(arguments: Sequence[Type], keywords: Mapping[str, Type]) -> object:
+        assert resolve is not None
+        alike = tuple(map(_whole_type, arguments)), {name: _whole_type(one) for name, one in keywords.items()}
+        return resolve(*alike)
+
+    if resolve is not None:
+        loop.get_call_template = resolve_alike  # type: ignore[attr-defined]
+    return loop
+
+
+def _whole_type(argument: Type) -> Type:
+    """Return the type of a constant, and 64 bits for integers of 32."""
+    whole = cast(Callable[[Type], Type], numba.types.unliteral)(argument)
+    return numba.types.int64 if whole == numba.types.int32 else whole
+
+
 def compiled(function: Function) -> Function:
     """Compile `function` at its first call, to run without the interpreter's lock.
 
     The machine code is cached beside the source, else in the user's cache folder; where neither is writable, every
     process compiles anew.
     """
-    return _cached(function)
+    return _compiled_once(_cached(function))
 
 
 def compiled_in_place(function: Function) -> Function:
@@ -37,7 +62,7 @@ def compiled_in_place(function: Function) -> Function:
     Who uses an array is then not counted. That matters where many small functions pass on many arrays: in missions,
     counting took more than half of the time.
     """
-    return _cached(function, **_IN_PLACE)
+    return _compiled_once(_cached(function, **_IN_PLACE))
 
 
 def compiled_loosely(function: Function) -> Function:

@@ -120,6 +120,7 @@ def _prepare() -> None:
     Methods of one kind share loops, so each kind has a process of its own. The learned ones take longest, and begin.
     """
     from alloc.allocators import describe, load, names
+    from alloc.allocators.exact.makespan import task_prices as bound
     from alloc.allocators.heuristic.greedy import tree_search
     from alloc.allocators.heuristic.task_prices import start as task_prices
     from alloc.allocators.online.registry import describe_policy, load_policy, policy_names
@@ -136,7 +137,9 @@ def _prepare() -> None:
         if not method.missing:
             kinds.setdefault(str(method.kind), []).append(partial(load, name))
         if name == "greedy":
-            kinds[str(method.kind)] += [tree_search.compile_loops, task_prices.compile_loops]  # for large instances
+            kinds[str(method.kind)] += [
+                one.compile_loops for one in (tree_search, task_prices, bound)
+            ]  # for large instances
     for name in policy_names():
         try:
             if not describe_policy(name).missing:

@@ -126,9 +126,20 @@ def test_methods_are_prepared_once_for_all(alloc, monkeypatch):
     monkeypatch.setattr(
         "alloc.allocators.heuristic.greedy.tree_search.compile_loops", lambda: loaded.append("the tree of greedy")
     )
+    monkeypatch.setattr(
+        "alloc.allocators.exact.makespan.task_prices.compile_loops", lambda: loaded.append("prices for bounds")
+    )
     ran = alloc("methods", "--prepare")
     assert (ran.code, ran.out) == (0, "")
-    assert {"greedy", "cpsat", "local-search", "gappo", "the tree of greedy", "policy gappo"} <= set(loaded)
+    assert {
+        "greedy",
+        "cpsat",
+        "local-search",
+        "gappo",
+        "the tree of greedy",
+        "prices for bounds",
+        "policy gappo",
+    } <= set(loaded)
     assert "plugin 'broken'" in ran.err
 
 

@@ -156,7 +156,7 @@ def _least_costs(needs: TaskNeeds, price: FloatArray, count: WholeArray) -> tupl
     order = usable[np.argsort(-needs.weight[usable], kind="stable")]
     if len(order) * int(needs.need.max()) > MAX_CELLS:
         return None
-    least = np.empty((len(order) + 1, int(needs.need.max()) + 1))
+    least = np.empty((len(order) + 1, int(needs.need.max()) + 2))[:, :-1]  # as its parts: a whole is another type
     fill_least(needs.weight[order], price[order], count[order], least)
     return order, least
 
@@ -173,6 +173,6 @@ def compile_loops() -> None:
     """Compile the loops of this module, or read it from the cache, so that no run waits for it."""
     ones = np.ones(2, dtype=np.int64)
     read_group(fill_table(ones, np.ones(2), ones, 2, False), 2, 1)
-    least = np.empty((3, 3))
+    least = np.empty((3, 3))[:, :2]
     fill_least(ones, np.ones(2), ones, least)
-    list_groups(ones, np.ones(2), ones, least[:, :2], 1.0, 1, np.empty((1, MAX_GROUP_SIZE), dtype=np.int64))
+    list_groups(ones, np.ones(2), ones, least, 1.0, 1, np.empty((1, MAX_GROUP_SIZE), dtype=np.int64))

@@ -116,3 +116,12 @@ def value_of_agents(
             done[chosen] += rate
             total += most
     return total
+
+
+def compile_loops() -> None:
+    """Call the loop on an instance with neighbours, whose arrays are read-only, so that no run waits for it."""
+    instance = Instance(ability=[1.0], workload=[1.0])
+    near, zeros = instance.reach.neighbours, np.zeros(1)
+    assert near is not None
+    pairs = near.first, near.task, near.distance, instance.reach.origin
+    value_of_agents(*pairs, instance.ability, instance.speed, zeros, 1.0, zeros)

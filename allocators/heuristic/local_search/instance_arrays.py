@@ -1,6 +1,6 @@
 """An instance as plain arrays, for the compiled loops."""
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +9,7 @@ from alloc.problems.distances.reach import TOLERANCE, Reach
 from alloc.problems.instance import FloatArray, Instance
 
 Int32Array = NDArray[np.int32]
+Array = TypeVar("Array", FloatArray, Int32Array)
 
 TABLE_LIMIT = 2_000_000
 """Pairs of origin and task up to which distances are tabulated; beyond, each is computed when it is needed."""
@@ -82,19 +83,29 @@ def instance_arrays(instance: Instance) -> InstanceArrays:
         origin=reach.origin.astype(np.int32),
         distance=np.zeros((0, 0)),
         cost=np.zeros((0, 0)),
-        origin_position=np.ascontiguousarray(reach.place),
-        task_position=np.ascontiguousarray(reach.goal),
+        origin_position=_read_only(np.ascontiguousarray(reach.place)),
+        task_position=_read_only(np.ascontiguousarray(reach.goal)),
         longest_distance=reach.communication_range + TOLERANCE,
         battery=reach.battery + TOLERANCE,
         list_begin=list_begin,
-        listed_task=listed_task,
-        listed_distance=listed_distance,
-        listed_cost=listed_cost,
+        listed_task=_read_only(listed_task),
+        listed_distance=_read_only(listed_distance),
+        listed_cost=_read_only(listed_cost),
         energy_per_distance=reach.energy_per_distance,
         ability_unit=scale,
         integer_ability=unit is not None,
         instant_travel=not instance.has_travel_time,
     )
+
+
+def _read_only(array: Array) -> Array:
+    """Return a view of an array that cannot be written to, as those of an instance and of its neighbours are.
+
+    Others are another type to numba, which would compile all loops anew, within a run.
+    """
+    view = array.view()
+    view.flags.writeable = False
+    return view
 
 
 def _lists(reach: Reach) -> tuple[NDArray[np.int64], Int32Array, FloatArray, FloatArray]:

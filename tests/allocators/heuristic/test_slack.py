@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from alloc.allocators import solve
+from alloc.allocators.heuristic import slack
+from alloc.allocators.heuristic.local_search.improve import improve
 from alloc.problems import Instance
 
 RNG = np.random.default_rng(1)
@@ -46,3 +48,20 @@ def test_the_saving_is_of_a_plan():
 def test_it_is_told_where_it_is_of_use(instance, settings):
     """Whole abilities, a run for the makespan alone or with slack, and methods without search have no such note."""
     assert notes_on_slack(solve(instance, **{**SETTINGS, **settings})) == []
+
+
+@pytest.mark.parametrize("limit", [None, 60])
+def test_small_instances_are_not_searched_for_long(limit, monkeypatch):
+    """Each search makes an iteration for each agent at the most, however much time there is."""
+    made = []
+
+    def counted(part):
+        improve(part)
+        made.append(part.iteration)
+
+    monkeypatch.setattr(slack, "improve", counted)
+    instance = Instance(
+        ability=RNG.uniform(1, 10, 5), workload=[3, 4], task_position=[[0, 0], [1, 1]], start_task=[0] * 5
+    )
+    solve(instance, "cpsat", objective="makespan-energy", time_limit_s=limit)
+    assert made == [5, 5]

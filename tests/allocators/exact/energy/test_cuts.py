@@ -26,7 +26,7 @@ def test_cheapest_group_with_cuts_is_that_of_all_groups_written_out(seed, kind):
     group = np.zeros(7, dtype=np.int64)
     least = price_groups(
         np.array([0, 7]), weight, price, copies, np.array([need]), np.array([max_weight]), kind != "real",
-        first_cut, np.nonzero(member.T)[1], penalty, np.array([100.0]), group,
+        first_cut, np.nonzero(member.T)[1].copy(), penalty, np.array([100.0]), group,
     )  # fmt: skip
     assert least == pytest.approx(cost.min(), abs=1e-6)
     assert group @ price + (member @ group // 2) @ penalty == pytest.approx(cost.min())

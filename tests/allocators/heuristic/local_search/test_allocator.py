@@ -11,6 +11,7 @@ from alloc.allocators import load, solve
 from alloc.allocators.contract.budget import Budget
 from alloc.allocators.contract.search import Search
 from alloc.allocators.heuristic.greedy.list_schedule import greedy
+from alloc.allocators.heuristic.local_search import annealing, candidates, instance_arrays
 from alloc.allocators.heuristic.local_search.allocator import LocalSearch
 from alloc.allocators.heuristic.local_search.improve import improve
 from alloc.allocators.heuristic.local_search.parameters import LocalSearchParameters
@@ -125,6 +126,20 @@ def test_many_agents(allocator):
     result = solve(instance, allocator, objective="makespan-energy", iterations=40, time_limit_s=None)
     assert result.gap < 1e-9
     assert result.energy < evaluate(instance, greedy(instance)).energy
+
+
+@pytest.mark.parametrize("places", [{}, {"start_task": [0, 1]}, {"agent_position": [[0, 0], [3, 1]]}])
+@pytest.mark.parametrize("distances", [None, [("a1", "t2", 2.5)]])
+def test_nothing_is_compiled_within_a_run(allocator, places, distances, monkeypatch):
+    """Wherever places and distances come from, the arrays are of the types that loading has compiled the loops for."""
+    kwargs = {"ability": [1, 2], "workload": [2, 2], "task_position": [[0, 0], [1, 2]], "distances": distances}
+    instance, before = Instance(**kwargs, **places), annealing.anneal.signatures
+    assert len(before) == 1
+    for limit in (instance_arrays.TABLE_LIMIT, 1):  # with a table of distances, and without one
+        for module in (instance_arrays, candidates):
+            monkeypatch.setattr(module, "TABLE_LIMIT", limit)
+        solve(instance, allocator, objective="makespan-energy", iterations=3, time_limit_s=None)
+    assert annealing.anneal.signatures == before
 
 
 def test_other_methods_can_use_it():
