@@ -53,5 +53,5 @@ class LocalSearch(Allocator):
         if not (instance.workload > 0).any():
             return Proposal(Allocation.idle(instance))
         search.submit(serve_all(instance, greedy(instance, search), lambda: search.remaining_s))
-        improve(search, plan=plan_by_prices(search), parameters=self.parameters)
+        improve(search, priced=plan_by_prices(search), parameters=self.parameters)
         return Proposal()
