@@ -12,6 +12,7 @@ import numpy as np
 
 from alloc.allocators.heuristic.greedy.task_tree import Tree, build_tree
 from alloc.allocators.heuristic.greedy.tree_search import idle_agents
+from alloc.allocators.heuristic.task_prices.sample import representatives
 from alloc.allocators.heuristic.task_prices.shortlists import (
     empty_shortlists,
     fill_highest,
@@ -59,7 +60,9 @@ class Bidders:
     tree : Tree
         Of its tasks with workload.
     chosen : ndarray of int
-        The agents; their abilities count so much more that they stand for all.
+        The agents.
+    ability : ndarray
+        Their abilities, with those of the agents that they stand for.
     length : int
         Tasks on each shortlist.
     run_all : callable
@@ -68,12 +71,17 @@ class Bidders:
     """
 
     def __init__(
-        self, instance: Instance, tree: Tree, chosen: IntArray, length: int, run_all: RunAll, threads: int
+        self,
+        instance: Instance,
+        tree: Tree,
+        chosen: IntArray,
+        ability: FloatArray,
+        length: int,
+        run_all: RunAll,
+        threads: int,
     ) -> None:
-        agents = idle_agents(instance, 1.0)
-        self.ability = agents.ability[chosen]
-        self.ability = self.ability * (float(agents.ability.sum()) / float(self.ability.sum()))
-        self._agents = agents._replace(origin=agents.origin[chosen], ability=self.ability)
+        agents, self.ability = idle_agents(instance, 1.0), ability
+        self._agents = agents._replace(origin=agents.origin[chosen], ability=ability)
         self._speed, self._tree = instance.speed[chosen], tree
         self._goal = np.ascontiguousarray(instance.reach.goal)
         self.lists, self.makespan = empty_shortlists(len(chosen), length), 1.0
@@ -151,9 +159,9 @@ class TaskPrices:
         def is_over() -> bool:
             return stopped() or time.monotonic() >= end
 
-        n, before = self.instance.n, self.bound
-        size = min(n, SAMPLED_PER_TASK * int(self._some.sum()))
-        sample = self._bidders(np.random.default_rng(0).permutation(n)[:size], COARSE_LENGTH)
+        before = self.bound
+        chosen, ability = representatives(self.instance, SAMPLED_PER_TASK * int(self._some.sum()))
+        sample = self._bidders(chosen, ability, COARSE_LENGTH)
         self._renew(sample)
         spread = max(LEAST_SPREAD, float((sample.lists.lost.max(axis=1) - sample.lists.lost[:, 0]).mean()))
         for width, iterations in COARSE:
@@ -173,12 +181,12 @@ class TaskPrices:
 
     def look_at_all(self) -> Bidders:
         """Let all agents bid at the present prices, and raise the bound by what that proves; return them."""
-        everyone = self.bidders = self._bidders(np.arange(self.instance.n), FINE_LENGTH)
+        everyone = self.bidders = self._bidders(np.arange(self.instance.n), self.instance.ability, FINE_LENGTH)
         self._prove(everyone)
         return everyone
 
-    def _bidders(self, chosen: IntArray, length: int) -> Bidders:
-        return Bidders(self.instance, self._tree, chosen, length, self._run_all, self._threads)
+    def _bidders(self, chosen: IntArray, ability: FloatArray, length: int) -> Bidders:
+        return Bidders(self.instance, self._tree, chosen, ability, length, self._run_all, self._threads)
 
     def _renew(self, bidders: Bidders) -> float:
         """Renew the shortlists; return the makespan at which the value of the agents is that of all workloads."""

@@ -11,7 +11,7 @@ from alloc.allocators.parallel.pool import side_by_side
 from alloc.problems import Allocation, Instance, serve_all
 from alloc.problems.instance import FloatArray
 
-TIME_SHARE = 0.35
+TIME_SHARE = 0.5
 """Part of the time left for the prices."""
 
 CLOSE = 0.003
