@@ -23,8 +23,10 @@ from alloc.allocators.parallel.pool import RunAll
 from alloc.problems import Instance
 from alloc.problems.instance import FloatArray, IntArray
 
-COARSE = (*(4 * [(0.25, 6)]), *(3 * [(0.08, 12)]))
-"""Widths of the smoothing, relative to the spread of values, and the most iterations with each, for a sample."""
+COARSE = ((5, ((1.0, 20), (0.5, 20), *(2 * [(0.25, 20)]), *(3 * [(0.12, 20)]))), (25, 2 * ((0.1, 15),)))
+"""Samples by agents for each task; for each, widths of the smoothing relative to the spread of values, and the most
+iterations with each. Over long ways prices even out slowly, which takes many iterations, so that these have few agents.
+"""
 
 FINE = ((0.025, 35), (0.0125, 25))
 """The same for all agents."""
@@ -32,11 +34,8 @@ FINE = ((0.025, 35), (0.0125, 25))
 LEAST_SPREAD = 1e-3
 """Spread of values where travel takes hardly any time."""
 
-COARSE_LENGTH, FINE_LENGTH = 24, 12
+COARSE_LENGTH, FINE_LENGTH = 32, 12
 """Tasks on the shortlists of each."""
-
-SAMPLED_PER_TASK = 25
-"""Agents in the sample, for each task."""
 
 SAFETY = 1e-9
 """Part by which a bound is lowered: rounding of a million terms."""
@@ -46,6 +45,9 @@ PROMISING = 1e-5
 
 CORRECTIONS = 20
 """Steps from which the quasi-Newton method knows the curvature."""
+
+LEAST_SLOPE = 1e-4
+"""Slope by the price of a task, relative to the mean share of a task in the value, at which prices are good enough."""
 
 LARGEST_EXPONENT = 50.0
 """Of a price."""
@@ -160,15 +162,15 @@ class TaskPrices:
             return stopped() or time.monotonic() >= end
 
         before = self.bound
-        chosen, ability = representatives(self.instance, SAMPLED_PER_TASK * int(self._some.sum()))
-        sample = self._bidders(chosen, ability, COARSE_LENGTH)
-        self._renew(sample)
-        spread = max(LEAST_SPREAD, float((sample.lists.lost.max(axis=1) - sample.lists.lost[:, 0]).mean()))
-        for width, iterations in COARSE:
-            if is_over():
-                return False
-            self._adjust(sample, width * spread, iterations, is_over)
+        for per_task, steps in COARSE:
+            sample = self._bidders(*representatives(self.instance, per_task * int(self._some.sum())), COARSE_LENGTH)
             self._renew(sample)
+            spread = max(LEAST_SPREAD, float((sample.lists.lost.max(axis=1) - sample.lists.lost[:, 0]).mean()))
+            for width, iterations in steps:
+                if is_over():
+                    return False
+                self._adjust(sample, width * spread, iterations, is_over)
+                self._renew(sample)
         if is_over() or self.makespan <= before * (1 + SAFETY):
             return False
         everyone = self.look_at_all()
@@ -233,6 +235,6 @@ class TaskPrices:
             if is_over():
                 raise StopIteration
 
-        options = {"maxiter": iterations, "maxcor": CORRECTIONS}
+        options = {"maxiter": iterations, "maxcor": CORRECTIONS, "gtol": LEAST_SLOPE / len(work), "ftol": 0.0}
         start = np.log(self.price[some]) / unit
         self.price = price_of(minimize(dual, start, jac=True, method="L-BFGS-B", callback=check, options=options).x)
