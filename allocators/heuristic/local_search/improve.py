@@ -9,8 +9,7 @@ from alloc.allocators.contract.clock import Clock
 from alloc.allocators.contract.search import Search
 from alloc.allocators.heuristic.local_search.annealing_state import AnnealingState, PenaltyFactor
 from alloc.allocators.heuristic.local_search.parameters import LocalSearchParameters
-from alloc.allocators.heuristic.local_search.parts import MOST_STATES, Attempt, Parts, Team
-from alloc.allocators.heuristic.local_search.tightening import tighten
+from alloc.allocators.heuristic.local_search.parts import MOST_STATES, Attempt, Parts, Team, tighten
 from alloc.allocators.heuristic.task_prices.start import PricedPlan
 from alloc.allocators.parallel.pool import side_by_side
 from alloc.problems import IDLE, Allocation, Objective, only_allowed

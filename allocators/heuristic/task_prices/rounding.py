@@ -1,7 +1,7 @@
-"""A plan from prices of tasks: agents do a task where they have nearly the most value, such that no task lacks much.
+"""A plan from prices of tasks: agents do tasks where they have nearly the most value, and little is missing.
 
 First, agents that prefer one task get it, and those that hardly care go where most is missing. Then each agent in turn
-changes to the task to which it brings most, counted by price and by how much the task lacks, until hardly any changes.
+changes to the task to which it brings most, counted by price and by how much is missing there.
 """
 
 from collections.abc import Callable, Iterator
@@ -21,10 +21,10 @@ SLACK = 0.001
 """Part by which the makespan aimed at exceeds that of a fractional allocation: whole agents leave some ability over."""
 
 WIDTHS = (0.02, 0.01, 0.005)
-"""Excess of work done, as a part of a task's workload, that divides what more is worth by e; for each pass."""
+"""Excess of work done, as a part of a task's workload, that divides the utility of more by e; for each pass."""
 
 LARGEST_EXPONENT = 300.0
-"""Of the factor by which a task is worth more that lacks all its work."""
+"""Of the factor on the utility of a task that has no agent yet."""
 
 SLICE = 65_536
 """Agents that compiled code looks at between two checks of the clock."""
@@ -62,7 +62,7 @@ def rounded(prices: TaskPrices, stopped: Callable[[], bool] = lambda: False) -> 
         excess = np.divide(done, need, out=np.full(instance.m, np.inf), where=need > 0) - 1
         factor[:] = prices.price * np.exp(-np.maximum(excess / width, -LARGEST_EXPONENT))
         for chosen in _slices(order, stopped):
-            settle(chosen, lists, scale, prices.price, ability, need, width, done, factor, entry)
+            change_tasks(chosen, lists, scale, prices.price, ability, need, width, done, factor, entry)
     task = lists.task[np.arange(instance.n), np.maximum(entry, 0)]
     return Allocation(np.where(entry < 0, IDLE, task).astype(np.intp))
 
@@ -140,7 +140,7 @@ def assign(
 
 
 @compiled
-def settle(
+def change_tasks(
     chosen: Indices,
     lists: Shortlists,
     scale: float,
@@ -152,33 +152,33 @@ def settle(
     factor: Floats,
     entry: Indices,
 ) -> None:
-    """Let each agent change to the task where it is worth most, one after the other.
+    """Let each agent change to the task where its utility is most, one after the other.
 
-    A unit of ability is worth the price of the task, times e for each `width` that the work done falls short; an agent
-    counts with the mean of what that is without it and with it, about.
+    The utility of a unit of ability is the price of the task, times e for each `width` that the work done falls short; an
+    agent counts with the mean of what that is without it and with it, about.
 
     Parameters
     ----------
     chosen, need, done, entry
         As in `assign`.
     factor : ndarray, shape (m,)
-        What a unit more is worth on each task as it is; changed in place.
+        Utility of a unit more on each task as it is; changed in place.
     """
     for agent in chosen:
         now, best = entry[agent], 0.0
         if now >= 0:
             task = lists.task[agent, now]
             brought = ability[agent] * (1.0 - lists.lost[agent, now] * scale)
-            best = brought * _worth(task, done[task] - 0.5 * brought, price, need, width) * (1.0 + 1e-9)
+            best = brought * _utility(task, done[task] - 0.5 * brought, price, need, width) * (1.0 + 1e-9)
         at = now
         for k in range(lists.task.shape[1]):
             task = lists.task[agent, k]
             if task < 0:
                 break
             brought = ability[agent] * (1.0 - lists.lost[agent, k] * scale)
-            if k == now or brought * factor[task] <= best:  # it is worth less than the first part of it
+            if k == now or brought * factor[task] <= best:  # its utility is less than that of its first part
                 continue
-            gain = brought * _worth(task, done[task] + 0.5 * brought, price, need, width)
+            gain = brought * _utility(task, done[task] + 0.5 * brought, price, need, width)
             if gain > best:
                 at, best = k, gain
         if at == now:
@@ -187,11 +187,11 @@ def settle(
             if k >= 0:
                 task = lists.task[agent, k]
                 done[task] += sign * ability[agent] * (1.0 - lists.lost[agent, k] * scale)
-                factor[task] = _worth(task, done[task], price, need, width)
+                factor[task] = _utility(task, done[task], price, need, width)
         entry[agent] = at
 
 
 @compiled
-def _worth(task: int, done: float, price: Floats, need: Floats, width: float) -> float:
-    """Return what a unit of ability more is worth where that much is there."""
+def _utility(task: int, done: float, price: Floats, need: Floats, width: float) -> float:
+    """Return the utility of a unit of ability more where that much is there."""
     return float(price[task] * np.exp(min(LARGEST_EXPONENT, (1.0 - done / need[task]) / width)))

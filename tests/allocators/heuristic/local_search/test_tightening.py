@@ -9,8 +9,7 @@ from alloc.allocators.contract.clock import Clock
 from alloc.allocators.contract.search import Search
 from alloc.allocators.heuristic.local_search import allocator
 from alloc.allocators.heuristic.local_search.allocator import LocalSearch
-from alloc.allocators.heuristic.local_search.parts import Team
-from alloc.allocators.heuristic.local_search.tightening import tighten
+from alloc.allocators.heuristic.local_search.parts import Team, tighten
 from alloc.allocators.heuristic.task_prices.start import plan_by_prices
 from alloc.allocators.parallel.pool import side_by_side
 from alloc.problems import Instance, Objective
