@@ -20,7 +20,6 @@ from alloc.allocators.contract.search import Search
 from alloc.allocators.contract.tolerance import EXACT
 from alloc.allocators.decomposition import Decomposition
 from alloc.allocators.heuristic.greedy.list_schedule import load_compiled
-from alloc.allocators.heuristic.task_prices.use import are_prices_used
 from alloc.allocators.proof.early import EarlyProof, needs_solver
 from alloc.allocators.refusal import refuse
 from alloc.allocators.registry import load
@@ -187,10 +186,7 @@ def _prepared(
     refuse(allocator, request.instance, request.objective, request.budget, request.tolerance)
     is_matched = _is_matched(request.instance)
     spent_s += time.monotonic() - begin
-    if allocator.method.name == "local-search" and are_prices_used(request.instance):  # the others do without
-        from alloc.allocators.heuristic.task_prices.start import compile_loops as compile_prices
-
-        compile_prices()
+    allocator.prepare(request.instance)
     load_compiled(request.instance)  # loading is not part of the run
     for library in ("scipy.spatial", "scipy.sparse.csgraph") if is_matched else ():
         importlib.import_module(library)

@@ -82,6 +82,17 @@ class Allocator(Parameterised):
         """
         return None
 
+    def prepare(self, instance: Instance) -> None:
+        """Load what a run on the instance needs beyond the method itself, such as compiled loops.
+
+        Called after `refusal` and before the clock starts: loading is no part of the run, as importing is none.
+
+        Parameters
+        ----------
+        instance : Instance
+            Nothing may be computed from it here.
+        """
+
     @abstractmethod
     def allocate(self, search: Search) -> Proposal:
         """Search for the best allocation of ``search.instance``.

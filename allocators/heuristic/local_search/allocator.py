@@ -10,8 +10,10 @@ from alloc.allocators.heuristic.greedy.list_schedule import greedy
 from alloc.allocators.heuristic.local_search.annealing_state import compile_loops
 from alloc.allocators.heuristic.local_search.improve import improve
 from alloc.allocators.heuristic.local_search.parameters import LocalSearchParameters
+from alloc.allocators.heuristic.task_prices.start import compile_loops as compile_prices
 from alloc.allocators.heuristic.task_prices.start import plan_by_prices
-from alloc.problems import Allocation, serve_all
+from alloc.allocators.heuristic.task_prices.use import are_prices_used
+from alloc.problems import Allocation, Instance, serve_all
 
 
 class LocalSearch(Allocator):
@@ -47,11 +49,16 @@ class LocalSearch(Allocator):
         self.parameters = with_settings(LocalSearchParameters, parameters, settings)
         compile_loops()
 
+    def prepare(self, instance: Instance) -> None:
+        """Compile the loops of task prices where they are used."""
+        if are_prices_used(instance):
+            compile_prices()
+
     def allocate(self, search: Search) -> Proposal:
         """Improve the start allocation, or else the greedy one, and submit every improvement."""
         instance = search.instance
         if not (instance.workload > 0).any():
             return Proposal(Allocation.idle(instance))
         search.submit(serve_all(instance, greedy(instance, search), lambda: search.remaining_s))
-        improve(search, plan=plan_by_prices(search), parameters=self.parameters)
+        improve(search, priced=plan_by_prices(search), parameters=self.parameters)
         return Proposal()

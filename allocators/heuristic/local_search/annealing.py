@@ -176,8 +176,7 @@ def eject(
     for index in range(count):
         gain += work.touched_penalty[index] - shortfall_penalty(plan, weights, work.touched[index])
     noise = weights.noise * work.logistic[draw(plan.random, NOISE_SIZE)]
-    is_logged = plan.counter[N_LOGGED] - since <= LOG_SIZE // 2
-    if is_logged and (gain <= noise or plan.counter[FULL_GROUP] > 0):
+    if gain <= noise or plan.counter[FULL_GROUP] > 0:
         undo(plan, work, since, count, cost)
 
 

@@ -21,7 +21,7 @@ from alloc.allocators.heuristic.local_search.plan import (
     workspace,
 )
 from alloc.problems import IDLE, Allocation, Instance
-from alloc.problems.instance import IntArray
+from alloc.problems.instance import FloatArray, IntArray
 
 PRICE_DECAY = 0.99
 """Power by which the prices of tasks fall towards 1 in each run in which the cost counts."""
@@ -90,13 +90,15 @@ class AnnealingState:
         """Number of tasks with a shortfall."""
         return int(self.plan.counter[N_SHORT])
 
-    def begin(self, allocation: Allocation, makespan: float) -> None:
-        """Continue from an allocation, with a target makespan in hours."""
+    def begin(self, allocation: Allocation, makespan: float, price: FloatArray | None = None) -> None:
+        """Continue from an allocation, with a target makespan in hours and prices of tasks; by default all have one."""
         idle = self.instance.m
         group = np.where(allocation.task_of_agent == IDLE, idle, allocation.task_of_agent).astype(np.int32)
         group[np.append(self.instance.workload == 0, False)[group]] = idle
         self._is_served = np.isin(np.arange(idle), group)
         self.plan.price[:] = 1.0
+        if price is not None:
+            self.plan.price[:-1] = np.where(price > 0, price, 1.0)
         self._set_groups(group)
         self.set_target(makespan)
 

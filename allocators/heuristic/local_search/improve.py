@@ -9,7 +9,8 @@ from alloc.allocators.contract.clock import Clock
 from alloc.allocators.contract.search import Search
 from alloc.allocators.heuristic.local_search.annealing_state import AnnealingState, PenaltyFactor
 from alloc.allocators.heuristic.local_search.parameters import LocalSearchParameters
-from alloc.allocators.heuristic.local_search.parts import MOST_STATES, Attempt, Parts, Team
+from alloc.allocators.heuristic.local_search.parts import MOST_STATES, Attempt, Parts, Team, tighten
+from alloc.allocators.heuristic.task_prices.start import PricedPlan
 from alloc.allocators.parallel.pool import side_by_side
 from alloc.problems import IDLE, Allocation, Objective, only_allowed
 from alloc.problems.evaluation import RELATIVE_TOLERANCE
@@ -49,7 +50,7 @@ def improve(
     *,
     until_s: float = math.inf,
     iterations: float = math.inf,
-    plan: Allocation | None = None,
+    priced: PricedPlan | None = None,
     parameters: LocalSearchParameters | None = None,
 ) -> None:
     """Improve ``search.best``, which must exist, and submit better plans until the search or a limit ends.
@@ -62,8 +63,8 @@ def improve(
         Time limit, on ``search.elapsed_s``.
     iterations : float
         Most iterations, of ``parameters.exchanges`` exchanges each.
-    plan : Allocation, optional
-        Where the search for less makespan begins, in place of the fastest known.
+    priced : PricedPlan, optional
+        A plan from prices of tasks, from which the search for less makespan begins; see `tighten`.
     parameters : LocalSearchParameters, optional
     """
     assert search.best is not None
@@ -75,34 +76,34 @@ def improve(
         return
     parameters = parameters or LocalSearchParameters()
     with side_by_side(min(search.threads, MOST_STATES)) as run_all:
-        _improve(search, Team.of(search, parameters.neighbours, run_all), parameters, clock, plan)
+        _improve(search, Team.of(search, parameters.neighbours, run_all), parameters, clock, priced)
 
 
 def _improve(
-    search: Search, team: Team, parameters: LocalSearchParameters, clock: Clock, plan: Allocation | None
+    search: Search, team: Team, parameters: LocalSearchParameters, clock: Clock, priced: PricedPlan | None
 ) -> None:
     energy_counts = search.objective is Objective.MAKESPAN_ENERGY
+    makespan_clock = clock.part(parameters.makespan_share) if energy_counts and not clock.is_endless else clock
+    if priced is not None:
+        tighten(search, team, priced, makespan_clock, parameters.exchanges)
     if clock.is_endless and energy_counts:
-        _improve_endlessly(search, team, parameters, clock, plan)
+        _improve_endlessly(search, team, parameters, clock)
         return
-    reduction = MakespanReduction(search, team, parameters, plan)
+    reduction = MakespanReduction(search, team, parameters)
     if not energy_counts:
         reduction.run(clock)
         return
-    reduction.run(clock.part(parameters.makespan_share), patience=PATIENCE)
+    reduction.run(makespan_clock, patience=PATIENCE)
     if clock.is_long:
         reduce_energy(search, team, parameters, clock.part(FIRST_CYCLE_SHARE))
     reduce_energy(search, team, parameters, clock)
 
 
-def _improve_endlessly(
-    search: Search, team: Team, parameters: LocalSearchParameters, clock: Clock, plan: Allocation | None
-) -> None:
+def _improve_endlessly(search: Search, team: Team, parameters: LocalSearchParameters, clock: Clock) -> None:
     """Alternate between makespan and energy, each turn twice as long as the one before."""
     cycle = parameters.first_cycle
     while not clock.is_over:
-        MakespanReduction(search, team, parameters, plan).run(Clock(search, until_iteration=search.iteration + cycle))
-        plan = None
+        MakespanReduction(search, team, parameters).run(Clock(search, until_iteration=search.iteration + cycle))
         reduce_energy(search, team, parameters, Clock(search, until_iteration=search.iteration + cycle))
         cycle *= 2
 
@@ -118,14 +119,10 @@ class MakespanReduction:
         It has a plan.
     team : Team
     parameters : LocalSearchParameters
-    plan : Allocation, optional
-        Where it begins first, in place of the fastest plan.
     """
 
-    def __init__(
-        self, search: Search, team: Team, parameters: LocalSearchParameters, plan: Allocation | None = None
-    ) -> None:
-        self._search, self._team, self._parameters, self._plan = search, team, parameters, plan
+    def __init__(self, search: Search, team: Team, parameters: LocalSearchParameters) -> None:
+        self._search, self._team, self._parameters = search, team, parameters
         by_size = EXCHANGES_PER_TASK * search.instance.m / parameters.exchanges
         self._first_iterations = max(float(parameters.attempt_iterations), by_size)
         self._iterations, self._fraction, self._count = self._first_iterations, 0.0, 0
@@ -140,9 +137,8 @@ class MakespanReduction:
         search, improved = self._search, 0.0
         assert search.fastest is not None
         if search.fastest.allocation is not self._known:
-            plan, self._plan = self._plan or search.fastest.allocation, None
             for state in self._team.states:
-                state.begin(plan, search.fastest.evaluation.served_makespan)
+                state.begin(search.fastest.allocation, search.fastest.evaluation.served_makespan)
             self._iterations, self._fraction = self._first_iterations, 0.0
         while not clock.is_over and not search.fast_enough:
             fastest = search.fastest.evaluation

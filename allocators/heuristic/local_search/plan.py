@@ -29,8 +29,8 @@ MOST_SUMS = 1 << 14
 N_SHORT, N_MOVES, FULL_GROUP, N_LOGGED = 0, 1, 2, 3
 """Entries of `Plan.counter`."""
 
-LOG_SIZE = 256
-"""Last moves that are kept, more than those of one ejection chain; a power of two."""
+LOG_SIZE = 512
+"""Last moves that are kept: those of the longest ejection chain, and those that take it back; a power of two."""
 
 MOST_TOUCHED = 8
 """Groups that an ejection chain changes, at most."""

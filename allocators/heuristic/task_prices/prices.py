@@ -12,6 +12,7 @@ import numpy as np
 
 from alloc.allocators.heuristic.greedy.task_tree import Tree, build_tree
 from alloc.allocators.heuristic.greedy.tree_search import idle_agents
+from alloc.allocators.heuristic.task_prices.sample import representatives
 from alloc.allocators.heuristic.task_prices.shortlists import (
     empty_shortlists,
     fill_highest,
@@ -22,8 +23,10 @@ from alloc.allocators.parallel.pool import RunAll
 from alloc.problems import Instance
 from alloc.problems.instance import FloatArray, IntArray
 
-COARSE = (*(4 * [(0.25, 6)]), *(3 * [(0.08, 12)]))
-"""Widths of the smoothing, relative to the spread of values, and the most iterations with each, for a sample."""
+COARSE = ((5, ((1.0, 20), (0.5, 20), *(2 * [(0.25, 20)]), *(3 * [(0.12, 20)]))), (25, 2 * ((0.1, 15),)))
+"""Samples by agents for each task; for each, widths of the smoothing relative to the spread of values, and the most
+iterations with each. Over long ways prices even out slowly, which takes many iterations, so that these have few agents.
+"""
 
 FINE = ((0.025, 35), (0.0125, 25))
 """The same for all agents."""
@@ -31,11 +34,8 @@ FINE = ((0.025, 35), (0.0125, 25))
 LEAST_SPREAD = 1e-3
 """Spread of values where travel takes hardly any time."""
 
-COARSE_LENGTH, FINE_LENGTH = 24, 12
+COARSE_LENGTH, FINE_LENGTH = 32, 12
 """Tasks on the shortlists of each."""
-
-SAMPLED_PER_TASK = 25
-"""Agents in the sample, for each task."""
 
 SAFETY = 1e-9
 """Part by which a bound is lowered: rounding of a million terms."""
@@ -45,6 +45,9 @@ PROMISING = 1e-5
 
 CORRECTIONS = 20
 """Steps from which the quasi-Newton method knows the curvature."""
+
+LEAST_SLOPE = 1e-4
+"""Slope by the price of a task, relative to the mean share of a task in the value, at which prices are good enough."""
 
 LARGEST_EXPONENT = 50.0
 """Of a price."""
@@ -59,7 +62,9 @@ class Bidders:
     tree : Tree
         Of its tasks with workload.
     chosen : ndarray of int
-        The agents; their abilities count so much more that they stand for all.
+        The agents.
+    ability : ndarray
+        Their abilities, with those of the agents that they stand for.
     length : int
         Tasks on each shortlist.
     run_all : callable
@@ -68,12 +73,17 @@ class Bidders:
     """
 
     def __init__(
-        self, instance: Instance, tree: Tree, chosen: IntArray, length: int, run_all: RunAll, threads: int
+        self,
+        instance: Instance,
+        tree: Tree,
+        chosen: IntArray,
+        ability: FloatArray,
+        length: int,
+        run_all: RunAll,
+        threads: int,
     ) -> None:
-        agents = idle_agents(instance, 1.0)
-        self.ability = agents.ability[chosen]
-        self.ability = self.ability * (float(agents.ability.sum()) / float(self.ability.sum()))
-        self._agents = agents._replace(origin=agents.origin[chosen], ability=self.ability)
+        agents, self.ability = idle_agents(instance, 1.0), ability
+        self._agents = agents._replace(origin=agents.origin[chosen], ability=ability)
         self._speed, self._tree = instance.speed[chosen], tree
         self._goal = np.ascontiguousarray(instance.reach.goal)
         self.lists, self.makespan = empty_shortlists(len(chosen), length), 1.0
@@ -151,16 +161,16 @@ class TaskPrices:
         def is_over() -> bool:
             return stopped() or time.monotonic() >= end
 
-        n, before = self.instance.n, self.bound
-        size = min(n, SAMPLED_PER_TASK * int(self._some.sum()))
-        sample = self._bidders(np.random.default_rng(0).permutation(n)[:size], COARSE_LENGTH)
-        self._renew(sample)
-        spread = max(LEAST_SPREAD, float((sample.lists.lost.max(axis=1) - sample.lists.lost[:, 0]).mean()))
-        for width, iterations in COARSE:
-            if is_over():
-                return False
-            self._adjust(sample, width * spread, iterations, is_over)
+        before = self.bound
+        for per_task, steps in COARSE:
+            sample = self._bidders(*representatives(self.instance, per_task * int(self._some.sum())), COARSE_LENGTH)
             self._renew(sample)
+            spread = max(LEAST_SPREAD, float((sample.lists.lost.max(axis=1) - sample.lists.lost[:, 0]).mean()))
+            for width, iterations in steps:
+                if is_over():
+                    return False
+                self._adjust(sample, width * spread, iterations, is_over)
+                self._renew(sample)
         if is_over() or self.makespan <= before * (1 + SAFETY):
             return False
         everyone = self.look_at_all()
@@ -173,12 +183,12 @@ class TaskPrices:
 
     def look_at_all(self) -> Bidders:
         """Let all agents bid at the present prices, and raise the bound by what that proves; return them."""
-        everyone = self.bidders = self._bidders(np.arange(self.instance.n), FINE_LENGTH)
+        everyone = self.bidders = self._bidders(np.arange(self.instance.n), self.instance.ability, FINE_LENGTH)
         self._prove(everyone)
         return everyone
 
-    def _bidders(self, chosen: IntArray, length: int) -> Bidders:
-        return Bidders(self.instance, self._tree, chosen, length, self._run_all, self._threads)
+    def _bidders(self, chosen: IntArray, ability: FloatArray, length: int) -> Bidders:
+        return Bidders(self.instance, self._tree, chosen, ability, length, self._run_all, self._threads)
 
     def _renew(self, bidders: Bidders) -> float:
         """Renew the shortlists; return the makespan at which the value of the agents is that of all workloads."""
@@ -225,6 +235,6 @@ class TaskPrices:
             if is_over():
                 raise StopIteration
 
-        options = {"maxiter": iterations, "maxcor": CORRECTIONS}
+        options = {"maxiter": iterations, "maxcor": CORRECTIONS, "gtol": LEAST_SLOPE / len(work), "ftol": 0.0}
         start = np.log(self.price[some]) / unit
         self.price = price_of(minimize(dual, start, jac=True, method="L-BFGS-B", callback=check, options=options).x)

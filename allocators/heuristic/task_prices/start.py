@@ -1,6 +1,7 @@
 """Where local search begins on large instances: a bound by prices of tasks, and a plan that follows them."""
 
 import time
+from typing import NamedTuple
 
 from alloc.allocators.contract.search import Search
 from alloc.allocators.heuristic.task_prices.prices import TaskPrices
@@ -8,8 +9,9 @@ from alloc.allocators.heuristic.task_prices.rounding import rounded
 from alloc.allocators.heuristic.task_prices.use import are_prices_used
 from alloc.allocators.parallel.pool import side_by_side
 from alloc.problems import Allocation, Instance, serve_all
+from alloc.problems.instance import FloatArray
 
-TIME_SHARE = 0.35
+TIME_SHARE = 0.5
 """Part of the time left for the prices."""
 
 CLOSE = 0.003
@@ -19,15 +21,22 @@ MOST_THREADS = 32
 """Threads beyond which more are not used."""
 
 
-def plan_by_prices(search: Search) -> Allocation | None:
-    """Raise the bound by prices of tasks, and return a plan that follows them.
+class PricedPlan(NamedTuple):
+    """A plan, and the price of a unit of ability on each task that it follows, shape (m,)."""
 
-    In such a plan some tasks may lack a little, and agents change between tasks at hardly any loss: its makespan may be
-    large, but exchanges soon bring it near the bound.
+    allocation: Allocation
+    price: FloatArray
+
+
+def plan_by_prices(search: Search) -> PricedPlan | None:
+    """Raise the bound by prices of tasks, submit a plan that follows them, and return it.
+
+    In such a plan some tasks lack a little, and agents change between tasks at hardly any loss: exchanges soon bring
+    it near the bound.
 
     Returns
     -------
-    Allocation or None
+    PricedPlan or None
         None where there are few agents, or prices prove nothing.
     """
     instance = search.instance
@@ -41,7 +50,9 @@ def plan_by_prices(search: Search) -> Allocation | None:
     search.raise_bound(prices.bound)
     if not helped or search.gap <= CLOSE or search.should_stop():
         return None
-    return serve_all(instance, rounded(prices), lambda: search.remaining_s)
+    plan = serve_all(instance, rounded(prices, search.should_stop), lambda: search.remaining_s)
+    search.submit(plan)
+    return PricedPlan(plan, prices.price)
 
 
 def compile_loops() -> None:

@@ -22,6 +22,9 @@ MOST_CUTS, MOST_OF_CLASS = 60, 4
 ROOM, ROOM_FOR_CUTS = 1024, 64
 """Groups and cuts for which there is room at first."""
 
+MOST_ENTRIES = 2**25
+"""Entries of the table of groups by classes and of that by cuts, at the most: a quarter of a gigabyte each."""
+
 
 class GroupMaster:
     """Minimise what the mixture costs such that its use of each class and each cut is within limits.
@@ -69,16 +72,34 @@ class GroupMaster:
             self._add_row(least if least > 0 else -highspy.kHighsInf, most, np.zeros(0))
 
     def add(self, group: WholeArray) -> bool:
-        """Add the group of each task, given by pairs, shape (p,), unless it is empty; return whether any is new."""
+        """Add the group of each task, given by pairs, shape (p,), unless it is empty; return whether any is new.
+
+        None is added for which there is no room in memory; without it, bounds are lower than they could be.
+        """
         before = self._groups
         for j in range(self._tasks):
             a, b = self._first[j], self._first[j + 1]
             inside = a + np.flatnonzero(group[a:b])
             key = j, self._model.class_of_pair[inside].tobytes(), group[inside].tobytes()
-            if len(inside) and key not in self._seen:
+            if len(inside) and key not in self._seen and self._has_room():
                 self._seen.add(key)
                 self._add_group(j, inside, group[inside])
         return self._groups > before
+
+    def _has_room(self, *, cut: bool = False) -> bool:
+        """Whether there is room for a group more, or a cut more; make it if memory allows."""
+        rows, cuts = self._used.shape
+        more_groups, more_cuts = not cut and self._groups == rows, cut and len(self.limit) == cuts
+        if (1 + more_groups) * rows * max(self._use.shape[1], (1 + more_cuts) * cuts) > MOST_ENTRIES:
+            return not (more_groups or more_cuts)
+        if more_groups:
+            self._use, self._used, self._task, self._cost = (
+                np.concatenate([known, np.zeros_like(known)])
+                for known in (self._use, self._used, self._task, self._cost)
+            )
+        if more_cuts:
+            self._used = np.hstack([self._used, np.zeros_like(self._used)])
+        return True
 
     def restrict(self, model: EnergyModel) -> None:
         """Go on with a model that has only some of the pairs, and without the groups that have others."""
@@ -138,10 +159,12 @@ class GroupMaster:
         return used
 
     def separate(self, should_stop: Callable[[], bool]) -> bool:
-        """Add the cuts that the mixture violates most; return whether there are any, as far as there was time."""
+        """Add the cuts that the mixture violates most; return whether there are any, as far as time and memory go."""
         before = len(self.limit)
         on = np.flatnonzero(self._part > 1e-6)
         for cut in self._separation.violated(self._use[on, :-1], self._task[on], self._part[on], should_stop):
+            if not self._has_room(cut=True):
+                return len(self.limit) > before
             self._cluster_at = np.append(self._cluster_at, len(self.limit))
             self._clusters.append(cut)
             self._add_cut(cut.limit, cut.use(self._use[: self._groups, :-1], self._task[: self._groups]))
@@ -154,15 +177,13 @@ class GroupMaster:
         times, new = np.zeros(len(self._count)), 0
         for row in np.argsort(-excess, kind="stable").tolist():
             members = sets[row][self._count[sets[row]] > 0]
-            if new < MOST_CUTS and (times[members] < MOST_OF_CLASS).all():
+            if new < MOST_CUTS and (times[members] < MOST_OF_CLASS).all() and self._has_room(cut=True):
                 times[members] += 1
                 new += 1
                 self._sets, self._set_at = np.vstack([self._sets, sets[row]]), np.append(self._set_at, len(self.limit))
                 self._add_cut(self._count[members].sum() // 2, self._use[: self._groups, members].sum(axis=1) // 2)
 
     def _add_cut(self, limit: float, used: FloatArray) -> None:
-        if len(self.limit) == self._used.shape[1]:
-            self._used = np.hstack([self._used, np.zeros_like(self._used)])
         self._used[: self._groups, len(self.limit)] = used
         self.limit = np.append(self.limit, limit)
         self._add_row(-highspy.kHighsInf, limit, used)
@@ -174,11 +195,6 @@ class GroupMaster:
 
     def _add_group(self, task: int, pairs: IntArray, agents: WholeArray) -> None:
         g, classes = self._groups, len(self._model.count)
-        if g == len(self._use):
-            self._use, self._used, self._task, self._cost = (
-                np.concatenate([known, np.zeros_like(known)])
-                for known in (self._use, self._used, self._task, self._cost)
-            )
         use = self._use[g]
         use[self._model.class_of_pair[pairs]] = agents
         self._task[g], self._cost[g] = task, self._model.cost[pairs] @ agents

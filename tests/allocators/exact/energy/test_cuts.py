@@ -1,8 +1,9 @@
-from itertools import product
+from itertools import combinations, product
 
 import numpy as np
 import pytest
 
+from alloc.allocators.exact.energy.cuts import group_master
 from alloc.allocators.exact.energy.cuts.cluster_cuts import ClusterSeparation
 from alloc.allocators.exact.energy.cuts.pricing import price_groups
 from alloc.allocators.exact.energy.cuts.subset_rows import violated_sets
@@ -58,3 +59,30 @@ def test_a_cut_of_a_cluster_holds_for_all_solutions_and_not_for_the_mixture(seed
     done = whole @ ability
     assert (whole[(done >= 13) & ((done <= 17) | (not limited))] @ cut.factor <= cut.limit).all()
     assert part @ cut.use(use, task) > cut.limit + 0.01
+
+
+def plain_model(tasks: int, classes: int) -> EnergyModel:
+    """Return a model in which any three agents, each of a class of its own, do a task."""
+    pairs = tasks * classes
+    return EnergyModel(
+        class_of_pair=np.tile(np.arange(classes), tasks), task_of_pair=np.repeat(np.arange(tasks), classes),
+        weight=np.ones(pairs, dtype=np.int64), copies=np.ones(pairs, dtype=np.int64), cost=np.ones(pairs),
+        need=np.full(tasks, 3), max_weight=np.full(tasks, -1), count=np.ones(classes, dtype=np.int64),
+        min_agents=np.zeros(classes, dtype=np.int64), ability=np.ones(classes, dtype=np.int64),
+    )  # fmt: skip
+
+
+def test_groups_and_cuts_end_where_memory_does(monkeypatch):
+    """Tables of groups grow up to their limit and no further; the programme goes on with the groups that it has."""
+    monkeypatch.setattr(group_master, "MOST_ENTRIES", 2 * group_master.ROOM * group_master.ROOM_FOR_CUTS)
+    master = group_master.GroupMaster(plain_model(1, 30), np.ones((1, 1), dtype=bool))
+    added = 0
+    for members in combinations(range(30), 3):
+        group = np.zeros(30, dtype=np.int64)
+        group[list(members)] = 1
+        added += master.add(group)
+    assert added == 2 * group_master.ROOM < 4060
+    assert max(master._use.size, master._used.size) <= group_master.MOST_ENTRIES
+    assert master.solve(lambda: False)
+    assert master.value == pytest.approx(3.0)
+    assert not master._has_room(cut=True) or master._used.shape[1] == group_master.ROOM_FOR_CUTS

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from oracle import least_energy_within
 
-from alloc.allocators.heuristic.local_search.annealing import eject
+from alloc.allocators.heuristic.local_search.annealing import LENGTH, eject, undo
 from alloc.allocators.heuristic.local_search.annealing_state import AnnealingState
-from alloc.allocators.heuristic.local_search.plan import N_SHORT
+from alloc.allocators.heuristic.local_search.moves import move
+from alloc.allocators.heuristic.local_search.plan import N_LOGGED, N_SHORT, POOL_BY_SUMS
 from alloc.problems import Allocation, Instance
 
 LINE = np.array([[0.0, 0], [1, 0], [2, 0]])
@@ -51,6 +52,24 @@ def test_an_ejection_without_gain_is_taken_back(ring: Instance) -> None:
         after = (state.plan.group_of_agent, state.plan.group_ability, state.plan.cost)
         assert all(np.array_equal(one, other) for one, other in zip(before, after, strict=True))
         assert state.plan.counter[N_SHORT] == 0
+
+
+def test_the_longest_chain_can_be_taken_back() -> None:
+    """Every exchange of a chain may move its whole pool: undoing that restores all groups, wherever the log begins."""
+    longest = 1 + (2 * LENGTH + 1) * POOL_BY_SUMS
+    instance = Instance(
+        ability=np.ones(300), workload=np.ones(3), task_position=LINE, agent_position=np.zeros((300, 2))
+    )
+    state = state_of(instance, [0] * 300)
+    before, random = state.plan.group_of_agent.copy(), np.random.default_rng(0)
+    for _ in range(3):
+        since = int(state.plan.counter[N_LOGGED])
+        for agent in random.integers(0, 300, longest).tolist():
+            target = int(random.integers(0, 4))
+            if state.plan.size[target] < np.diff(state.plan.begin)[target]:
+                move(state.plan, agent, target)
+        undo(state.plan, state.workspace, since, 0, 0.0)
+        assert np.array_equal(state.plan.group_of_agent, before)
 
 
 def test_one_strong_agent_may_be_cheaper_than_many() -> None:

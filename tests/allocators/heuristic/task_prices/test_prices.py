@@ -5,6 +5,7 @@ from tiny_instances import all_can_be_served, seeds_where, tiny_instance
 
 from alloc.allocators.heuristic.task_prices.prices import TaskPrices
 from alloc.allocators.heuristic.task_prices.rounding import rounded
+from alloc.allocators.heuristic.task_prices.sample import representatives
 from alloc.problems import Instance, evaluate, makespan_lower_bound, serve_all
 
 
@@ -46,7 +47,7 @@ def test_shortlists_have_the_most_valuable_tasks():
     instance = travelling(200, 60)
     prices = TaskPrices(instance, 1.0, map, 1)
     price = np.random.default_rng(1).uniform(0.5, 1.0, instance.m)
-    bidders = prices._bidders(np.arange(instance.n), 5)
+    bidders = prices._bidders(np.arange(instance.n), instance.ability, 5)
     total = bidders.renew(price, 2.0)
     distance, mask = instance.reach.rows(instance.reach.origin)
     value = np.where(mask, price * np.maximum(0, 1 - distance / (2.0 * instance.speed[:, None])), 0.0)
@@ -80,7 +81,41 @@ def test_a_rounded_plan_serves_tasks_nearly_as_prices_say():
     plan = rounded(prices)
     score = evaluate(instance, serve_all(instance, plan))
     assert not score.violations
-    assert score.makespan < 1.1 * prices.bound
+    assert score.makespan < 1.03 * prices.bound
+
+
+def test_agents_that_settle_even_out_what_tasks_lack():
+    """Without passes in which agents change to where they bring most, the same plan is much slower."""
+    instance = travelling(3_000, 30)
+    prices = prices_of(instance)
+    settled, calls = rounded(prices), iter([False, False])  # both passes of the assignment, and no other
+    unsettled = rounded(prices, lambda: next(calls, True))
+    slow, fast = (evaluate(instance, plan).served_makespan for plan in (unsettled, settled))
+    assert fast - prices.bound < 0.3 * (slow - prices.bound)
+
+
+@pytest.mark.parametrize("count", [10, 1_000])
+def test_a_sample_has_the_ability_of_all_in_every_quarter(count):
+    """Representatives stand for all ability, and in each quarter of the square for about as much as there is."""
+    instance = travelling(4_000, 10, seed=3)
+    chosen, ability = representatives(instance, count)
+    assert len(np.unique(chosen)) == count
+    assert ability.sum() == pytest.approx(instance.ability.sum())
+    place = instance.reach.place[instance.reach.origin]
+    quarter = (place[:, 0] > 0.5) + 2 * (place[:, 1] > 0.5)
+    total, sampled = np.bincount(quarter, instance.ability), np.bincount(quarter[chosen], ability, 4)
+    assert sampled == pytest.approx(total, rel=0.01 if count == 1_000 else 0.6)
+
+
+def test_a_sample_is_all_where_there_are_few_or_no_places():
+    """No more agents are chosen than there are; without positions, any agents stand for all."""
+    instance = Instance(ability=np.arange(1, 101), workload=[1.0, 2.0])
+    chosen, ability = representatives(instance, 1_000)
+    assert chosen.tolist() == [*range(100)]
+    assert (ability == instance.ability).all()
+    chosen, ability = representatives(instance, 7)
+    assert len(np.unique(chosen)) == 7
+    assert ability.sum() == pytest.approx(5050)
 
 
 def test_where_nothing_is_scarce_prices_end_early():
