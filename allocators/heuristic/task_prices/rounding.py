@@ -154,7 +154,7 @@ def change_tasks(
 ) -> None:
     """Let each agent change to the task where its utility is most, one after the other.
 
-    The utility of a unit of ability is the price of the task, times e for each `width` that the work done falls short; an
+    The utility of a unit of ability is the price of the task, times e for each `width` that the work falls short; an
     agent counts with the mean of what that is without it and with it, about.
 
     Parameters
