@@ -57,6 +57,8 @@ class MissionArrays(NamedTuple):
         The numbers of those that are.
     speaks : ndarray of bool, shape (n,)
         Who sends a message.
+    speakers, speaker_places, speaker_cells : ndarray
+        Those who do, where they are, and where those of each cell begin, as `in_cells`, `places` and `cells` of all.
     task_hour, task_left : ndarray, shape (rows, m)
         Hour at which an agent's knowledge of a task was true, -1 where it knows nothing, and the work left then.
     known, known_report : ndarray of int, shape (rows,) and (rows, n)
@@ -91,6 +93,9 @@ class MissionArrays(NamedTuple):
     is_near: BoolArray
     near: Numbers
     speaks: BoolArray
+    speakers: Numbers
+    speaker_places: FloatArray
+    speaker_cells: Numbers
     task_hour: FloatArray
     task_left: FloatArray
     known: Numbers
