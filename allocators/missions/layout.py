@@ -47,6 +47,8 @@ class MissionArrays(NamedTuple):
         Least and largest coordinates of all places, which all know.
     sites : ndarray, shape (3, m)
         Where tasks are.
+    task_now : ndarray, shape (m,)
+        What can be seen of each task now: the work left, minus its status where it is closed, NaN where it is to come.
     places : ndarray, shape (3, n)
         Where agents are at the hour of the grid, in the order of `in_cells`.
     cells, in_cells : ndarray of int, shape (cells + 1,) and (n,)
@@ -87,6 +89,7 @@ class MissionArrays(NamedTuple):
     allowed: BoolArray
     area: FloatArray
     sites: FloatArray
+    task_now: FloatArray
     places: FloatArray
     cells: Numbers
     in_cells: Numbers

@@ -87,6 +87,7 @@ def pack(mission: Mission, knowledge: Knowledge | str | None = None, memory: flo
         "allowed": _allowed(mission),
         "area": np.array(mission.area),
         "sites": np.ascontiguousarray(instance.task_position.T),
+        "task_now": np.zeros(m),
         "places": np.ascontiguousarray(instance.start_position.T),
         "cells": cells,
         "in_cells": np.arange(n, dtype=np.int32),
