@@ -47,13 +47,30 @@ def send_all(state: MissionArrays, slot: int) -> bool:
             agent.messages += 1
             known = BYTES_OF_AGENT * count_known(state.known[number], state.heard_of[number])
             agent.bytes += BYTES_OF_MESSAGE + BYTES_OF_TASK * count(state.task_hour[number]) + known
-    found = find_senders(state, slot)
+    found = gather_speakers(state) > 0 and find_senders(state, slot)
     if found:
         for number in range(len(agents)):
             if speaks[number]:
                 keep(state, slot, number)
+    else:
+        state.senders[slot] = 0
     head.tick += 1
     return found
+
+
+@compiled_in_place
+def gather_speakers(state: MissionArrays) -> int:
+    """Fill in where those are that send now, by the cells of the grid; return how many they are."""
+    places, speakers, to, at, count = state.places, state.speakers, state.speaker_places, state.speaker_cells, 0
+    for cell in range(len(at) - 1):
+        for place in range(state.cells[cell], state.cells[cell + 1]):
+            number = state.in_cells[place]
+            if state.speaks[number]:
+                speakers[count] = number
+                to[0, count], to[1, count], to[2, count] = places[0, place], places[1, place], places[2, place]
+                count += 1
+        at[cell + 1] = count
+    return count
 
 
 @compiled_in_place
@@ -109,13 +126,15 @@ def find_senders(state: MissionArrays, slot: int) -> bool:
 def find_near(state: MissionArrays, number: int, end: int, near: Numbers) -> int:
     """Fill in who sends within the radius of an agent, but for those that are lost; return where they end."""
     head, here, room = state.head[0], place_of(state.agents[number], state.head[0].hour), (state.is_near, state.near)
-    radius = head.radius + TOLERANCE
+    radius, cells = head.radius + TOLERANCE, state.speaker_cells
     first, last, low, high = cells_near(head, here[0], here[1], radius)
     for row in range(low, high + 1):
-        begin, until = state.cells[row * head.columns + first], state.cells[row * head.columns + last + 1]
-        for place in range(find_within(head.is_manhattan, radius, here, state.places, begin, until, room)):
-            other = state.in_cells[state.near[place]]
-            is_heard = state.speaks[other] & (other != number)
+        begin, until = cells[row * head.columns + first], cells[row * head.columns + last + 1]
+        if begin == until:
+            continue
+        for place in range(find_within(head.is_manhattan, radius, here, state.speaker_places, begin, until, room)):
+            other = state.speakers[state.near[place]]
+            is_heard = other != number
             if head.loss > 0:
                 key = keyed(keyed(keyed(head.loss_key, other), number), head.tick)
                 is_heard &= fraction(key) >= head.loss

@@ -2,6 +2,8 @@
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from alloc.allocators.missions.grid import SLACK, cells_near, drift, find_within, length, locate
 from alloc.allocators.missions.layout import ABSENT, IDLE, OPEN, TO_COME, WORKING, MissionArrays
 from alloc.allocators.missions.motion import Point, place_of, work_left
@@ -28,6 +30,7 @@ def look_around(state: MissionArrays, is_located: bool) -> None:
     is_located = is_located or not drift(head) <= head.side
     if is_located:
         locate(head, state.agents, state.places, state.cells, state.in_cells)
+    note_tasks(state)
     for place in range(head.lookers):
         number = state.lookers[place]
         here = place_of(state.agents[number], head.hour)
@@ -37,18 +40,27 @@ def look_around(state: MissionArrays, is_located: bool) -> None:
 
 
 @compiled_in_place
+def note_tasks(state: MissionArrays) -> None:
+    """Note what can be seen of each task now; NaN where it is to come."""
+    head = state.head[0]
+    for number in range(len(state.tasks)):
+        task = state.tasks[number]
+        is_there = task.status != TO_COME
+        state.task_now[number] = seen_of(head, state.agents, task, number) if is_there else np.nan
+
+
+@compiled_in_place
 def see_tasks(state: MissionArrays, number: int, here: Point) -> None:
     """Take notice of the tasks that an agent sees."""
-    head, hours, left = state.head[0], state.task_hour[number], state.task_left[number]
-    room, sensing = (state.is_near, state.near), head.sensing + TOLERANCE
-    for place in range(find_within(head.is_manhattan, sensing, here, state.sites, 0, len(state.tasks), room)):
-        at = state.near[place]
-        task = state.tasks[at]
-        if task.status == TO_COME:
-            continue
-        if task.seen != head.looks:
-            task.seen, task.now = head.looks, seen_of(head, state.agents, task, at)
-        hours[at], left[at] = head.hour, task.now
+    head, hours, left, now = state.head[0], state.task_hour[number], state.task_left[number], state.task_now
+    hour, is_manhattan, sensing = head.hour, head.is_manhattan, head.sensing + TOLERANCE
+    at_x, at_y, at_z = state.sites[0], state.sites[1], state.sites[2]
+    x, y, z = here
+    for at in range(len(now)):
+        is_far = length(is_manhattan, at_x[at] - x, at_y[at] - y, at_z[at] - z) > sensing
+        is_seen = (not is_far) & (now[at] == now[at])
+        hours[at] = hour if is_seen else hours[at]  # without a branch, so that several are compared at once
+        left[at] = now[at] if is_seen else left[at]
 
 
 @compiled_in_place

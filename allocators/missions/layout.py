@@ -47,6 +47,8 @@ class MissionArrays(NamedTuple):
         Least and largest coordinates of all places, which all know.
     sites : ndarray, shape (3, m)
         Where tasks are.
+    task_now : ndarray, shape (m,)
+        What can be seen of each task now: the work left, minus its status where it is closed, NaN where it is to come.
     places : ndarray, shape (3, n)
         Where agents are at the hour of the grid, in the order of `in_cells`.
     cells, in_cells : ndarray of int, shape (cells + 1,) and (n,)
@@ -57,6 +59,8 @@ class MissionArrays(NamedTuple):
         The numbers of those that are.
     speaks : ndarray of bool, shape (n,)
         Who sends a message.
+    speakers, speaker_places, speaker_cells : ndarray
+        Those who do, where they are, and where those of each cell begin, as `in_cells`, `places` and `cells` of all.
     task_hour, task_left : ndarray, shape (rows, m)
         Hour at which an agent's knowledge of a task was true, -1 where it knows nothing, and the work left then.
     known, known_report : ndarray of int, shape (rows,) and (rows, n)
@@ -85,12 +89,16 @@ class MissionArrays(NamedTuple):
     allowed: BoolArray
     area: FloatArray
     sites: FloatArray
+    task_now: FloatArray
     places: FloatArray
     cells: Numbers
     in_cells: Numbers
     is_near: BoolArray
     near: Numbers
     speaks: BoolArray
+    speakers: Numbers
+    speaker_places: FloatArray
+    speaker_cells: Numbers
     task_hour: FloatArray
     task_left: FloatArray
     known: Numbers

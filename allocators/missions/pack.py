@@ -75,6 +75,7 @@ def pack(mission: Mission, knowledge: Knowledge | str | None = None, memory: flo
         reports = min(2 * (rows + slots) * n + 2 * n + 1025, max(MOST_REPORTS, REPORTS_EACH * n))
     head = _head(mission, known, len(events) + len(deadlines) + (known is Knowledge.LOCAL))
     head["memory"], head["limit"] = memory, min(reports, 32 * n + 1024)
+    cells = divide(mission, head)
     parts = {
         "head": head,
         "agents": _agents(mission, known),
@@ -86,12 +87,16 @@ def pack(mission: Mission, knowledge: Knowledge | str | None = None, memory: flo
         "allowed": _allowed(mission),
         "area": np.array(mission.area),
         "sites": np.ascontiguousarray(instance.task_position.T),
+        "task_now": np.zeros(m),
         "places": np.ascontiguousarray(instance.start_position.T),
-        "cells": divide(mission, head),
+        "cells": cells,
         "in_cells": np.arange(n, dtype=np.int32),
         "is_near": np.zeros(max(n, m), np.bool_),
         "near": np.zeros(max(n, m), np.int32),
         "speaks": np.zeros(n, np.bool_),
+        "speakers": np.zeros(n, np.int32),
+        "speaker_places": np.zeros((3, n)),
+        "speaker_cells": np.zeros_like(cells),
         **_knowledge(n, m, rows, slots, words=-(-n // 64) if memory < mission.end else 0),
         "links": np.zeros((n, n) if mission.radio.burst else (0, 0), np.int32),
         "silences": np.zeros(len(events), np.intp),

@@ -75,13 +75,7 @@ class Agent:
 
 
 class Task:
-    """A task: see `TaskFacts` and `TaskState`; `first` and `last` work there, `changed` is as of an agent.
-
-    Attributes
-    ----------
-    now, seen : float, int
-        What is seen of it, and the number of looks when that was found.
-    """
+    """A task: see `TaskFacts` and `TaskState`; `first` and `last` work there, `changed` is as of an agent."""
 
     workload: float
     x: float
@@ -105,8 +99,6 @@ class Task:
     closed: float
     version: int
     changed: int
-    now: float
-    seen: int
 
 
 class Happening:
