@@ -61,8 +61,10 @@ class _Reason(logging.Filter):
         error = record.msg
         if not isinstance(error, OSError):
             return True
-        known = error.errno is not None and error.errno > 0  # a host that is not found has numbers below 0
-        self.text = os.strerror(error.errno) if known else error.strerror or str(error)
+        if error.errno is not None and error.errno > 0:  # a host that is not found has numbers below 0
+            self.text = os.strerror(error.errno)
+        else:
+            self.text = error.strerror or str(error)
         return False
 
 

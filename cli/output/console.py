@@ -118,9 +118,9 @@ def _write(stream: TextIO | None, text: str) -> None:
     except (OSError, ValueError) as error:
         _silence(stream)  # avoids a second failure when the interpreter flushes at exit
         if stream is sys.stdout:
-            number, words = (
-                (error.errno, error.strerror) if isinstance(error, OSError) else (errno.EBADF, "it is closed")
-            )
+            number, words = errno.EBADF, "it is closed"
+            if isinstance(error, OSError):
+                number, words = error.errno or number, error.strerror or str(error)
             raise OSError(number, f"cannot be written: {words[:1].lower()}{words[1:]}", OUTPUT) from error
 
 
