@@ -14,9 +14,9 @@ Dantzig-Wolfe decomposition for linear mixed-integer programming, doi:10.1016/S0
 from collections.abc import Callable
 
 import numpy as np
-from scipy.sparse import csr_array, vstack
+from scipy.sparse import csr_array
 
-from alloc.allocators.exact.energy.cuts.all_groups import write_groups
+from alloc.allocators.exact.energy.cuts.all_groups import groups_within
 from alloc.allocators.exact.energy.cuts.group_master import GroupMaster
 from alloc.allocators.exact.energy.cuts.group_programme import GroupProgramme
 from alloc.allocators.exact.energy.cuts.pricing import STEPS, price_groups
@@ -105,36 +105,18 @@ class CuttingPlanes:
     def all_groups(self, cost: float, most: int) -> GroupProgramme | None:
         """Return all groups of which plans that cost less than `cost` consist; None if they are more than `most`.
 
-        None as well if the run should stop meanwhile: all tasks together may take a second.
-        What the group of a task costs more than its cheapest one is at most what `cost` exceeds the bound by.
+        None as well if the run should stop meanwhile. What the group of a task costs more than its cheapest one is at
+        most what `cost` exceeds the bound by.
         """
-        model = self._model
-        if not model.is_whole:
-            return None
-        penalty = self._known_penalty
+        model, master, penalty = self._model, self._master, self._known_penalty
         value, _, least = self._relax(self._price, penalty)
-        gap, paid = cost * (1 + 1e-9) - value, self._paid(self._price, penalty)
-        first, (first_cut, cut) = model.first, self._master.cuts_of_pairs(penalty)
-        task, group = [np.zeros(0, dtype=np.int64)], [csr_array((0, len(paid)), dtype=np.int64)]
-        for j in range(len(least)):
-            if self._should_stop():
-                return None
-            a, b, room = first[j], first[j + 1], most - sum(len(tasks) for tasks in task)
-            inside = np.zeros((room, b - a), dtype=np.int64)
-            found = write_groups(
-                self._weight[a:b], paid[a:b], model.copies[a:b], int(self._need[j]), model.max_weight[j],
-                first_cut[a : b + 1], cut, penalty, least[j] + gap, inside,
-            )  # fmt: skip
-            if found > room:
-                return None
-            rows, pairs = np.nonzero(inside[:found])
-            entries = (inside[rows, pairs], (rows, a + pairs))
-            task.append(np.full(found, j))
-            group.append(csr_array(entries, shape=(found, len(paid))))
-        all_tasks, groups = np.concatenate(task), csr_array(vstack(group))
-        on = penalty > 0
-        used = self._master.used(all_tasks, model.by_class(groups).toarray())[:, on]
-        return GroupProgramme(model, cost, all_tasks, groups, csr_array(used), self._master.limit[on])
+        limit, cuts = least + cost * (1 + 1e-9) - value, (*master.cuts_of_pairs(penalty), penalty)
+        found = groups_within(model, self._paid(self._price, penalty), limit, cuts, most, self._should_stop)
+        if found is None:
+            return None
+        (task, groups), on = found, penalty > 0
+        used = master.used(task, model.by_class(groups).toarray())[:, on]
+        return GroupProgramme(model, cost, task, groups, csr_array(used), master.limit[on])
 
     @property
     def _known_penalty(self) -> FloatArray:

@@ -152,8 +152,7 @@ class GroupMaster:
     def used(self, task: IntArray, use: FloatArray) -> FloatArray:
         """Return what groups use of each cut, given their tasks and agents of each class, shapes (g, c) and (g, k)."""
         used, padded = np.zeros((len(task), len(self.limit))), np.hstack([use, np.zeros((len(task), 1))])
-        for at, members in zip(self._set_at.tolist(), self._sets, strict=True):
-            used[:, at] = padded[:, members].sum(axis=1) // 2
+        used[:, self._set_at] = sum(padded[:, members] for members in self._sets.T) // 2
         for at, cut in zip(self._cluster_at.tolist(), self._clusters, strict=True):
             used[:, at] = cut.use(use, task)
         return used

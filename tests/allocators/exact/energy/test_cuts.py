@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from alloc.allocators.exact.energy.cuts import group_master
+from alloc.allocators.exact.energy.cuts.all_groups import write_groups
 from alloc.allocators.exact.energy.cuts.cluster_cuts import ClusterSeparation
 from alloc.allocators.exact.energy.cuts.pricing import price_groups
 from alloc.allocators.exact.energy.cuts.subset_rows import violated_sets
@@ -31,6 +32,32 @@ def test_cheapest_group_with_cuts_is_that_of_all_groups_written_out(seed, kind):
     )  # fmt: skip
     assert least == pytest.approx(cost.min(), abs=1e-6)
     assert group @ price + (member @ group // 2) @ penalty == pytest.approx(cost.min())
+
+
+@pytest.mark.parametrize("kind", ["whole", "limited", "real"])
+@pytest.mark.parametrize("seed", range(12))
+def test_groups_within_a_limit_are_those_of_all_written_out(seed, kind):
+    """No group is missing, but for those that can do without an agent where sums of weights have no limit."""
+    rng = np.random.default_rng(seed)
+    weight = rng.uniform(0.1, 0.6, 7) if kind == "real" else rng.integers(1, 6, 7).astype(float)
+    need, max_weight = (1.0, -1) if kind == "real" else (9.0, 10 if kind == "limited" else -1)
+    price, copies = rng.uniform(-0.1 if kind == "limited" else 0.0, 1.0, 7), rng.integers(1, 3, 7)
+    member, penalty = rng.random((4, 7)) < 0.4, rng.uniform(0.0, 1.0, 4)
+    groups = np.array(list(product(*(range(most + 1) for most in copies))))
+    done = groups @ weight
+    least = np.where(groups > 0, weight, np.inf).min(axis=1)
+    meets = (done >= need) & ((done <= max_weight) | (max_weight < 0))
+    wanted = meets & ((kind == "limited") | (done - least < need))
+    cost = groups @ price + (groups @ member.T // 2) @ penalty
+    limit = float(np.quantile(cost[wanted], 0.3)) + 1e-9
+    group = np.zeros((1000, 7), dtype=np.int64)
+    found = write_groups(
+        weight, price, copies, need, max_weight, kind != "real", np.append(0, member.sum(axis=0).cumsum()),
+        np.nonzero(member.T)[1], penalty, limit, group,
+    )  # fmt: skip
+    every, written = {tuple(one) for one in groups[meets & (cost <= limit)].tolist()}, group[:found].tolist()
+    assert {tuple(one) for one in groups[wanted & (cost <= limit)].tolist()} <= {tuple(one) for one in written} <= every
+    assert found == len({tuple(one) for one in written}) > 0
 
 
 def test_a_cut_closes_the_gap_of_three_agents_for_two_tasks():
