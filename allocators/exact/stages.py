@@ -26,6 +26,9 @@ from alloc.problems import Instance, Objective, count_classes, fewest_unserved, 
 MAKESPAN_SHARE = 0.6
 """Part of the time limit after which the makespan stage gives way to the energy stage, proven or not."""
 
+PATIENCE = 2.0
+"""Time without a faster plan, as a multiple of the time until it was found, after which it does so as well."""
+
 
 @dataclass(frozen=True)
 class ExactParameters(CheckedParameters):
@@ -94,15 +97,17 @@ class ExactAllocator(Allocator):
         if min_served == 0:
             return Proposal(energy_lower_bound=0.0)
         if search.objective is Objective.MAKESPAN:
-            self._minimise_makespan(search, min_served, 1.0)
+            self._minimise_makespan(search, min_served, 1.0, np.inf)
             return Proposal()
         return Proposal(energy_lower_bound=self._minimise_both(search, min_served))
 
     def _minimise_both(self, search: Search, min_served: int) -> float | None:
         """Run both stages, again where the energy was proven early and the makespan had not had all of its time."""
         bound: float | None = None
+        patience = PATIENCE
         while True:
-            complete = self._minimise_makespan(search, min_served, MAKESPAN_SHARE)
+            complete = self._minimise_makespan(search, min_served, MAKESPAN_SHARE, patience)
+            patience = np.inf
             found = None
             with search.improving("the search for the least energy"):
                 found = least_energy(search, self.solver, min_served)
@@ -110,13 +115,12 @@ class ExactAllocator(Allocator):
             if found is None or complete or search.fast_enough or is_over(search):
                 return bound  # what holds within a makespan holds within a lesser one
 
-    def _minimise_makespan(self, search: Search, min_served: int, share: float) -> bool:
-        """Run the makespan stage for a share of the time left; return whether it ended before its time was up."""
+    def _minimise_makespan(self, search: Search, min_served: int, share: float, patience: float) -> bool:
+        """Run the makespan stage for a share of the time left at most; return whether more would not help."""
         until_s = np.inf
         if search.budget.time_limit_s is not None:
             until_s = search.elapsed_s + share * search.remaining_s
-        least_makespan(search, self.solver, min_served, until_s, descent=self.parameters.descent)
-        return search.elapsed_s < until_s
+        return least_makespan(search, self.solver, min_served, until_s, patience, descent=self.parameters.descent)
 
 
 def count_pairs(instance: Instance, objective: Objective) -> int:

@@ -18,7 +18,9 @@ PROBE_SHARE = 0.1
 """Share of the time of a probe; as much goes to plans after one that stayed open."""
 
 
-def least_makespan(search: Search, solver: Solver, min_served: int, until_s: float, *, descent: bool) -> None:
+def least_makespan(
+    search: Search, solver: Solver, min_served: int, until_s: float, patience: float = np.inf, *, descent: bool
+) -> bool:
     """Narrow the gap between plans and bounds until it is closed or time is up; both go to `search`.
 
     Parameters
@@ -30,10 +32,17 @@ def least_makespan(search: Search, solver: Solver, min_served: int, until_s: flo
         How many tasks are to be served.
     until_s : float
         Seconds since the run began at which this must end.
+    patience : float
+        Time without a faster plan, as a multiple of the time until the fastest was found, after which this ends.
     descent : bool
         Whether plans are looked for without the solver first.
+
+    Returns
+    -------
+    bool
+        Whether more time would not help.
     """
-    state = MakespanState.begin(search, min_served, until_s, descent=descent)
+    state = MakespanState.begin(search, min_served, until_s, patience, descent=descent)
     is_plain = search.instance.reach.is_complete and state.model.unit is not None
     if descent and (is_plain or not state.repartition.is_tractable):
         descend_in_steps(state)
@@ -42,6 +51,7 @@ def least_makespan(search: Search, solver: Solver, min_served: int, until_s: flo
         with state.with_local_search():
             take_turns(state)
             bisect(state, solver)
+    return state.closed or not state.over
 
 
 def take_turns(state: MakespanState) -> None:

@@ -27,6 +27,9 @@ UNLIMITED_S = 60.0
 LEAST_WEIGHT = 1 / 8
 """Part of its usual time that a phase which finds nothing still gets."""
 
+LEAST_SHARE = 0.2
+"""Part of the stage that the time until the fastest plan was found counts as at least, where patience is limited."""
+
 TELLING_SHARE = 0.05
 """Share of the time from which on it tells something that local search finds nothing."""
 
@@ -40,8 +43,10 @@ class MakespanState:
     search : Search
     model : Model
         Classes not told apart by place.
-    until_s : float
-        Seconds since the run began at which the stage must end; ``inf`` without a time limit.
+    begin_s, until_s : float
+        Seconds since the run began at which the stage began and must end; the latter ``inf`` without a time limit.
+    patience : float
+        Time without a faster plan, as a multiple of the time until the fastest was found, after which the stage ends.
     descent : bool
         Whether plans are looked for without the solver.
     repeatable : bool
@@ -71,7 +76,9 @@ class MakespanState:
 
     search: Search
     model: Model
+    begin_s: float
     until_s: float
+    patience: float
     descent: bool
     repeatable: bool
     rng: np.random.Generator
@@ -87,13 +94,17 @@ class MakespanState:
     local_weight: float = 1.0
 
     @classmethod
-    def begin(cls, search: Search, min_served: int, until_s: float, *, descent: bool) -> "MakespanState":
+    def begin(
+        cls, search: Search, min_served: int, until_s: float, patience: float = np.inf, *, descent: bool
+    ) -> "MakespanState":
         """Start from the simple bound and the best plan of `search`."""
         model = Model.build(search.instance, agent_classes(search.instance, by_place=False), min_served)
         return cls(
             search=search,
             model=model,
+            begin_s=search.elapsed_s,
             until_s=until_s,
+            patience=patience,
             descent=descent,
             repeatable=is_repeatable(search),
             rng=np.random.default_rng(search.seed),
@@ -121,8 +132,21 @@ class MakespanState:
 
     @property
     def over(self) -> bool:
-        """Whether time is up or the run must end."""
-        return is_over(self.search) or self.search.elapsed_s >= self.until_s
+        """Whether time or patience is at its end, or the run must end."""
+        return is_over(self.search) or self.search.elapsed_s >= self.until_s or self.has_stalled
+
+    @property
+    def has_stalled(self) -> bool:
+        """Whether no faster plan has been found for so long that patience is at its end.
+
+        Not where abilities are multiples of a unit: there a proof may come at any time.
+        """
+        if np.isinf(self.patience) or np.isinf(self.until_s) or self.model.unit is not None:
+            return False
+        assert self.search.fastest is not None
+        last_s = max(self.begin_s, self.search.fastest.time_s)
+        took_s = max(last_s - self.begin_s, LEAST_SHARE * (self.until_s - self.begin_s))
+        return self.search.elapsed_s - last_s > self.patience * took_s
 
     @property
     def ended(self) -> bool:

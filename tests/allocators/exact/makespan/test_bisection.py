@@ -1,5 +1,7 @@
 """The makespan stage, with a solver whose verdicts are given."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from oracle import brute_force
@@ -86,3 +88,19 @@ def test_probe_gives_the_solvers_verdict():
     search.submit(greedy(instance))
     assert probe_makespan(state, solver, Probe(best * (1 + 1e-9), 1.0)) is Verdict.FEASIBLE
     assert state.upper == pytest.approx(best)
+
+
+@pytest.mark.parametrize("patience", [1.0, np.inf])
+@pytest.mark.parametrize("is_whole", [False, True])
+def test_patience_ends_where_abilities_have_no_unit(monkeypatch, is_whole, patience):
+    """After as long again as it took to find the fastest plan; where there is a unit, a proof may come."""
+    drawn = instance_of(0)
+    instance = Instance(ability=np.round(drawn.ability), workload=drawn.workload) if is_whole else drawn
+    search = search_on(instance)
+    state = MakespanState.begin(search, instance.m, 15.0, patience, descent=False)
+    found_s = state.begin_s + 5.0
+    monkeypatch.setattr(search, "fastest", replace(search.fastest, time_s=found_s))
+    for elapsed_s, has_waited in ((found_s + 4.9, False), (found_s + 5.1, True)):
+        monkeypatch.setattr(Search, "elapsed_s", elapsed_s)
+        assert state.has_stalled == (has_waited and patience == 1.0 and not is_whole)
+        assert state.over == state.has_stalled
