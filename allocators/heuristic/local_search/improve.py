@@ -25,7 +25,7 @@ HARD_FROM = 0.95
 FIRST_CYCLE_SHARE = 0.1
 """Part of a long budget for a first annealing cycle, so that a run that is stopped early has a good plan."""
 
-RESTARTS = 4
+RESTARTS = 8
 """Cycles of the rest of the budget, each from the fastest plan, where cycles do not leave the first plans they find."""
 
 PATIENCE, LEAST_SHARE = 3.0, 0.2
