@@ -44,9 +44,6 @@ LEAST_EXCHANGES = 250.0
 PATIENCE = 3
 """Periods in a row that end with a shortfall, after one more of which the search returns to the best plan."""
 
-OFTEN = 0.05
-"""Part of the periods from which on returns to the best plan are so frequent that the search cannot leave it."""
-
 
 class AnnealingState:
     """A plan that exchanges improve for a target makespan.
@@ -254,25 +251,19 @@ class PenaltyFactor:
         self.value, self._state = 1.0, state
         self._period = EXCHANGES_PER_AGENT * state.instance.n / exchanges if allowed >= LEAST_EXCHANGES else math.inf
         self._iterations, self._short_periods = 0, 0
-        self._periods, self._returns = 0, 0
-
-    @property
-    def is_trapped(self) -> bool:
-        """Whether the search has returned to its best plan so often that it has hardly seen others."""
-        return self._returns > OFTEN * self._periods
 
     def update(self, iterations: int) -> None:
         """Take note of so many iterations more."""
         self._iterations += iterations
         if self._iterations < self._period:
             return
-        self._iterations, self._periods = 0, self._periods + 1
+        self._iterations = 0
         is_short = self._state.n_short > 0
         self.value = min(HIGHEST, max(LOWEST, self.value * (RISE if is_short else FALL)))
         self._short_periods = self._short_periods + 1 if is_short else 0
         if self._short_periods > PATIENCE:
             self._state.return_to_best()
-            self._short_periods, self._returns = 0, self._returns + 1
+            self._short_periods = 0
 
 
 def _as_allocation(group: Int32Array, idle: int) -> Allocation:

@@ -25,9 +25,6 @@ HARD_FROM = 0.95
 FIRST_CYCLE_SHARE = 0.1
 """Part of a long budget for a first annealing cycle, so that a run that is stopped early has a good plan."""
 
-RESTARTS = 8
-"""Cycles of the rest of the budget, each from the fastest plan, where cycles do not leave the first plans they find."""
-
 PATIENCE, LEAST_SHARE = 3.0, 0.2
 """Time without a smaller makespan, as a multiple of the time until then, and share of the time for it, after which the
 energy has its turn."""
@@ -97,12 +94,9 @@ def _improve(
         reduction.run(clock)
         return
     reduction.run(makespan_clock, patience=PATIENCE)
-    if not (clock.is_long and reduce_energy(search, team, parameters, clock.part(FIRST_CYCLE_SHARE))):
-        reduce_energy(search, team, parameters, clock)
-        return
-    for left in range(RESTARTS, 0, -1):
-        assert search.fastest is not None
-        reduce_energy(search, team, parameters, clock.part(1 / left), search.fastest.allocation)
+    if clock.is_long:
+        reduce_energy(search, team, parameters, clock.part(FIRST_CYCLE_SHARE))
+    reduce_energy(search, team, parameters, clock)
 
 
 def _improve_endlessly(search: Search, team: Team, parameters: LocalSearchParameters, clock: Clock) -> None:
@@ -182,26 +176,19 @@ class MakespanReduction:
         return attempt
 
 
-def reduce_energy(
-    search: Search, team: Team, parameters: LocalSearchParameters, clock: Clock, start: Allocation | None = None
-) -> bool:
-    """Anneal from the best plan, or another `start`, within its makespan; the budget is one cooling cycle.
-
-    Returns whether it could hardly leave the first plans that it found.
-    """
+def reduce_energy(search: Search, team: Team, parameters: LocalSearchParameters, clock: Clock) -> None:
+    """Anneal within the makespan of the best plan; what is left of the budget is one cooling cycle."""
     best, state = search.best, team.states[0]
     assert best is not None
     if clock.is_over or best.evaluation.cost == 0:
-        return False
-    plan, is_anew = _plan_in_force(search), start is not None
-    if plan is not None:
-        start = _serving(plan, best.allocation, search.instance.m)
-    state.begin(start or best.allocation, search.makespan_limit)
+        return
+    plan = _plan_in_force(search)
+    start = best.allocation if plan is None else _serving(plan, best.allocation, search.instance.m)
+    state.begin(start, search.makespan_limit)
     clock = Clock(search, clock.until_s, clock.until_iteration)
     report, parts = _Reporter(search, state), Parts(team, search.seed)
     final = parameters.final_noise
-    first = (parameters.initial_noise, 1.0) if is_anew else (final, HARD)
-    search.iteration += parts.run(parts.count, parameters.exchanges, parameters.weights(state, *first))  # the pace
+    search.iteration += parts.run(parts.count, parameters.exchanges, parameters.weights(state, final, HARD))  # the pace
     exchanges = parameters.exchanges * clock.iterations_left / search.instance.n
     initial = parameters.initial_noise if plan is None else MOVES_NOISE
     initial *= parameters.noise_reduction(exchanges)
@@ -216,7 +203,6 @@ def reduce_energy(
         factor.update(made)
         report()
     report(at_once=True)
-    return factor.is_trapped and plan is None
 
 
 class _Reporter:

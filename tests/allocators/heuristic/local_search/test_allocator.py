@@ -12,9 +12,8 @@ from alloc.allocators.contract.budget import Budget
 from alloc.allocators.contract.search import Search
 from alloc.allocators.heuristic.greedy.list_schedule import greedy
 from alloc.allocators.heuristic.local_search import annealing, candidates, instance_arrays
-from alloc.allocators.heuristic.local_search import improve as improvement
 from alloc.allocators.heuristic.local_search.allocator import LocalSearch
-from alloc.allocators.heuristic.local_search.improve import RESTARTS, improve
+from alloc.allocators.heuristic.local_search.improve import improve
 from alloc.allocators.heuristic.local_search.parameters import LocalSearchParameters
 from alloc.problems import Allocation, InputError, Instance, Objective, evaluate, serve_all
 from alloc.problems.generate import paper, random_instance
@@ -151,23 +150,6 @@ def test_other_methods_can_use_it():
     improve(search, iterations=30, parameters=LocalSearchParameters(exchanges=500))
     assert search.iteration <= 30
     assert search.best.evaluation.is_better_than(first, Objective.MAKESPAN_ENERGY)
-
-
-@pytest.mark.parametrize("is_trapped", [False, True])
-def test_cycles_that_are_trapped_begin_anew_from_the_fastest_plan(monkeypatch, is_trapped):
-    """After a first cycle that did not leave the plans that it found, several shorter ones; else one long one."""
-    instance, starts = paper(1, 0), []
-
-    def note(search, team, parameters, clock, start=None):
-        starts.append(start)
-        search.iteration += int(clock.iterations_left)
-        return is_trapped
-
-    monkeypatch.setattr(improvement, "reduce_energy", note)
-    search = Search(instance, Objective.MAKESPAN_ENERGY, Budget(None, 5000), seed=0)
-    search.submit(greedy(instance))
-    improve(search, iterations=5000)
-    assert starts == [None, *([search.fastest.allocation] * RESTARTS if is_trapped else [None])]
 
 
 def test_parameters_are_keywords():

@@ -8,7 +8,6 @@ from alloc.allocators.heuristic.local_search.annealing_state import (
     FALL,
     LEAST_EXCHANGES,
     LOWEST,
-    OFTEN,
     PATIENCE,
     RISE,
     AnnealingState,
@@ -70,16 +69,3 @@ def test_a_short_budget_leaves_the_penalty_alone(state):
     for _ in range(10):
         factor.update(1)
     assert factor.value == 1.0
-
-
-def test_a_search_that_returns_again_and_again_is_trapped(state):
-    """One return in many periods is nothing; with one every few periods, the search has hardly seen other plans."""
-    factor = PenaltyFactor(state, 10**9, 1e9)
-    for _ in range(100):
-        factor.update(1)
-    for times in range(1, 8):
-        lose(state)
-        for _ in range(PATIENCE + 1):
-            factor.update(1)
-        assert factor.is_trapped == (times > OFTEN * (100 + times * (PATIENCE + 1)))
-    assert factor.is_trapped
