@@ -27,7 +27,7 @@ MAKESPAN_SHARE = 0.6
 """Part of the time limit after which the makespan stage gives way to the energy stage, proven or not."""
 
 PATIENCE = 2.0
-"""Time without a faster plan, as a multiple of the time until it was found, after which it does so as well."""
+"""The energy stage also begins when no faster plan came for this multiple of the time until the fastest was found."""
 
 
 @dataclass(frozen=True)

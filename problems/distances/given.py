@@ -76,7 +76,7 @@ class DistanceTable(ReadOnly):
         entries = [_row(entry, number) for number, entry in enumerate(listed(rows, "distances", "rows"))]
         source, target = [entry[0] for entry in entries], [entry[1] for entry in entries]
         distance = numbers([entry[2] for entry in entries], "distances") if entries else np.zeros(0)
-        return cls.from_columns(source, target, distance, agent_ids, task_ids, missing, base_ids)
+        return cls.from_columns(source, target, distance, agent_ids, task_ids, missing=missing, base_ids=base_ids)
 
     @classmethod
     def from_columns(
@@ -86,6 +86,7 @@ class DistanceTable(ReadOnly):
         distance: Floats,
         agent_ids: Sequence[str],
         task_ids: Sequence[str],
+        *,
         missing: str = "metric",
         base_ids: Sequence[str] = (),
     ) -> "DistanceTable":

@@ -163,7 +163,13 @@ class Columns:
         if given is None:
             return None
         return DistanceTable.from_columns(
-            given.source, given.target, given.distance, self.agent_ids, self.task_ids, given.missing, self.base_ids
+            given.source,
+            given.target,
+            given.distance,
+            self.agent_ids,
+            self.task_ids,
+            missing=given.missing,
+            base_ids=self.base_ids,
         )
 
 

@@ -66,7 +66,6 @@ class Recorder:
         self._legs: list[list[Leg]] = [[] for _ in state.agents]
         self._levels = [[Level(0.0, 0.0, TaskStatus.TO_COME)] for _ in state.tasks]
         self._workers: list[set[int]] = [set() for _ in state.tasks]
-        self._arrives = [math.inf] * len(state.agents)
         self._messages: list[tuple[float, int, int]] = []
         self._changed: list[tuple[float, AgentState | TaskState]] = []
         self._knowledge = _Knowledge(simulation) if self._is_knowledge_recorded(simulation) else None

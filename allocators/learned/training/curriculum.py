@@ -110,8 +110,3 @@ class Curriculum:
 def with_reference(instances: Sequence[Instance]) -> list[TrainingInstance]:
     """Return each instance with its reference makespan."""
     return [TrainingInstance(instance, reference_makespan(instance)) for instance in instances]
-
-
-def reference_board(instances: Sequence[Instance], energy_weight: Sequence[float], rng: np.random.Generator) -> Board:
-    """Return a board of games whose target is the reference makespan of each instance."""
-    return make_board(instances, [reference_makespan(instance) for instance in instances], energy_weight, rng)

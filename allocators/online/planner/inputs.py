@@ -108,9 +108,11 @@ class Input:
         row = dict(of_type(given, Mapping, "event"))
         kind = row.pop("event", None)
         kinds = (*map(str, EventKind), AGENT_REPORTS)
-        if not isinstance(kind, str) or kind not in kinds:
-            hint = nearest(kind, kinds) if isinstance(kind, str) else f"; it must be one of {', '.join(kinds)}"
-            raise InputError("is missing" + hint if kind is None else f"is {shown(kind)}, which is none{hint}", "event")
+        if kind is None:
+            raise InputError(f"is missing; it must be one of {', '.join(kinds)}", "event")
+        kind = text(kind, "event")
+        if kind not in kinds:
+            raise InputError(f"there is no event {shown(kind)}{nearest(kind, kinds)}", "event")
         fields = REPORT_FIELDS if kind == AGENT_REPORTS else FIELDS[EventKind(kind)]
         require_known(row, ("hour", *fields), "")
         values = {"hour": now, **{name: value for name, value in row.items() if value is not None}}

@@ -97,7 +97,7 @@ class Lines:
         """Do what is asked for, and return the hour of the plan to be made."""
         name = text(fields.pop("request"), "request")
         if name not in REQUESTS:
-            raise InputError(f"is {shown(name)}, which is none{nearest(name, tuple(REQUESTS))}", "request")
+            raise InputError(f"there is no request {shown(name)}{nearest(name, tuple(REQUESTS))}", "request")
         require_known(fields, REQUESTS[name], "")
         if name == "save":
             if self._state is None:

@@ -86,7 +86,8 @@ def plan_command(
     planner = None
     if state is not None and Path(state).exists():
         if mission is not None:
-            raise typer.BadParameter(f"{state} has one already; leave it out, or remove the file", param_hint="MISSION")
+            why = f"must be left out, as {state} is there: the planner in it goes on; or remove that file"
+            raise typer.BadParameter(why, param_hint="MISSION")
         planner = MissionPlanner.restore(state)
     elif mission is not None:
         planner = begin(read_mission(mission))

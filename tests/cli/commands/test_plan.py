@@ -116,7 +116,7 @@ def test_it_goes_on_from_its_state(alloc, pair):
     assert answers(again.out)[0]["orders"] == answers(first.out)[0]["orders"]
     ran = alloc(*arguments, "pair.json")
     assert (ran.code, ran.out) == (2, "")
-    assert "state.json has one already; leave it out" in ran.err
+    assert "state.json is there: the planner in it goes on" in ran.err
 
 
 def test_wrong_arguments_are_told_before_any_line(alloc, pair):

@@ -13,8 +13,8 @@ def test_rows_and_columns_make_the_same_table() -> None:
     """Agents have the nodes from 0 on and tasks those after them, however the table is given; arrays are read-only."""
     source, target, distance = zip(*ROWS, strict=True)
     for table in (
-        DistanceTable.of(ROWS, AGENTS, TASKS, "unreachable"),
-        DistanceTable.from_columns(source, target, np.array(distance), AGENTS, TASKS, "unreachable"),
+        DistanceTable.of(ROWS, AGENTS, TASKS, missing="unreachable"),
+        DistanceTable.from_columns(source, target, np.array(distance), AGENTS, TASKS, missing="unreachable"),
     ):
         assert (table.n, table.m, table.missing) == (3, 3, "unreachable")
         assert (table.source.tolist(), table.target.tolist()) == ([0, 3, 4], [3, 0, 3])
@@ -24,7 +24,7 @@ def test_rows_and_columns_make_the_same_table() -> None:
 
 def test_an_empty_table_is_one() -> None:
     """A table without rows is a table, by which nobody can go anywhere if that is what it says."""
-    table = DistanceTable.from_columns([], [], np.zeros(0), AGENTS, TASKS, "unreachable")
+    table = DistanceTable.from_columns([], [], np.zeros(0), AGENTS, TASKS, missing="unreachable")
     assert (len(table.source), len(table.target), len(table.distance)) == (0, 0, 0)
 
 

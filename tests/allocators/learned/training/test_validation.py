@@ -9,7 +9,7 @@ from boards import plan_of
 
 from alloc.allocators.learned.network.actor_critic import ActorCritic, NetworkSize
 from alloc.allocators.learned.play.action_sampling import sample_actions
-from alloc.allocators.learned.training.curriculum import Curriculum, reference_board
+from alloc.allocators.learned.training.curriculum import Curriculum, with_reference
 from alloc.allocators.learned.training.families import RECIPES
 from alloc.allocators.learned.training.validation import (
     DISTANCE_WEIGHT,
@@ -19,7 +19,7 @@ from alloc.allocators.learned.training.validation import (
     validation_boards,
 )
 from alloc.problems import InputError, Instance, evaluate
-from alloc.problems.game import PLANNING, reset, step
+from alloc.problems.game import PLANNING, make_board, reset, step
 from alloc.problems.generate import paper_like
 
 
@@ -50,7 +50,9 @@ def test_time_is_that_of_the_best_plan_met(network: ActorCritic) -> None:
 
 def test_a_bad_game_does_not_decide(network: ActorCritic) -> None:
     """However far from its reference a makespan is, it costs no more than an unserved task."""
-    boards = [reference_board([paper_like(10, 3, 44, 1)] * 2, [1.0] * 2, np.random.default_rng(0))]
+    instances = [paper_like(10, 3, 44, 1)] * 2
+    references = [one.reference_h for one in with_reference(instances)]
+    boards = [make_board(instances, references, [1.0] * 2, np.random.default_rng(0))]
     hard = replace(boards[0], need=boards[0].need * torch.tensor([[1.0], [1e6]]))
     costs = [validate(network, [board], PLANNING, Curriculum()).cost for board in (boards[0], hard)]
     assert 0 < costs[1] - costs[0] < 0.6

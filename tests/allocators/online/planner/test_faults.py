@@ -21,7 +21,7 @@ WRONG = (
     ({**FAIL, "hour": 3.0}, "event: agent-fails needs agent 'ann' to be away or in the mission, but it is failed"),
     ({**FAIL, "agent": "bem"}, "agent: there is no agent 'bem' (did you mean 'ben'?)"),
     ({**FAIL, "hour": math.nan}, "hour: must be a finite number"),
-    ({**FAIL, "event": "agent-fail"}, "event: is 'agent-fail', which is none (did you mean 'agent-fails'?)"),
+    ({**FAIL, "event": "agent-fail"}, "event: there is no event 'agent-fail' (did you mean 'agent-fails'?)"),
     ({"hour": 3.0, "agent": "ben"}, "event: is missing; it must be one of"),
     ({**FAIL, "amount": 3}, "unknown field 'amount'"),
     ({"event": "agent-returns", "agent": "ben"}, "needs agent 'ben' to be away, but it is in the mission"),
