@@ -41,6 +41,7 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--calls", type=int, default=1000)
     parser.add_argument("--methods", nargs="+", default=[name for name in names() if describe(name).anytime])
+    parser.add_argument("--sizes", nargs="+", default=list(SIZES))
     parser.add_argument("--processor", action="store_true", help="processor time")
     options = parser.parse_args()
     if options.processor:
@@ -49,7 +50,7 @@ if __name__ == "__main__":
     print("| method | size | " + " | ".join(f"{limit} ms: p50, p99, worst" for limit in LIMITS_MS) + " |")
     print("|---" * (2 + len(LIMITS_MS)) + "|")
     gc.freeze()
-    for name, (size, instance) in ((name, one) for name in options.methods for one in SIZES.items()):
+    for name, (size, instance) in ((name, (one, SIZES[one])) for name in options.methods for one in options.sizes):
         method = load(name)
         cells = [overshoot(instance, method, limit, options.calls) for limit in LIMITS_MS]
         print(f"| {name} | {size} | {' | '.join(cells)} |", flush=True)

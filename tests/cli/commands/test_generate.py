@@ -51,7 +51,7 @@ def test_machine_covering_is_the_generator_s(alloc):
         ("--workload", "pareto", "alloc: --workload: must be equal or uniform"),
         ("--ability-min", "1.5", "alloc: --ability-min: must be a whole number"),
         ("--ability-max", "0", "alloc: --ability-max: must be a whole number >= "),
-        ("--tau", "0.5", "--tau': is for random, not for covering"),
+        ("--tau", "0.5", "--tau: is for random, not for covering"),
     ],
 )
 def test_machine_covering_refuses(alloc, option, value, told):
