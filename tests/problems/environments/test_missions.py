@@ -1,5 +1,6 @@
 """Missions as environments of PettingZoo and Gymnasium."""
 
+import re
 import warnings
 
 import numpy as np
@@ -87,7 +88,7 @@ def test_state_and_text_pass_pettingzoos_own_tests(capsys) -> None:
     check_state_space(env)
     check_state(env, num_cycles=20)
     render_test(agents)
-    assert capsys.readouterr().out.startswith("hour 0: 0 of 4 tasks done\nagent a1: idle at ")
+    assert re.match(r"hour 0: 0 of 4 tasks done\nagent a1: (idle|absent) at ", capsys.readouterr().out)  # drawn anew
     for shown in (agents(render_mode="human"), fleet(render_mode="human")):
         shown.reset(seed=0)
         shown.step(0)
