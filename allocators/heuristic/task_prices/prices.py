@@ -23,9 +23,10 @@ from alloc.allocators.parallel.pool import RunAll
 from alloc.problems import Instance
 from alloc.problems.instance import FloatArray, IntArray
 
-COARSE = ((5, ((1.0, 20), (0.5, 20), *(2 * [(0.25, 20)]), *(3 * [(0.12, 20)]))), (25, 2 * ((0.1, 15),)))
+COARSE = ((5, (*(12 * ((0.25, 6),)), *(12 * ((0.12, 6),)))), (25, 5 * ((0.1, 6),)))
 """Samples by agents for each task; for each, widths of the smoothing relative to the spread of values, and the most
 iterations with each. Over long ways prices even out slowly, which takes many iterations, so that these have few agents.
+After more iterations at once prices may run away where agents reach more tasks than a shortlist has.
 """
 
 FINE = ((0.025, 35), (0.0125, 25))
@@ -166,10 +167,16 @@ class TaskPrices:
             sample = self._bidders(*representatives(self.instance, per_task * int(self._some.sum())), COARSE_LENGTH)
             self._renew(sample)
             spread = max(LEAST_SPREAD, float((sample.lists.lost.max(axis=1) - sample.lists.lost[:, 0]).mean()))
+            best, best_price = 0.0, self.price
             for width, iterations in steps:
                 if is_over():
                     return False
                 self._adjust(sample, width * spread, iterations, is_over)
+                value = self._renew(sample)
+                if value > best:
+                    best, best_price = value, self.price
+            if self.price is not best_price:
+                self.price = best_price
                 self._renew(sample)
         if is_over() or self.makespan <= before * (1 + SAFETY):
             return False

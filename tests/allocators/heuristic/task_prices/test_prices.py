@@ -20,15 +20,15 @@ def prices_of(instance: Instance) -> TaskPrices:
     return prices
 
 
-def travelling(agents: int, tasks: int, seed: int = 0) -> Instance:
-    """Return an instance in the unit square with speeds and short ranges."""
+def travelling(agents: int, tasks: int, seed: int = 0, *, reach: float = 0.5) -> Instance:
+    """Return an instance in the unit square with speeds and ranges."""
     rng = np.random.default_rng(seed)
     return Instance(
         ability=rng.integers(1, 10, agents),
         workload=rng.integers(50, 800, tasks) * (agents / (80 * tasks)),
         agent_position=rng.random((agents, 2)),
         task_position=rng.random((tasks, 2)),
-        communication_range=np.full(agents, 0.5),
+        communication_range=np.full(agents, reach),
         speed=rng.uniform(1, 5, agents),
     )
 
@@ -53,6 +53,12 @@ def test_shortlists_have_the_most_valuable_tasks():
     value = np.where(mask, price * np.maximum(0, 1 - distance / (2.0 * instance.speed[:, None])), 0.0)
     assert total == pytest.approx(float(instance.ability @ value.max(axis=1)))
     assert (np.argsort(-value, axis=1)[:, :5] == bidders.lists.task).all()
+
+
+def test_prices_do_not_run_away_where_shortlists_are_too_short():
+    """Where agents reach all of many tasks, prices raise the bound as well."""
+    instance = travelling(20_000, 300, reach=np.inf)
+    assert prices_of(instance).bound > 1.005 * makespan_lower_bound(instance)
 
 
 def test_prices_raise_the_bound_to_the_fractional_optimum():
