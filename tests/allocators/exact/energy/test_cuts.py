@@ -11,52 +11,58 @@ from alloc.allocators.exact.energy.cuts.subset_rows import violated_sets
 from alloc.allocators.exact.energy.energy_model import EnergyModel
 
 
+class DrawnTask:
+    """A task with seven classes of up to two agents and four random cuts, and all of its groups written out."""
+
+    def __init__(self, seed, kind):
+        rng = np.random.default_rng(seed)
+        self.is_whole = kind != "real"
+        self.weight = rng.integers(1, 6, 7).astype(float) if self.is_whole else rng.uniform(0.1, 0.6, 7)
+        self.need, self.max_weight = (9.0, 10 if kind == "limited" else -1) if self.is_whole else (1.0, -1)
+        self.price = rng.uniform(-0.1 if kind == "limited" else 0.0, 1.0, 7)
+        self.copies = rng.integers(1, 3, 7)
+        self.member, self.penalty = rng.random((4, 7)) < 0.4, rng.uniform(0.0, 1.0, 4)
+        self.first_cut, self.cut = np.append(0, self.member.sum(axis=0).cumsum()), np.nonzero(self.member.T)[1].copy()
+        groups = np.array(list(product(*(range(most + 1) for most in self.copies))))
+        done = groups @ self.weight
+        meets = (done >= self.need) & ((done <= self.max_weight) | (self.max_weight < 0))
+        self.groups, self.done = groups[meets], done[meets]
+        self.cost = self.costs(self.groups)
+
+    def costs(self, groups):
+        return groups @ self.price + (groups @ self.member.T // 2) @ self.penalty
+
+
 @pytest.mark.parametrize("kind", ["whole", "limited", "real"])
 @pytest.mark.parametrize("seed", range(12))
 def test_cheapest_group_with_cuts_is_that_of_all_groups_written_out(seed, kind):
     """With classes of up to two agents and random cuts, no group is cheaper, and the one found costs what it says."""
-    rng = np.random.default_rng(seed)
-    weight = rng.uniform(0.1, 0.6, 7) if kind == "real" else rng.integers(1, 6, 7).astype(float)
-    need, max_weight = (1.0, -1) if kind == "real" else (9.0, 10 if kind == "limited" else -1)
-    price, copies = rng.uniform(-0.1 if kind == "limited" else 0.0, 1.0, 7), rng.integers(1, 3, 7)
-    member, penalty = rng.random((4, 7)) < 0.4, rng.uniform(0.0, 1.0, 4)
-    first_cut = np.append(0, member.sum(axis=0).cumsum())
-    groups = np.array(list(product(*(range(most + 1) for most in copies))))
-    done = groups @ weight
-    groups = groups[(done >= need) & ((done <= max_weight) | (max_weight < 0))]
-    cost = groups @ price + (groups @ member.T // 2) @ penalty
+    task = DrawnTask(seed, kind)
     group = np.zeros(7, dtype=np.int64)
     least = price_groups(
-        np.array([0, 7]), weight, price, copies, np.array([need]), np.array([max_weight]), kind != "real",
-        first_cut, np.nonzero(member.T)[1].copy(), penalty, np.array([100.0]), group,
+        np.array([0, 7]), task.weight, task.price, task.copies, np.array([task.need]), np.array([task.max_weight]),
+        task.is_whole, task.first_cut, task.cut, task.penalty, np.array([100.0]), group,
     )  # fmt: skip
-    assert least == pytest.approx(cost.min(), abs=1e-6)
-    assert group @ price + (member @ group // 2) @ penalty == pytest.approx(cost.min())
+    assert least == pytest.approx(task.cost.min(), abs=1e-6)
+    assert task.costs(group) == pytest.approx(task.cost.min())
 
 
 @pytest.mark.parametrize("kind", ["whole", "limited", "real"])
 @pytest.mark.parametrize("seed", range(12))
 def test_groups_within_a_limit_are_those_of_all_written_out(seed, kind):
     """No group is missing, but for those that can do without an agent where sums of weights have no limit."""
-    rng = np.random.default_rng(seed)
-    weight = rng.uniform(0.1, 0.6, 7) if kind == "real" else rng.integers(1, 6, 7).astype(float)
-    need, max_weight = (1.0, -1) if kind == "real" else (9.0, 10 if kind == "limited" else -1)
-    price, copies = rng.uniform(-0.1 if kind == "limited" else 0.0, 1.0, 7), rng.integers(1, 3, 7)
-    member, penalty = rng.random((4, 7)) < 0.4, rng.uniform(0.0, 1.0, 4)
-    groups = np.array(list(product(*(range(most + 1) for most in copies))))
-    done = groups @ weight
-    least = np.where(groups > 0, weight, np.inf).min(axis=1)
-    meets = (done >= need) & ((done <= max_weight) | (max_weight < 0))
-    wanted = meets & ((kind == "limited") | (done - least < need))
-    cost = groups @ price + (groups @ member.T // 2) @ penalty
-    limit = float(np.quantile(cost[wanted], 0.3)) + 1e-9
+    task = DrawnTask(seed, kind)
+    least = np.where(task.groups > 0, task.weight, np.inf).min(axis=1)
+    wanted = (kind == "limited") | (task.done - least < task.need)
+    limit = float(np.quantile(task.cost[wanted], 0.3)) + 1e-9
     group = np.zeros((1000, 7), dtype=np.int64)
     found = write_groups(
-        weight, price, copies, need, max_weight, kind != "real", np.append(0, member.sum(axis=0).cumsum()),
-        np.nonzero(member.T)[1], penalty, limit, group,
+        task.weight, task.price, task.copies, task.need, task.max_weight, task.is_whole, task.first_cut, task.cut,
+        task.penalty, limit, group,
     )  # fmt: skip
-    every, written = {tuple(one) for one in groups[meets & (cost <= limit)].tolist()}, group[:found].tolist()
-    assert {tuple(one) for one in groups[wanted & (cost <= limit)].tolist()} <= {tuple(one) for one in written} <= every
+    every, written = {tuple(one) for one in task.groups[task.cost <= limit].tolist()}, group[:found].tolist()
+    needed = {tuple(one) for one in task.groups[wanted & (task.cost <= limit)].tolist()}
+    assert needed <= {tuple(one) for one in written} <= every
     assert found == len({tuple(one) for one in written}) > 0
 
 
