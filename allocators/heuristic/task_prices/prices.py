@@ -165,9 +165,8 @@ class TaskPrices:
         before = self.bound
         for per_task, steps in COARSE:
             sample = self._bidders(*representatives(self.instance, per_task * int(self._some.sum())), COARSE_LENGTH)
-            self._renew(sample)
+            best, best_price = self._renew(sample), self.price
             spread = max(LEAST_SPREAD, float((sample.lists.lost.max(axis=1) - sample.lists.lost[:, 0]).mean()))
-            best, best_price = 0.0, self.price
             for width, iterations in steps:
                 if is_over():
                     return False
