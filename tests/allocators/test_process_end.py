@@ -13,7 +13,7 @@ import os, sys, threading, time
 from alloc.allocators import load, solve
 from alloc.problems.generate import paper
 
-instance, method, after_s = paper(1, seed=3), load(sys.argv[1]), float(sys.argv[2])
+instance, method, after_s = paper(4, seed=3), load(sys.argv[1]), float(sys.argv[2])
 if sys.argv[1] == "gappo":
     from alloc.allocators.learned import policy
     from alloc.allocators.learned.search.fine_tuning import FineTuning, FineTuningParameters
