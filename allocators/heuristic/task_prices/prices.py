@@ -12,6 +12,7 @@ import numpy as np
 
 from alloc.allocators.heuristic.greedy.task_tree import Tree, build_tree
 from alloc.allocators.heuristic.greedy.tree_search import idle_agents
+from alloc.allocators.heuristic.task_prices.regions import regions_of
 from alloc.allocators.heuristic.task_prices.sample import representatives
 from alloc.allocators.heuristic.task_prices.shortlists import (
     empty_shortlists,
@@ -51,7 +52,7 @@ LEAST_SLOPE = 1e-4
 """Slope by the price of a task, relative to the mean share of a task in the value, at which prices are good enough."""
 
 LARGEST_EXPONENT = 50.0
-"""Of a price."""
+"""Of a price, below the highest."""
 
 
 class Bidders:
@@ -151,6 +152,7 @@ class TaskPrices:
         self._most_proven, self._best_price = 0.0, self.price
         self.bidders: Bidders | None = None
         self._tree = build_tree(instance.reach.goal, np.flatnonzero(self._some))
+        self._regions = regions_of(self._tree)
         self._run_all, self._threads = run_all, threads
 
     def improve(self, end: float, stopped: Callable[[], bool]) -> bool:
@@ -223,24 +225,26 @@ class TaskPrices:
             return
         work, some = self.instance.workload, self._some
         unit = width * np.sqrt(work[some].mean() / work[some])  # the curvature grows with the workload
+        regions, tasks = self._regions, len(unit)
 
         def price_of(x: FloatArray) -> FloatArray:
+            exponent = x[:tasks] * unit + width * (regions @ x[tasks:])
             price = np.zeros(len(work))
-            price[some] = np.exp(np.clip(x * unit, -LARGEST_EXPONENT, LARGEST_EXPONENT))
-            price /= price.max()
+            price[some] = np.exp(np.clip(exponent - exponent.max(), -LARGEST_EXPONENT, 0))
             return price
 
         def dual(x: FloatArray) -> tuple[float, FloatArray]:
             price = price_of(x)
             smoothed, _, share = bidders.value(price, self.makespan, width)
             needed = price * work
-            slope = (share / smoothed - needed / needed.sum())[some] * unit
-            return float(np.log(smoothed / needed.sum())) / width, slope / width
+            slope = (share / smoothed - needed / needed.sum())[some]
+            by_variable = np.concatenate([slope * unit / width, regions.T @ slope])
+            return float(np.log(smoothed / needed.sum())) / width, by_variable
 
         def check(_: FloatArray) -> None:
             if is_over():
                 raise StopIteration
 
         options = {"maxiter": iterations, "maxcor": CORRECTIONS, "gtol": LEAST_SLOPE / len(work), "ftol": 0.0}
-        start = np.log(self.price[some]) / unit
+        start = np.concatenate([np.log(self.price[some]) / unit, np.zeros(regions.shape[1])])
         self.price = price_of(minimize(dual, start, jac=True, method="L-BFGS-B", callback=check, options=options).x)
