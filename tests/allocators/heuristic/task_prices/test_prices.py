@@ -3,7 +3,9 @@ import pytest
 from oracle import brute_force
 from tiny_instances import all_can_be_served, seeds_where, tiny_instance
 
+from alloc.allocators.heuristic.greedy.task_tree import build_tree
 from alloc.allocators.heuristic.task_prices.prices import TaskPrices
+from alloc.allocators.heuristic.task_prices.regions import regions_of
 from alloc.allocators.heuristic.task_prices.rounding import rounded
 from alloc.allocators.heuristic.task_prices.sample import representatives
 from alloc.problems import Instance, evaluate, makespan_lower_bound, serve_all
@@ -130,3 +132,40 @@ def test_where_nothing_is_scarce_prices_end_early():
     prices = TaskPrices(instance, makespan_lower_bound(instance), map, 1)
     assert not prices.improve(np.inf, never)
     assert prices.bidders is None
+
+
+def test_a_lack_far_away_is_evened_out_in_few_iterations():
+    """Along a line of tasks that each agent sees a part of, work at one end and agents at the other find prices soon."""
+    n, m = 8_000, 200
+    rng = np.random.default_rng(0)
+    along = np.linspace(0, 1, m)
+    instance = Instance(
+        ability=rng.integers(1, 10, n),
+        workload=(0.6 + 0.4 * along) * 5 * n / (0.8 * m),
+        agent_position=np.stack([rng.random(n) ** 1.4, np.zeros(n)], axis=1),
+        task_position=np.stack([along, np.zeros(m)], axis=1),
+        speed=rng.uniform(1, 5, n),
+        communication_range=np.full(n, 0.05),
+    )
+    prices, others = (TaskPrices(instance, makespan_lower_bound(instance), map, 1) for _ in range(2))
+    others._regions = others._regions[:, :0]
+    for one in (prices, others):
+        one.improve(np.inf, never)
+    assert prices.bound > 1.04 * others.bound
+    assert prices.makespan < 1.00001 * prices.bound
+
+
+def test_regions_are_the_nodes_of_the_tree():
+    """Each task is in all regions on its way to the root, with weights that fall with the size of the region."""
+    position = np.random.default_rng(0).random((50, 3))
+    tree = build_tree(position, np.arange(10, 50))
+    weight = regions_of(tree).toarray()
+    assert weight.shape == (40, len(tree.begin))
+    for node, (begin, end) in enumerate(zip(tree.begin, tree.end, strict=True)):
+        inside = np.isin(np.arange(10, 50), tree.order[begin:end])
+        assert weight[:, node] == pytest.approx(np.where(inside, (end - begin) ** -0.25, 0.0))
+
+
+def test_a_region_of_one_task_is_none():
+    """One task has a variable of its own already."""
+    assert regions_of(build_tree(np.zeros((3, 3)), np.array([1]))).shape == (1, 0)
