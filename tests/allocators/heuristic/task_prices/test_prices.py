@@ -135,7 +135,7 @@ def test_where_nothing_is_scarce_prices_end_early():
 
 
 def test_a_lack_far_away_is_evened_out_in_few_iterations():
-    """Along a line of tasks that each agent sees a part of, work at one end and agents at the other find prices soon."""
+    """Where agents are at one end of a line, work at the other, and each agent reaches a part, bounds come soon."""
     n, m = 8_000, 200
     rng = np.random.default_rng(0)
     along = np.linspace(0, 1, m)
