@@ -26,25 +26,33 @@ class Best:
     Attributes
     ----------
     bound : float
-        The greatest that was proven of the makespan.
+        The greatest that was proven of the makespan; 0 where none was.
+    unserved : int or float
+        The fewest tasks that a run left unserved; infinite where there is none.
     makespan : float
-        The least that was found; infinite where there is none.
+        The least over the served tasks of the runs that left so few unserved; infinite where there is none.
     energy : float
-        The least at a makespan that is at most 0.01 % more; NaN where there is none.
+        The least of these runs at a makespan that is at most 0.01 % more; NaN where there is none.
     """
 
     bound: float
+    unserved: float
     makespan: float
     energy: float
 
     @classmethod
     def of(cls, endings: Sequence[Ending]) -> "Best":
         """Return the best of all runs on one instance."""
-        solved = [(one.makespan, one.energy) for one in endings if one.makespan is not None and one.energy is not None]
+        unserved = min((one.unserved or 0 for one in endings if one.served_makespan is not None), default=np.inf)
+        solved = [
+            (one.served_makespan, one.energy)
+            for one in endings
+            if one.served_makespan is not None and one.energy is not None and (one.unserved or 0) == unserved
+        ]
         makespan = min((one for one, _ in solved), default=np.inf)
         energies = [energy for one, energy in solved if one <= makespan * (1 + ALIKE)]
         bound = max((one.lower_bound or 0.0 for one in endings), default=0.0)
-        return cls(bound, makespan, min(energies, default=np.nan))
+        return cls(bound, unserved, makespan, min(energies, default=np.nan))
 
 
 @dataclass(frozen=True)
@@ -55,11 +63,11 @@ class Stand:
     ----------
     ending : Ending
     beyond_bound : float
-        By which part its makespan is above the bound.
+        By which part its makespan is above the bound; NaN where a task is unserved, or there is none.
     is_least : bool
-        Whether no makespan is known that is less.
+        Whether nothing better is known: fewer tasks unserved, or as few and a lesser makespan over the others.
     energy_ratio : float
-        Of its energy to the least known; NaN where there is none.
+        Of its energy to the least known; NaN where there is none, or where it left more tasks unserved.
     behind, energy_behind : float
         By which part its makespan, and its energy at no less makespan, are above the least of the others; below 0 it
         leads. NaN where there is none to compare with.
@@ -145,13 +153,14 @@ def _score(ending: Ending | None, limit_s: float, *, energy: bool) -> Score:
 
 
 def _stand(ending: Ending, best: Best, others: Sequence[Ending | None]) -> Stand:
-    makespan = np.nan if ending.served_makespan is None else ending.served_makespan
+    served = np.nan if ending.served_makespan is None else ending.served_makespan
+    serves_as_many = (ending.unserved or 0) == best.unserved
     behind, energy_behind = _behind(ending, others)
     return Stand(
         ending,
-        beyond_bound=makespan / best.bound - 1 if best.bound else np.nan,
-        is_least=makespan <= best.makespan * (1 + EQUAL),
-        energy_ratio=(ending.energy or 0.0) / best.energy if best.energy else np.nan,
+        beyond_bound=ending.makespan / best.bound - 1 if best.bound and ending.makespan is not None else np.nan,
+        is_least=serves_as_many and served <= best.makespan * (1 + EQUAL),
+        energy_ratio=(ending.energy or 0.0) / best.energy if best.energy and serves_as_many else np.nan,
         behind=behind,
         energy_behind=energy_behind,
     )

@@ -49,7 +49,8 @@ class Difference:
     instances : int
         How many the figures are of.
     left_out : int
-        Instances without the score of one of the two, such as those on which a task was unserved or a run failed.
+        Instances without the score of one of the two, such as those on which a task was unserved or a run failed, and
+        those on which the other has 0 and this method more, so that there is no ratio.
     mean : float or None
         Mean of the relative differences: -0.1 is 10 % less than the other.
     low, high : float or None
@@ -136,8 +137,9 @@ def differences(endings: Endings, score: str = "makespan") -> list[Difference]:
 def _difference(
     method: str, against: str, score: str, ours: NDArray[np.float64], theirs: NDArray[np.float64]
 ) -> Difference:
-    known = ~np.isnan(ours) & (theirs > 0)
-    relative = ours[known] / theirs[known] - 1
+    both_nothing = (ours == 0) & (theirs == 0)
+    known = ~np.isnan(ours) & ((theirs > 0) | both_nothing)
+    relative = (ours[known] + both_nothing[known]) / (theirs[known] + both_nothing[known]) - 1  # 1 / 1 for 0 / 0
     relative[np.abs(relative) <= EQUAL] = 0.0
     low, high = interval(relative)
     return Difference(

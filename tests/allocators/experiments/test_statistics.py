@@ -53,6 +53,15 @@ def test_instances_without_a_score_are_left_out_and_counted():
     assert (one.low, one.high, one.p, one.p_holm) == (None, None, None, None)
 
 
+def test_two_scores_of_nothing_are_equal():
+    """Where agents of both methods stay where they are, both have energy 0, which is no difference; 1 over 0 is none."""
+    endings = {"a": [[solved(1.0, 0.0)]] * 2 + [[solved(1.0, 2.0)]]}
+    endings["b"] = [[solved(1.0, 0.0)], [solved(1.0, 1.0)], [solved(1.0, 1.0)]]
+    (one,) = differences(endings, "energy")
+    assert (one.instances, one.left_out, one.better, one.equal, one.worse) == (2, 1, 1, 1, 0)
+    assert one.mean == pytest.approx(-0.25)
+
+
 def test_small_samples_are_known_as_such():
     """Nine instances are few, ten are not."""
     assert differences({"a": runs(*[1] * 9), "b": runs(*[2] * 9)})[0].is_small

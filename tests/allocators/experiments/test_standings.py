@@ -1,0 +1,57 @@
+"""How methods stand against the best known, and beside each other, on runs worked out by hand."""
+
+import numpy as np
+import pytest
+
+from alloc.allocators.experiments.standings import Best, best_known, standings
+from alloc.allocators.experiments.store.outcome import Ending, Outcome
+
+
+def solved(makespan, energy=1.0, unserved=0, **others):
+    """Return how a run ended; with tasks unserved its makespan is that of the served ones alone."""
+    whole = None if unserved else makespan
+    scores = {"makespan": whole, "served_makespan": makespan, "energy": energy, "unserved": unserved}
+    return Ending(outcome=Outcome.SOLVED, **scores, **others)
+
+
+def stand(endings, label, *, energy=False):
+    """Return how a method with a single run stands."""
+    (found,) = standings(endings, best_known(endings), None, energy=energy)[label].stands
+    return found
+
+
+def test_a_run_that_serves_fewer_tasks_is_not_the_best():
+    """A plan without the task that takes longest has a lesser makespan, no bound to be compared with, and no praise."""
+    endings = {"all": [[solved(2.0, 4.0, lower_bound=1.6)]], "some": [[solved(1.0, 1.0, unserved=1)]]}
+    assert best_known(endings) == [Best(1.6, 0, 2.0, 4.0)]
+    assert stand(endings, "all").is_least
+    assert stand(endings, "all").beyond_bound == pytest.approx(0.25)
+    assert stand(endings, "all").energy_ratio == 1.0
+    assert not stand(endings, "some").is_least
+    assert np.isnan([stand(endings, "some").beyond_bound, stand(endings, "some").energy_ratio]).all()
+
+
+def test_where_no_plan_serves_all_tasks_those_that_serve_most_are_compared():
+    """The fewest unserved tasks come first, then the makespan over the served ones."""
+    endings = {"a": [[solved(3.0, 2.0, 1)]], "b": [[solved(2.0, 3.0, 1)]], "c": [[solved(1.0, 1.0, 2)]]}
+    assert best_known(endings) == [Best(0.0, 1, 2.0, 3.0)]
+    assert [stand(endings, label).is_least for label in "abc"] == [False, True, False]
+    found = standings(endings, best_known(endings), None, energy=True)
+    assert [found[label].first for label in "abc"] == [0, 1, 0]
+
+
+def test_runs_are_behind_the_best_of_the_others():
+    """Below 0 a method leads; its energy is compared with those that are no slower."""
+    endings = {"a": [[solved(1.0, 3.0)]], "b": [[solved(2.0, 1.0)]]}
+    first, second = stand(endings, "a", energy=True), stand(endings, "b", energy=True)
+    assert (first.behind, second.behind) == pytest.approx((-0.5, 1.0))
+    assert np.isnan(first.energy_behind)
+    assert second.energy_behind == pytest.approx(1 / 3 - 1)
+
+
+def test_late_runs_are_never_first():
+    """An answer beyond the time limit does not win, however good it is; equal answers win both."""
+    late, in_time = solved(1.0, runtime_s=2.0), solved(2.0, runtime_s=1.0)
+    endings = {"a": [[late, solved(1.0, runtime_s=1.0)]], "b": [[in_time, solved(1.0 + 1e-12, runtime_s=1.0)]]}
+    found = standings(endings, best_known(endings), 1.0, energy=False)
+    assert [found[label].first for label in "ab"] == [1, 2]
