@@ -6,9 +6,8 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from alloc.allocators.experiments.policies import PolicyRow
+from alloc.allocators.experiments.statistics import CONFIDENCE
 from alloc.problems import MissionResult
-
-CONFIDENCE = 0.95
 
 MEASURES = ("mission_time", "priority_done_share", "energy")
 

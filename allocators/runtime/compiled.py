@@ -1,6 +1,8 @@
 """Decorators for functions that numba compiles to machine code, at their first call or from its cache."""
 
+import contextlib
 from collections.abc import Callable, Mapping, Sequence
+from inspect import signature
 from typing import TypeVar, cast
 
 import numba
@@ -8,6 +10,8 @@ import numba
 Function = TypeVar("Function", bound=Callable[..., object])
 Type = object  # those of numba have no stubs
 
+RESOLVED = ["args", "kws"]
+"""Parameters of what numba asks a function for, when another one that is compiled calls it."""
 
 _LOOSELY = {"error_model": "numpy", "fastmath": {"contract", "reassoc", "arcp", "nsz", "afn"}}
 
@@ -27,16 +31,17 @@ def _compiled_once(loop: Function) -> Function:
     """Let compiled callers share one compilation of `loop`, whatever constants and integers they call it with.
 
     Numba compiles a function anew for each constant that is an argument, also for the value that a variable has at
-    first, and for integers of 32 and of 64 bits: a tenth of the time that all loops took.
+    first, and for integers of 32 and of 64 bits: a tenth of the time that all loops took. `get_call_template` is not
+    among what numba documents: where it is not as it was, loops are compiled for each caller, and do the same.
     """
     resolve = getattr(loop, "get_call_template", None)  # not where numba is told to compile nothing
+    if resolve is None or list(signature(resolve).parameters) != RESOLVED:
+        return loop
 
-    def resolve_alike(arguments: Sequence[Type], keywords: Mapping[str, Type]) -> object:
-        assert resolve is not None
-        alike = tuple(map(_whole_type, arguments)), {name: _whole_type(one) for name, one in keywords.items()}
-        return resolve(*alike)
+    def resolve_alike(args: Sequence[Type], kws: Mapping[str, Type]) -> object:
+        return resolve(tuple(map(_whole_type, args)), {name: _whole_type(one) for name, one in kws.items()})
 
-    if resolve is not None:
+    with contextlib.suppress(AttributeError):
         loop.get_call_template = resolve_alike  # type: ignore[attr-defined]
     return loop
 

@@ -104,7 +104,7 @@ def run_server(service: Service, host: str, port: int, most_bytes: int, tell: Ca
         server.run()
     except SystemExit as error:
         words = f"{reason.text[:1].lower()}{reason.text[1:]}"
-        raise InputError(f"cannot listen on {host}:{port}: {words}; name another place", "http") from error
+        raise InputError(f"cannot listen on {host}:{port}: {words}; name another host or port", "http") from error
     finally:
         sys.setswitchinterval(interval_s)
         log.removeFilter(reason)

@@ -48,8 +48,8 @@ def complain(text: str) -> None:
 
 
 def interrupted() -> int:
-    """Say that Ctrl-C came before there was anything to answer with, and return the exit code."""
-    complain("interrupted before there was a result")
+    """Say that Ctrl-C came before all was done, whatever was printed by then, and return the exit code."""
+    complain("interrupted before it was done")
     return INTERRUPTED
 
 

@@ -13,7 +13,7 @@ from alloc.cli.start import repeat_lost_interrupts
 from alloc.problems import Family, random_instance
 from alloc.problems.formats import write_instance
 
-INTERRUPTED = "alloc: interrupted before there was a result\n"
+INTERRUPTED = "alloc: interrupted before it was done\n"
 
 PATIENCE_S = 2.5
 """A second for the run to end, and as much again, and some, for a busy machine to end the process."""

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from alloc.allocators.experiments.differences import Interval, PolicyDifference, paired_differences
 from alloc.allocators.experiments.policies import PolicyRow
 from alloc.allocators.experiments.report.table import Table
+from alloc.allocators.experiments.statistics import CONFIDENCE, SMALL
 from alloc.allocators.experiments.stored import Comparison, Endings, doubts
 from alloc.allocators.experiments.sweep import mean
 from alloc.problems.text import counted, number, percent
@@ -22,7 +23,8 @@ def mission_tables(comparison: Comparison, endings: Endings, rows: Sequence[Poli
     rows : sequence of PolicyRow
         Those of the comparison.
     """
-    return [_policies(comparison, endings, rows), *difference_tables(paired_differences(rows))]
+    tables = difference_tables(paired_differences(rows), len(comparison.instances))
+    return [_policies(comparison, endings, rows), *tables]
 
 
 def _policies(comparison: Comparison, endings: Endings, rows: Sequence[PolicyRow]) -> Table:
@@ -44,13 +46,20 @@ def _policies(comparison: Comparison, endings: Endings, rows: Sequence[PolicyRow
     return Table("Policies", header, cells, [*notes, *doubts(endings)])
 
 
-def difference_tables(differences: Sequence[PolicyDifference]) -> list[Table]:
-    """Return how policies differ from the first one, as one table; none where there is only one."""
+def difference_tables(differences: Sequence[PolicyDifference], missions: int) -> list[Table]:
+    """Return how policies differ from the first one in so many missions, as one table; none if there is only one."""
     if not differences:
         return []
-    title = f"Against {differences[0].against}, in the same missions with the same seeds (95 % interval)"
+    title = f"Against {differences[0].against}, in the same missions with the same seeds ({percent(CONFIDENCE)} interval)"
     header = ["policy", "time", "interval", "pairs", "energy", "interval", "priority done", "interval", "pairs"]
-    return [Table(title, header, [_difference(one) for one in differences], [])]
+    return [Table(title, header, [_difference(one) for one in differences], _sample(missions))]
+
+
+def _sample(missions: int) -> list[str]:
+    """Return what is to be known of a small sample, in a sentence."""
+    if missions == 1:
+        return ["A single mission: pairs are its seeds, and tell nothing of other missions."]
+    return [f"Small sample: intervals from fewer than {SMALL} missions say little."] if missions < SMALL else []
 
 
 def _difference(one: PolicyDifference) -> list[str]:

@@ -15,7 +15,7 @@ MEANINGS = {
     "SQLITE_READONLY": "cannot be written: it, or its folder, is read-only; change its permissions",
     "SQLITE_PERM": "may not be opened; change its permissions",
     "SQLITE_CANTOPEN": "cannot be opened; check the path, its folder, and the permissions of both",
-    "SQLITE_BUSY": f"is locked by another program for more than {BUSY_S:g} s; end that, and call this again",
+    "SQLITE_BUSY": f"has been locked by another program for {BUSY_S:g} s; end that, and call this again",
     "SQLITE_LOCKED": "is locked by another program; end that, and call this again",
     "SQLITE_PROTOCOL": "is locked by another program; end that, and call this again",
     "SQLITE_NOTADB": "is no store of runs; name another file",

@@ -154,7 +154,7 @@ def _explain(axes: "Axes") -> None:
     from matplotlib.lines import Line2D
 
     entries = [("o", f"task {state}", colour) for state, colour in TASK_COLOURS.items()]
-    entries += [("s", state, colour) for state, colour in AGENT_COLOURS.items()]
+    entries += [("s", f"agent {state}", colour) for state, colour in AGENT_COLOURS.items()]
     marks = [
         Line2D(
             [], [], marker=shape, linestyle="", color=colour, markeredgecolor="0.4", markeredgewidth=0.5, label=label

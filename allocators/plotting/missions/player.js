@@ -35,7 +35,7 @@ const isWorkedOn = (j, hour) => spans[j].some(([begin, until]) => begin <= hour 
 function stateAt(j, hour) {
   const found = taskAt(tasks[j], hour);
   if (!found) return null;
-  const name = found.status !== "open" ? found.status : isWorkedOn(j, hour) ? "worked on" : "waits";
+  const name = found.status !== "open" ? found.status : isWorkedOn(j, hour) ? "in progress" : "waiting";
   return { ...found, name, number: stateOf[name] };
 }
 
@@ -267,7 +267,7 @@ function about() {
   if (followed < 0) return "Click an agent, or choose one above, to follow it. Wheel and drag zoom and move the map.";
   const leg = legAt(agents[followed], hour);
   const state = leg && agentStates[leg[4]];
-  const doing = `${agents[followed].id} ${!leg ? "has not joined" : state ? state.name : "has failed"}${leg && leg[5] >= 0 ? ` (${tasks[leg[5]].id})` : ""}.`;
+  const doing = `${agents[followed].id} ${!leg ? "has not joined" : state ? `is ${state.name}` : "has failed"}${leg && leg[5] >= 0 ? ` (${tasks[leg[5]].id})` : ""}.`;
   if (mission.isFull) return `${doing}\nEverybody knows all that is true.`;
   const reports = reportsOf(followed, hour);
   if (!reports) return `${doing}\nWhat it knows was not recorded.`;
@@ -364,7 +364,7 @@ for (const [kind, states] of [["task", taskStates], ["agent", agentStates]]) {
   for (const { name, colour } of states) {
     const entry = legend.append("li");
     entry.append("i").attr("class", kind).style("background", colour);
-    entry.append("span").text(kind === "task" ? `task ${name}` : name);
+    entry.append("span").text(`${kind} ${name}`);
   }
 }
 const wish = new URLSearchParams(location.hash.slice(1)); // such as #hour=3&follow=a2&known

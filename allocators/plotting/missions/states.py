@@ -6,24 +6,24 @@ from alloc.problems.instance import FloatArray, IntArray
 from alloc.problems.missions.course import Course, Leg
 from alloc.problems.missions.simulation.state import AgentStatus, TaskStatus
 
-WAITS, WORKED_ON, DONE, MISSED, CANCELLED = "waits", "worked on", "done", "missed", "cancelled"
+WAITING, IN_PROGRESS, DONE, MISSED, CANCELLED = "waiting", "in progress", "done", "missed", "cancelled"
 
 TASK_COLOURS = {
     DONE: "#009e73",
-    WORKED_ON: "#e69f00",
-    WAITS: "#cc79a7",
+    IN_PROGRESS: "#e69f00",
+    WAITING: "#cc79a7",
     MISSED: "#d55e00",
     CANCELLED: "#999999",
 }
 """From the palette of Okabe and Ito."""
 
-WORKS, FLIES, EXPLORES, STANDS, AWAY = "works", "flies to a task", "flies elsewhere", "stands", "is away"
+WORKING, FLYING, ELSEWHERE, IDLE, AWAY = "working", "flying to a task", "flying elsewhere", "idle", "away"
 
 AGENT_COLOURS = {
-    WORKS: "#e69f00",
-    FLIES: "#0072b2",
-    EXPLORES: "#9fcdec",
-    STANDS: "#e4e6e8",
+    WORKING: "#e69f00",
+    FLYING: "#0072b2",
+    ELSEWHERE: "#9fcdec",
+    IDLE: "#e4e6e8",
     AWAY: "#8c8c8c",
 }
 
@@ -33,8 +33,8 @@ _OVER = {TaskStatus.DONE: DONE, TaskStatus.MISSED: MISSED, TaskStatus.CANCELLED:
 def doing(leg: Leg) -> str | None:
     """Return what an agent does, in the words of the drawings; None where it is not in the mission."""
     if leg.status is AgentStatus.FLYING:
-        return FLIES if leg.task >= 0 else EXPLORES
-    return {AgentStatus.WORKING: WORKS, AgentStatus.IDLE: STANDS, AgentStatus.AWAY: AWAY}.get(leg.status)
+        return FLYING if leg.task >= 0 else ELSEWHERE
+    return {AgentStatus.WORKING: WORKING, AgentStatus.IDLE: IDLE, AgentStatus.AWAY: AWAY}.get(leg.status)
 
 
 def workers(course: Course, hours: FloatArray) -> IntArray:
@@ -61,5 +61,5 @@ def task_states(course: Course, hours: FloatArray) -> list[list[str | None]]:
 
 def _state(status: TaskStatus, here: int) -> str | None:
     if status is TaskStatus.OPEN:
-        return WORKED_ON if here else WAITS
+        return IN_PROGRESS if here else WAITING
     return _OVER.get(status)

@@ -8,8 +8,8 @@ from alloc.allocators.plotting.missions.states import (
     AGENT_COLOURS,
     MISSED,
     TASK_COLOURS,
-    WAITS,
-    WORKS,
+    WAITING,
+    WORKING,
     doing,
     task_states,
 )
@@ -67,7 +67,7 @@ def draw_work(axes: "Axes", course: Course) -> None:
     """Draw the work left of all tasks that have appeared."""
     hours = _hours(course)
     left = course.work_left(hours).sum(axis=0)
-    axes.fill_between(hours, left, color=TASK_COLOURS[WAITS], alpha=0.25, linewidth=0)
+    axes.fill_between(hours, left, color=TASK_COLOURS[WAITING], alpha=0.25, linewidth=0)
     axes.plot(hours, left, color="#8c3f6a", linewidth=1.5)
     axes.set_ylim(0, (float(left.max(initial=0.0)) or 1.0) * 1.06)
     axes.set_ylabel(plain_text(heading("work left", course.mission.instance.units.work)))
@@ -103,7 +103,7 @@ def _beside(axes: "Axes") -> None:
 
 
 def draw_gantt(axes: "Axes", course: Course) -> None:
-    """Draw a row for each agent: when it flew, worked, stood and was away."""
+    """Draw a row for each agent: when it was flying, working, idle and away."""
     from matplotlib.patches import Patch
 
     n = len(course.legs)
@@ -153,6 +153,6 @@ def name_work(axes: "Axes", course: Course) -> None:
     width = axes.bbox.width * 72 / axes.figure.dpi / (course.end or 1.0)
     for agent, legs in enumerate(course.legs):
         for leg in legs:
-            if doing(leg) == WORKS and LETTER * size * len(names[leg.task]) + 3 < width * (leg.end - leg.begin):
+            if doing(leg) == WORKING and LETTER * size * len(names[leg.task]) + 3 < width * (leg.end - leg.begin):
                 middle = (leg.begin + leg.end) / 2
                 axes.text(middle, agent, plain_text(names[leg.task]), ha="center", va="center_baseline", fontsize=size)

@@ -147,8 +147,10 @@ def _tell(rows: "list[PolicyRow]", differences: "list[PolicyDifference]", units:
     late = sum(row.decisions_late for row in rows)
     if late:
         note(f"{late} decisions came after the deadline and were not followed; see --deadline-ms")
-    for found in difference_tables(differences):
+    for found in difference_tables(differences, len({row.number for row in rows})):
         say(f"\n{found.title}:\n{table(found.header, found.rows)}")
+        for one in found.notes:
+            note(one)
 
 
 def _cells(row: "PolicyRow") -> list[str]:

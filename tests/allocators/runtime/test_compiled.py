@@ -1,7 +1,10 @@
 """Loops are compiled once for all callers, whatever constants and integers these call them with."""
 
+import numba
 import numpy as np
+import pytest
 
+from alloc.allocators.runtime import compiled as module
 from alloc.allocators.runtime.compiled import compiled
 
 
@@ -23,3 +26,42 @@ def test_constants_and_small_integers_share_what_is_compiled():
     assert total(np.array([1, 2], dtype=np.int32)) == 13
     assert total(np.array([2**40, -1])) == 2**40 + 9
     assert [str(one) for one in added.signatures] in ([], ["(int64, int64)"])  # none where `total` is cached
+
+
+class Changed:
+    """A compiled function of a numba whose inner parts are not those of today."""
+
+    def get_call_template(self, call):
+        return call
+
+
+class Fixed:
+    """Likewise, with nothing that could be replaced."""
+
+    __slots__ = ()
+
+    def get_call_template(self, args, kws):
+        return args, kws
+
+
+@pytest.mark.parametrize("function", [Changed(), Fixed(), object()])
+def test_another_numba_is_left_as_it_is(function):
+    """Where the place in numba that is replaced is not as it was, a function stays what it is."""
+    assert module._compiled_once(function) is function
+    assert "get_call_template" not in getattr(function, "__dict__", {})
+
+
+def test_loops_that_share_nothing_do_the_same(monkeypatch):
+    """Without that place each caller has loops compiled for it, with the same sums."""
+    monkeypatch.setattr(module, "RESOLVED", ["of another numba"])
+    own = module._compiled_once(numba.njit(added.py_func))
+
+    @numba.njit
+    def both(steps):
+        found = 0
+        for step in steps:
+            found = own(found, step)
+        return own(found, 10)
+
+    assert both(np.array([1, 2], dtype=np.int32)) == 13
+    assert len(own.signatures) > 1

@@ -13,7 +13,7 @@ def test_a_port_that_is_taken_is_one_line(alloc):
         port = taken.getsockname()[1]
         ran = alloc("serve", "--http", str(port))
     place = f"127.0.0.1:{port}"
-    line = f"alloc: --http: cannot listen on {place}: address already in use; name another place\n"
+    line = f"alloc: --http: cannot listen on {place}: address already in use; name another host or port\n"
     assert (ran.code, ran.out, ran.err) == (2, "", line)
     assert sys.getswitchinterval() == before
 
