@@ -28,7 +28,10 @@ def convert_command(
         ),
     ],
 ) -> None:
-    """Write an instance in another format, which the suffix decides."""
+    """Write an instance in another format.
+
+    The suffix decides which.
+    """
     from alloc.problems.formats import read_instance, write_instance
 
     write_instance(read_instance(source), target)

@@ -19,9 +19,10 @@ EXAMPLES = examples(
 
 
 def register(app: typer.Typer) -> None:
-    """Add the command to `app`, by both of its names."""
-    for name in ("export", "export-model"):
-        app.command(name, epilog=EXAMPLES.replace("alloc export ", f"alloc {name} "))(export_command)
+    """Add the command to `app`, by both of its names; the help of the second one says that it is the same."""
+    app.command("export", epilog=EXAMPLES)(export_command)
+    examples_of_both = EXAMPLES.replace("alloc export ", "alloc export-model ")
+    app.command("export-model", help="The same as `alloc export`.", epilog=examples_of_both)(export_command)
 
 
 def export_command(
@@ -45,7 +46,7 @@ def export_command(
         ),
     ] = None,
 ) -> None:
-    """Write the integer programme of an instance, for any solver."""
+    """Write an instance as an integer programme for any solver."""
     from alloc.problems import read_instance, write_model
 
     check_outputs(("--output", output), read=[("INSTANCE", instance)])

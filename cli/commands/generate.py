@@ -113,7 +113,10 @@ def generate_command(
     sensing: Annotated[float | None, _option("How far agents see in the mission.", "0.3")] = None,
     loss: Annotated[float | None, _option("Share of the messages that is lost in the mission.", "0.2")] = None,
 ) -> None:
-    """Generate instances: the scenarios of the paper, random ones, machine covering; or missions."""
+    """Generate instances or missions.
+
+    Families are the scenarios of the paper, random instances, machine covering, and missions.
+    """
     wanted = {name: value for name, value in locals().items() if value is not None and name not in FIXED}
     _check_options(family, wanted)
     if count > 1 and output == STANDARD:

@@ -81,7 +81,10 @@ def import_command(
     ] = None,
     quiet: options.QuietOption = False,
 ) -> None:
-    """Make an instance of tables as people keep them: spreadsheets of agents and tasks."""
+    """Make an instance of spreadsheets of agents and tasks.
+
+    They are read as people keep them; what each column was taken for is told.
+    """
     from alloc.problems import Instance
     from alloc.problems.formats import write_instance
     from alloc.problems.formats.spreadsheet import read_grid

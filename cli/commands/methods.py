@@ -74,7 +74,10 @@ def methods_command(
         typer.Option("--prepare", help="Compile the loops of all methods and policies now, not in first runs."),
     ] = False,
 ) -> None:
-    """List the methods, what each can do, and which packages it still needs; or the parameters of one."""
+    """List the methods, or the parameters of one.
+
+    The list tells what each method can do, and which packages it still needs.
+    """
     from alloc.allocators import names
 
     if method is not None:

@@ -40,7 +40,10 @@ def plot_command(
         typer.Argument(metavar="RESULT", help=f"{options.PLAN}; - is standard input."),
     ] = None,
 ) -> None:
-    """Draw a stored result or allocation: sites and moves, when each task is done; or the log of a mission."""
+    """Draw a stored result, an allocation or a mission's log.
+
+    Of a plan it shows sites and moves, and when each task is done.
+    """
     from alloc.allocators import plot
     from alloc.problems import InputError
     from alloc.problems.formats import read_instance

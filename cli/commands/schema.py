@@ -38,7 +38,7 @@ def schema_command(
         ),
     ] = None,
 ) -> None:
-    """Print the JSON Schema of a format, or list the formats that have one."""
+    """Print the JSON Schema of a format, or list the formats."""
     from alloc.problems.formats.schemas import SCHEMAS, schema_text
 
     if name is None:

@@ -54,7 +54,10 @@ def validate_command(
     ],
     json: options.JsonOption = False,
 ) -> None:
-    """Check instances, missions and logs, and print a summary of each, and what may not be meant."""
+    """Check instances, missions and logs.
+
+    A summary of each is printed, and what may not be meant.
+    """
     facts: list[dict[str, object]] = []
     for name in files:
         found, faults = _checked(name)

@@ -29,6 +29,15 @@ def test_help_names_every_command_and_loads_no_numpy():
     assert all(f"\n  {command} " in ran.stdout for command in COMMANDS)
 
 
+def test_what_a_command_does_fits_a_line_of_the_list():
+    """No line of the list is cut off, and no two commands have the same one: a second name says so."""
+    listed = python("-m", "alloc", "--help", COLUMNS="80").stdout.split("Commands:\n")[1].split("\n\n")[0]
+    lines = dict(line.split(maxsplit=1) for line in listed.splitlines())
+    assert not [line for line in lines.values() if line.endswith("...")]
+    assert len(set(lines.values())) == len(COMMANDS)
+    assert lines["export-model"] == "The same as `alloc export`."
+
+
 def test_commands_are_found():
     """The checks of every command go through the commands there are, and those of readers through the readers."""
     assert {"solve", "train"} < set(COMMANDS)

@@ -94,7 +94,10 @@ def compare_command(
     engine: kept.EngineOption = None,
     address: kept.AddressOption = None,
 ) -> None:
-    """Run several methods on instances, or policies in missions, with several seeds, and print a table."""
+    """Compare methods on instances, or policies in missions.
+
+    Each runs with every seed, and a table is printed.
+    """
     from alloc.allocators import Budget
     from alloc.problems.formats import is_standard_output
 

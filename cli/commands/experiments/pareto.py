@@ -55,7 +55,10 @@ def pareto_command(
     json: options.JsonOption = False,
     quiet: options.QuietOption = False,
 ) -> None:
-    """Trace the Pareto front of makespan and energy: how much energy saving time costs."""
+    """Trace the Pareto front of makespan and energy.
+
+    It tells how much energy it costs to save time.
+    """
     from alloc.allocators.pareto import pareto
 
     check_outputs(("--output", output), ("--plot", plot), read=[("INSTANCE", instance)])

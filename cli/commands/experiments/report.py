@@ -42,7 +42,10 @@ def report_command(
         str | None, typer.Option(help="Heading of the page.", show_default="the names of the stores")
     ] = None,
 ) -> None:
-    """Write the runs of stores as one page: tables, statistics, charts, failures, and maps of the plans."""
+    """Write the runs of stores as one page.
+
+    It has tables, statistics, charts, failures, and maps of the plans.
+    """
     from alloc.allocators import report_html
 
     check_outputs(("--output", output), read=[("STORE", store) for store in stores])

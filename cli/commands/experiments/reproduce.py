@@ -57,7 +57,10 @@ def reproduce_command(
         bool, typer.Option("--page", help="Make no runs: figures and page from those in the folder.")
     ] = False,
 ) -> None:
-    """Repeat the paper's experiments: five methods learn from nothing, in four scenarios, with figures and a page."""
+    """Repeat the paper's experiments.
+
+    Five methods learn from nothing in four scenarios, and figures and a page are made of it.
+    """
     from alloc.allocators.experiments.reproduction.folder import Folder
 
     place = Folder(Path(folder))

@@ -62,7 +62,10 @@ def whatif_command(
     json: options.JsonOption = False,
     quiet: options.QuietOption = False,
 ) -> None:
-    """Say what more or fewer agents bring: makespan, energy and bounds by size of the fleet."""
+    """Say what more or fewer agents bring.
+
+    It tells makespan, energy and bounds by size of the fleet.
+    """
     from alloc.allocators import whatif
     from alloc.problems import read_instance
 

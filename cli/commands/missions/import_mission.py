@@ -64,7 +64,10 @@ def import_mission_command(
     ] = None,
     quiet: options.QuietOption = False,
 ) -> None:
-    """Make a mission of a file of others: a benchmark, a simulator's configuration, or records of what happened."""
+    """Make a mission of a file of another program.
+
+    It may be of a benchmark, a simulator's configuration, or a record of what happened.
+    """
     from alloc.problems import import_mission, write_mission
 
     check_outputs(("--output", output), read=[("FILE", file), ("--fleet", fleet)])

@@ -69,7 +69,10 @@ def plan_command(
         typer.Option(metavar="FILE", help="Go on from this file if it is there, by its policy; save to it at the end."),
     ] = None,
 ) -> None:
-    """Plan for a program in any language: events in, orders out, one line of JSON each."""
+    """Plan for a program in any language.
+
+    Events come in and orders go out, a line of JSON each.
+    """
     from alloc.allocators import MissionPlanner, load_policy
     from alloc.allocators.online.planner.lines import Lines
     from alloc.problems import read_mission

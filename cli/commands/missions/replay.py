@@ -27,7 +27,10 @@ def replay_command(
     json: options.JsonOption = False,
     quiet: options.QuietOption = False,
 ) -> None:
-    """Simulate a mission again by the orders of its log, and find the same figures."""
+    """Simulate a mission again by the orders of its log.
+
+    The figures must come out the same.
+    """
     from alloc.cli.output.mission import law_lines, lines
     from alloc.problems import InputError, read_log, replay
     from alloc.problems.formats.files import named

@@ -69,7 +69,10 @@ def simulate_command(
     json: options.JsonOption = False,
     quiet: options.QuietOption = False,
 ) -> None:
-    """Let a policy lead the agents of a mission: allocation that goes on in time."""
+    """Let a policy lead the agents of a mission.
+
+    Allocation goes on in time: agents are done, fail and join, and tasks appear.
+    """
     from alloc.allocators import simulate
     from alloc.problems import Recorder, read_mission, write_log
 

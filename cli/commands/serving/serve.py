@@ -60,7 +60,10 @@ def serve_command(
     ] = 10_000,
     most_bytes: Annotated[int, typer.Option(min=1, help="Largest request over HTTP.")] = 4_000_000,
 ) -> None:
-    """Solve for other programs: lines of JSON on standard input, or HTTP."""
+    """Solve for other programs.
+
+    They ask by lines of JSON on standard input, or over HTTP.
+    """
     from alloc.allocators.parallel.processors import available_threads
     from alloc.allocators.serving.request import ServiceLimits
     from alloc.allocators.serving.service import Service

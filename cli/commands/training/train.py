@@ -70,7 +70,10 @@ def train_command(
     address: options.AddressOption = None,
     threads: options.TorchThreadsOption = 1,
 ) -> None:
-    """Train a learned method, with a checkpoint after each generation."""
+    """Train a learned method.
+
+    There is a checkpoint after each generation.
+    """
     state, lines = _files(output, checkpoint, log, init)
     from alloc.allocators.parallel.engines import check_engine, make_engine
 

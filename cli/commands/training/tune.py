@@ -38,7 +38,10 @@ def tune_command(
     ] = None,
     seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, help="Seed of all random numbers.")] = 0,
 ) -> None:
-    """Tune the hyperparameters of a learned method on validation games."""
+    """Tune the hyperparameters of a learned method.
+
+    Trials are judged by validation games.
+    """
     check_output(study)
     from alloc.allocators.learned.algorithms.registry import method_parameters
     from alloc.allocators.learned.training.families import check_families
