@@ -3,14 +3,21 @@
 from collections.abc import Sequence
 
 
+WRITTEN_OUT = 1e7
+"""Numbers below which whole ones are told by all their digits."""
+
+
 def one_line(text: str) -> str:
     """Return `text` with line breaks and control characters replaced by blanks."""
     return " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
 
 
 def number(value: float | None, digits: int = 6) -> str:
-    """Return `value` with this many significant digits; a dash for None."""
-    return "-" if value is None else f"{value:.{digits}g}"
+    """Return `value` with this many significant digits, a dash for None; below ten millions without an exponent."""
+    if value is None:
+        return "-"
+    text = f"{value:.{digits}g}"
+    return f"{value:.0f}" if "e+" in text and abs(value) < WRITTEN_OUT else text
 
 
 def counted(count: int, noun: str) -> str:

@@ -91,7 +91,7 @@ SEPARATORS_AND_ENCODINGS = [
         "Latin-1",
         "Bezeichnung;Fähigkeit\nMüller;4\n".encode("latin-1"),
         fields={"agent_ids": ("Müller",), "ability": [4]},
-        lines=("agents.csv: is no UTF-8 and was read as Windows-1252",),
+        lines=("agents.csv: is not UTF-8 and was read as Windows-1252",),
     ),
     Case("line ends of an old Mac", "id,ability\rd1,4\rd2,2\r", fields={"ability": [4, 2]}),
     Case("quoted cells with commas", '"id","ability"\n"Smith, J.","4"\n', fields={"agent_ids": ("Smith, J.",)}),
@@ -164,6 +164,13 @@ NUMBERS = [
         "id,ability\nd1,four\n",
         error="agents.csv: line 2, column 'ability': must be a number, got 'four'",
     ),
+    Case(
+        "a name taken for something else",
+        "Gerät;Rate\nM 1;schnell\n",
+        error="agents.csv: line 2, column 'Rate': must be a number, got 'schnell'; if this is not the ability, say "
+        "which is by --map ability=COLUMN",
+    ),
+    Case("devices", "Gerät;Rate\nM 1;4\n", fields={"agent_ids": ("M 1",), "ability": [4]}),
     Case(
         "no ability",
         "id,ability\nd1,4\nd2,\n",

@@ -20,6 +20,7 @@ from alloc.allocators.experiments.store.revision import revision
 from alloc.allocators.experiments.store.store import LEASE_S, Store
 from alloc.allocators.parallel.engine import POLL_S
 from alloc.problems import InputError, Instance, Mission
+from alloc.problems.text import counted
 
 OTHERS_S = 0.3
 """Seconds between two looks at what other commands have left to do."""
@@ -247,7 +248,8 @@ def _check_workers(workers: int | None, threads: int, room: int, *, pinned: bool
     """Raise an error for more timed runs at a time than there are processors, as they never share one."""
     if pinned and (workers or 1) > room:
         raise InputError(
-            f"{workers or 1} timed runs of {threads} threads at a time need {(workers or 1) * threads} processors, and "
-            f"there is room for {room}; take fewer workers or threads, or limit iterations instead of time",
+            f"{workers or 1} timed runs of {counted(threads, 'thread')} at a time need {(workers or 1) * threads} "
+            f"processors, and there is room for {room}; take fewer workers or threads, or limit iterations instead of "
+            "time",
             "workers",
         )

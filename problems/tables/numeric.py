@@ -117,7 +117,9 @@ class Numbers:
         degrees = angle(cell) if name in ANGLES and not re.search(OTHER_SIDES[name], cell) else None
         if degrees is not None:
             return degrees, ""
-        raise self._table.error(f"must be a number, got {shown(cell)}", row, column)
+        header = self._table.headers[column].text
+        guess = "" if header.casefold() == name else f"; if this is not the {name}, say which is by --map {name}=COLUMN"
+        raise self._table.error(f"must be a number, got {shown(cell)}{guess}", row, column)
 
     def _value(self, digits: str, mark: Mark, row: int, column: int) -> float:
         shown_mark = mark_of(digits)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from alloc.problems.text import heading, labelled, short_names
+from alloc.problems.text import heading, labelled, number, short_names
 
 
 @pytest.mark.parametrize(
@@ -32,3 +32,12 @@ def test_units_are_left_out_where_there_are_none() -> None:
     """A number or a heading alone, or with the unit."""
     assert (labelled("1", ""), labelled("1", "h")) == ("1", "1 h")
     assert (heading("finish", ""), heading("finish", "h")) == ("finish", "finish (h)")
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(1714.2, "1714"), (-12345.6, "-12346"), (0.0012345, "0.00123"), (12.345, "12.3"), (2.5e7, "2.5e+07"), (None, "-")],
+)
+def test_numbers_are_read_without_an_exponent(value: float | None, text: str) -> None:
+    """Three digits of an ability of 1714 are not 1.71e+03; what is larger than ten millions has an exponent."""
+    assert number(value, 3) == text

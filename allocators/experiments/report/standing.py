@@ -22,7 +22,8 @@ def standing_tables(found: dict[str, Standing]) -> list[Table]:
         "that over runs with the least T; energy gap to the run's own bound.",
     ]
     notes_of_others = [
-        "By how much more T, and energy at no less T, a method has than the best other one; below 0 it leads. First: "
+        "By how much more T a method has than the best of the others, and by how much more energy than the best of "
+        "those that are no slower; below 0 it leads. First: "
         "nobody had fewer tasks unserved, then less T, then less energy; never runs that took more than "
         f"{LATE:g} times their limit. First answer: its T, mean, and its time, median.",
     ]

@@ -36,7 +36,7 @@ def grid_of_text(data: bytes, source: str) -> Grid:
     text, encoding = decoded(data)
     if text.lstrip().startswith(("<", "{")):
         raise InputError("is HTML, XML or JSON, not a table; save it as .csv or .xlsx")
-    notes = [] if encoding.startswith("utf") else [f"is no UTF-8 and was read as {encoding}"]
+    notes = [] if encoding.startswith("utf") else [f"is not UTF-8 and was read as {encoding}"]
     declared = DECLARED.match(text)
     first = 0
     if declared:

@@ -269,7 +269,7 @@ def test_a_store_of_the_first_version_has_no_maps(store, tmp_path):
 
 def test_what_cannot_be_read_or_written_is_an_error(store, tmp_path, monkeypatch):
     """A missing store, another suffix, and a missing package are errors of one line; no page is left behind."""
-    with pytest.raises(InputError, match=r"no\.db: cannot be opened"):
+    with pytest.raises(InputError, match=r"no\.db: there is no such file"):
         report_html([tmp_path / "no.db"], tmp_path / "report.html")
     assert not (tmp_path / "no.db").exists()
     with pytest.raises(InputError, match=r"must end in \.html"):

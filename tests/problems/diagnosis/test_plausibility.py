@@ -62,7 +62,7 @@ DOUBTFUL = [
     ),
     ({"speed": 3 * [5], **NOWHERE}, "speed", "has no effect"),
     ({"battery": 3 * [5], **NOWHERE}, "battery", "has no effect"),
-    ({"ability": (2, 3, 5000)}, "ability", "that of a3 is 2e+03 times the median of the others, 2.5"),
+    ({"ability": (2, 3, 5000)}, "ability", "that of a3 is 2000 times the median of the others, 2.5"),
     ({"ability": (2, 2, 2), "workload": (5, 5), **NOWHERE}, "agents", "all are alike"),
     ({"workload": (1, 2, 3, 4), "task_position": None}, "agents", "3 agents for 4 tasks, and each agent does one task"),
 ]

@@ -150,6 +150,8 @@ def _has_plans(connection: sqlite3.Connection) -> bool:
 @contextmanager
 def _opened(path: PathLike) -> Iterator[sqlite3.Connection]:
     """Open a store for reading, while others may write it."""
+    if not os.path.exists(path):
+        raise InputError("there is no such file; check the path", source=named(path))
     with explained(named(path)):
         opened = _connected(os.path.abspath(os.fspath(path)), named(path))
     with closing(opened) as connection, explained(named(path)):

@@ -44,7 +44,7 @@ def test_progress_is_shown_on_a_terminal(monkeypatch, capsys):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["no.db", "-o", "report.html"], "no.db: cannot be opened"),
+        (["no.db", "-o", "report.html"], "no.db: there is no such file"),
         (["text", "-o", "report.html"], "text: is no store of runs"),
         (["runs.db", "-o", "report.pdf"], "report.pdf: must end in .html"),
         (["runs.db", "-o", "no/report.html"], "no/report.html"),
