@@ -248,18 +248,28 @@ function drawGantt() {
   pen.fillRect(x(player.hour) - 1, 0, 2, chart.clientHeight);
 }
 
+// a row of the table of counts, whose colours explain the map
+function addCount(rows) {
+  const added = rows.append("tr");
+  const name = added.append("td");
+  name.append("i").attr("class", (row) => row.kind).style("background", (row) => row.colour);
+  name.append("span").text((row) => row.name);
+  added.append("td");
+  return added;
+}
 function tell() {
   const { hour } = player;
   byId("clock").textContent = hours(hour);
   byId("hour").value = hour;
   byId("play").textContent = player.isPlaying ? "pause" : "play";
   const states = tasks.map((_, j) => stateAt(j, hour)).filter(Boolean);
-  const rows = taskStates.map((state) => [`tasks: ${state.name}`, states.filter((one) => one.name === state.name).length]);
-  agentStates.forEach((state, number) => rows.push([`agents: ${state.name}`,
-    agents.filter((agent) => (legAt(agent, hour) || [])[4] === number).length]));
-  rows.push(["work left", d3.sum(states, (one) => one.left).toFixed(1)]);
-  rows.push(["messages so far", d3.bisector((one) => one[0]).right(mission.messages, hour)]);
-  d3.select("#counts tbody").selectAll("tr").data(rows).join("tr").selectAll("td").data((row) => row).join("td").text(String);
+  const rows = taskStates.map(({ name, colour }) => ({ kind: "task", name: `tasks ${name}`, colour,
+    value: states.filter((one) => one.name === name).length }));
+  agentStates.forEach(({ name, colour }, number) => rows.push({ kind: "agent", name: `agents ${name}`, colour,
+    value: agents.filter((agent) => (legAt(agent, hour) || [])[4] === number).length }));
+  rows.push({ kind: "other", name: "work left", value: d3.sum(states, (one) => one.left).toFixed(1) });
+  rows.push({ kind: "other", name: "messages so far", value: d3.bisector((one) => one[0]).right(mission.messages, hour) });
+  d3.select("#counts tbody").selectAll("tr").data(rows).join(addCount).select("td:last-child").text((row) => row.value);
   byId("about").textContent = about();
 }
 function about() {
@@ -359,14 +369,6 @@ const [heading, ...below] = mission.summary;
 byId("heading").textContent = heading;
 byId("summary").textContent = below.join("\n");
 agents.forEach((agent, i) => byId("follow").add(new Option(agent.id, i)));
-const legend = d3.select("#legend");
-for (const [kind, states] of [["task", taskStates], ["agent", agentStates]]) {
-  for (const { name, colour } of states) {
-    const entry = legend.append("li");
-    entry.append("i").attr("class", kind).style("background", colour);
-    entry.append("span").text(`${kind} ${name}`);
-  }
-}
 const wish = new URLSearchParams(location.hash.slice(1)); // such as #hour=3&follow=a2&known
 if (wish.has("hour")) player.hour = Math.min(end, Math.max(0, Number(wish.get("hour")) || 0));
 if (wish.has("known")) { byId("known").checked = player.showsKnown = true; }
