@@ -7,13 +7,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from alloc.allocators.plotting.missions.map import Plane, agent_colours, name_tasks, plane_of, prepare, task_areas
+from alloc.allocators.plotting.missions.map import (
+    FAILED,
+    Plane,
+    agent_colours,
+    name_tasks,
+    plane_of,
+    prepare,
+    task_areas,
+)
 from alloc.allocators.plotting.missions.picture import title
 from alloc.allocators.plotting.missions.states import AGENT_COLOURS, TASK_COLOURS, doing, task_states
 from alloc.allocators.plotting.style import in_style, new_figure
 from alloc.problems import InputError
 from alloc.problems.formats import write_bytes_atomically
 from alloc.problems.missions.course import Course
+from alloc.problems.missions.simulation.state import AgentStatus
 from alloc.problems.text import labelled
 
 if TYPE_CHECKING:
@@ -80,11 +89,8 @@ def _film(course: Course, plane: Plane, suffix: str, frames: int) -> bytes:
 
     hours = np.linspace(0, course.end, frames)
     figure = new_figure(8, 7.2)
-    update = _draw(figure, course, plane, hours)
-    figure.draw_without_rendering()
-    figure.set_layout_engine("none")  # so that nothing moves but agents
-    name_tasks(figure.axes[0], course, plane)
-    film = FuncAnimation(figure, update, frames=frames, init_func=list, blit=False, cache_frame_data=False)
+    show = draw_film(figure, course, plane, hours)
+    film = FuncAnimation(figure, show, frames=frames, init_func=list, blit=False, cache_frame_data=False)
     writer = (
         PillowWriter(fps=PER_SECOND)
         if suffix == ".gif"
@@ -96,8 +102,8 @@ def _film(course: Course, plane: Plane, suffix: str, frames: int) -> bytes:
         return written.read_bytes()
 
 
-def _draw(figure: "Figure", course: Course, plane: Plane, hours: np.ndarray) -> "Callable[[int], list[Artist]]":
-    """Draw what stays, and return what draws the picture of a number."""
+def draw_film(figure: "Figure", course: Course, plane: Plane, hours: np.ndarray) -> "Callable[[int], list[Artist]]":
+    """Draw what stays, and return what shows the hour of a number; a task has a name from when it appears."""
     from matplotlib.collections import LineCollection
 
     axes = figure.subplots()
@@ -113,11 +119,15 @@ def _draw(figure: "Figure", course: Course, plane: Plane, hours: np.ndarray) -> 
     )
     agents = axes.scatter([np.nan] * n, [np.nan] * n, s=60 if n <= 20 else 22 if n <= 100 else 9, marker="s", zorder=5)
     agents.set(edgecolor="#3d4750", linewidth=0.8 if n <= 100 else 0.3)
+    failed = axes.scatter([np.nan] * n, [np.nan] * n, s=50 if n <= 20 else 18, marker=FAILED, color="black", zorder=6)
     states, left = task_states(course, hours), course.work_left(hours)
     most = np.maximum([max(level.left for level in levels) for levels in course.levels], 1e-300)
     _explain(axes)
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")  # so that nothing moves but agents
+    names = name_tasks(axes, course, plane)
 
-    def update(number: int) -> "list[Artist]":
+    def show(number: int) -> "list[Artist]":
         hour = float(hours[number])
         clock.set_text(labelled(f"{hour:.2f}", course.mission.instance.units.time or "h"))
         now = [row[number] for row in states]
@@ -128,25 +138,31 @@ def _draw(figure: "Figure", course: Course, plane: Plane, hours: np.ndarray) -> 
         edge.set_sizes(np.where(over, 0.25 * area, area))
         fill.set(facecolor=colours)
         fill.set_sizes(np.where(over, 0.25 * area, area * share))
-        _move(course, plane, hour, agents, trails)
+        for j, name in names.items():
+            name.set_visible(now[j] is not None)
+        _move(course, plane, hour, agents, failed, trails)
         return []
 
-    return update
+    return show
 
 
-def _move(course: Course, plane: Plane, hour: float, agents: "Artist", trails: "Artist") -> None:
-    """Put agents where they are at an hour, and draw the ways behind them."""
-    places, colours, ways = [], [], []
+def _move(course: Course, plane: Plane, hour: float, agents: "Artist", failed: "Artist", trails: "Artist") -> None:
+    """Put agents where they are at an hour, those that have failed as crosses, and draw the ways behind them."""
+    places, colours, ways, over = [], [], [], []
     for agent, legs in enumerate(course.legs):
         leg = course.leg(agent, hour)
         places.append(plane.point(leg.position(hour)) if leg is not None else (np.nan, np.nan))
-        colours.append(AGENT_COLOURS.get((doing(leg) if leg is not None else None) or "", "none"))
+        state = None if leg is None else doing(leg)
+        colours.append("none" if state is None else AGENT_COLOURS[state])
+        over.append(leg is not None and leg.status is AgentStatus.FAILED)
         since = hour - TRAIL * course.end
         way = [
             plane.point(one.position(max(one.begin, since))) for one in legs if one.end >= since and one.begin <= hour
         ]
         ways.append([*way, places[-1]])
-    agents.set(offsets=places, facecolor=colours)
+    where, is_over = np.array(places, dtype=float).reshape(-1, 2), np.array(over, dtype=np.bool_)[:, None]
+    agents.set(offsets=np.where(is_over, np.nan, where), facecolor=colours)
+    failed.set(offsets=np.where(is_over, where, np.nan))
     trails.set(segments=ways)
 
 
@@ -155,9 +171,17 @@ def _explain(axes: "Axes") -> None:
 
     entries = [("o", f"task {state}", colour) for state, colour in TASK_COLOURS.items()]
     entries += [("s", f"agent {state}", colour) for state, colour in AGENT_COLOURS.items()]
+    entries += [(FAILED, "agent failed", "black")]
     marks = [
         Line2D(
-            [], [], marker=shape, linestyle="", color=colour, markeredgecolor="0.4", markeredgewidth=0.5, label=label
+            [],
+            [],
+            marker=shape,
+            linestyle="",
+            color=colour,
+            markeredgecolor="black" if shape == FAILED else "0.4",
+            markeredgewidth=1.5 if shape == FAILED else 0.5,
+            label=label,
         )
         for shape, label, colour in entries
     ]

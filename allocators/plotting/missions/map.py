@@ -20,12 +20,16 @@ from alloc.problems.vocabulary import GEOGRAPHIC
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.text import Annotation
 
 MOST_NAMES = 40
 """Tasks beyond which none is named."""
 
 MARKS = {DONE: "o", MISSED: "X", CANCELLED: "s"}
 """Shapes of tasks that are over; those that are left are circles without a filling."""
+
+FAILED = "x"
+"""Mark of agents that have failed."""
 
 MARGIN = 0.06
 """Of the drawing around all places, as a share of its longer side."""
@@ -157,31 +161,29 @@ def _draw_tracks(axes: "Axes", course: Course, plane: Plane) -> None:
         label="start of an agent",
     )
     failed = [
-        corners[-1] for legs, corners in zip(course.legs, tracks, strict=True) if legs and _failed(legs[-1].status)
+        corners[-1]
+        for legs, corners in zip(course.legs, tracks, strict=True)
+        if legs and legs[-1].status is AgentStatus.FAILED
     ]
     if failed:
         ends = np.array(failed)
         axes.scatter(
-            ends[:, 0], ends[:, 1], s=44, marker="x", color="black", linewidths=1.6, zorder=5, label="agent failed"
+            ends[:, 0], ends[:, 1], s=44, marker=FAILED, color="black", linewidths=1.6, zorder=5, label="agent failed"
         )
 
 
-def _failed(status: AgentStatus) -> bool:
-    return status is AgentStatus.FAILED
-
-
-def name_tasks(axes: "Axes", course: Course, plane: Plane) -> None:
-    """Write names beside tasks where there is room; the layout must be final."""
+def name_tasks(axes: "Axes", course: Course, plane: Plane) -> "dict[int, Annotation]":
+    """Write names beside tasks where there is room, and return them by task; the layout must be final."""
     instance = course.mission.instance
     if instance.m > MOST_NAMES:
-        return
+        return {}
     size, place = 8.0, plane.where.tasks
     names = [plain_text(name) for name in short_names(instance.task_ids, 18)]
     centre = axes.transData.transform(place) * 72 / axes.figure.dpi
     width = np.array([0.62 * size * len(name) for name in names])
     middle = place_labels(centre, np.sqrt(task_areas(course) / np.pi), width, 1.1 * size, _frame(axes))
-    for j in np.flatnonzero(~np.isnan(middle[:, 0])):
-        write(axes, names[j], place[j], middle[j] - centre[j], size)
+    named = np.flatnonzero(~np.isnan(middle[:, 0])).tolist()
+    return {j: write(axes, names[j], place[j], middle[j] - centre[j], size) for j in named}
 
 
 def _frame(axes: "Axes") -> FloatArray:
@@ -191,11 +193,11 @@ def _frame(axes: "Axes") -> FloatArray:
     return np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
 
 
-def write(axes: "Axes", text: str, place: FloatArray, offset: FloatArray, size: float) -> None:
+def write(axes: "Axes", text: str, place: FloatArray, offset: FloatArray, size: float) -> "Annotation":
     """Write a name beside a place, by an offset in points."""
     from matplotlib.patheffects import withStroke
 
-    axes.annotate(
+    return axes.annotate(
         text,
         (float(place[0]), float(place[1])),
         xytext=(float(offset[0]), float(offset[1])),
