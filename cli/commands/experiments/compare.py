@@ -9,6 +9,7 @@ import typer
 from alloc.cli import options
 from alloc.cli.commands.experiments import options as kept
 from alloc.cli.commands.experiments.missions import compare_missions
+from alloc.cli.commands.experiments.sources import gather
 from alloc.cli.options import examples
 from alloc.cli.output.console import note, say, table
 from alloc.cli.output.files import check_outputs
@@ -69,7 +70,11 @@ def register(app: typer.Typer) -> None:
 def compare_command(
     instances: Annotated[
         list[str],
-        typer.Argument(metavar="INSTANCE...", help=f"Instances, or with --policies missions, each {options.READABLE}."),
+        typer.Argument(
+            metavar="INSTANCE...",
+            help=f"Instances, or with --policies missions, each {options.READABLE}; folders and patterns of these; "
+            "tables of instances, and families such as paper-1:0-9.",
+        ),
     ],
     methods: MethodsOption = None,
     policies: PoliciesOption = None,
@@ -181,10 +186,9 @@ def _compare(
     """Run the methods on all instances, print the rows, and return the exit code."""
     from alloc.allocators.experiments.compare import compare, share_bounds
     from alloc.allocators.runtime.interrupts import signals_set
-    from alloc.problems.formats import read_instance
     from alloc.problems.units import common_units
 
-    problems = [read_instance(name) for name in files]
+    problems = gather(files)
     units = common_units([problem.units for problem in problems])
     stop, rows, total = threading.Event(), list["Row"](), len(problems) * len(methods)
     with signals_set(stop):

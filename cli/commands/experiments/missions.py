@@ -8,6 +8,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from alloc.cli.commands.experiments.options import Keeping
+from alloc.cli.commands.experiments.sources import gather_missions
 from alloc.cli.commands.experiments.stored import make_missing
 from alloc.cli.output.console import note, say, table
 from alloc.cli.output.rows import show_done, write_rows
@@ -39,12 +40,11 @@ def compare_missions(
     """Let the policies lead all missions, print the rows, and return the exit code."""
     from alloc.allocators import describe_policy
     from alloc.allocators.experiments.differences import paired_differences
-    from alloc.problems import read_mission
     from alloc.problems.units import common_units
 
     for name, _ in policies.values():
         describe_policy(name)
-    missions = [read_mission(file) for file in files]
+    missions = gather_missions(files)
     units = common_units([mission.instance.units for mission in missions])
     asked = (missions, policies, seeds, knowledge, deadline_ms)
     found = _in_store(keeping, *asked) if keeping is not None else _at_once(*asked, units)
@@ -148,7 +148,7 @@ def _tell(rows: "list[PolicyRow]", differences: "list[PolicyDifference]", units:
     if late:
         note(f"{late} decisions came after the deadline and were not followed; see --deadline-ms")
     for found in difference_tables(differences, len({row.number for row in rows})):
-        say(f"\n{found.title}:\n{table(found.header, found.rows)}")
+        say(f"\n{found.title}\n{table(found.header, found.rows)}")
         for one in found.notes:
             note(one)
 

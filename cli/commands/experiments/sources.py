@@ -4,7 +4,7 @@ import csv
 import glob
 import os
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from inspect import signature
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +12,7 @@ from alloc.cli.options import BETWEEN_SETTINGS, values
 from alloc.cli.output.files import read_instances
 
 if TYPE_CHECKING:
-    from alloc.problems import Instance
+    from alloc.problems import Instance, Mission
 
 FAMILY = re.compile(r"(paper-[1-4]|random|covering)(?:\[(.*)\])?:(\d{1,9})(?:-(\d{1,9}))?")
 """A generated family with its seeds, both ends included."""
@@ -23,7 +23,7 @@ COLUMN = "instance"
 """That of a table of instances which names them; others are for people."""
 
 
-def gather(sources: list[str]) -> "list[Instance]":
+def gather(sources: Sequence[str]) -> "list[Instance]":
     """Return the instances that all sources name, in their order.
 
     Raises
@@ -34,9 +34,41 @@ def gather(sources: list[str]) -> "list[Instance]":
     return [instance for source in sources for instance in _instances(source)]
 
 
-def _instances(source: str) -> "list[Instance]":
+def gather_missions(sources: Sequence[str]) -> "list[Mission]":
+    """Return the missions that all sources name, in their order: files, patterns of them, and folders of .json files.
+
+    Raises
+    ------
+    InputError
+        If a source cannot be read, a pattern matches nothing, or a folder holds none.
+    """
+    from alloc.problems import read_mission
+
+    return [read_mission(file) for source in sources for file in _mission_files(source)]
+
+
+def _mission_files(source: str) -> list[str]:
     from alloc.problems import InputError
 
+    if os.path.isdir(source) and not os.path.exists(os.path.join(source, "agents.csv")):
+        found = sorted(glob.glob(os.path.join(glob.escape(source), "*.json")))
+        if not found:
+            raise InputError("holds no missions", source=source)
+        return found
+    return [source] if os.path.exists(source) or not glob.has_magic(source) else _matching(source)
+
+
+def _matching(pattern: str) -> list[str]:
+    """Return the files and folders that a pattern matches, in the order of their names."""
+    from alloc.problems import InputError
+
+    found = sorted(glob.glob(pattern, recursive=True))
+    if not found:
+        raise InputError("matches no file", source=pattern)
+    return found
+
+
+def _instances(source: str) -> "list[Instance]":
     if os.path.isfile(source) and source.endswith(".csv"):
         return gather(_listed(source))
     family = FAMILY.fullmatch(source)
@@ -45,10 +77,7 @@ def _instances(source: str) -> "list[Instance]":
     if family is not None:
         return _generated(source, *family.groups())
     if glob.has_magic(source):
-        found = sorted(glob.glob(source, recursive=True))
-        if not found:
-            raise InputError("matches no file", source=source)
-        return gather(found)
+        return gather(_matching(source))
     return read_instances(source)
 
 

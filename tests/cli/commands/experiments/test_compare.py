@@ -116,3 +116,25 @@ def test_wrong_brackets_are_bad_usage(alloc, small, methods):
     """What is not NAME[PARAMETER=VALUE,...], or names no parameter of the method, is one line and exit code 2."""
     ran = alloc("compare", "small.json", "--methods", methods)
     assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
+
+
+def test_instances_are_named_alike_with_and_without_a_store(alloc):
+    """Folders, patterns and families are compared without a store as well, and folders and patterns of missions."""
+    alloc("generate", "random", "--agents", "4", "--tasks", "2", "--count", "2", "--seed", "1", "--output", "some")
+    for source, names in (
+        ("some", ["random-4x2-seed-1", "random-4x2-seed-2"]),
+        ("some/*-2.json", ["random-4x2-seed-2"]),
+        ("random[agents=4,tasks=2]:7", ["random[agents=4,tasks=2]:7"]),
+    ):
+        ran = alloc("compare", source, "--methods", "greedy", "--json")
+        assert [row["instance"] for row in ran.json["rows"]] == names
+    for folder in ("missions", "empty"):
+        Path(folder).mkdir()
+    for seed in "12":
+        sizes = ("--agents", "2", "--tasks", "2", "--seed", seed)
+        alloc("generate", "mission", *sizes, "--output", f"missions/{seed}.json")
+    for source, count in (("missions", 2), ("missions/[2-9].json", 1)):
+        assert len(alloc("compare", source, "--policies", "nearest", "--json").json["rows"]) == count
+    for source, wrong in (("empty", "empty: holds no missions"), ("*.npz", "*.npz: matches no file")):
+        ran = alloc("compare", source, "--policies", "nearest")
+        assert (ran.code, ran.err) == (2, f"alloc: {wrong}\n")
