@@ -12,6 +12,7 @@ import numpy as np
 
 from alloc.allocators.contract.budget import Budget
 from alloc.problems import Instance, Objective, count_classes
+from alloc.problems.text import counted
 
 MAKESPAN_PAIRS_PER_SECOND = 30_000
 ENERGY_PAIRS_PER_SECOND = 5_000
@@ -31,19 +32,19 @@ def choose(instance: Instance, objective: Objective, budget: Budget) -> tuple[st
     searchable = max(15_000, int(MAKESPAN_PAIRS_PER_SECOND * seconds))
     is_easy = instance.reach.is_complete and not instance.has_travel_time and has_whole_abilities(instance)
     limit = max(1_000, int(ENERGY_PAIRS_PER_SECOND * seconds)) if energy and is_easy else searchable
-    size = f"{pairs} pairs of agent class and task"
-    time = "without a time limit" if budget.time_limit_s is None else f"in {budget.time_limit_s:g} s"
+    size = f"{counted(pairs, 'pair')} of agent class and task"
+    time = "without a time limit" if budget.time_limit_s is None else f"in {budget.time_limit_s:.3g} s"
     if pairs <= limit and instance.n * instance.m <= MOST_PAIRS_SEARCHED:
         return (
             "milp" if energy else "cpsat",
-            f"{size} are few enough for a proof, or a small gap, {time} (up to {limit})",
+            f"{size}, few enough for a proof, or a small gap, {time} (up to {limit})",
         )
     if pairs <= limit:
         return (
             "local-search",
             f"{instance.n} agents and {instance.m} tasks are too many for the search of exact methods",
         )
-    return "local-search", f"{size} are too many for a proof {time} (more than {limit})"
+    return "local-search", f"{size}, too many for a proof {time} (more than {limit})"
 
 
 def has_whole_abilities(instance: Instance) -> bool:

@@ -62,3 +62,11 @@ def test_travel_times_and_real_abilities_favour_the_bounds_of_exact_methods() ->
     cases = [scattered(500, 50, whole=True), scattered(500, 50), scattered(500, 50, whole=True, speed=1.0)]
     picks = [choose(each, Objective.MAKESPAN_ENERGY, Budget(3.0))[0] for each in cases]
     assert picks == ["local-search", "milp", "milp"]
+
+
+def test_the_reason_is_a_sentence_for_one_pair_as_for_many() -> None:
+    """One agent and one task are a pair, and the time is told in few digits."""
+    one = Instance(ability=[1], workload=[1])
+    assert choose(one, Objective.MAKESPAN, Budget(0.0308532))[1].startswith(
+        "1 pair of agent class and task, few enough for a proof, or a small gap, in 0.0309 s"
+    )

@@ -111,7 +111,7 @@ def _difference_table(found: Sequence[Difference]) -> Table:
         notes.append(f"Small sample: {smallest} instances; intervals and tests of fewer than {SMALL} say little.")
     left_out = max(one.left_out for one in found)
     if left_out:
-        notes.append(f"Up to {counted(left_out, 'instance')} left out, without the figure of one of the two.")
+        notes.append(f"Left out: up to {counted(left_out, 'instance')} on which one of the two has no figure.")
     header = ["method", f"{score} less", "equal", "more", "difference", "from", "to", "p", "p (Holm)"]
     return Table(f"Against {found[0].against}: {score}", header, [_difference_cells(one) for one in found], notes)
 

@@ -129,7 +129,7 @@ def conclude(keeping: Keeping, kept: Kept, rows: "list[Row]", *, quiet: bool) ->
     from alloc.allocators.experiments.report.files import write_report
     from alloc.allocators.experiments.report.tables import report_tables
 
-    if not quiet and len(kept.endings) > 1:
+    if not quiet and sum(any(map(any, lists)) for lists in kept.endings.values()) > 1:
         _tell_differences(kept)
     for one in kept.notes:
         note(one)

@@ -16,6 +16,7 @@ import typer
 from alloc.cli import options
 from alloc.cli.options import examples
 from alloc.cli.output.console import write_out
+from alloc.cli.output.files import check_outputs
 
 if TYPE_CHECKING:
     from alloc.allocators.online.planner.lines import Lines
@@ -81,6 +82,7 @@ def plan_command(
         raise typer.BadParameter("is needed: there is no other way of planning yet", param_hint="'--stdio'")
     if mission == "-":
         raise typer.BadParameter("cannot be standard input, but for its first line: leave it out", param_hint="MISSION")
+    check_outputs(("--state", state), read=[("MISSION", mission)] if mission is not None else [])
     given = options.values(settings)
 
     def begin(problem: "Mission") -> MissionPlanner:

@@ -70,7 +70,7 @@ def serve_command(
     from alloc.problems import InputError
 
     if stdio == (http is not None):
-        raise typer.BadParameter("is needed, or --http, but not both", param_hint="'--stdio'")
+        raise typer.BadParameter("give either --stdio or --http", param_hint="'--stdio'")
     host, port = (LOCAL, 0) if http is None else _address(http)
     limits = ServiceLimits(
         agents=most_agents,

@@ -123,6 +123,8 @@ def test_wrong_arguments_are_told_before_any_line(alloc, pair):
     """A policy or a file that there is not is one line and exit code 2."""
     for arguments, told in (
         (("pair.json",), "--stdio: is needed"),
+        (("pair.json", "--stdio", "--state", "absent/state.json"), "there is no folder 'absent'; create it first"),
+        (("pair.json", "--stdio", "--state", "pair.json"), "pair.json: is MISSION and --state at once"),
         (("pair.json", "--stdio", "--policy", "gredy"), "did you mean 'greedy'?"),
         (("none.json", "--stdio"), "none.json"),
         (("-", "--stdio"), "leave it out"),

@@ -293,3 +293,12 @@ def test_policies_in_missions_are_kept(alloc, plugin):
     assert mean == pytest.approx(rows[0]["mission_time_mean"])
     rows = list(csv.DictReader(Path("runs.csv").read_text().splitlines()))
     assert [row["tasks_done"] for row in rows] == ["2", "", "2", ""]
+
+
+def test_before_the_first_run_has_ended_there_is_nothing_to_compare(alloc, monkeypatch):
+    """Interrupted at once, it says so, and that the same command goes on, but prints no table of differences."""
+    monkeypatch.setattr("alloc.allocators.experiments.campaign.Campaign.run", lambda self, stop: False)
+    ran = alloc("compare", f"{TINY}:1", "--methods", "greedy,auction", *QUICK)
+    assert (ran.code, ran.out) == (1, "")
+    assert "note: interrupted; the same command goes on from here" in ran.err
+    assert "Against" not in ran.err
