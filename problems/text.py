@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 
-
 WRITTEN_OUT = 1e7
 """Numbers below which whole ones are told by all their digits."""
 

@@ -9,6 +9,7 @@ from alloc.allocators.contract.base import Allocator
 from alloc.allocators.contract.budget import Budget, StopReason
 from alloc.allocators.contract.parameters import labelled_method
 from alloc.allocators.contract.tolerance import relative_gap
+from alloc.allocators.experiments.store.outcome import Ending
 from alloc.allocators.experiments.sweep import LOG, by_label, mean_and_worst, sweep
 from alloc.allocators.registry import load
 from alloc.allocators.request import checked_objective, checked_seed, checked_threads
@@ -167,30 +168,45 @@ def summarise(instance: Instance, method: str, results: Sequence[Result], reason
     reason : str
         Why there are none.
     """
-    first = Row(instance=instance.name, method=method, agents=instance.n, tasks=instance.m, reason=reason)
-    if not results:
-        return first
-    makespan_mean, makespan_worst = mean_and_worst([result.makespan for result in results])
-    gap_mean, gap_worst = mean_and_worst([result.gap for result in results])
-    energy_mean, energy_worst = mean_and_worst([result.energy for result in results])
-    runtime_mean_s, runtime_worst_s = mean_and_worst([result.runtime_s for result in results])
+    row = Row(instance=instance.name, method=method, agents=instance.n, tasks=instance.m, reason=reason)
     scores = [result.evaluation for result in results]
+    unserved = [instance.m if score is None else len(score.unserved_tasks) for score in scores]
+    return with_figures(row, results, [result.method for result in results], unserved) if results else row
+
+
+def with_figures(row: Row, runs: Sequence[Result | Ending], picked: Sequence[str], unserved: Sequence[int]) -> Row:
+    """Return a row with the figures of some runs.
+
+    Parameters
+    ----------
+    row : Row
+        Without figures.
+    runs : sequence of Result or Ending
+        One at least, all with a result.
+    picked : sequence of str
+        The method that each ran.
+    unserved : sequence of int
+        How many tasks each left unserved.
+    """
+    makespan, gap, energy, runtime = (
+        mean_and_worst([getattr(run, name) for run in runs]) for name in ("makespan", "gap", "energy", "runtime_s")
+    )
     return replace(
-        first,
-        picked="/".join(sorted({result.method for result in results})) if method == "auto" else "",
-        runs=len(results),
-        statuses="/".join(sorted({str(result.status) for result in results})),
-        unserved=max(instance.m if score is None else len(score.unserved_tasks) for score in scores),
-        makespan_mean=makespan_mean,
-        makespan_worst=makespan_worst,
-        lower_bound=max((r.lower_bound for r in results if r.lower_bound is not None), default=None),
-        gap_mean=gap_mean,
-        gap_worst=gap_worst,
-        energy_mean=energy_mean,
-        energy_worst=energy_worst,
-        runtime_mean_s=runtime_mean_s,
-        runtime_worst_s=runtime_worst_s,
-        makespans=tuple(result.makespan for result in results if result.makespan is not None),
+        row,
+        picked="/".join(sorted(set(picked))) if row.method == "auto" else "",
+        runs=len(runs),
+        statuses="/".join(sorted({str(run.status) for run in runs})),
+        unserved=max(unserved),
+        makespan_mean=makespan[0],
+        makespan_worst=makespan[1],
+        lower_bound=max((run.lower_bound for run in runs if run.lower_bound is not None), default=None),
+        gap_mean=gap[0],
+        gap_worst=gap[1],
+        energy_mean=energy[0],
+        energy_worst=energy[1],
+        runtime_mean_s=runtime[0],
+        runtime_worst_s=runtime[1],
+        makespans=tuple(run.makespan for run in runs if run.makespan is not None),
     )
 
 

@@ -5,11 +5,10 @@ from dataclasses import dataclass, replace
 
 from alloc.allocators.contract.budget import Budget
 from alloc.allocators.experiments.campaign import Job
-from alloc.allocators.experiments.compare import Row
+from alloc.allocators.experiments.compare import Row, with_figures
 from alloc.allocators.experiments.store.key import Run, canonical, this_machine, versions
 from alloc.allocators.experiments.store.outcome import Ending, Outcome
 from alloc.allocators.experiments.store.store import CONDITIONS, Store
-from alloc.allocators.experiments.sweep import mean_and_worst
 from alloc.allocators.request import checked_objective, checked_seed, checked_threads
 from alloc.problems import Instance, Mission, Objective
 from alloc.problems.arguments import of_type
@@ -192,27 +191,7 @@ def _row(instance: Instance, label: str, endings: Sequence[Ending | None], seeds
     if why := unsolved(endings, seeds):
         return replace(empty, reason=why)
     ended = [ending for ending in endings if ending is not None]
-    makespan, gap, energy, runtime = (
-        mean_and_worst([getattr(ending, name) for ending in ended])
-        for name in ("makespan", "gap", "energy", "runtime_s")
-    )
-    return replace(
-        empty,
-        picked="/".join(sorted({ending.picked for ending in ended})) if label == "auto" else "",
-        runs=len(ended),
-        statuses="/".join(sorted({ending.status for ending in ended})),
-        unserved=max(ending.unserved or 0 for ending in ended),
-        makespan_mean=makespan[0],
-        makespan_worst=makespan[1],
-        lower_bound=max((one.lower_bound for one in ended if one.lower_bound is not None), default=None),
-        gap_mean=gap[0],
-        gap_worst=gap[1],
-        energy_mean=energy[0],
-        energy_worst=energy[1],
-        runtime_mean_s=runtime[0],
-        runtime_worst_s=runtime[1],
-        makespans=tuple(ending.makespan for ending in ended if ending.makespan is not None),
-    )
+    return with_figures(empty, ended, [one.picked for one in ended], [one.unserved or 0 for one in ended])
 
 
 def unsolved(endings: Sequence[Ending | None], seeds: Sequence[int]) -> str:

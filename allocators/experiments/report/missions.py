@@ -50,7 +50,8 @@ def difference_tables(differences: Sequence[PolicyDifference], missions: int) ->
     """Return how policies differ from the first one in so many missions, as one table; none if there is only one."""
     if not differences:
         return []
-    title = f"Against {differences[0].against}, in the same missions with the same seeds ({percent(CONFIDENCE)} interval)"
+    first, confidence = differences[0].against, percent(CONFIDENCE)
+    title = f"Against {first}, in the same missions with the same seeds ({confidence} interval)"
     header = ["policy", "time", "interval", "pairs", "energy", "interval", "priority done", "interval", "pairs"]
     return [Table(title, header, [_difference(one) for one in differences], _sample(missions))]
 

@@ -17,9 +17,9 @@ def standing_tables(found: dict[str, Standing]) -> list[Table]:
     """Return both tables; the first has a row for each method, and the second the same rows in the same order."""
     best, others = zip(*(_cells(label, standing) for label, standing in found.items()), strict=True)
     notes_of_best = [
-        "T over the tasks that are served; runs with the least T known, among those with the fewest tasks unserved; runs "
-        "proven optimal; T beyond the greatest bound known; energy over the least known at the least T, and the mean of "
-        "that over runs with the least T; energy gap to the run's own bound.",
+        "T over the tasks that are served; runs with the least T known, among those with the fewest tasks unserved; "
+        "runs proven optimal; T beyond the greatest bound known; energy over the least known at the least T, and the "
+        "mean of that over runs with the least T; energy gap to the run's own bound.",
     ]
     notes_of_others = [
         "By how much more T a method has than the best of the others, and by how much more energy than the best of "

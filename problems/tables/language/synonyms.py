@@ -38,8 +38,8 @@ AGENTS: Synonyms = {
     "id": (
         "id",
         "name, agent, drone, uav, robot, vehicle, truck, van, crew, worker, machine, employee, person, callsign, "
-        "drohne, roboter, fahrzeug, maschine, gerat, geraet, mitarbeiter, bezeichnung, kennung, nom, identifiant, vehicule, "
-        "nombre, identificador, vehiculo, dron",
+        "drohne, roboter, fahrzeug, maschine, gerat, geraet, mitarbeiter, bezeichnung, kennung, nom, identifiant, "
+        "vehicule, nombre, identificador, vehiculo, dron",
         "team, no, nr, number, nummer, numero, code, label",
     ),
     "ability": (

@@ -75,7 +75,7 @@ def test_tables_tell_what_was_compared_and_how_it_ended(compared):
     assert cells[:7] == ["b", "0", "0", "3", "+50 %", "+50 %", "+50 %"]
     notes = " ".join(tables["Against a_1: T"].notes)
     assert "Small sample: 3 instances" in notes
-    assert "Up to 1 instance left out" in notes
+    assert "Left out: up to 1 instance on which one of the two has no figure" in notes
     assert tables["Performance profiles"].rows[1][1:] == ["0 %"] * 6 + ["75 %"] * 2
     assert tables["Targets over time"].rows[0][-1] == "100 %"
 

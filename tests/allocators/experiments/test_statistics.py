@@ -54,7 +54,7 @@ def test_instances_without_a_score_are_left_out_and_counted():
 
 
 def test_two_scores_of_nothing_are_equal():
-    """Where agents of both methods stay where they are, both have energy 0, which is no difference; 1 over 0 is none."""
+    """Where the agents of both methods stay, both have energy 0, and are equal; what is 1 over 0 is left out."""
     endings = {"a": [[solved(1.0, 0.0)]] * 2 + [[solved(1.0, 2.0)]]}
     endings["b"] = [[solved(1.0, 0.0)], [solved(1.0, 1.0)], [solved(1.0, 1.0)]]
     (one,) = differences(endings, "energy")
