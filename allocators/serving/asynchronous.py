@@ -67,6 +67,8 @@ async def solve_async(
     ------
     InputError, RefusedError
         As `solve` does.
+    RuntimeError
+        If the method raises `StopIteration`, which no awaitable can.
     """
     loop = asyncio.get_running_loop()
     tell = function(on_improvement, "on_improvement")
@@ -96,6 +98,10 @@ async def solve_async(
                 **arguments,
             )
             loop.call_soon_threadsafe(done.set_result, result)
+        except StopIteration as error:  # which asyncio takes for the end of a coroutine, so that no future may have it
+            failure = RuntimeError("the method raised StopIteration")
+            failure.__cause__ = error
+            loop.call_soon_threadsafe(done.set_exception, failure)
         except BaseException as error:
             loop.call_soon_threadsafe(done.set_exception, error)
 
@@ -103,10 +109,12 @@ async def solve_async(
     thread.start()
     try:
         result = await asyncio.shield(done)
-    except BaseException as error:
+    except BaseException:
         cancellation.set()
         await _ended(done)
-        raise (failures or [error])[0] from None
+        if failures:
+            raise failures[0] from None
+        raise
     finally:
         thread.join()
     if failures:  # of the last improvement, told when the run had ended already

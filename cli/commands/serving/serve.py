@@ -62,7 +62,7 @@ def serve_command(
 ) -> None:
     """Solve for other programs.
 
-    They ask by lines of JSON on standard input, or over HTTP.
+    Requests are lines of JSON on standard input, or come over HTTP.
     """
     from alloc.allocators.parallel.processors import available_threads
     from alloc.allocators.serving.request import ServiceLimits

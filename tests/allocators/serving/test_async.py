@@ -7,7 +7,19 @@ import time
 
 import pytest
 
-from alloc.allocators import InputError, Result, StopReason, load, registry, solve, solve_async
+from alloc.allocators import (
+    Allocator,
+    InputError,
+    Method,
+    Proposal,
+    Result,
+    Search,
+    StopReason,
+    load,
+    registry,
+    solve,
+    solve_async,
+)
 from alloc.problems import Instance, paper_like
 from alloc.problems.generate import paper
 
@@ -33,6 +45,22 @@ def test_errors_are_those_of_solve() -> None:
     """What `solve` raises is raised where the run is awaited."""
     with pytest.raises(InputError, match="there is no method"):
         asyncio.run(solve_async(HARD, "nothing"))
+
+
+class Exhausted(Allocator):
+    """Asks an empty iterator for its next item."""
+
+    method = Method(name="exhausted", summary="")
+
+    def allocate(self, search: Search) -> Proposal:
+        return next(iter(()))
+
+
+def test_an_exception_that_no_future_holds_is_raised_as_well() -> None:
+    """StopIteration, which asyncio does not take, does not leave the caller waiting for ever."""
+    with pytest.raises(RuntimeError, match="StopIteration") as raised:
+        asyncio.run(asyncio.wait_for(solve_async(HARD, Exhausted(), time_limit_s=1), 20))
+    assert isinstance(raised.value.__cause__, StopIteration)
 
 
 def test_improvements_are_told_in_the_loop() -> None:

@@ -330,7 +330,7 @@ def test_a_locked_store_is_told(tmp_path, monkeypatch):
         finish(store, RUNS[0])
         other = sqlite3.connect(tmp_path / "runs.db", isolation_level=None)
         other.execute("BEGIN IMMEDIATE")
-        with pytest.raises(InputError, match="is locked by another program"):
+        with pytest.raises(InputError, match="has been locked by another program for 30 s"):
             store.claim(KEYS)
         other.close()
         assert store.claim(KEYS).key == KEYS[1]
