@@ -10,7 +10,7 @@ from alloc.allocators.contract.budget import Budget, StopReason
 from alloc.allocators.contract.parameters import labelled_method
 from alloc.allocators.contract.tolerance import relative_gap
 from alloc.allocators.experiments.store.outcome import Ending
-from alloc.allocators.experiments.sweep import LOG, by_label, mean_and_worst, sweep
+from alloc.allocators.experiments.sweep import by_label, load_failure, mean_and_worst, sweep
 from alloc.allocators.registry import load
 from alloc.allocators.request import checked_objective, checked_seed, checked_threads
 from alloc.allocators.result import Result
@@ -244,5 +244,4 @@ def _load(name: str) -> str | Allocator | Exception:
     except InputError as error:
         return error
     except Exception as error:  # the figures of the others do not depend on a faulty plugin
-        LOG.warning("method %r cannot be loaded", name, exc_info=error)
-        return ImportError(f"cannot be loaded: {type(error).__name__}: {error}")
+        return load_failure(f"method {name!r}", error)

@@ -5,12 +5,12 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 
-from alloc.allocators.experiments.sweep import by_label, mean, mean_and_worst, sweep
+from alloc.allocators.experiments.sweep import by_label, load_failure, mean, mean_and_worst, sweep
 from alloc.allocators.online.contract import Policy
 from alloc.allocators.online.registry import load_policy
 from alloc.allocators.online.run import simulate_until
 from alloc.allocators.runtime.interrupts import run_native
-from alloc.problems import MissingPackageError, Mission, MissionResult
+from alloc.problems import InputError, MissingPackageError, Mission, MissionResult
 from alloc.problems.arguments import choice, event, listed, of_type, real, whole
 from alloc.problems.vocabulary import Knowledge
 
@@ -144,14 +144,18 @@ def compare_policies(
     )
 
 
-def _loaded(policy: str | Policy) -> Policy | MissingPackageError:
-    """Load a policy once; that a package is not installed goes into the rows."""
+def _loaded(policy: str | Policy) -> Policy | Exception:
+    """Load a policy once; that a package is not installed, or that it fails, goes into the rows."""
     if isinstance(policy, Policy):
         return policy
     try:
         return load_policy(policy)
     except MissingPackageError as error:
         return error
+    except InputError:
+        raise
+    except Exception as error:  # the figures of the others do not depend on a faulty plugin
+        return load_failure(f"policy {policy!r}", error)
 
 
 def summarise_runs(

@@ -83,6 +83,12 @@ def by_label(
     return found
 
 
+def load_failure(title: str, error: Exception) -> ImportError:
+    """Log why something called `title` cannot be loaded, and return what stands in its rows."""
+    LOG.warning("%s cannot be loaded", title, exc_info=error)
+    return ImportError(f"cannot be loaded: {type(error).__name__}: {error}")
+
+
 def sweep(
     run: Callable[[P, M, int], R | None],
     problems: Iterable[P],

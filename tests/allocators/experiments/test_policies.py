@@ -7,7 +7,17 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from alloc.allocators import AgentDecider, Briefing, Policy, PolicyInfo, compare_policies, paired_differences, simulate
+from alloc.allocators import (
+    AgentDecider,
+    Briefing,
+    Policy,
+    PolicyInfo,
+    compare_policies,
+    load_policy,
+    paired_differences,
+    simulate,
+)
+from alloc.allocators.experiments import policies
 from alloc.problems import InputError, MissionParameters, random_mission
 
 MISSIONS = [random_mission(MissionParameters(agents=3, tasks=4), seed) for seed in (1, 2, 3)]
@@ -60,6 +70,18 @@ def test_refusals_and_failures_are_rows():
     assert "needs full knowledge" in refused.reason
     assert failed.reason == "failed with seed 4: ZeroDivisionError: nine"
     assert (refused.runs, failed.runs, fine.runs, fine.knowledge) == (0, 0, 1, "local")
+
+
+def test_a_policy_that_cannot_be_loaded_is_a_row(monkeypatch):
+    """A plugin that fails as it is made leaves the figures of the others, as a method does."""
+
+    def load(name):
+        raise ZeroDivisionError("nine")
+
+    monkeypatch.setattr(policies, "load_policy", load)
+    failed, fine = compare_policies(MISSIONS[:1], {"broken": "broken", "own": load_policy("nearest")})
+    assert (failed.runs, failed.reason) == (0, "cannot be loaded: ZeroDivisionError: nine")
+    assert fine.runs == 1
 
 
 def test_differences_are_paired_by_mission_and_seed():
