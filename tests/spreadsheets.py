@@ -107,7 +107,7 @@ SEPARATORS_AND_ENCODINGS = [
         'id,ability\n"d1,4\nd2,3\n',
         error="agents.csv: line 2: has a cell that cannot be read: unexpected end of data; are its quotes in pairs?",
     ),
-    Case("no text", b"\x89PNG\x00\x1a\n" + b"abcdef" * 5, error="agents.csv: is no text; save it as .csv or .xlsx"),
+    Case("no text", b"\x89PNG\x00\x1a\n" + b"abcdef" * 5, error="agents.csv: is not text; save it as .csv or .xlsx"),
     Case("empty file", "", error="agents.csv: is empty; it needs a row with the names of its columns, and rows below"),
 ]
 
@@ -470,18 +470,18 @@ VALUES = [
     Case(
         "consumption in W",
         "id,ability,Consumption (W)\na,1,30\n",
-        error="agents.csv: column 'Consumption (W)': is in W, which is no unit of energy; map another column",
+        error="agents.csv: column 'Consumption (W)': is in W, which is not a unit of energy; map another column",
     ),
     Case(
         "an unknown unit of speed",
         "id,ability,Speed [furlongs/h]\na,1,30\n",
-        error="agents.csv: column 'Speed [furlongs/h]': is in furlongs, which is no unit of distance;"
+        error="agents.csv: column 'Speed [furlongs/h]': is in furlongs, which is not a unit of distance;"
         " map another column",
     ),
     Case(
         "battery in minutes",
         "id,ability,Battery (min)\na,1,30\n",
-        error="agents.csv: column 'Battery (min)': is in min, which is no unit of energy; map another column",
+        error="agents.csv: column 'Battery (min)': is in min, which is not a unit of energy; map another column",
     ),
 ]
 

@@ -74,7 +74,7 @@ def _draw_log(log: str, output: str) -> None:
     (check_film if is_film else check_picture)(output)
     text = read_text(log)
     if not is_log(text):
-        raise InputError("is no log of a mission; to draw a plan, give the instance and the plan", source=named(log))
+        raise InputError("is not a log of a mission; to draw a plan, give the instance and the plan", source=named(log))
     try:
         course = course_of(log_from_text(text))
     except InputError as error:

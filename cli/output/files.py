@@ -185,6 +185,6 @@ def check_output(name: str | None) -> None:
     from alloc.problems.formats import check_writable
 
     if name == "":
-        raise InputError("is no name of a file; give one", source="''")
+        raise InputError("is not a name of a file; give one", source="''")
     if name is not None:
         check_writable(name)

@@ -133,5 +133,5 @@ def _spread(instance: Instance, grouping: Grouping, found: list[Entry]) -> Alloc
 def _count(value: float, line: int) -> int:
     """Return a value as the whole number that it should be."""
     if not (-WHOLE <= value <= MOST_PAIRS) or abs(value - round(value)) > WHOLE:
-        raise InputError(f"{value:g} is no number of agents; is this the solution of a relaxation?", f"line {line}")
+        raise InputError(f"{value:g} is not a number of agents; is this the solution of a relaxation?", f"line {line}")
     return round(value)

@@ -159,5 +159,5 @@ def _proportion(one: Found, quantity: str, label: str, labels: Mapping[str, str]
 
 def _unfit(one: Found, unit: object, quantity: str) -> InputError:
     return InputError(
-        f"is in {unit}, which is no unit of {quantity}; map another column", f"column {one.header!r}", one.source
+        f"is in {unit}, which is not a unit of {quantity}; map another column", f"column {one.header!r}", one.source
     )

@@ -162,7 +162,7 @@ def _metres(records: Records) -> None:
         records.found.remove(one)
         factor = 1.0 if one.measure is None else proportion(one.measure.top, "m")
         if factor is None or (one.measure is not None and one.measure.bottom):
-            raise InputError(f"is in {one.measure}, which is no height", f"column {one.header!r}", one.source)
+            raise InputError(f"is in {one.measure}, which is not a height", f"column {one.header!r}", one.source)
         if factor != 1:
             records.numbers["z"] = records.numbers["z"] * factor
             records.conversions["z"] = f" in m, times {factor:g}"

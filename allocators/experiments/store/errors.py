@@ -18,7 +18,7 @@ MEANINGS = {
     "SQLITE_BUSY": f"has been locked by another program for {BUSY_S:g} s; end that, and call this again",
     "SQLITE_LOCKED": "is locked by another program; end that, and call this again",
     "SQLITE_PROTOCOL": "is locked by another program; end that, and call this again",
-    "SQLITE_NOTADB": "is no store of runs; name another file",
+    "SQLITE_NOTADB": "is not a store of runs; name another file",
     "SQLITE_CORRUPT": "is damaged; `sqlite3 FILE .recover` saves what can be read",
     "SQLITE_IOERR": "cannot be read or written: the disk or the file system fails, or is full; what it holds is kept",
     "SQLITE_TOOBIG": "cannot be written: a row is too large",

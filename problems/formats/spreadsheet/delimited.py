@@ -73,7 +73,7 @@ def decoded(data: bytes) -> tuple[str, str]:
         encoding = "utf-16-le" if head[1::2].count(0) > head[::2].count(0) else "utf-16-be"
         return _decode(data, encoding), encoding
     if b"\0" in data:
-        raise InputError("is no text; save it as .csv or .xlsx")
+        raise InputError("is not text; save it as .csv or .xlsx")
     for encoding in ("utf-8", "Windows-1252"):
         try:
             return data.decode(encoding), encoding

@@ -108,7 +108,7 @@ def log_from_text(text: str) -> MissionLog:
     _refuse_document(text)
     documents = [_line(line, number) for number, line in enumerate(text.split("\n"), 1) if line.strip()]
     if len(documents) < 2:
-        raise InputError("is no log of a mission: it needs a header, and a result as its last line; is it cut off?")
+        raise InputError("is not a log of a mission: it needs a header, and a result as its last line; is it cut off?")
     header, *records, result = documents
     try:
         require_format(header.get("format"), (LOG_FORMAT,))
@@ -131,7 +131,7 @@ def _refuse_document(text: str) -> None:
         return
     if isinstance(found, dict) and found.get("format") != LOG_FORMAT:
         kind = f", but of the format {found['format']!r}" if "format" in found else ""
-        raise InputError(f"is no log of a mission{kind}; `alloc simulate --log` writes logs")
+        raise InputError(f"is not a log of a mission{kind}; `alloc simulate --log` writes logs")
 
 
 def _line(text: str, number: int) -> Record:

@@ -56,7 +56,7 @@ def write_mission(mission: Mission, path: PathLike) -> None:
     source = named(path, output=True)
     try:
         if not is_stream(path) and Path(path).suffix.lower() != ".json":
-            raise InputError("is no name for a mission; use .json, or - for standard output")
+            raise InputError("is not a name for a mission; use .json, or - for standard output")
         write_text_atomically(path, json_text.lines(mission_to_document(mission)))
     except InputError as error:
         raise told(error, source) from error.__cause__

@@ -99,18 +99,18 @@ def test_faults_of_files_are_told(alloc):
     assert (ran.code, ran.err) == (2, "alloc: bad.json: tasks: an instance needs at least one agent and one task\n")
     ran = alloc("replay", "bad.json")
     assert (ran.code, ran.err.count("\n")) == (2, 1)
-    assert "bad.json: is no log of a mission, but of the format 'alloc-mission/1'" in ran.err
+    assert "bad.json: is not a log of a mission, but of the format 'alloc-mission/1'" in ran.err
 
 
 def test_one_document_over_many_lines_is_no_log(alloc, mission):
     """A mission, whose first line alone is no JSON, is told as what it is; to draw a plan takes two files."""
     ran = alloc("replay", mission)
     assert (ran.code, ran.out) == (2, "")
-    told = "is no log of a mission, but of the format 'alloc-mission/1'; `alloc simulate --log` writes logs"
+    told = "is not a log of a mission, but of the format 'alloc-mission/1'; `alloc simulate --log` writes logs"
     assert ran.err == f"alloc: {mission}: {told}\n"
     ran = alloc("plot", mission, "--output", "x.png")
     assert (ran.code, ran.out, Path("x.png").exists()) == (2, "", False)
-    told = "is no log of a mission; to draw a plan, give the instance and the plan"
+    told = "is not a log of a mission; to draw a plan, give the instance and the plan"
     assert ran.err == f"alloc: {mission}: {told}\n"
 
 

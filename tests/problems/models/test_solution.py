@@ -73,7 +73,7 @@ def test_fractions_are_told(tmp_path: Path, solver: str) -> None:
     """Half an agent is a relaxation, and no allocation."""
     path = tmp_path / "answer.sol"
     path.write_text(SOLVERS[solver].format(value="0.5"))
-    with pytest.raises(InputError, match=r"answer\.sol: line \d+: 0\.5 is no number of agents"):
+    with pytest.raises(InputError, match=r"answer\.sol: line \d+: 0\.5 is not a number of agents"):
         read_allocation(path, INSTANCE)
 
 
@@ -93,9 +93,9 @@ def test_fractions_are_told(tmp_path: Path, solver: str) -> None:
         ("# Objective value = 1\nx_a1__t 1\nx_a1__north_field 1\n", "line 3: with this, agents like a1"),
         ("# Objective value = 1\nn_a1__t 3\n", "line 2: with this, agents like a1"),
         ("# Objective value = 1\nx_a1__t one\n", "line 2: the value of x_a1__t must be a number, got 'one'"),
-        ("# Objective value = 1\nx_a1__t nan\n", "line 2: nan is no number of agents"),
-        ("# Objective value = 1\nx_a1__t inf\n", "line 2: inf is no number of agents"),
-        ("# Objective value = 1\nx_a1__t -1\n", "line 2: -1 is no number of agents"),
+        ("# Objective value = 1\nx_a1__t nan\n", "line 2: nan is not a number of agents"),
+        ("# Objective value = 1\nx_a1__t inf\n", "line 2: inf is not a number of agents"),
+        ("# Objective value = 1\nx_a1__t -1\n", "line 2: -1 is not a number of agents"),
         ("# Objective value = 1\nx_a1__t 1\nn_a3__t 1\n", "mixes variables of several models: n, x"),
     ],
 )

@@ -300,7 +300,7 @@ def test_a_later_store_is_refused(tmp_path):
 def test_other_files_are_no_stores(tmp_path):
     """A text, and a database of another program, are refused in one line and left as they were."""
     (tmp_path / "text").write_text("instance,method\n" * 100)
-    with pytest.raises(InputError, match="is no store of runs"):
+    with pytest.raises(InputError, match="is not a store of runs"):
         Store(tmp_path / "text")
     with sqlite3.connect(tmp_path / "other.db") as other:
         other.execute("CREATE TABLE birds (name TEXT)")

@@ -45,7 +45,7 @@ def test_progress_is_shown_on_a_terminal(monkeypatch, capsys):
     ("arguments", "message"),
     [
         (["no.db", "-o", "report.html"], "no.db: there is no such file"),
-        (["text", "-o", "report.html"], "text: is no store of runs"),
+        (["text", "-o", "report.html"], "text: is not a store of runs"),
         (["runs.db", "-o", "report.pdf"], "report.pdf: must end in .html"),
         (["runs.db", "-o", "no/report.html"], "no/report.html"),
         (["runs.db", "-o", "runs.db"], "runs.db: is STORE and --output at once"),

@@ -208,7 +208,7 @@ def test_a_full_disk_is_one_line_and_loses_nothing(alloc, plugin):
         (("--store", "absent/runs.db"), "absent/runs.db: cannot be opened"),
         (("--store", "runs.db", "--report", "runs.txt"), "runs.txt: must end in .md, .tex, .csv or .parquet"),
         (("--store", "runs.db", "--csv", "runs.db"), "is --store and --csv at once"),
-        (("--store", "text"), "text: is no store of runs"),
+        (("--store", "text"), "text: is not a store of runs"),
         (("--store", "."), ".: cannot be opened"),
     ],
 )
