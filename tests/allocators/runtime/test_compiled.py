@@ -8,24 +8,37 @@ from alloc.allocators.runtime import compiled as module
 from alloc.allocators.runtime.compiled import compiled
 
 
-@compiled
-def added(start, step):
+def add(start, step):
     return start + step
 
 
-@compiled
-def total(steps):
-    found = 0
-    for step in steps:
-        found = added(found, step)
-    return added(found, 10)
+def summed(added):
+    """Return a compiled loop that calls `added` with a constant at first, with elements, and with a constant."""
+
+    @numba.njit
+    def total(steps):
+        found = 0
+        for step in steps:
+            found = added(found, step)
+        return added(found, 10)
+
+    return total
 
 
 def test_constants_and_small_integers_share_what_is_compiled():
     """A variable that is 0 at first, a constant, and integers of 32 bits: one function does for all, with their sum."""
+    added = module._compiled_once(numba.njit(add))
+    total = summed(added)
     assert total(np.array([1, 2], dtype=np.int32)) == 13
     assert total(np.array([2**40, -1])) == 2**40 + 9
-    assert [str(one) for one in added.signatures] in ([], ["(int64, int64)"])  # none where `total` is cached
+    assert [str(one) for one in added.signatures] == ["(int64, int64)"]
+
+
+def test_what_is_compiled_shares():
+    """The decorator that all loops have makes them share, also where their machine code comes from the cache."""
+    added = compiled(add)
+    assert "get_call_template" in vars(added)
+    assert summed(added)(np.array([1, 2], dtype=np.int32)) == 13
 
 
 class Changed:
@@ -54,14 +67,8 @@ def test_another_numba_is_left_as_it_is(function):
 def test_loops_that_share_nothing_do_the_same(monkeypatch):
     """Without that place each caller has loops compiled for it, with the same sums."""
     monkeypatch.setattr(module, "RESOLVED", ["of another numba"])
-    own = module._compiled_once(numba.njit(added.py_func))
-
-    @numba.njit
-    def both(steps):
-        found = 0
-        for step in steps:
-            found = own(found, step)
-        return own(found, 10)
-
-    assert both(np.array([1, 2], dtype=np.int32)) == 13
-    assert len(own.signatures) > 1
+    added = module._compiled_once(numba.njit(add))
+    total = summed(added)
+    assert total(np.array([1, 2], dtype=np.int32)) == 13
+    assert total(np.array([2**40, -1])) == 2**40 + 9
+    assert len(added.signatures) > 1
