@@ -1,10 +1,10 @@
-"""Statistics of a comparison: paired differences, performance profiles, and targets reached over time.
+"""Statistics of a comparison: scores by instance, paired differences with intervals, and tests.
 
 What varies is the instance: seeds are averaged within each, so that a hundred runs on three instances are three
 observations and not a hundred. All tests and intervals are those of scipy.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,12 +29,6 @@ MOST_DRAWN = 20_000_000
 
 EQUAL = 1e-9
 """Relative difference up to which two scores are equal, as for the evaluator."""
-
-WITHIN = (0.0, 0.01, 0.05)
-"""Relative distances to the best known makespan of an instance that count as targets."""
-
-FACTORS = (1.0, 1.001, 1.01, 1.05, 1.1, 1.2, 1.5, 2.0)
-"""Ratios to the best method on an instance at which performance profiles are told."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -159,7 +153,17 @@ def _difference(
 
 
 def interval(values: NDArray[np.float64]) -> tuple[float | None, float | None]:
-    """Return the BCa bootstrap interval of the mean; None for fewer than three values."""
+    """Return the BCa bootstrap interval of the mean, with a confidence of 95 %; None for fewer than three values.
+
+    Parameters
+    ----------
+    values : ndarray, shape (instances,)
+        Finite.
+
+    References
+    ----------
+    Efron (1987), Better bootstrap confidence intervals, doi:10.1080/01621459.1987.10478410.
+    """
     from scipy import stats
 
     if len(values) < LEAST:
@@ -184,6 +188,15 @@ def signed_rank(values: NDArray[np.float64]) -> float | None:
 
     Zeros are left out, as Wilcoxon did; where nothing else is left nothing speaks for a difference, and p is 1. With
     ties among few values the distribution is enumerated.
+
+    Parameters
+    ----------
+    values : ndarray, shape (instances,)
+        Differences, finite.
+
+    References
+    ----------
+    Wilcoxon (1945), Individual comparisons by ranking methods, doi:10.2307/3001968.
     """
     from scipy import stats
 
@@ -211,68 +224,3 @@ def holm(p_values: Sequence[float | None]) -> list[float | None]:
         largest = max(largest, min(1.0, (len(order) - rank) * p))
         corrected[place] = largest
     return corrected
-
-
-def profiles(
-    endings: Endings, factors: Sequence[float] = FACTORS, score: str = "makespan"
-) -> Mapping[str, list[float]]:
-    """Return performance profiles: on which share of the instances a method is within each factor of the best one.
-
-    An instance that no method solved counts for none; one that a method did not solve counts against it.
-
-    References
-    ----------
-    Dolan and Moré (2002), doi:10.1007/s101070100263.
-    """
-    table = np.array([scores(runs, score) for runs in endings.values()])
-    table = table[:, ~np.isnan(table).all(axis=0)]
-    best = np.nanmin(table, axis=0) if table.size else np.zeros(0)
-    shares = [[_share(row <= best * (factor + EQUAL)) for factor in factors] for row in table]
-    return dict(zip(endings, shares, strict=True))
-
-
-def targets_reached(
-    endings: Endings, times_s: Sequence[float], within: Sequence[float] = WITHIN
-) -> Mapping[str, list[float]]:
-    """Return which share of its targets a method has reached by each time, over all runs.
-
-    A target is a makespan: the best known of an instance, found in any of these runs, or so much more. A run reaches
-    it at the first improvement in its trace that is as good.
-
-    References
-    ----------
-    Hansen et al. (2021), COCO: a platform for comparing continuous optimizers, doi:10.1080/10556788.2020.1808977.
-    """
-    known = [ending for lists in endings.values() for runs in lists for ending in runs if ending is not None]
-    if not known:
-        return {label: [0.0] * len(times_s) for label in endings}
-    best = [_best([runs[number] for runs in endings.values()]) for number in range(len(next(iter(endings.values()))))]
-    found = {}
-    for label, lists in endings.items():
-        reached = np.array(
-            [
-                _reached(ending, target * (1 + more))
-                for target, runs in zip(best, lists, strict=True)
-                if target is not None
-                for ending in runs
-                for more in within
-            ]
-        )
-        found[label] = [_share(reached <= time) for time in times_s]
-    return found
-
-
-def _best(lists: Sequence[Sequence[Ending | None]]) -> float | None:
-    makespans = [ending.makespan for runs in lists for ending in runs if ending is not None]
-    return min((makespan for makespan in makespans if makespan is not None), default=None)
-
-
-def _reached(ending: Ending | None, target: float) -> float:
-    """Return when a run had a makespan of at most `target`; infinity if never."""
-    points = () if ending is None else ending.trace
-    good = (time for time, makespan, *_ in points if makespan is not None and makespan <= target * (1 + EQUAL))
-    return min(good, default=float("inf"))
-
-
-def _share(which: NDArray[np.bool_]) -> float:
-    return float(np.mean(which)) if which.size else 0.0

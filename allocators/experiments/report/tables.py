@@ -6,19 +6,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from alloc.allocators.experiments.compare import Row
+from alloc.allocators.experiments.profiles import FACTORS, WITHIN, profiles, targets_reached
 from alloc.allocators.experiments.report.standing import standing_tables
 from alloc.allocators.experiments.report.table import Table
 from alloc.allocators.experiments.standings import best_known, standings
 from alloc.allocators.experiments.statistics import (
     CONFIDENCE,
-    FACTORS,
     LEAST,
     SMALL,
-    WITHIN,
     Difference,
     differences,
-    profiles,
-    targets_reached,
 )
 from alloc.allocators.experiments.store.outcome import Outcome
 from alloc.allocators.experiments.stored import Comparison, Endings, doubts

@@ -15,6 +15,7 @@ import pytest
 from stored_runs import ANGRY, MACHINE, fill
 
 from alloc.allocators import report_html
+from alloc.allocators.experiments.profiles import profiles, targets_reached
 from alloc.allocators.experiments.report.page import details as details_module
 from alloc.allocators.experiments.report.page import libraries
 from alloc.allocators.experiments.report.page import summary as summary_module
@@ -22,7 +23,7 @@ from alloc.allocators.experiments.report.page.groups import laid_out
 from alloc.allocators.experiments.report.page.page import check_page
 from alloc.allocators.experiments.report.page.series import series
 from alloc.allocators.experiments.report.page.source import EDGES_S, read_stores, thinned
-from alloc.allocators.experiments.statistics import differences, profiles, targets_reached
+from alloc.allocators.experiments.statistics import differences
 from alloc.allocators.experiments.store.outcome import Ending, Outcome
 from alloc.allocators.experiments.store.plan import packed, unpacked
 from alloc.allocators.experiments.store.store import Store

@@ -5,10 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from alloc.allocators.experiments.profiles import profiles, targets_reached
 from alloc.allocators.experiments.report.page.groups import Group, Layout
 from alloc.allocators.experiments.report.page.source import EDGES_S, moment
 from alloc.allocators.experiments.report.page.summary import Entry, relative_to_best
-from alloc.allocators.experiments.statistics import profiles, scores, targets_reached
+from alloc.allocators.experiments.statistics import scores
 from alloc.allocators.experiments.store.outcome import Ending
 
 MOST_POINTS = 2000
