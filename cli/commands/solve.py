@@ -204,7 +204,7 @@ def _tell(result: "Result", *, summary: bool) -> None:
 
 
 def _doubt(result: "Result") -> None:
-    """Tell the first of what may not be meant in the instance."""
+    """Tell the first of what may be a mistake in the instance."""
     from alloc.problems.diagnosis.plausibility import findings
 
     found = findings(result.instance)

@@ -56,7 +56,7 @@ def validate_command(
 ) -> None:
     """Check instances, missions and logs.
 
-    A summary of each is printed, and what may not be meant.
+    A summary of each is printed, and what may be a mistake.
     """
     facts: list[dict[str, object]] = []
     for name in files:

@@ -11,7 +11,7 @@ from alloc.problems.vocabulary import Knowledge
 
 
 def mission_findings(mission: Mission) -> tuple[Finding, ...]:
-    """Return what about a mission may not be meant, that of its instance first.
+    """Return what about a mission may be a mistake, that of its instance first.
 
     Parameters
     ----------

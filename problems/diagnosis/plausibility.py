@@ -26,7 +26,7 @@ MOST_NAMES = 3
 
 @dataclass(frozen=True)
 class Finding:
-    """Something about an instance that may not be meant.
+    """Something about an instance that may be a mistake.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class Finding:
 
 
 def findings(instance: Instance) -> tuple[Finding, ...]:
-    """Return what about an instance may not be meant, the most serious first; nothing for a plausible one.
+    """Return what about an instance may be a mistake, the most serious first; nothing for a plausible one.
 
     Takes O(n + m) time; who can reach nothing is looked at only where a table of all pairs is small.
 

@@ -22,7 +22,7 @@ class Checked:
     words : str
         One line for people.
     findings : sequence of Finding
-        What may not be meant.
+        What may be a mistake.
     """
 
     facts: dict[str, object]

@@ -204,7 +204,7 @@ def test_policies_and_methods_are_not_mixed(alloc, mission, small):
 
 
 def test_missions_and_logs_are_validated(alloc, mission, small):
-    """Missions, logs and instances are checked side by side, with the facts of each and what may not be meant."""
+    """Missions, logs and instances are checked side by side, with the facts of each and what may be a mistake."""
     alloc("simulate", mission, "--policy", "greedy", "--log", "run.jsonl")
     document = json.loads(Path(mission).read_text())
     document |= {"knowledge": "full", "horizon": 0.1, "sensing": 1}

@@ -1,4 +1,4 @@
-"""What may not be meant in an instance: each finding where it belongs, and none where all is well."""
+"""What may be a mistake in an instance: each finding where it belongs, and none where all is well."""
 
 from pathlib import Path
 from typing import Any
