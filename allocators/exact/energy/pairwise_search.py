@@ -4,10 +4,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from alloc.allocators.exact.demand import Demand
+from alloc.allocators.exact.energy.energy_model import MAX_NEED, Mask
 from alloc.allocators.exact.energy.pairwise import descend_pairs, perturb, total_distance
 from alloc.allocators.exact.knapsack import WholeArray
+from alloc.allocators.exact.model import ROUNDING, Model
+from alloc.problems import Allocation, Instance
 from alloc.problems.bounds import scale_to_one, typical_distance
 from alloc.problems.instance import FloatArray, IntArray
+
+
+MAX_WORK = 100_000_000
+"""Cells of all tables that a round of prices, or a descent over all pairs of tasks, may fill: some 0.1 s."""
 
 
 @dataclass(frozen=True)
@@ -85,6 +93,18 @@ class PairwiseSearch:
         self.best = self._task.copy()
         return not self._stale.any()
 
+    def restrict(self, allowed: Mask) -> None:
+        """Send agents only where they are allowed from now on, shape (n, t), unless the best plan does otherwise."""
+        allowed = np.hstack([allowed, np.ones((len(allowed), 1), dtype=bool)])
+        agents = np.arange(len(allowed))
+        if not allowed[agents, self.best].all():
+            return
+        self._distance[~allowed] = np.inf
+        if not allowed[agents, self._task].all():
+            self._task = self.best.copy()
+        can = np.isfinite(self._distance).astype(np.float64)
+        self._pairs = np.ascontiguousarray(self._pairs[(can.T @ can)[self._pairs[:, 0], self._pairs[:, 1]] > 0])
+
     def anneal(self, rounds: int, progress: float) -> None:
         """Perturb and descend `rounds` times, `progress` being how far annealing is, from 0 to 1."""
         unit = self.cost * self._scale / len(self._task) + 1e-300
@@ -111,3 +131,28 @@ def _pairs(partners: WholeArray, tasks: int) -> WholeArray:
     both = np.unique(both[both[:, 0] < both[:, 1]], axis=0)
     idle = np.column_stack([np.arange(tasks), np.full(tasks, tasks)])
     return np.ascontiguousarray(np.vstack([both, idle]).astype(np.int64))
+
+
+def begin_primal(
+    instance: Instance, model: Model, demand: Demand, plan: Allocation, task_distance: FloatArray, seed: int
+) -> PairwiseSearch | None:
+    """Start the search at `plan`; None where travel takes time, or its tables are too large."""
+    if model.travel_time is not None:
+        return None
+    column = np.full(instance.m + 1, len(model.tasks))
+    column[model.tasks] = np.arange(len(model.tasks))
+    task = column[plan.task_of_agent]
+    cost = np.where(model.classes.mask, model.classes.cost, np.inf)[:, model.tasks]
+    if demand.integral and demand.need.max() <= MAX_NEED:
+        weight, need = demand.ability.astype(np.int64), demand.need.astype(np.int64)
+    else:
+        work = model.workload / demand.time * (1 - ROUNDING)
+        scale = MAX_NEED / work.max()
+        weight, need = np.floor(model.classes.ability * scale).astype(np.int64), np.ceil(work * scale).astype(np.int64)
+    served = np.bincount(task, minlength=len(need) + 1)[:-1] > 0
+    need, cost = np.where(served, need, 0), np.where(served, cost, np.inf)
+    partners = min(len(need), Perturbation().partners)
+    if len(need) * partners / 2 * (instance.n + 2 * instance.n / len(need) * need.max()) > MAX_WORK:
+        return None
+    agent_class = model.classes.class_of_agent
+    return PairwiseSearch(task, weight[agent_class], cost[agent_class], need, task_distance, seed)

@@ -7,18 +7,15 @@ import numpy as np
 from alloc.allocators.exact.demand import Demand
 from alloc.allocators.exact.energy.cuts.cutting_planes import CuttingPlanes
 from alloc.allocators.exact.energy.cuts.group_programme import GroupProgramme
-from alloc.allocators.exact.energy.energy_model import MAX_NEED, EnergyModel, round_demand
+from alloc.allocators.exact.energy.energy_model import EnergyModel, round_demand
 from alloc.allocators.exact.energy.lagrangian import LagrangianBound
 from alloc.allocators.exact.energy.linear import class_prices
-from alloc.allocators.exact.energy.pairwise_search import PairwiseSearch, Perturbation
+from alloc.allocators.exact.energy.pairwise_search import MAX_WORK, PairwiseSearch, begin_primal
 from alloc.allocators.exact.energy.timer import Timer
 from alloc.allocators.exact.model import ROUNDING, Model
 from alloc.allocators.parallel.pool import Pool
 from alloc.problems import IDLE, Allocation, Instance
 from alloc.problems.instance import FloatArray, IntArray
-
-MAX_WORK = 100_000_000
-"""Cells of all tables that a round of prices, or a descent over all pairs of tasks, may fill: some 0.1 s."""
 
 STATES = 2000
 """Cells that count for a pair where weights are no whole numbers."""
@@ -37,6 +34,9 @@ FEW_GROUPS = 2500
 
 PARTS = 1.0, 0.7, 0.5, 0.35, 0.25
 """Parts of the gap tried in turn, until the groups within are few enough."""
+
+FEWER_PAIRS = 0.9
+"""Part of the pairs that are left at the most when the search for plans is told which they are."""
 
 LESS_GAP = 0.9
 """Part of the last gap at which groups are counted again."""
@@ -93,9 +93,9 @@ class PrimalDual:
         self._dual = None if demand.partial else self._begin_dual(task_distance, seconds)
         self._cuts: CuttingPlanes | None = None
         self._should_stop = should_stop
-        self._primal = _begin_primal(instance, model, demand, plan, task_distance, seed)
+        self._primal = begin_primal(instance, model, demand, plan, task_distance, seed)
         self._reported = self._cost = _cost_of_plan(instance, plan)
-        self._gap_tried = np.inf
+        self._gap_tried, self._restricted_to = np.inf, len(self._pairs)
         self._primal_timer, self._dual_timer = Timer(), Timer()
         self._descended = self._primal is None
 
@@ -239,7 +239,12 @@ class PrimalDual:
             self._cuts.ascend(min(rounds, MAX_CUT_ROUNDS), self._cost)
 
     def _better(self) -> Allocation | None:
-        """Return the best plan if it has not been returned yet."""
+        """Return the best plan if it has not been returned yet; tell the primal side which pairs are left."""
+        if self._primal is not None and len(self._kept) < FEWER_PAIRS * self._restricted_to:
+            self._restricted_to, pairs = len(self._kept), self._kept
+            allowed = np.zeros((len(self._demand.count), len(self._model.tasks)), dtype=bool)
+            allowed[self._demand.class_of_pair[pairs], self._demand.task_of_pair[pairs]] = True
+            self._primal.restrict(allowed[self._model.classes.class_of_agent])
         if self._primal is None or self._primal.cost >= self._reported * (1 - 1e-12):
             return None
         self._reported = self._primal.cost
@@ -267,31 +272,6 @@ def pairwise_distance(place: FloatArray) -> FloatArray:
     known = np.nan_to_num(place)
     known = known / max(1.0, float(np.abs(known).max(initial=0.0)))
     return np.asarray(np.sqrt(((known[:, None] - known[None]) ** 2).sum(axis=2)))
-
-
-def _begin_primal(
-    instance: Instance, model: Model, demand: Demand, plan: Allocation, task_distance: FloatArray, seed: int
-) -> PairwiseSearch | None:
-    """Start the search at `plan`; None where travel takes time, or its tables are too large."""
-    if model.travel_time is not None:
-        return None
-    column = np.full(instance.m + 1, len(model.tasks))
-    column[model.tasks] = np.arange(len(model.tasks))
-    task = column[plan.task_of_agent]
-    cost = np.where(model.classes.mask, model.classes.cost, np.inf)[:, model.tasks]
-    if demand.integral and demand.need.max() <= MAX_NEED:
-        weight, need = demand.ability.astype(np.int64), demand.need.astype(np.int64)
-    else:
-        work = model.workload / demand.time * (1 - ROUNDING)
-        scale = MAX_NEED / work.max()
-        weight, need = np.floor(model.classes.ability * scale).astype(np.int64), np.ceil(work * scale).astype(np.int64)
-    served = np.bincount(task, minlength=len(need) + 1)[:-1] > 0
-    need, cost = np.where(served, need, 0), np.where(served, cost, np.inf)
-    partners = min(len(need), Perturbation().partners)
-    if len(need) * partners / 2 * (instance.n + 2 * instance.n / len(need) * need.max()) > MAX_WORK:
-        return None
-    agent_class = model.classes.class_of_agent
-    return PairwiseSearch(task, weight[agent_class], cost[agent_class], need, task_distance, seed)
 
 
 def _cost_of_plan(instance: Instance, plan: Allocation) -> float:

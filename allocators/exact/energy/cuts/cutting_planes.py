@@ -28,8 +28,9 @@ from alloc.problems.instance import FloatArray
 SMOOTHING = 0.7
 """Part of the best prices so far in those that are tried next."""
 
-PRECISION = 1e-5
-"""Relative difference between bound and programme at which cuts are added."""
+PRECISION, EARLY = 1e-5, 0.05
+"""Relative difference between bound and programme at which prices are the best, and the part of the gap to the plan at
+which cuts are added before that."""
 
 MOST_KEPT = 0.95
 """Part of the pairs that are left at the most where some are dropped."""
@@ -87,7 +88,7 @@ class CuttingPlanes:
         for group in groups:
             self._master.add(group)
         self._price, self._penalty = price, np.zeros(0)
-        self.bound, self.converged = -np.inf, False
+        self.bound, self.converged, self._in_vain = -np.inf, False, False
         self.kept = np.ones(len(model.copies), dtype=bool)
 
     def ascend(self, rounds: int, cost: float) -> None:
@@ -136,8 +137,11 @@ class CuttingPlanes:
         if value > self.bound:
             self.bound, self._price, self._penalty = value, price, penalty
         is_new = master.add(group)
-        if self.bound >= master.value * (1 - PRECISION) or not (is_new or self._smoothing):
-            self.converged = not (self._drop_pairs(cost) or master.separate(self._should_stop))
+        is_best = self.bound >= master.value * (1 - PRECISION) or not (is_new or self._smoothing)
+        is_near = master.value - self.bound <= EARLY * (cost - self.bound) and not self._in_vain
+        if is_best or is_near:
+            found = self._drop_pairs(cost) or master.separate(self._should_stop)
+            self.converged, self._in_vain = is_best and not found, not (is_best or found)
             is_new = True
         self._smoothing = SMOOTHING if is_new else (self._smoothing / 2 if self._smoothing > 0.2 else 0.0)
 
