@@ -26,6 +26,10 @@ MAX_TASKS = 2000
 MAX_LEAD_S = 0.1
 """How much more time one side may have had before it waits for the other."""
 
+LONG, SHORT_S, STUCK = 1.5, 0.5, 2.5
+"""The search for plans is stuck when its time exceeds so many times that until its best plan, and so many seconds; it
+then gets a quarter of the time of bounds."""
+
 MAX_CUT_ROUNDS = 5
 """Rounds of cutting planes in one call, of which one may take as long as many of subgradients."""
 
@@ -96,7 +100,7 @@ class PrimalDual:
         self._primal = begin_primal(instance, model, demand, plan, task_distance, seed)
         self._reported = self._cost = _cost_of_plan(instance, plan)
         self._gap_tried, self._restricted_to = np.inf, len(self._pairs)
-        self._primal_timer, self._dual_timer = Timer(), Timer()
+        self._primal_timer, self._dual_timer, self._improved_s = Timer(), Timer(), 0.0
         self._descended = self._primal is None
 
     @property
@@ -190,7 +194,7 @@ class PrimalDual:
         if not self._descended:
             return self._descend()
         rising = None if pool is None else pool.submit(self._ascend)
-        lead_s = self._primal_timer.spent_s - self._dual_timer.spent_s  # rounds of either side may take long
+        lead_s = self._lead_s  # rounds of either side may take long
         if self._primal is not None and (lead_s <= MAX_LEAD_S or rising is not None):
             primal = self._primal
             self._primal_timer.run(lambda rounds: primal.anneal(rounds, progress))
@@ -199,6 +203,13 @@ class PrimalDual:
         elif lead_s >= -MAX_LEAD_S or self._primal is None:
             self._ascend()
         return self._better()
+
+    @property
+    def _lead_s(self) -> float:
+        """By how much the search for plans has had more time than is due to it."""
+        spent_s = self._primal_timer.spent_s
+        is_stuck = spent_s > LONG * self._improved_s + SHORT_S
+        return spent_s * (STUCK if is_stuck else 1.0) - self._dual_timer.spent_s
 
     def repeat(self, slice_: int) -> Allocation | None:
         """Work on both sides as `run` does, by count and not by the clock."""
@@ -247,7 +258,7 @@ class PrimalDual:
             self._primal.restrict(allowed[self._model.classes.class_of_agent])
         if self._primal is None or self._primal.cost >= self._reported * (1 - 1e-12):
             return None
-        self._reported = self._primal.cost
+        self._reported, self._improved_s = self._primal.cost, self._primal_timer.spent_s
         tasks = np.append(self._model.tasks, IDLE)
         return Allocation(tasks[self._primal.best])
 

@@ -26,8 +26,15 @@ LEAST_VIOLATION = 0.02
 MOST_ROUNDS, MUCH_MORE = 40, 1.1
 """Solutions sought for one cut, and by which factor its violation may still grow for more to be sought."""
 
-TURN = 40
-"""Clusters of which cuts are sought before the mixture changes, if there are any cuts."""
+TURN, MOST_CUTS = 60, 40
+"""Clusters of which cuts are sought, and cuts of them, before the mixture changes, if there are any cuts."""
+
+WHOLE, MOST_BROKEN = 1e-6, 30
+"""Distance from a whole number from which agents count as broken up, and classes of such agents above which a cluster
+is left out."""
+
+MOST_KNOWN, MOST_SHARING = 2000, 500
+"""Clusters whose knapsacks are kept, and clusters of tasks that share agents, at the most."""
 
 PRECISION = 1e-9
 """By how much a cut is loosened for rounding."""
@@ -61,19 +68,22 @@ class ClusterSeparation:
     ----------
     model : EnergyModel
     member : ndarray of bool, shape (f, t)
-        The tasks of each cluster.
+        The tasks of each cluster; those that share agents in the mixture are clusters as well.
     """
 
     def __init__(self, model: EnergyModel, member: Mask) -> None:
         self._model, self._member = model, member
-        self._knapsacks: dict[int, EnergyModel] = {}
-        self._points: dict[int, FloatArray] = {}
-        self._next = 0
+        self._knapsacks: dict[bytes, EnergyModel] = {}
+        self._points: dict[bytes, FloatArray] = {}
+        self._turn, self._due, self._pause = 0, dict[bytes, int](), dict[bytes, int]()
 
     def violated(
         self, use: FloatArray, task: IntArray, part: FloatArray, should_stop: Callable[[], bool]
     ) -> list[ClusterCut]:
-        """Return cuts that a mixture violates; clusters take turns, and if those of this turn have none, more do.
+        """Return cuts that a mixture violates, of clusters that break up few agents first: theirs are cut most often.
+
+        Of 341 clusters of an instance with 500 agents and 30 tasks, those that have parts of agents of 1 or 2 classes
+        were cut in 78 % of all cases, with 3 to 9 classes in 40 %, with 15 or more in none, and took longer.
 
         Parameters
         ----------
@@ -85,31 +95,48 @@ class ClusterSeparation:
             Asked between clusters.
         """
         cuts: list[ClusterCut] = []
-        turn = [(self._next + f) % len(self._member) for f in range(len(self._member))]
-        for begin in range(0, len(turn), TURN):
-            for f in turn[begin : begin + TURN]:
-                if should_stop():
-                    return cuts
-                here = self._member[f][task]
-                if (part[here] < 1 - 1e-6).any() and self._knapsack(f).need[0] > 0:
-                    cuts += self._cut_of(f, part[here] @ use[here])
-            self._next += TURN
-            if cuts:
+        mixed = np.zeros((len(self._model.need), use.shape[1]))
+        np.add.at(mixed, task, part[:, None] * use)
+        member = self._member
+        if len(member):
+            member = np.unique(np.vstack([member, sharing_clusters(mixed, MOST_SHARING)]), axis=0)
+        broken = (_distance_from_whole(member.astype(float) @ mixed) > WHOLE).sum(axis=1)
+        self._turn += 1
+        pausing = np.array([self._due.get(inside.tobytes(), 0) > self._turn for inside in member], dtype=bool)
+        order, tried = np.lexsort((broken, pausing)), 0
+        for f in order[(broken[order] > 0) & (broken[order] <= MOST_BROKEN)].tolist():
+            if should_stop() or len(cuts) >= MOST_CUTS or (cuts and (tried >= TURN or pausing[f])):
                 break
+            if self._knapsack(member[f]).need[0] > 0:
+                tried += 1
+                found = self._cut_of(member[f], member[f].astype(float) @ mixed)
+                self._rest(member[f], in_vain=not found)
+                cuts += found
         return cuts
 
-    def _knapsack(self, f: int) -> EnergyModel:
-        """Return the knapsack of a cluster; built when it is first asked for, as there are many."""
-        if f not in self._knapsacks:
-            self._knapsacks[f] = Clusters.build(self._model, self._member[f : f + 1]).model
-            self._points[f] = self._knapsacks[f].copies[None].astype(float)
-        return self._knapsacks[f]
+    def _rest(self, inside: Mask, *, in_vain: bool) -> None:
+        """Leave a cluster without a cut out of the next turns, twice as many each time."""
+        key = inside.tobytes()
+        self._pause[key] = 2 * self._pause.get(key, 1) if in_vain else 1
+        self._due[key] = self._turn + self._pause[key] if in_vain else 0
 
-    def _cut_of(self, f: int, mixed: FloatArray) -> list[ClusterCut]:
+    def _knapsack(self, inside: Mask) -> EnergyModel:
+        """Return the knapsack of a cluster; built when it is first asked for, as there are many."""
+        key = inside.tobytes()
+        if key not in self._knapsacks:
+            if len(self._knapsacks) >= MOST_KNOWN:
+                self._knapsacks.clear()
+                for known in (self._points, self._due, self._pause):
+                    known.clear()
+            self._knapsacks[key] = Clusters.build(self._model, inside[None]).model
+            self._points[key] = self._knapsacks[key].copies[None].astype(float)
+        return self._knapsacks[key]
+
+    def _cut_of(self, inside: Mask, mixed: FloatArray) -> list[ClusterCut]:
         """Return a cut of a cluster that has `mixed` agents of each class, shape (k,); none if none is violated."""
-        knapsack = self._knapsack(f)
-        inside = mixed[knapsack.class_of_pair]
-        function = _Separator(inside, self._points[f], is_exact=bool(knapsack.max_weight[0] >= 0))
+        knapsack, key = self._knapsack(inside), inside.tobytes()
+        agents = mixed[knapsack.class_of_pair]
+        function = _Separator(agents, self._points[key], is_exact=bool(knapsack.max_weight[0] >= 0))
         best, cuts = LEAST_VIOLATION, []
         for _ in range(MOST_ROUNDS):
             factor, most = function.most_violated()
@@ -118,14 +145,43 @@ class ClusterSeparation:
             point, _, cost = solve_subproblems(knapsack, -factor, compare=False)
             if not np.isfinite(cost):
                 break
-            violation = float(factor @ inside) + cost
+            violation = float(factor @ agents) + cost
             if violation > best:
                 best, whole = violation, np.zeros(len(mixed))
                 whole[knapsack.class_of_pair] = factor
-                cuts = [ClusterCut(self._member[f], whole, PRECISION - cost)]
+                cuts = [ClusterCut(inside, whole, PRECISION - cost)]
             function.add(point.astype(float))
-            self._points[f] = np.vstack([self._points[f], point])
+            self._points[key] = np.vstack([self._points[key], point])
         return cuts
+
+
+def sharing_clusters(mixed: FloatArray, most: int) -> Mask:
+    """Return clusters of tasks that share agents in a mixture, shape (f, t), at most about as many as given.
+
+    Each task is joined, one after another, by the task with which those so far share the most.
+
+    Parameters
+    ----------
+    mixed : ndarray, shape (t, k)
+        Agents of each class on each task, parts of which are shared.
+    most : int
+    """
+    tasks = len(mixed)
+    part = _distance_from_whole(mixed)
+    shared = part @ part.T
+    inside, rows, each = np.eye(tasks, dtype=bool), [], np.arange(tasks)
+    for _ in range(min(tasks // 2, 1 + most // tasks)):
+        strength = np.where(inside, -1.0, inside.astype(float) @ shared)
+        joining = strength.argmax(axis=1)
+        joins = strength[each, joining] > WHOLE
+        inside = inside.copy()
+        inside[each[joins], joining[joins]] = True
+        rows.append(inside)
+    return np.vstack([np.zeros((0, tasks), dtype=bool), *rows])
+
+
+def _distance_from_whole(number: FloatArray) -> FloatArray:
+    return np.asarray(np.abs(number - np.round(number)))
 
 
 class _Separator:

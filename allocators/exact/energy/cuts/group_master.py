@@ -19,6 +19,9 @@ LEAST_VIOLATION, MOST_FOUND = 0.05, 5000
 MOST_CUTS, MOST_OF_CLASS = 60, 4
 """Cuts over classes added at once, and of these how many with the same class."""
 
+DUAL_SIMPLEX, PRIMAL_SIMPLEX = 1, 4
+"""How HiGHS goes on after cuts, and after groups alone: in half of the time that the former takes."""
+
 ROOM, ROOM_FOR_CUTS = 1024, 64
 """Groups and cuts for which there is room at first."""
 
@@ -62,7 +65,7 @@ class GroupMaster:
         self._scale = 1 / max(1e-300, float(np.abs(model.cost).mean()))
         self.value, self.price = np.inf, np.zeros(classes)
         self.penalty, self.limit = np.zeros(0), np.zeros(0)
-        self._highs = highspy.Highs()
+        self._highs, self._cuts_known = highspy.Highs(), 0
         self._highs.HandleUserInterrupt = True
         for option, value in (("output_flag", False), ("threads", 1), ("presolve", "off")):
             self._highs.setOptionValue(option, value)
@@ -115,6 +118,9 @@ class GroupMaster:
 
     def solve(self, should_stop: Callable[[], bool]) -> bool:
         """Solve; return whether that succeeded, as it does not where it is stopped."""
+        only_groups = self._cuts_known == len(self.limit)  # then the last basis still has a mixture
+        self._highs.setOptionValue("simplex_strategy", PRIMAL_SIMPLEX if only_groups else DUAL_SIMPLEX)
+        self._cuts_known = len(self.limit)
         run_native(self._highs.solve, should_stop, self._highs.cancelSolve)
         if self._highs.getModelStatus() != highspy.HighsModelStatus.kOptimal:
             return False
