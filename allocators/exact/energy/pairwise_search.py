@@ -76,6 +76,7 @@ class PairwiseSearch:
         order = np.argsort(task_distance, axis=1, kind="stable").astype(np.int64)
         self._near = np.ascontiguousarray(order[:, : perturbation.around])
         self._pairs = _pairs(order[:, : perturbation.partners], tasks)
+        self._all_distance, self._all_pairs = self._distance, self._pairs
         self._noise = np.zeros_like(self._distance)
         self._stale = np.ones(len(self._need), dtype=np.bool_)
         self.best = self._task.copy()
@@ -94,16 +95,12 @@ class PairwiseSearch:
         return not self._stale.any()
 
     def restrict(self, allowed: Mask) -> None:
-        """Send agents only where they are allowed from now on, shape (n, t), unless the best plan does otherwise."""
-        allowed = np.hstack([allowed, np.ones((len(allowed), 1), dtype=bool)])
-        agents = np.arange(len(allowed))
-        if not allowed[agents, self.best].all():
-            return
-        self._distance[~allowed] = np.inf
-        if not allowed[agents, self._task].all():
-            self._task = self.best.copy()
+        """Send agents from now on only where they are allowed, shape (n, t), or where they are, or are in the best plan."""
+        allowed, agents = np.hstack([allowed, np.ones((len(allowed), 1), dtype=bool)]), np.arange(len(allowed))
+        allowed[agents, self._task] = allowed[agents, self.best] = True
+        self._distance = np.where(allowed, self._all_distance, np.inf)
         can = np.isfinite(self._distance).astype(np.float64)
-        self._pairs = np.ascontiguousarray(self._pairs[(can.T @ can)[self._pairs[:, 0], self._pairs[:, 1]] > 0])
+        self._pairs = self._all_pairs[(can.T @ can)[self._all_pairs[:, 0], self._all_pairs[:, 1]] > 0]
 
     def anneal(self, rounds: int, progress: float) -> None:
         """Perturb and descend `rounds` times, `progress` being how far annealing is, from 0 to 1."""

@@ -39,8 +39,8 @@ FEW_GROUPS = 2500
 PARTS = 1.0, 0.7, 0.5, 0.35, 0.25
 """Parts of the gap tried in turn, until the groups within are few enough."""
 
-FEWER_PAIRS = 0.9
-"""Part of the pairs that are left at the most when the search for plans is told which they are."""
+LIKELY = 1.0
+"""Part of the gap that plans may cost above the bound of whose pairs the search for plans is told."""
 
 LESS_GAP = 0.9
 """Part of the last gap at which groups are counted again."""
@@ -99,7 +99,7 @@ class PrimalDual:
         self._should_stop = should_stop
         self._primal = begin_primal(instance, model, demand, plan, task_distance, seed)
         self._reported = self._cost = _cost_of_plan(instance, plan)
-        self._gap_tried, self._restricted_to = np.inf, len(self._pairs)
+        self._gap_tried, self._least_with = np.inf, np.zeros(0)
         self._primal_timer, self._dual_timer, self._improved_s = Timer(), Timer(), 0.0
         self._descended = self._primal is None
 
@@ -250,9 +250,10 @@ class PrimalDual:
             self._cuts.ascend(min(rounds, MAX_CUT_ROUNDS), self._cost)
 
     def _better(self) -> Allocation | None:
-        """Return the best plan if it has not been returned yet; tell the primal side which pairs are left."""
-        if self._primal is not None and len(self._kept) < FEWER_PAIRS * self._restricted_to:
-            self._restricted_to, pairs = len(self._kept), self._kept
+        """Return the best plan if it has not been returned yet; tell the primal side which pairs are likely."""
+        if self._primal is not None and self._cuts is not None and self._cuts.least_with is not self._least_with:
+            self._least_with = self._cuts.least_with
+            pairs = self._kept[self._least_with <= self._proven + LIKELY * (self._cost - self._proven)]
             allowed = np.zeros((len(self._demand.count), len(self._model.tasks)), dtype=bool)
             allowed[self._demand.class_of_pair[pairs], self._demand.task_of_pair[pairs]] = True
             self._primal.restrict(allowed[self._model.classes.class_of_agent])

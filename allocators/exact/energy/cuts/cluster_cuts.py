@@ -10,7 +10,7 @@ Boyd (1994), Fenchel cutting planes for integer programs, doi:10.1287/opre.42.1.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import highspy
 import numpy as np
@@ -136,23 +136,68 @@ class ClusterSeparation:
         """Return a cut of a cluster that has `mixed` agents of each class, shape (k,); none if none is violated."""
         knapsack, key = self._knapsack(inside), inside.tobytes()
         agents = mixed[knapsack.class_of_pair]
-        function = _Separator(agents, self._points[key], is_exact=bool(knapsack.max_weight[0] >= 0))
-        best, cuts = LEAST_VIOLATION, []
-        for _ in range(MOST_ROUNDS):
-            factor, most = function.most_violated()
-            if most < max(LEAST_VIOLATION, MUCH_MORE * best):
-                break
-            point, _, cost = solve_subproblems(knapsack, -factor, compare=False)
+        if self._is_whole(knapsack, key, agents):
+            return []
+        factor, cost, self._points[key] = _most_violated(knapsack, agents, self._points[key])
+        if factor is None:
+            return []
+        whole = np.zeros(len(mixed))
+        whole[knapsack.class_of_pair] = factor
+        return [ClusterCut(inside, whole, PRECISION - cost)]
+
+    def _is_whole(self, knapsack: EnergyModel, key: bytes, agents: FloatArray) -> bool:
+        """Whether a mixture is one of solutions, as a smaller knapsack shows; add those found to the points.
+
+        A mixture of solutions with none, or all, of a class is one of solutions with none, or all. So only the other
+        classes, those that are open, count.
+        """
+        is_open, ends = (agents > WHOLE) & (agents < knapsack.copies - WHOLE), np.round(agents)
+        points, done = self._points[key], int(knapsack.weight[~is_open] @ ends[~is_open])
+        is_exact = bool(knapsack.max_weight[0] >= 0)
+        most = knapsack.max_weight - done if is_exact else knapsack.max_weight
+        if is_exact and most[0] < 0:
+            return False
+        smaller = replace(knapsack.only(is_open), need=np.maximum(knapsack.need - done, 0), max_weight=most)
+        there = points[(points == ends)[:, ~is_open].all(axis=1)][:, is_open]
+        if len(there) == 0:
+            point, _, cost = solve_subproblems(smaller, np.zeros(int(is_open.sum())), compare=False)
             if not np.isfinite(cost):
-                break
-            violation = float(factor @ agents) + cost
-            if violation > best:
-                best, whole = violation, np.zeros(len(mixed))
-                whole[knapsack.class_of_pair] = factor
-                cuts = [ClusterCut(inside, whole, PRECISION - cost)]
-            function.add(point.astype(float))
-            self._points[key] = np.vstack([self._points[key], point])
-        return cuts
+                return False
+            there = point[None].astype(float)
+        factor, _, solutions = _most_violated(smaller, agents[is_open], there)
+        new = np.tile(ends, (len(solutions) - len(there), 1))
+        new[:, is_open] = solutions[len(there) :]
+        self._points[key] = np.vstack([points, new])
+        return factor is None
+
+
+def _most_violated(
+    knapsack: EnergyModel, agents: FloatArray, points: FloatArray
+) -> tuple[FloatArray | None, float, FloatArray]:
+    """Return factors of a violated cut, or None, the least of minus its use, and solutions known, shape (s, p).
+
+    Parameters
+    ----------
+    agents : ndarray, shape (p,)
+        Of each class in the mixture.
+    points : ndarray, shape (s, p)
+        Solutions to begin with.
+    """
+    function = _Separator(agents, points, is_exact=bool(knapsack.max_weight[0] >= 0))
+    best, found, limit, known = LEAST_VIOLATION, None, 0.0, [points]
+    for _ in range(MOST_ROUNDS):
+        factor, most = function.most_violated()
+        if most < max(LEAST_VIOLATION, MUCH_MORE * best):
+            break
+        point, _, cost = solve_subproblems(knapsack, -factor, compare=False)
+        if not np.isfinite(cost):
+            break
+        violation = float(factor @ agents) + cost
+        if violation > best:
+            best, found, limit = violation, factor, cost
+        function.add(point.astype(float))
+        known.append(point[None])
+    return found, limit, np.vstack(known)
 
 
 def sharing_clusters(mixed: FloatArray, most: int) -> Mask:
@@ -170,7 +215,7 @@ def sharing_clusters(mixed: FloatArray, most: int) -> Mask:
     part = _distance_from_whole(mixed)
     shared = part @ part.T
     inside, rows, each = np.eye(tasks, dtype=bool), [], np.arange(tasks)
-    for _ in range(min(tasks // 2, 1 + most // tasks)):
+    for _ in range(min(tasks // int(__import__("os").environ.get("BIG", 2)), 1 + most // tasks)):
         strength = np.where(inside, -1.0, inside.astype(float) @ shared)
         joining = strength.argmax(axis=1)
         joins = strength[each, joining] > WHOLE
@@ -181,6 +226,7 @@ def sharing_clusters(mixed: FloatArray, most: int) -> Mask:
 
 
 def _distance_from_whole(number: FloatArray) -> FloatArray:
+    """Return how far numbers are from the nearest whole ones."""
     return np.asarray(np.abs(number - np.round(number)))
 
 

@@ -19,6 +19,7 @@ from scipy.sparse import csr_array
 from alloc.allocators.exact.energy.cuts.all_groups import groups_within
 from alloc.allocators.exact.energy.cuts.group_master import GroupMaster
 from alloc.allocators.exact.energy.cuts.group_programme import GroupProgramme
+from alloc.allocators.exact.energy.cuts.known_prices import KnownPrices
 from alloc.allocators.exact.energy.cuts.pricing import STEPS, price_groups
 from alloc.allocators.exact.energy.energy_model import EnergyModel, Mask
 from alloc.allocators.exact.energy.subproblems import solve_subproblems
@@ -31,6 +32,13 @@ SMOOTHING = 0.7
 PRECISION, EARLY = 1e-5, 0.05
 """Relative difference between bound and programme at which prices are the best, and the part of the gap to the plan at
 which cuts are added before that."""
+
+MOST_LOST = 0.1
+"""Part of the gap to the plan that searches for groups may lose by ending early; beyond that cuts over classes, which
+make them long, are left out."""
+
+MORE = 8
+"""Times as many groups are written out as wanted, as prices met before rule out many of them."""
 
 MOST_KEPT = 0.95
 """Part of the pairs that are left at the most where some are dropped."""
@@ -70,6 +78,8 @@ class CuttingPlanes:
         No plan costs less.
     kept : ndarray of bool, shape (p,)
         Pairs that have not been dropped, as no better plan has them.
+    least_with : ndarray, shape (p,)
+        What plans with an agent of each pair that is kept cost at least, as of when pairs were last looked at.
     converged : bool
         Whether the mixture violates no cut, or the programme could not be solved.
     """
@@ -87,9 +97,9 @@ class CuttingPlanes:
         self._master, self._smoothing = GroupMaster(model, member), SMOOTHING
         for group in groups:
             self._master.add(group)
-        self._price, self._penalty = price, np.zeros(0)
+        self._price, self._penalty, self._known_prices = price, np.zeros(0), KnownPrices()
         self.bound, self.converged, self._in_vain = -np.inf, False, False
-        self.kept = np.ones(len(model.copies), dtype=bool)
+        self.kept, self.least_with = np.ones(len(model.copies), dtype=bool), np.full(len(model.copies), -np.inf)
 
     def ascend(self, rounds: int, cost: float) -> None:
         """Do so many rounds of pricing, given the cost of a plan at hand."""
@@ -112,12 +122,15 @@ class CuttingPlanes:
         model, master, penalty = self._model, self._master, self._known_penalty
         value, _, least = self._relax(self._price, penalty)
         limit, cuts = least + cost * (1 + 1e-9) - value, (*master.cuts_of_pairs(penalty), penalty)
-        found = groups_within(model, self._paid(self._price, penalty), limit, cuts, most, self._should_stop)
+        found = groups_within(model, self._paid(self._price, penalty), limit, cuts, MORE * most, self._should_stop)
         if found is None:
             return None
         (task, groups), on = found, penalty > 0
-        used = master.used(task, model.by_class(groups).toarray())[:, on]
-        return GroupProgramme(model, cost, task, groups, csr_array(used), master.limit[on])
+        used = master.used(task, model.by_class(groups).toarray())
+        can = self._known_prices.within(model, cost, task, groups, used, master.sets)
+        if can.sum() > most:
+            return None
+        return GroupProgramme(model, cost, task[can], groups[can], csr_array(used[can][:, on]), master.limit[on])
 
     @property
     def _known_penalty(self) -> FloatArray:
@@ -133,7 +146,11 @@ class CuttingPlanes:
         smoothing = self._smoothing if np.isfinite(self.bound) else 1.0
         price = smoothing * self._price + (1 - smoothing) * master.price
         penalty = smoothing * known + (1 - smoothing) * master.penalty
-        value, group, _ = self._relax(price, penalty)
+        value, group, least = self._relax(price, penalty)
+        if self._lost(group, least, price, penalty) > MOST_LOST * (cost - max(self.bound, value)):
+            known[master.leave_out_sets()] = 0.0
+            self._penalty = known
+            return
         if value > self.bound:
             self.bound, self._price, self._penalty = value, price, penalty
         is_new = master.add(group)
@@ -145,6 +162,14 @@ class CuttingPlanes:
             is_new = True
         self._smoothing = SMOOTHING if is_new else (self._smoothing / 2 if self._smoothing > 0.2 else 0.0)
 
+    def _lost(self, group: WholeArray, least: FloatArray, price: FloatArray, penalty: FloatArray) -> float:
+        """Return how much lower the bound is as searches for groups ended early, which cuts over classes make long."""
+        master = self._master
+        if not (master.seeks_sets and penalty.any()):
+            return 0.0
+        nothing = np.bincount(self._model.task_of_pair, group, len(least)) == 0
+        return float((master.cheapest(price, penalty) - least)[nothing].sum())
+
     def _drop_pairs(self, cost: float) -> bool:
         """Drop the pairs that no plan that costs less has, if they are many; return whether they are.
 
@@ -155,14 +180,16 @@ class CuttingPlanes:
         penalty = self._known_penalty
         value, _, least = self._relax(self._price, penalty)
         paid = self._paid(self._price, penalty)
+        self._known_prices.note(model, paid, penalty, value, least)
         group, excess, total = solve_subproblems(model, paid)
         unpenalised = np.bincount(model.task_of_pair, group * paid, len(least))
         if not np.isfinite(total) or abs(total - unpenalised.sum()) > 1e-9 * np.abs(unpenalised).sum():
             return False  # a search for a group ended early
         more = excess + (unpenalised - least)[model.task_of_pair]
-        stay = value + more <= cost * (1 + 1e-9)
+        self.least_with, stay = value + more, value + more <= cost * (1 + 1e-9)
         if stay.mean() > MOST_KEPT:
             return False
+        self.least_with = self.least_with[stay]
         self.kept[self.kept] = stay
         self._model = model.only(stay)
         self._weight = self._weight[stay]

@@ -19,6 +19,9 @@ LEAST_VIOLATION, MOST_FOUND = 0.05, 5000
 MOST_CUTS, MOST_OF_CLASS = 60, 4
 """Cuts over classes added at once, and of these how many with the same class."""
 
+SMALL_GROUP = 8
+"""Agents for each task above which cuts over classes make the search for groups long, and so are the last resort."""
+
 DUAL_SIMPLEX, PRIMAL_SIMPLEX = 1, 4
 """How HiGHS goes on after cuts, and after groups alone: in half of the time that the former takes."""
 
@@ -48,6 +51,8 @@ class GroupMaster:
         Of each cut.
     limit : ndarray, shape (c,)
         How much all groups together can use of each cut.
+    seeks_sets : bool
+        Whether cuts over classes are sought.
     """
 
     def __init__(self, model: EnergyModel, member: Mask) -> None:
@@ -58,6 +63,7 @@ class GroupMaster:
         self._task, self._cost, self._groups = np.zeros(ROOM, dtype=np.intp), np.zeros(ROOM), 0
         self._seen: set[tuple[int, bytes, bytes]] = set()
         self._sets, self._set_at = np.zeros((0, 3), dtype=np.int64), np.zeros(0, dtype=np.intp)
+        self.seeks_sets, self._has_small_groups = True, model.count.sum() <= SMALL_GROUP * self._tasks
         self._clusters: list[ClusterCut] = []
         self._cluster_at, self._member = np.zeros(0, dtype=np.intp), member
         self._separation = ClusterSeparation(model, member)
@@ -155,6 +161,11 @@ class GroupMaster:
         table = csr_array(entry, shape=(len(self._count), max(1, len(penalty))))[self._model.class_of_pair]
         return table.indptr.astype(np.int64), table.indices.astype(np.int64)
 
+    @property
+    def sets(self) -> IntArray:
+        """Which cuts are over classes."""
+        return self._set_at
+
     def used(self, task: IntArray, use: FloatArray) -> FloatArray:
         """Return what groups use of each cut, given their tasks and agents of each class, shapes (g, c) and (g, k)."""
         used, padded = np.zeros((len(task), len(self.limit))), np.hstack([use, np.zeros((len(task), 1))])
@@ -173,8 +184,17 @@ class GroupMaster:
             self._cluster_at = np.append(self._cluster_at, len(self.limit))
             self._clusters.append(cut)
             self._add_cut(cut.limit, cut.use(self._use[: self._groups, :-1], self._task[: self._groups]))
-        self._separate_sets(on)
+        if self.seeks_sets and (self._has_small_groups or len(self.limit) == before):
+            self._separate_sets(on)
         return len(self.limit) > before
+
+    def leave_out_sets(self) -> IntArray:
+        """Take out the cuts over classes, seek no more of them, and return which they were."""
+        self.seeks_sets, first, sets = False, self._tasks + len(self._model.count), self._set_at
+        for row in (first + self._set_at).tolist():
+            self._highs.changeRowBounds(row, -highspy.kHighsInf, highspy.kHighsInf)
+        self._sets, self._set_at = self._sets[:0], self._set_at[:0]
+        return sets
 
     def _separate_sets(self, on: IntArray) -> None:
         use = np.ascontiguousarray(self._use[on].T.astype(np.int64))
