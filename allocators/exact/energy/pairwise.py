@@ -33,6 +33,8 @@ def repartition_pair(
 
     Task number ``len(need) - 1`` stands for idleness: it needs nothing. Distances are ``inf`` where an agent cannot go.
     """
+    if need[a] > need[b]:  # the smaller table
+        a, b = b, a
     pool = np.empty(len(task), dtype=np.int64)
     free, least, most = collect_pair(a, b, task, weight, distance, need, pool)
     if most < least or free == 0:
@@ -45,13 +47,15 @@ def repartition_pair(
         w, paid = weight[i], distance[i, a] - distance[i, b] + noise[i, a] - noise[i, b]
         if task[i] == a:
             old += paid
-        for s in range(min(w, most + 1)):
+        first = min(w, most + 1)
+        for s in range(first):
             after[s] = cost[s]
-        for s in range(w, most + 1):
-            candidate = cost[s - w] + paid
-            better = candidate < cost[s]
-            after[s] = candidate if better else cost[s]
-            row[s] = better
+        kept, least_cost, is_taken = cost[first:], after[first:], row[first:]  # indices that are never negative
+        for s in range(most + 1 - first):
+            candidate = cost[s] + paid
+            better = candidate < kept[s]
+            least_cost[s] = candidate if better else kept[s]
+            is_taken[s] = better
         cost, after = after, cost
     best = least
     for s in range(least, most + 1):
