@@ -26,9 +26,9 @@ MAX_TASKS = 2000
 MAX_LEAD_S = 0.1
 """How much more time one side may have had before it waits for the other."""
 
-LONG, SHORT_S, STUCK = 1.5, 0.5, 2.5
+LONG, SHORT_S, STUCK = 1.5, 0.5, 2.0
 """The search for plans is stuck when its time exceeds so many times that until its best plan, and so many seconds; it
-then gets a quarter of the time of bounds."""
+then gets half of the time of bounds."""
 
 MAX_CUT_ROUNDS = 5
 """Rounds of cutting planes in one call, of which one may take as long as many of subgradients."""
