@@ -7,7 +7,7 @@ from alloc.allocators.contract.search import Search
 from alloc.allocators.exact.energy.cuts.group_programme import GroupProgramme
 from alloc.allocators.exact.energy.places import nearest_places, without_idlers
 from alloc.allocators.exact.energy.primal_dual import FEW_GROUPS, REPEATABLE_SLICES, PrimalDual
-from alloc.allocators.exact.energy.state import EnergyState
+from alloc.allocators.exact.energy.state import STAGE_S, EnergyState
 from alloc.allocators.exact.model import Model
 from alloc.allocators.exact.monitor import SolverMonitor, is_over
 from alloc.allocators.exact.solver_model import Answer, Solver, SolverLimits, SolverModel
@@ -29,6 +29,10 @@ SOLVER_GAP = 1e-7
 
 SMALL_PAIRS = 3000
 """Pairs of class and task that a better plan may have, up to which the solver comes next even if bounds still rise."""
+
+LATER, MUCH_LATER, MIXING_SHARE, MOST_MIXED = 0.12, 0.3, 0.04, 1500
+"""Parts of the time between two attempts to make a plan of groups found so far, after a better plan and else; part of
+the time that an attempt takes, and groups in it, at the most."""
 
 LOCAL_SHARE, MAX_LOCAL_S = 0.7, 30.0
 """Share of the time, and seconds at the most, of local search where nothing else finds plans."""
@@ -95,15 +99,35 @@ def _close_gap(state: EnergyState, both: PrimalDual) -> GroupProgramme | None:
                 return None
             state.submit(both.repeat(number))
         return None
+    next_try = LATER
     with Pool(1) as pool:
         while not (is_over(search) or both.closed):
             progress = state.progress
+            if progress >= next_try:
+                next_try = progress + (LATER if _mix_groups(state, both) else MUCH_LATER)
+                continue
             is_ready = both.converged or (both.is_rising_slowly and len(both.keep) <= SMALL_PAIRS)
             groups = None if progress < SHARE_WITHOUT_GROUPS else both.few_groups()
             if groups is not None or progress >= 1 or (is_ready and progress >= SHARE_WITHOUT_SOLVER):
                 return groups
             state.submit(both.run(min(1.0, progress), pool if state.spare_threads else None))
     return None
+
+
+def _mix_groups(state: EnergyState, both: PrimalDual) -> bool:
+    """Look for a better plan among the groups that prices have brought up; return whether there was one."""
+    search, before = state.search, state.cost
+    groups = both.known_groups(MOST_MIXED)
+    if groups is None:
+        return False
+    monitor = SolverMonitor(search, state.model, state.demand, state.until_s)
+    seconds = MIXING_SHARE * min(STAGE_S, state.until_s - state.begin_s)
+    counts, _ = groups.solve(monitor, search.seed, repeatable=False, seconds=seconds)
+    search.iteration += 1
+    if counts is not None:
+        search.submit(both.allocation(groups, counts))
+        state.submit(None)
+    return state.cost < before * (1 - SOLVER_GAP)
 
 
 def _solve_groups(state: EnergyState, both: PrimalDual, groups: GroupProgramme) -> float:

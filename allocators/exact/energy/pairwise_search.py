@@ -94,6 +94,13 @@ class PairwiseSearch:
         self.best = self._task.copy()
         return not self._stale.any()
 
+    def adopt(self, task: IntArray) -> None:
+        """Go on from a better plan, given the task of each agent, shape (n,)."""
+        self._task = task.astype(np.int64)
+        self.best = self._task.copy()
+        agents = np.arange(len(task))
+        self._distance[agents, self._task] = self._all_distance[agents, self._task]
+
     def restrict(self, allowed: Mask) -> None:
         """Send agents from now on only where they are allowed, shape (n, t), or where they are, or are in the best plan."""
         allowed, agents = np.hstack([allowed, np.ones((len(allowed), 1), dtype=bool)]), np.arange(len(allowed))

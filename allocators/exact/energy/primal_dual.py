@@ -100,6 +100,8 @@ class PrimalDual:
         self._primal = begin_primal(instance, model, demand, plan, task_distance, seed)
         self._reported = self._cost = _cost_of_plan(instance, plan)
         self._gap_tried, self._least_with = np.inf, np.zeros(0)
+        self._column = np.full(instance.m + 1, len(model.tasks))  # the last is that of IDLE, -1
+        self._column[model.tasks] = np.arange(len(model.tasks))
         self._primal_timer, self._dual_timer, self._improved_s = Timer(), Timer(), 0.0
         self._descended = self._primal is None
 
@@ -152,6 +154,10 @@ class PrimalDual:
             return None
         self._gap_tried = gap
         return self._cuts.all_groups(self._cost, FEW_GROUPS)
+
+    def known_groups(self, most: int) -> GroupProgramme | None:
+        """Return groups found so far of which a better plan may consist, at most so many."""
+        return None if self._cuts is None else self._cuts.known_groups(self._cost, most)
 
     def groups_of_cheapest(self, most: int) -> GroupProgramme | None:
         """Return all groups of which the plans consist that cost less than a part of the gap above the bound.
@@ -225,6 +231,8 @@ class PrimalDual:
         if cost <= self._cost:
             is_better = cost < self._cost * (1 - 1e-9)
             self._plan, self._cost = plan, cost
+            if self._primal is not None and is_better and cost < self._primal.cost * (1 - 1e-9):
+                self._primal.adopt(self._column[plan.task_of_agent])
             if self._dual is not None and self._cuts is not None and is_better:
                 self._cuts.note_plan(self._counts[self._dual.kept])
 

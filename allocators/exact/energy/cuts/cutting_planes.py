@@ -132,6 +132,14 @@ class CuttingPlanes:
             return None
         return GroupProgramme(model, cost, task[can], groups[can], csr_array(used[can][:, on]), master.limit[on])
 
+    def known_groups(self, cost: float, most: int) -> GroupProgramme:
+        """Return those of the groups found so far that a plan that costs less than `cost` can have, at most so many."""
+        penalty = self._known_penalty
+        value, _, least = self._relax(self._price, penalty)
+        task, groups, used = self._master.cheap_groups(self._price, penalty, least, cost - value, most)
+        on = penalty > 0
+        return GroupProgramme(self._model, cost, task, groups, csr_array(used[:, on]), self._master.limit[on])
+
     @property
     def _known_penalty(self) -> FloatArray:
         """The best penalties so far, zero for the cuts since, shape (c,)."""
@@ -181,6 +189,7 @@ class CuttingPlanes:
         value, _, least = self._relax(self._price, penalty)
         paid = self._paid(self._price, penalty)
         self._known_prices.note(model, paid, penalty, value, least)
+        self._master.leave_out_dear(self._price, penalty, least, cost * (1 + 1e-9) - value)
         group, excess, total = solve_subproblems(model, paid)
         unpenalised = np.bincount(model.task_of_pair, group * paid, len(least))
         if not np.isfinite(total) or abs(total - unpenalised.sum()) > 1e-9 * np.abs(unpenalised).sum():

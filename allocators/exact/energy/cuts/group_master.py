@@ -61,7 +61,7 @@ class GroupMaster:
         self._count = np.append(model.count, 0)
         self._use, self._used = np.zeros((ROOM, classes + 1)), np.zeros((ROOM, ROOM_FOR_CUTS))
         self._task, self._cost, self._groups = np.zeros(ROOM, dtype=np.intp), np.zeros(ROOM), 0
-        self._seen: set[tuple[int, bytes, bytes]] = set()
+        self._seen: dict[tuple[int, bytes, bytes], int] = {}
         self._sets, self._set_at = np.zeros((0, 3), dtype=np.int64), np.zeros(0, dtype=np.intp)
         self.seeks_sets, self._has_small_groups = True, model.count.sum() <= SMALL_GROUP * self._tasks
         self._clusters: list[ClusterCut] = []
@@ -85,15 +85,21 @@ class GroupMaster:
 
         None is added for which there is no room in memory; without it, bounds are lower than they could be.
         """
-        before = self._groups
+        is_new = False
         for j in range(self._tasks):
             a, b = self._first[j], self._first[j + 1]
             inside = a + np.flatnonzero(group[a:b])
             key = j, self._model.class_of_pair[inside].tobytes(), group[inside].tobytes()
-            if len(inside) and key not in self._seen and self._has_room():
-                self._seen.add(key)
+            if len(inside) == 0:
+                continue
+            g = self._seen.get(key)
+            if g is None and self._has_room():
+                self._seen[key], is_new = self._groups, True
                 self._add_group(j, inside, group[inside])
-        return self._groups > before
+            elif g is not None and not np.isfinite(self._cost[g]):  # it was left out
+                self._cost[g], is_new = self._model.cost[inside] @ group[inside], True
+                self._highs.changeColBounds(g, 0.0, highspy.kHighsInf)
+        return is_new
 
     def _has_room(self, *, cut: bool = False) -> bool:
         """Whether there is room for a group more, or a cut more; make it if memory allows."""
@@ -117,10 +123,49 @@ class GroupMaster:
         stay[model.task_of_pair, model.class_of_pair] = True
         known = slice(self._groups)
         lost = (self._use[known, :-1] > 0) & ~stay[self._task[known]]
-        for g in np.flatnonzero(lost.any(axis=1) & np.isfinite(self._cost[known])).tolist():
+        self._leave_out(lost.any(axis=1))
+        self._separation = ClusterSeparation(model, self._member)
+
+    def leave_out_dear(self, price: FloatArray, penalty: FloatArray, least: FloatArray, more: float) -> None:
+        """Leave out groups that cost at some prices by `more` above the least, shape (t,), if they are not in use.
+
+        No better plan has them; with fewer groups the programme is solved faster. Pricing may bring them back.
+        """
+        known = slice(len(self._part))
+        cost = self._cost[known] + self._use[known, :-1] @ price + self._used[known, : len(penalty)] @ penalty
+        self._leave_out((cost - least[self._task[known]] > more) & (self._part <= 0))
+
+    def cheap_groups(
+        self, price: FloatArray, penalty: FloatArray, least: FloatArray, more: float, most: int
+    ) -> tuple[IntArray, csr_array, FloatArray]:
+        """Return groups known that cost at most by `more` above the least, the cheapest `most` of them at some prices.
+
+        Returns
+        -------
+        ndarray of int, shape (g,)
+            Their tasks.
+        csr_array, shape (g, p)
+            Agents of each pair.
+        ndarray, shape (g, c)
+            What they use of each cut.
+        """
+        known, model = slice(self._groups), self._model
+        cost = self._cost[known] + self._use[known, :-1] @ price + self._used[known, : len(penalty)] @ penalty
+        above = cost - least[self._task[known]]
+        cheap = np.argsort(above, kind="stable")[:most]
+        cheap = cheap[above[cheap] <= more]
+        pair = np.zeros((self._tasks, len(model.count)), dtype=np.intp)
+        pair[model.task_of_pair, model.class_of_pair] = np.arange(len(model.cost))
+        row, agent_class = np.nonzero(self._use[cheap, :-1])
+        agents = self._use[cheap][row, agent_class].astype(np.int64)
+        entries = agents, (row, pair[self._task[cheap][row], agent_class])
+        groups = csr_array(entries, shape=(len(cheap), len(model.cost)))
+        return self._task[cheap], groups, self._used[cheap, : len(self.limit)]
+
+    def _leave_out(self, groups: Mask) -> None:
+        for g in np.flatnonzero(groups & np.isfinite(self._cost[: len(groups)])).tolist():
             self._cost[g] = np.inf
             self._highs.changeColBounds(g, 0.0, 0.0)
-        self._separation = ClusterSeparation(model, self._member)
 
     def solve(self, should_stop: Callable[[], bool]) -> bool:
         """Solve; return whether that succeeded, as it does not where it is stopped."""
