@@ -13,7 +13,6 @@ from alloc.problems import Allocation, Instance
 from alloc.problems.bounds import scale_to_one, typical_distance
 from alloc.problems.instance import FloatArray, IntArray
 
-
 MAX_WORK = 100_000_000
 """Cells of all tables that a round of prices, or a descent over all pairs of tasks, may fill: some 0.1 s."""
 
@@ -95,14 +94,15 @@ class PairwiseSearch:
         return not self._stale.any()
 
     def adopt(self, task: IntArray) -> None:
-        """Go on from a better plan, given the task of each agent, shape (n,)."""
-        self._task = task.astype(np.int64)
-        self.best = self._task.copy()
-        agents = np.arange(len(task))
-        self._distance[agents, self._task] = self._all_distance[agents, self._task]
+        """Go on from a better plan, given the task of each agent, if it is one with rounded weights too."""
+        agents, done = np.arange(len(task)), np.bincount(task, self._weight, len(self._need))
+        if (done < self._need).any() or not np.isfinite(self._all_distance[agents, task]).all():
+            return
+        self._task, self.best = task.astype(np.int64), task.astype(np.int64)
+        self._distance[agents, task] = self._all_distance[agents, task]
 
     def restrict(self, allowed: Mask) -> None:
-        """Send agents from now on only where they are allowed, shape (n, t), or where they are, or are in the best plan."""
+        """Send agents only where they are allowed, shape (n, t), or where they are now or in the best plan."""
         allowed, agents = np.hstack([allowed, np.ones((len(allowed), 1), dtype=bool)]), np.arange(len(allowed))
         allowed[agents, self._task] = allowed[agents, self.best] = True
         self._distance = np.where(allowed, self._all_distance, np.inf)

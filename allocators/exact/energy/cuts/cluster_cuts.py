@@ -215,13 +215,13 @@ def sharing_clusters(mixed: FloatArray, most: int) -> Mask:
     part = _distance_from_whole(mixed)
     shared = part @ part.T
     inside, rows, each = np.eye(tasks, dtype=bool), [], np.arange(tasks)
-    for _ in range(min(tasks // int(__import__("os").environ.get("BIG", 2)), 1 + most // tasks)):
+    for _ in range(min(tasks // 2, 1 + most // tasks)):
         strength = np.where(inside, -1.0, inside.astype(float) @ shared)
         joining = strength.argmax(axis=1)
         joins = strength[each, joining] > WHOLE
         inside = inside.copy()
         inside[each[joins], joining[joins]] = True
-        rows.append(inside)
+        rows.append(inside[joins])
     return np.vstack([np.zeros((0, tasks), dtype=bool), *rows])
 
 

@@ -1,11 +1,16 @@
+from dataclasses import replace
 from itertools import combinations, product
 
 import numpy as np
 import pytest
+from scipy.optimize import linprog
+from scipy.sparse import csr_array
 
 from alloc.allocators.exact.energy.cuts import group_master
 from alloc.allocators.exact.energy.cuts.all_groups import write_groups
-from alloc.allocators.exact.energy.cuts.cluster_cuts import ClusterSeparation
+from alloc.allocators.exact.energy.cuts.cluster_cuts import ClusterSeparation, sharing_clusters
+from alloc.allocators.exact.energy.cuts.cutting_planes import CuttingPlanes
+from alloc.allocators.exact.energy.cuts.known_prices import KnownPrices
 from alloc.allocators.exact.energy.cuts.pricing import price_groups
 from alloc.allocators.exact.energy.cuts.subset_rows import violated_sets
 from alloc.allocators.exact.energy.energy_model import EnergyModel
@@ -119,3 +124,116 @@ def test_groups_and_cuts_end_where_memory_does(monkeypatch):
     assert master.solve(lambda: False)
     assert master.value == pytest.approx(3.0)
     assert not master._has_room(cut=True) or master._used.shape[1] == group_master.ROOM_FOR_CUTS
+
+
+def test_tasks_that_share_agents_become_clusters():
+    """Tasks 0, 1 and 2 share agents in a chain, task 3 has whole ones."""
+    mixed = np.array([[0.5, 0.0, 1.0], [0.5, 0.4, 0.0], [0.0, 0.6, 0.0], [0.0, 0.0, 2.0]])
+    clusters = {tuple(np.flatnonzero(inside)) for inside in sharing_clusters(mixed, 8)}
+    assert {(0, 1), (1, 2), (0, 1, 2)} <= clusters
+    assert not any(3 in cluster and len(cluster) > 1 for cluster in clusters)
+
+
+def knapsack_of(rng: np.random.Generator, limited: bool) -> EnergyModel:
+    """Two tasks of one cluster, and eight classes of one or two agents."""
+    ability, count = rng.integers(1, 6, 8), rng.integers(1, 3, 8)
+    need = np.array([6, 7])
+    return EnergyModel(
+        class_of_pair=np.tile(np.arange(8), 2), task_of_pair=np.repeat([0, 1], 8), weight=np.tile(ability, 2),
+        copies=np.tile(count, 2), cost=np.zeros(16), need=need, max_weight=need + 1 if limited else np.full(2, -1),
+        count=count, min_agents=np.zeros(8, dtype=np.int64), ability=ability,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("limited", [False, True])
+@pytest.mark.parametrize("seed", range(15))
+def test_a_cluster_is_cut_where_its_mixture_is_none_of_whole_solutions(seed, limited):
+    """A linear programme over all solutions written out says by how much a cut can be violated at the most."""
+    rng = np.random.default_rng(seed)
+    model, both = knapsack_of(rng, limited), np.ones((1, 2), dtype=bool)
+    knapsack = ClusterSeparation(model, both)._knapsack(both[0])
+    every = np.array(list(product(*(range(most + 1) for most in knapsack.copies))))
+    done = every @ knapsack.weight
+    every = every[(done >= knapsack.need[0]) & ((done <= knapsack.max_weight[0]) | (not limited))]
+    use = every[rng.integers(len(every), size=3)].astype(float)
+    task, part = np.zeros(3, dtype=int), np.full(3, 1 / 3)
+    assert not ClusterSeparation(model, both).violated(use, task, part, lambda: False)
+    use[0, np.flatnonzero(use[0])[0]] -= 0.75
+    goal = np.append(-part @ use, 1.0)
+    ends = [(-1.0, 1.0 if limited else 0.0)] * 8 + [(None, None)]
+    most = -linprog(goal, np.hstack([every, -np.ones((len(every), 1))]), np.zeros(len(every)), bounds=ends).fun
+    cuts = ClusterSeparation(model, both).violated(use, task, part, lambda: False)
+    assert bool(cuts) == (most > 0.021)
+    for cut in cuts:
+        assert (every @ cut.factor <= cut.limit).all()
+
+
+def test_groups_that_cost_too_much_at_prices_met_before_are_in_no_better_plan():
+    """Of three groups, one costs too much by its agents, one by the penalty of its set of classes."""
+    model, prices = plain_model(1, 4), KnownPrices()
+    prices.note(model, np.array([0.1, 0.1, 0.1, 0.9]), np.array([0.8]), 2.0, np.array([0.3]))
+    group = csr_array(np.array([[1, 1, 1, 0], [1, 1, 0, 1], [0, 1, 1, 1]]))
+    used, sets, task = np.array([[1.0], [0.0], [0.0]]), np.array([0]), np.zeros(3, dtype=np.int64)
+    assert prices.within(model, 2.7, task, group, used, sets).tolist() == [False, False, False]
+    assert prices.within(model, 2.85, task, group, used, sets).tolist() == [True, True, True]
+    assert prices.within(model, 2.7, task, group, used, sets[:0]).tolist() == [True, False, False]
+
+
+def three_for_two() -> tuple[EnergyModel, list[np.ndarray]]:
+    """Any two of three agents do either of two tasks, or one dear agent alone; and the groups of both tasks."""
+    model = EnergyModel(
+        class_of_pair=np.tile(np.arange(4), 2), task_of_pair=np.repeat([0, 1], 4), weight=np.tile([1, 1, 1, 2], 2),
+        copies=np.ones(8, dtype=np.int64), cost=np.tile([1.0, 1.0, 1.0, 3.0], 2), need=np.array([2, 2]),
+        max_weight=np.full(2, -1), count=np.array([1, 1, 1, 4]), min_agents=np.zeros(4, dtype=np.int64),
+        ability=None,
+    )  # fmt: skip
+    return model, [np.tile(group, 2) for group in ([1, 1, 0, 0], [1, 0, 1, 0], [0, 1, 1, 0], [0, 0, 0, 1])]
+
+
+def test_cuts_over_classes_can_be_left_out_again():
+    """They raise the value of the mixture, and without them it is what it was; none is sought after that."""
+    model, groups = three_for_two()
+    master = group_master.GroupMaster(model, np.zeros((0, 2), dtype=bool))
+    for group in groups:
+        master.add(group)
+    assert master.solve(lambda: False)
+    before = master.value
+    assert master.separate(lambda: False)
+    assert master.solve(lambda: False)
+    assert master.value > before + 0.1
+    assert len(master.leave_out_sets()) > 0
+    assert master.solve(lambda: False)
+    assert master.value == pytest.approx(before)
+    assert not master.separate(lambda: False)
+
+
+def test_dear_groups_are_left_out_until_they_are_added_again():
+    """At prices of zero, a dear agent costs 1 above the least; it is not in use where there are two of each other."""
+    model, groups = three_for_two()
+    model = replace(model, count=np.array([2, 2, 2, 4]))
+    master = group_master.GroupMaster(model, np.zeros((0, 2), dtype=bool))
+    for group in groups:
+        master.add(group)
+    assert master.solve(lambda: False)
+    least, at = np.full(2, 2.0), (np.zeros(4), np.zeros(0))
+    master.leave_out_dear(*at, least, 0.5)
+    task, kept, _ = master.cheap_groups(*at, least, 10.0, 100)
+    assert np.bincount(task).tolist() == [3, 3]
+    assert kept.toarray()[:, [3, 7]].max() == 0
+    assert master.add(groups[3])
+    assert not master.add(groups[3])
+    assert len(master.cheap_groups(*at, least, 10.0, 100)[0]) == 8
+
+
+def test_bound_with_cuts_is_the_least_cost_and_groups_found_have_its_plan():
+    """Two agents for one task and the dear one for the other cost 5, mixtures 4.5."""
+    model, groups = three_for_two()
+    cuts = CuttingPlanes(model, np.zeros((0, 2), dtype=bool), np.zeros(4), groups)
+    cuts.ascend(50, 5.5)
+    assert cuts.bound == pytest.approx(5.0, abs=1e-3)
+    programme = cuts.known_groups(5.5, 100)
+    used, cost = model.by_class(programme.group).toarray(), programme.group @ model.cost
+    first, second = np.flatnonzero(programme.task == 0), np.flatnonzero(programme.task == 1)
+    plans = [cost[[f, s]].sum() for f in first for s in second if (used[f] + used[s] <= model.count).all()]
+    assert min(plans) == 5.0
+    assert len(cuts.known_groups(5.5, 1).task) == 1

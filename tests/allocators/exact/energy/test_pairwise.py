@@ -48,3 +48,37 @@ def test_search_keeps_needs_and_never_loses_its_best_plan():
         assert (np.bincount(search.best, weight, 7)[:6] >= need).all()
     assert costs == sorted(costs, reverse=True)
     assert costs[-1] < 0.6 * costs[0]
+
+
+def search_of(seed: int) -> tuple[PairwiseSearch, np.ndarray, np.ndarray]:
+    """A search with 30 agents and six tasks, their distances, and the plan that it begins with."""
+    rng = np.random.default_rng(seed)
+    weight, task, distance = rng.integers(1, 9, 30), np.arange(30) % 6, rng.random((30, 6))
+    need = np.bincount(task, weight, 6).astype(np.int64) - 2
+    return PairwiseSearch(task, weight, distance, need, 1 - np.eye(6), seed), distance, task
+
+
+def test_search_sends_agents_only_where_they_are_allowed():
+    """Or where they are, which may be far from the best."""
+    search, _, task = search_of(2)
+    allowed = np.random.default_rng(0).random((30, 6)) < 0.4
+    search.restrict(allowed)
+    for step in range(5):
+        search.anneal(20, step / 5)
+    moved = (search.best != task) & (search.best < 6)
+    assert moved.any()
+    assert allowed[moved, search.best[moved]].all()
+
+
+def test_search_goes_on_from_a_better_plan_that_meets_all_needs():
+    """Another search's plan is taken over, even where this one may not go; one that leaves a task undone is not."""
+    (search, _, task), (other, *_) = search_of(2), search_of(2)
+    search.restrict(np.zeros((30, 6), dtype=bool))
+    for step in range(5):
+        other.anneal(20, step / 5)
+    search.adopt(np.full(30, 6))
+    assert search.best.tolist() == task.tolist()
+    search.adopt(other.best)
+    assert search.cost == pytest.approx(other.cost)
+    search.anneal(20, 0.5)
+    assert search.cost <= other.cost * (1 + 1e-9)
