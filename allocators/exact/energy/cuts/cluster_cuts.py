@@ -110,15 +110,15 @@ class ClusterSeparation:
             if self._knapsack(member[f]).need[0] > 0:
                 tried += 1
                 found = self._cut_of(member[f], member[f].astype(float) @ mixed)
-                self._rest(member[f], in_vain=not found)
+                self._rest(member[f], found=bool(found))
                 cuts += found
         return cuts
 
-    def _rest(self, inside: Mask, *, in_vain: bool) -> None:
+    def _rest(self, inside: Mask, *, found: bool) -> None:
         """Leave a cluster without a cut out of the next turns, twice as many each time."""
         key = inside.tobytes()
-        self._pause[key] = 2 * self._pause.get(key, 1) if in_vain else 1
-        self._due[key] = self._turn + self._pause[key] if in_vain else 0
+        self._pause[key] = 1 if found else 2 * self._pause.get(key, 1)
+        self._due[key] = 0 if found else self._turn + self._pause[key]
 
     def _knapsack(self, inside: Mask) -> EnergyModel:
         """Return the knapsack of a cluster; built when it is first asked for, as there are many."""
@@ -195,8 +195,8 @@ def _most_violated(
         violation = float(factor @ agents) + cost
         if violation > best:
             best, found, limit = violation, factor, cost
-        function.add(point.astype(float))
-        known.append(point[None])
+        known.append(point[None].astype(float))
+        function.add(known[-1][0])
     return found, limit, np.vstack(known)
 
 

@@ -98,7 +98,7 @@ class CuttingPlanes:
         for group in groups:
             self._master.add(group)
         self._price, self._penalty, self._known_prices = price, np.zeros(0), KnownPrices()
-        self.bound, self.converged, self._in_vain = -np.inf, False, False
+        self.bound, self.converged, self._found_none = -np.inf, False, False
         self.kept, self.least_with = np.ones(len(model.copies), dtype=bool), np.full(len(model.copies), -np.inf)
 
     def ascend(self, rounds: int, cost: float) -> None:
@@ -155,7 +155,7 @@ class CuttingPlanes:
         price = smoothing * self._price + (1 - smoothing) * master.price
         penalty = smoothing * known + (1 - smoothing) * master.penalty
         value, group, least = self._relax(price, penalty)
-        if self._lost(group, least, price, penalty) > MOST_LOST * (cost - max(self.bound, value)):
+        if self._lost(group, least, price, penalty) > MOST_LOST * max(0.0, cost - max(self.bound, value)):
             known[master.leave_out_sets()] = 0.0
             self._penalty = known
             return
@@ -163,10 +163,10 @@ class CuttingPlanes:
             self.bound, self._price, self._penalty = value, price, penalty
         is_new = master.add(group)
         is_best = self.bound >= master.value * (1 - PRECISION) or not (is_new or self._smoothing)
-        is_near = master.value - self.bound <= EARLY * (cost - self.bound) and not self._in_vain
+        is_near = master.value - self.bound <= EARLY * (cost - self.bound) and not self._found_none
         if is_best or is_near:
             found = self._drop_pairs(cost) or master.separate(self._should_stop)
-            self.converged, self._in_vain = is_best and not found, not (is_best or found)
+            self.converged, self._found_none = is_best and not found, not (is_best or found)
             is_new = True
         self._smoothing = SMOOTHING if is_new else (self._smoothing / 2 if self._smoothing > 0.2 else 0.0)
 

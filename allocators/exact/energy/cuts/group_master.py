@@ -123,7 +123,7 @@ class GroupMaster:
         stay[model.task_of_pair, model.class_of_pair] = True
         known = slice(self._groups)
         lost = (self._use[known, :-1] > 0) & ~stay[self._task[known]]
-        self._leave_out(lost.any(axis=1))
+        self._leave_out(np.asarray(lost.any(axis=1)))
         self._separation = ClusterSeparation(model, self._member)
 
     def leave_out_dear(self, price: FloatArray, penalty: FloatArray, least: FloatArray, more: float) -> None:
