@@ -7,13 +7,14 @@ from typing import ClassVar
 from alloc.allocators.contract.parameters import bounded
 from alloc.allocators.online.contract import AgentDecider, Briefing, Policy, PolicyInfo
 from alloc.allocators.online.groups.announced import Announced, Route
+from alloc.allocators.online.groups.contact import in_contact
 from alloc.allocators.online.policies.routes import RouteSearch, RoutesParameters
 from alloc.allocators.online.policies.spreading import Lookout
 from alloc.allocators.online.routes.describe import Foresight
 from alloc.allocators.online.routes.plan import finish_hours, warm_up
 from alloc.problems.missions.simulation.places import Place
 from alloc.problems.missions.simulation.reports import AgentReport, Message, View
-from alloc.problems.missions.simulation.state import ACTIVE, AgentStatus, Order, TaskStatus
+from alloc.problems.missions.simulation.state import AgentStatus, Order, TaskStatus
 from alloc.problems.vocabulary import Knowledge
 
 
@@ -65,6 +66,7 @@ class _Planner(AgentDecider):
         period = briefing.radio.period
         self._parameters, self._search = parameters, RouteSearch(parameters, briefing)
         self._contact = parameters.contact * period + briefing.radio.delay
+        self._radius = briefing.radio.radius
         self._lookout = Lookout(briefing, parameters.fresh * period)
         self._is_alone = briefing.knowledge is Knowledge.FULL
         self._announced = Announced()
@@ -76,7 +78,7 @@ class _Planner(AgentDecider):
         for message in view.heard:
             self._announced.hear(message.notes)
         self._lookout.note(view)
-        group = self._group(view)
+        group = in_contact(view, self._radius, view.hour - self._contact)
         is_planner = self._is_alone or group[0] == view.id
         if is_planner or self._has_waited(view, group):
             self._renew(view, group if is_planner else [str(view.id)])
@@ -105,14 +107,6 @@ class _Planner(AgentDecider):
     def message(self, view: View) -> Message | None:
         """Return all that is known, and all routes."""
         return view.message(self._announced.notes())
-
-    def _group(self, view: View) -> list[str]:
-        """Return the agents that are heard of, in the order of their ids, the agent itself included."""
-        return sorted(
-            name
-            for name, report in view.agents.items()
-            if name == view.id or (report.status in ACTIVE and view.hour - report.hour <= self._contact)
-        )
 
     def _has_waited(self, view: View, group: list[str]) -> bool:
         """Whether there were tasks for longer than a plan takes to come, and none for the agent."""

@@ -6,6 +6,7 @@ import pytest
 from alloc.allocators import simulate
 from alloc.allocators.online.contract import Briefing
 from alloc.allocators.online.groups.announced import Announced, Route
+from alloc.allocators.online.groups.contact import in_contact
 from alloc.allocators.online.policies.local_routes import LocalRoutes
 from alloc.allocators.online.policies.spreading import Lookout
 from alloc.problems import Instance, Mission, Radio
@@ -109,6 +110,24 @@ def test_agents_look_around_in_parts_of_the_area():
 def test_who_sees_everything_stays():
     """There is nothing to look for."""
     assert looked(drawn(sensing=np.inf), []) == STAY
+
+
+@pytest.mark.parametrize(("radius", "reached"), [(0.05, ["a1"]), (0.3, ["a1", "a2"]), (1.4, ["a1", "a2", "a3"])])
+def test_who_is_seen_beyond_the_radio_is_not_in_contact(radius, reached):
+    """All see each other; a3 hears the first agent by the second one alone, at 1.35 from it."""
+    simulation = Simulation(drawn(sensing=5.0))
+    simulation.advance()
+    view = simulation.view("a1")
+    assert len(view.agents) == 3
+    assert in_contact(view, radius, view.hour) == reached
+
+
+def test_reports_from_before_do_not_count():
+    """Who was not heard of for too long is no longer in contact."""
+    simulation = Simulation(drawn(sensing=5.0))
+    simulation.advance()
+    view = simulation.view("a1")
+    assert in_contact(view, 5.0, view.hour + 1.0) == ["a1"]
 
 
 @pytest.mark.slow
