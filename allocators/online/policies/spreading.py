@@ -25,7 +25,7 @@ class Lookout:
 
     The area is divided in cells, and each belongs to the agent that is nearest to it. An agent goes to that of its
     cells that was not seen for longest over the hours that it takes to see it; where all were seen lately, to their
-    middle.
+    middle. A cell is seen from where its corners are within the sensing radius too, or its middle within half of it.
 
     Parameters
     ----------
@@ -42,6 +42,8 @@ class Lookout:
         axes = [_middles(a, b, side) for a, b in zip(low.tolist(), high.tolist(), strict=True)]
         self._cells = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
         self._seen = np.full(len(self._cells), -np.inf)
+        corner = sum(float(axis[0]) - least for axis, least in zip(axes, low.tolist(), strict=True))
+        self._whole = max(self._sensing - corner, self._sensing / 2)
         self._goal = -1
 
     def note(self, view: View) -> None:
@@ -49,7 +51,7 @@ class Lookout:
         if not self._is_blind or is_fixed(view):
             return
         reports = [report for report in view.agents.values() if report.place.position is not None]
-        near = self._distances(view, [report.place for report in reports]) <= self._sensing
+        near = self._distances(view, [report.place for report in reports]) <= self._whole
         hours = np.array([report.hour for report in reports])
         self._seen = np.maximum(self._seen, np.where(near, hours[:, None], -np.inf).max(axis=0, initial=-np.inf))
 
