@@ -13,6 +13,7 @@ from alloc.allocators.contract.parameters import CheckedParameters, with_setting
 from alloc.allocators.contract.search import Search
 from alloc.allocators.exact.energy import primal_dual
 from alloc.allocators.exact.energy.least_energy import least_energy
+from alloc.allocators.exact.energy.travel import search as travel_search
 from alloc.allocators.exact.makespan import ascent, enumeration
 from alloc.allocators.exact.makespan.bisection import least_makespan
 from alloc.allocators.exact.makespan.repartition import search as repartition_search
@@ -72,6 +73,7 @@ class ExactAllocator(Allocator):
         enumeration.compile_loops()
         repartition_search.compile_loops()
         primal_dual.compile_loops()
+        travel_search.compile_loops()
         annealing_state.compile_loops()
 
     def refusal(self, instance: Instance, objective: Objective, budget: Budget) -> str | None:

@@ -12,6 +12,13 @@ from alloc.allocators.exact.knapsack import WholeArray
 from alloc.problems.instance import FloatArray
 
 
+def pairwise_distance(place: FloatArray) -> FloatArray:
+    """Return how far any two places are apart, large numbers being scaled, shape (t, t)."""
+    known = np.nan_to_num(place)
+    known = known / max(1.0, float(np.abs(known).max(initial=0.0)))
+    return np.asarray(np.sqrt(((known[:, None] - known[None]) ** 2).sum(axis=2)))
+
+
 def cluster_tasks(task_distance: FloatArray) -> Mask:
     """Return clusters of up to a quarter of the tasks by average linkage, as rows of members, shape (f, t).
 

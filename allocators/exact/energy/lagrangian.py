@@ -134,6 +134,11 @@ class LagrangianBound:
         self._groups: deque[WholeArray] = deque(maxlen=LAST_GROUPS)
 
     @property
+    def price(self) -> FloatArray:
+        """Price of an agent of each class, shape (k,)."""
+        return self._price
+
+    @property
     def converged(self) -> bool:
         """Whether steps have become so short that the bound hardly rises any more."""
         if self._member is None:

@@ -34,8 +34,12 @@ LATER, MUCH_LATER, MIXING_SHARE, MOST_MIXED = 0.12, 0.3, 0.04, 1500
 """Parts of the time between two attempts to make a plan of groups found so far, after a better plan and else; part of
 the time that an attempt takes, and groups in it, at the most."""
 
-LOCAL_SHARE, MAX_LOCAL_S = 0.7, 30.0
-"""Share of the time, and seconds at the most, of local search where nothing else finds plans."""
+LOCAL_SHARE, LESS_SHARE, MAX_LOCAL_S = 0.7, 0.1, 30.0
+"""Share of the time of local search where nothing else finds plans, and where an annealed search with prices does, and
+seconds at the most."""
+
+SHARE_WITH_PLANS = 0.85
+"""Share of the time up to which that search goes on while it finds plans, unless pairs are too many for the solver."""
 
 
 def least_energy(search: Search, solver: Solver, min_served: int) -> float | None:
@@ -72,11 +76,15 @@ def _least_cost(state: EnergyState, solver: Solver) -> float:
     """Close the gap from both sides, then by the solver; return what is proven to be needed, in units of distance."""
     both, search = state.primal_dual, state.search
     if state.local_search is not None:
-        state.local_search.turn(min(LOCAL_SHARE * search.remaining_s, MAX_LOCAL_S))
+        share = LOCAL_SHARE if state.travel is None else LESS_SHARE
+        state.local_search.turn(min(share * search.remaining_s, MAX_LOCAL_S))
         state.submit(None)
     if both is None:
         return _solve_rest(state, solver).bound
     groups = _close_gap(state, both)
+    if state.travel is not None:
+        state.travel.submit()
+        state.submit(None)
     if both.closed or is_over(search):
         return both.bound
     bound = both.bound
@@ -103,12 +111,13 @@ def _close_gap(state: EnergyState, both: PrimalDual) -> GroupProgramme | None:
     with Pool(1) as pool:
         while not (is_over(search) or both.closed):
             progress = state.progress
-            if progress >= next_try:
+            if progress >= next_try and state.travel is None:
                 next_try = progress + (LATER if _mix_groups(state, both) else MUCH_LATER)
                 continue
             is_ready = both.converged or (both.is_rising_slowly and len(both.keep) <= SMALL_PAIRS)
             groups = None if progress < SHARE_WITHOUT_GROUPS else both.few_groups()
-            if groups is not None or progress >= 1 or (is_ready and progress >= SHARE_WITHOUT_SOLVER):
+            is_ready = is_ready and progress >= SHARE_WITHOUT_SOLVER and not _finds_plans(state, both)
+            if groups is not None or progress >= 1 or is_ready:
                 return groups
             state.submit(both.run(min(1.0, progress), pool if state.spare_threads else None))
     return None
@@ -128,6 +137,13 @@ def _mix_groups(state: EnergyState, both: PrimalDual) -> bool:
         search.submit(both.allocation(groups, counts))
         state.submit(None)
     return state.cost < before * (1 - SOLVER_GAP)
+
+
+def _finds_plans(state: EnergyState, both: PrimalDual) -> bool:
+    """Whether the annealed search is to go on: for the solver there are too many pairs, or plans still get better."""
+    if state.travel is None or len(both.keep) > SMALL_PAIRS:
+        return state.travel is not None
+    return state.progress < SHARE_WITH_PLANS and not state.travel.has_stalled(state.stage_s)
 
 
 def _solve_groups(state: EnergyState, both: PrimalDual, groups: GroupProgramme) -> float:

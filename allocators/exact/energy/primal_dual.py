@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from alloc.allocators.exact.demand import Demand
+from alloc.allocators.exact.energy.clusters import pairwise_distance
 from alloc.allocators.exact.energy.cuts.cutting_planes import CuttingPlanes
 from alloc.allocators.exact.energy.cuts.group_programme import GroupProgramme
 from alloc.allocators.exact.energy.energy_model import EnergyModel, round_demand
@@ -115,6 +116,12 @@ class PrimalDual:
         """The bound, which may exceed the cost of the best plan by rounding."""
         bound = 0.0 if self._dual is None else self._dual.bound
         return bound if self._cuts is None else max(bound, self._cuts.bound)
+
+    @property
+    def price(self) -> FloatArray | None:
+        """Price of an agent of each class, shape (k,), once prices are nearly the best; None before."""
+        dual = self._dual if self._dual is not None and self._dual.is_nearly_optimal else None
+        return self._cuts.price if self._cuts is not None else None if dual is None else dual.price
 
     @property
     def finds_plans(self) -> bool:
@@ -285,13 +292,6 @@ class PrimalDual:
             return None
         self._pairs = pairs
         return LagrangianBound(rounded, task_distance, class_prices(self._demand, cost, seconds))
-
-
-def pairwise_distance(place: FloatArray) -> FloatArray:
-    """Return how far any two places are apart, large numbers being scaled, shape (t, t)."""
-    known = np.nan_to_num(place)
-    known = known / max(1.0, float(np.abs(known).max(initial=0.0)))
-    return np.asarray(np.sqrt(((known[:, None] - known[None]) ** 2).sum(axis=2)))
 
 
 def _cost_of_plan(instance: Instance, plan: Allocation) -> float:

@@ -7,6 +7,7 @@ import numpy as np
 from alloc.allocators.contract.search import Search
 from alloc.allocators.exact.demand import Demand
 from alloc.allocators.exact.energy.primal_dual import MAX_TASKS, PrimalDual
+from alloc.allocators.exact.energy.travel.phase import TravelPhase
 from alloc.allocators.exact.local_search import LocalSearchPhase
 from alloc.allocators.exact.model import FEW_PAIRS, Model
 from alloc.allocators.exact.solver_model import is_repeatable
@@ -38,6 +39,8 @@ class EnergyState:
         None where the solver is quick enough by itself, or neither side can be had.
     local_search : LocalSearchPhase or None
         None where `primal_dual` finds plans without rounding, or the solver is quick enough by itself.
+    travel : TravelPhase or None
+        None where travel takes no time, or `primal_dual` has no prices.
     """
 
     search: Search
@@ -48,6 +51,7 @@ class EnergyState:
     repeatable: bool
     primal_dual: PrimalDual | None
     local_search: LocalSearchPhase | None
+    travel: TravelPhase | None
 
     @classmethod
     def begin(cls, search: Search, model: Model, demand: Demand) -> "EnergyState":
@@ -65,6 +69,9 @@ class EnergyState:
         enough = primal_dual is not None and primal_dual.finds_plans and demand.integral
         if len(demand.class_of_pair) > FEW_PAIRS and not enough:
             local_search = LocalSearchPhase(search, Objective.MAKESPAN_ENERGY, until_s, search.makespan_limit)
+        travel = (
+            None if primal_dual is None or not TravelPhase.is_applicable(search, model) else TravelPhase(search, model)
+        )
         return cls(
             search=search,
             model=model,
@@ -74,6 +81,7 @@ class EnergyState:
             repeatable=is_repeatable(search),
             primal_dual=primal_dual,
             local_search=local_search,
+            travel=travel,
         )
 
     @property
@@ -89,10 +97,14 @@ class EnergyState:
         return self.search.best.evaluation.cost_in_distance
 
     @property
+    def stage_s(self) -> float:
+        """Seconds of which phases get their shares."""
+        return min(STAGE_S, self.until_s - self.begin_s)
+
+    @property
     def progress(self) -> float:
         """How much of the stage's time has passed; may exceed 1."""
-        stage_s = min(STAGE_S, self.until_s - self.begin_s)
-        return (self.search.elapsed_s - self.begin_s) / stage_s if stage_s > 0 else 1.0
+        return (self.search.elapsed_s - self.begin_s) / self.stage_s if self.stage_s > 0 else 1.0
 
     def submit(self, plan: Allocation | None) -> None:
         """Submit a plan of `primal_dual`, if there is a new one, and pass it the best plan."""
@@ -100,6 +112,8 @@ class EnergyState:
             self.search.submit(plan)
         if self.local_search is not None:
             self.local_search.exchange()
+        if self.travel is not None and self.primal_dual is not None:
+            self.travel.turn(self.primal_dual)
         if self.primal_dual is not None:
             assert self.search.best is not None
             self.primal_dual.note_plan(self.search.best.allocation, self.cost)

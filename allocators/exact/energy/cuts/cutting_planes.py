@@ -101,6 +101,11 @@ class CuttingPlanes:
         self.bound, self.converged, self._found_none = -np.inf, False, False
         self.kept, self.least_with = np.ones(len(model.copies), dtype=bool), np.full(len(model.copies), -np.inf)
 
+    @property
+    def price(self) -> FloatArray:
+        """The best prices of agents so far, shape (k,)."""
+        return self._price
+
     def ascend(self, rounds: int, cost: float) -> None:
         """Do so many rounds of pricing, given the cost of a plan at hand."""
         for _ in range(rounds):

@@ -1,0 +1,113 @@
+"""The annealed search within the energy stage: which plans it submits, and at which makespan it looks for them."""
+
+import numpy as np
+
+from alloc.allocators.contract.search import Search
+from alloc.allocators.exact.energy.clusters import pairwise_distance
+from alloc.allocators.exact.energy.primal_dual import PrimalDual
+from alloc.allocators.exact.energy.timer import Timer
+from alloc.allocators.exact.energy.travel.search import TravelSearch
+from alloc.allocators.exact.model import ROUNDING, Model
+from alloc.problems import IDLE, Allocation
+from alloc.problems.evaluation import last_equal
+from alloc.problems.instance import IntArray
+
+MAX_PAIRS = 2_000_000
+"""Agents times tasks above which tables take too much memory."""
+
+CALLS = 10
+"""Repartitions in a round of the timer."""
+
+REPEATABLE_CALLS = 2000
+"""Repartitions of a turn where effort is counted."""
+
+WORTHWHILE = 2e-3
+"""Relative gain from which a plan is submitted at the end of a cycle. A plan is a little faster than it has to be, and
+those that come after must be as fast, so that each costs some energy."""
+
+PATIENCE, LEAST_SHARE = 1.0, 0.3
+"""Time without a better plan, as a multiple of the time until the best was found, after which the search has stalled,
+and share of the stage that the latter counts as at least."""
+
+
+class TravelPhase:
+    """Looks for plans of less energy by `TravelSearch`, beside the bounds of `PrimalDual`, from which it has prices.
+
+    Parameters
+    ----------
+    search : Search
+        Its best plan serves all tasks with workload.
+    model : Model
+        Classes told apart by place.
+    """
+
+    def __init__(self, search: Search, model: Model) -> None:
+        assert search.best is not None
+        self._search, self._model, self._timer = search, model, Timer()
+        self._column = np.full(search.instance.m + 1, len(model.tasks))
+        self._column[model.tasks] = np.arange(len(model.tasks))
+        self._class = model.classes.class_of_agent
+        cost = np.where(model.classes.mask, model.classes.cost, np.inf)[:, model.tasks][self._class]
+        distance = pairwise_distance(search.instance.reach.goal[model.tasks])
+        task = self._task_of(search.best.allocation)
+        self._annealing = TravelSearch(cost, task, distance, search.seed)
+        self._limit, self._reported = 0.0, np.inf
+        self._begin_s = self._found_s = self._last_s = search.elapsed_s
+
+    @staticmethod
+    def is_applicable(search: Search, model: Model) -> bool:
+        """Whether travel takes time, all tasks are served, and tables fit."""
+        agents, tasks = search.instance.n, len(model.tasks)
+        return model.travel_time is not None and model.min_served == tasks > 1 and agents * tasks <= MAX_PAIRS
+
+    def turn(self, both: PrimalDual) -> None:
+        """Search for as long as others did since the last turn, or by count, once there are prices.
+
+        What a cycle has found is submitted at its end.
+        """
+        search, annealing = self._search, self._annealing
+        until_s = 2 * search.elapsed_s - self._last_s
+        self._last_s = search.elapsed_s
+        if annealing.is_between_cycles:
+            price = both.price
+            if price is None:
+                return
+            self._begin_cycle()
+            annealing.set_prices(price[self._class])
+        if search.budget.time_limit_s is None:
+            annealing.anneal(REPEATABLE_CALLS)
+        else:
+            self._timer.run(lambda rounds: annealing.anneal(CALLS * rounds))
+            while search.elapsed_s < until_s and not (annealing.is_between_cycles or search.interrupted):
+                self._timer.run(lambda rounds: annealing.anneal(CALLS * rounds))
+        self._last_s = search.elapsed_s
+        if annealing.is_between_cycles and annealing.cost < self._reported * (1 - WORTHWHILE):
+            self.submit()
+
+    def submit(self) -> None:
+        """Submit the best plan if it is new."""
+        if self._annealing.cost < self._reported * (1 - 1e-9):
+            self._reported, self._found_s = self._annealing.cost, self._search.elapsed_s
+            tasks = np.append(self._model.tasks, IDLE)
+            self._search.submit(Allocation(tasks[self._annealing.best]))
+
+    def has_stalled(self, stage_s: float) -> bool:
+        """Whether no better plan has been found for long, in a stage of `stage_s` seconds."""
+        took_s = max(self._found_s - self._begin_s, LEAST_SHARE * stage_s)
+        return self._search.elapsed_s - self._found_s > PATIENCE * took_s
+
+    def _begin_cycle(self) -> None:
+        """Take note of the best plan, and of its makespan, which may be less than before."""
+        search, model = self._search, self._model
+        assert search.best is not None
+        limit, plan = search.makespan_limit, search.best.allocation
+        if limit != self._limit:
+            share = model.shares(last_equal(limit))[self._class] / (1 - ROUNDING)
+            self._annealing.set_weights(share, self._task_of(plan))
+            self._limit, self._reported = limit, self._annealing.cost
+        elif search.best.evaluation.cost_in_distance < self._annealing.cost * (1 - 1e-9):
+            self._annealing.set_plan(self._task_of(plan))
+            self._reported = self._annealing.cost
+
+    def _task_of(self, plan: Allocation) -> IntArray:
+        return np.asarray(self._column[plan.task_of_agent])
