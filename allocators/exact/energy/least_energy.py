@@ -38,6 +38,9 @@ LOCAL_SHARE, LESS_SHARE, MAX_LOCAL_S = 0.7, 0.1, 30.0
 """Share of the time of local search where nothing else finds plans, and where an annealed search with prices does, and
 seconds at the most."""
 
+SHORT_STAGE_S = 0.6
+"""Length of the stage up to which that search hardly begins, so that local search has its whole share."""
+
 SHARE_WITH_PLANS = 0.85
 """Share of the time up to which that search goes on while it finds plans, unless pairs are too many for the solver."""
 
@@ -76,7 +79,7 @@ def _least_cost(state: EnergyState, solver: Solver) -> float:
     """Close the gap from both sides, then by the solver; return what is proven to be needed, in units of distance."""
     both, search = state.primal_dual, state.search
     if state.local_search is not None:
-        share = LOCAL_SHARE if state.travel is None else LESS_SHARE
+        share = LOCAL_SHARE if state.travel is None or state.stage_s < SHORT_STAGE_S else LESS_SHARE
         state.local_search.turn(min(share * search.remaining_s, MAX_LOCAL_S))
         state.submit(None)
     if both is None:
