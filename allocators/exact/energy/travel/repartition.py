@@ -46,8 +46,8 @@ class Tasks(NamedTuple):
 def price_of_work(tasks: Tasks, j: int, done: float, at_most: float) -> float:
     """Return what work of `done` beyond the need costs, or the penalty where even `at_most` is a shortfall."""
     if done > 1.0:
-        return tasks.price[j] * (done - 1.0)
-    return tasks.fixed_penalty[j] + tasks.penalty[j] * (1.0 - at_most) if at_most < 1.0 else 0.0
+        return float(tasks.price[j] * (done - 1.0))
+    return float(tasks.fixed_penalty[j] + tasks.penalty[j] * (1.0 - at_most)) if at_most < 1.0 else 0.0
 
 
 @compiled

@@ -82,7 +82,7 @@ class TravelSearch:
     @property
     def cost(self) -> float:
         """Sum of flights of the best plan."""
-        return float(self._groups.total[1]) / self._scale
+        return float(self._groups.total[1] / self._scale)
 
     def set_weights(self, weight: FloatArray, task: IntArray) -> None:
         """Set the part of each task that an agent does, shape (n, m), 0 out of reach, and a plan that does all."""
