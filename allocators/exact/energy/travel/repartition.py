@@ -1,10 +1,9 @@
 """The best way to share the agents of a few tasks among these tasks, at prices of work; compiled.
 
-With a price of the work on each task, the cost of an agent less the price of its work is least on one of the tasks.
-What a plan costs above a constant is by how much agents cost more where they are, their regrets, and the price of work
-beyond needs. A depth-first search with
-these as a bound finds the best of all ways to share a dozen agents among two or three tasks in some hundred nodes, as
-agents near one task have large regrets elsewhere.
+With a price of the work on each task, the cost of an agent less the price of its work is least on one of the tasks. By
+how much it is more where the agent goes is its regret. Up to a constant, a plan costs the regrets of all agents and the
+price of the work beyond needs. A depth-first search with that as a bound finds the best of all ways to share a dozen
+agents among two or three tasks in some hundred nodes, as agents near one task have large regrets elsewhere.
 
 References
 ----------
