@@ -14,6 +14,9 @@ from alloc.allocators.contract.budget import Budget
 from alloc.problems import Instance, Objective, count_classes
 from alloc.problems.text import counted
 
+PICKED = ("cpsat", "milp", "local-search")
+"""What `choose` returns one of."""
+
 MAKESPAN_PAIRS_PER_SECOND = 30_000
 ENERGY_PAIRS_PER_SECOND = 5_000
 MOST_PAIRS_SEARCHED = 4_000_000

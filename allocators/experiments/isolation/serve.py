@@ -14,6 +14,7 @@ from functools import partial
 from multiprocessing.connection import Connection
 from typing import Any
 
+from alloc.allocators.auto import PICKED
 from alloc.allocators.contract.base import Allocator
 from alloc.allocators.experiments.store.key import MISSION, Run
 from alloc.allocators.experiments.store.outcome import Outcome
@@ -99,7 +100,11 @@ def maker(order: Order) -> Callable[[Run, Any], Figures]:
         with contextlib.suppress(Exception):  # its runs will tell
             simulate(Mission.from_instance(_warming()), policy, knowledge=order.run.knowledge)
         return partial(_lead, policy)
-    return partial(_solve, name if name == "auto" else load(name, **order.settings))
+    if name == "auto":
+        for one in PICKED:
+            load(one)  # which one it takes depends on the instance, and is known when the run's time counts already
+        return partial(_solve, name)
+    return partial(_solve, load(name, **order.settings))
 
 
 def _solve(allocator: str | Allocator, run: Run, instance: Instance) -> Figures:

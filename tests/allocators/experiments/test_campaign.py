@@ -9,8 +9,9 @@ import evil_methods
 import pytest
 from in_process import InProcess
 
+from alloc.allocators.auto import PICKED
 from alloc.allocators.experiments.campaign import Campaign, Job, Means
-from alloc.allocators.experiments.isolation import cores
+from alloc.allocators.experiments.isolation import cores, serve
 from alloc.allocators.experiments.store.key import Run, fingerprint, versions
 from alloc.allocators.experiments.store.outcome import Outcome
 from alloc.allocators.experiments.store.plan import unpacked
@@ -182,3 +183,11 @@ def test_a_store_that_fails_leaves_no_process_behind(plugin, monkeypatch):
             Campaign(store, jobs, Means(workers=1)).run(threading.Event())
         assert store.leases() == {}
     assert not is_there(int((plugin / "naps").read_text().split()[0]))
+
+
+def test_what_auto_may_pick_is_loaded_before_its_time_counts(monkeypatch):
+    """Loops that are compiled for the first time take longer than a run may."""
+    loaded = []
+    monkeypatch.setattr(serve, "load", lambda name, **_: loaded.append(name))
+    serve.maker(serve.Order(job("auto").run, {}, b""))
+    assert sorted(loaded) == sorted(PICKED)

@@ -19,7 +19,7 @@ LEAST_VIOLATION, MOST_FOUND = 0.05, 5000
 MOST_CUTS, MOST_OF_CLASS = 60, 4
 """Cuts over classes added at once, and of these how many with the same class."""
 
-SMALL_GROUP = 8
+SMALL_GROUP = 12
 """Agents for each task above which cuts over classes make the search for groups long, and so are the last resort."""
 
 DUAL_SIMPLEX, PRIMAL_SIMPLEX = 1, 4
