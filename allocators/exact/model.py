@@ -45,7 +45,7 @@ from functools import cached_property
 import numpy as np
 
 from alloc.allocators.exact.demand import Demand
-from alloc.problems import AgentClasses, Allocation, Instance
+from alloc.problems import IDLE, AgentClasses, Allocation, Instance
 from alloc.problems.instance import FloatArray, IntArray
 
 FEW_PAIRS = 200
@@ -131,6 +131,16 @@ class Model:
             spare=spare,
             ability=ability,
         )
+
+    def columns(self, plan: Allocation) -> IntArray:
+        """Return the index into `tasks` of the task of each agent, shape (n,); t for idle agents and other tasks."""
+        tasks = np.append(self.tasks, np.iinfo(np.intp).max)
+        column = np.searchsorted(tasks, plan.task_of_agent)
+        return np.where(tasks[column] == plan.task_of_agent, column, len(self.tasks))
+
+    def plan_of(self, column: IntArray) -> Allocation:
+        """Return the plan of such indices; agents with t are idle."""
+        return Allocation(np.append(self.tasks, IDLE)[column])
 
     def pairs_at(self, demand: Demand) -> IntArray:
         """Return which of the model's pairs are those of `demand`."""

@@ -143,9 +143,7 @@ def begin_primal(
     """Start the search at `plan`; None where travel takes time, or its tables are too large."""
     if model.travel_time is not None:
         return None
-    column = np.full(instance.m + 1, len(model.tasks))
-    column[model.tasks] = np.arange(len(model.tasks))
-    task = column[plan.task_of_agent]
+    task = model.columns(plan)
     cost = np.where(model.classes.mask, model.classes.cost, np.inf)[:, model.tasks]
     if demand.integral and demand.need.max() <= MAX_NEED:
         weight, need = demand.ability.astype(np.int64), demand.need.astype(np.int64)

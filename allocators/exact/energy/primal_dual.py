@@ -40,9 +40,6 @@ FEW_GROUPS = 2500
 PARTS = 1.0, 0.7, 0.5, 0.35, 0.25
 """Parts of the gap tried in turn, until the groups within are few enough."""
 
-LIKELY = 1.0
-"""Part of the gap that plans may cost above the bound of whose pairs the search for plans is told."""
-
 LESS_GAP = 0.9
 """Part of the last gap at which groups are counted again."""
 
@@ -101,8 +98,6 @@ class PrimalDual:
         self._primal = begin_primal(instance, model, demand, plan, task_distance, seed)
         self._reported = self._cost = _cost_of_plan(instance, plan)
         self._gap_tried, self._least_with = np.inf, np.zeros(0)
-        self._column = np.full(instance.m + 1, len(model.tasks))  # the last is that of IDLE, -1
-        self._column[model.tasks] = np.arange(len(model.tasks))
         self._primal_timer, self._dual_timer, self._improved_s = Timer(), Timer(), 0.0
         self._descended = self._primal is None
 
@@ -239,7 +234,7 @@ class PrimalDual:
             is_better = cost < self._cost * (1 - 1e-9)
             self._plan, self._cost = plan, cost
             if self._primal is not None and is_better and cost < self._primal.cost * (1 - 1e-9):
-                self._primal.adopt(self._column[plan.task_of_agent])
+                self._primal.adopt(self._model.columns(plan))
             if self._dual is not None and self._cuts is not None and is_better:
                 self._cuts.note_plan(self._counts[self._dual.kept])
 
@@ -268,15 +263,14 @@ class PrimalDual:
         """Return the best plan if it has not been returned yet; tell the primal side which pairs are likely."""
         if self._primal is not None and self._cuts is not None and self._cuts.least_with is not self._least_with:
             self._least_with = self._cuts.least_with
-            pairs = self._kept[self._least_with <= self._proven + LIKELY * (self._cost - self._proven)]
+            pairs = self._kept[self._least_with <= self._cost]
             allowed = np.zeros((len(self._demand.count), len(self._model.tasks)), dtype=bool)
             allowed[self._demand.class_of_pair[pairs], self._demand.task_of_pair[pairs]] = True
             self._primal.restrict(allowed[self._model.classes.class_of_agent])
         if self._primal is None or self._primal.cost >= self._reported * (1 - 1e-12):
             return None
         self._reported, self._improved_s = self._primal.cost, self._primal_timer.spent_s
-        tasks = np.append(self._model.tasks, IDLE)
-        return Allocation(tasks[self._primal.best])
+        return self._model.plan_of(self._primal.best)
 
     @property
     def _counts(self) -> IntArray:

@@ -132,7 +132,7 @@ class GroupMaster:
         No better plan has them; with fewer groups the programme is solved faster. Pricing may bring them back.
         """
         known = slice(len(self._part))
-        cost = self._cost[known] + self._use[known, :-1] @ price + self._used[known, : len(penalty)] @ penalty
+        cost = self._paid(known, price, penalty)
         self._leave_out((cost - least[self._task[known]] > more) & (self._part <= 0))
 
     def cheap_groups(
@@ -150,7 +150,7 @@ class GroupMaster:
             What they use of each cut.
         """
         known, model = slice(self._groups), self._model
-        cost = self._cost[known] + self._use[known, :-1] @ price + self._used[known, : len(penalty)] @ penalty
+        cost = self._paid(known, price, penalty)
         above = cost - least[self._task[known]]
         cheap = np.argsort(above, kind="stable")[:most]
         cheap = cheap[above[cheap] <= more]
@@ -161,6 +161,11 @@ class GroupMaster:
         entries = agents, (row, pair[self._task[cheap][row], agent_class])
         groups = csr_array(entries, shape=(len(cheap), len(model.cost)))
         return self._task[cheap], groups, self._used[cheap, : len(self.limit)]
+
+    def _paid(self, known: slice, price: FloatArray, penalty: FloatArray) -> FloatArray:
+        """Return what groups cost at prices of agents and penalties of the first cuts."""
+        paid: FloatArray = self._cost[known] + self._use[known, :-1] @ price
+        return paid + self._used[known, : len(penalty)] @ penalty
 
     def _leave_out(self, groups: Mask) -> None:
         for g in np.flatnonzero(groups & np.isfinite(self._cost[: len(groups)])).tolist():
@@ -187,7 +192,7 @@ class GroupMaster:
     def cheapest(self, price: FloatArray, penalty: FloatArray) -> FloatArray:
         """Return the cost of the cheapest group known of each task at some prices, shape (t,)."""
         known, least = slice(self._groups), np.full(self._tasks, np.inf)
-        cost = self._cost[known] + self._use[known, :-1] @ price + self._used[known, : len(penalty)] @ penalty
+        cost = self._paid(known, price, penalty)
         np.minimum.at(least, self._task[known], cost)
         return least
 

@@ -8,9 +8,7 @@ from alloc.allocators.exact.energy.primal_dual import PrimalDual
 from alloc.allocators.exact.energy.timer import Timer
 from alloc.allocators.exact.energy.travel.search import TravelSearch
 from alloc.allocators.exact.model import ROUNDING, Model
-from alloc.problems import IDLE, Allocation
 from alloc.problems.evaluation import last_equal
-from alloc.problems.instance import IntArray
 
 MAX_PAIRS = 2_000_000
 """Agents times tasks above which tables take too much memory."""
@@ -44,13 +42,10 @@ class TravelPhase:
     def __init__(self, search: Search, model: Model) -> None:
         assert search.best is not None
         self._search, self._model, self._timer = search, model, Timer()
-        self._column = np.full(search.instance.m + 1, len(model.tasks))
-        self._column[model.tasks] = np.arange(len(model.tasks))
         self._class = model.classes.class_of_agent
         cost = np.where(model.classes.mask, model.classes.cost, np.inf)[:, model.tasks][self._class]
         distance = pairwise_distance(search.instance.reach.goal[model.tasks])
-        task = self._task_of(search.best.allocation)
-        self._annealing = TravelSearch(cost, task, distance, search.seed)
+        self._annealing = TravelSearch(cost, model.columns(search.best.allocation), distance, search.seed)
         self._limit, self._reported = 0.0, np.inf
         self._begin_s = self._found_s = self._last_s = search.elapsed_s
 
@@ -88,8 +83,7 @@ class TravelPhase:
         """Submit the best plan if it is new."""
         if self._annealing.cost < self._reported * (1 - 1e-9):
             self._reported, self._found_s = self._annealing.cost, self._search.elapsed_s
-            tasks = np.append(self._model.tasks, IDLE)
-            self._search.submit(Allocation(tasks[self._annealing.best]))
+            self._search.submit(self._model.plan_of(self._annealing.best))
 
     def has_stalled(self, stage_s: float) -> bool:
         """Whether no better plan has been found for long, in a stage of `stage_s` seconds."""
@@ -103,11 +97,8 @@ class TravelPhase:
         limit, plan = search.makespan_limit, search.best.allocation
         if limit != self._limit:
             share = model.shares(last_equal(limit))[self._class] / (1 - ROUNDING)
-            self._annealing.set_weights(share, self._task_of(plan))
+            self._annealing.set_weights(share, model.columns(plan))
             self._limit, self._reported = limit, self._annealing.cost
         elif search.best.evaluation.cost_in_distance < self._annealing.cost * (1 - 1e-9):
-            self._annealing.set_plan(self._task_of(plan))
+            self._annealing.set_plan(model.columns(plan))
             self._reported = self._annealing.cost
-
-    def _task_of(self, plan: Allocation) -> IntArray:
-        return np.asarray(self._column[plan.task_of_agent])
