@@ -1,4 +1,4 @@
-"""Figures 2 to 6 in the paper's form: makespan over iterations in each scenario, and battery left at the end."""
+"""Figures 2 to 6 in the form of the paper: makespan over iterations in each scenario, and remaining battery."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -39,7 +39,7 @@ def draw_all(learned: Sequence[Learned], solved: Sequence[Solved], folder: Path)
 
 
 def _convergence(rows: Sequence[Learned], solved: Sequence[Solved], scenario: int) -> "Figure":
-    """Draw figure 2, 3, 4 or 5, with what the other methods reach in a narrow panel beside."""
+    """Draw figure 2, 3, 4 or 5, with the methods that do not learn in a narrow panel on the right."""
     figure = new_figure(8.2, 4.4)
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=[5, 1])
     for method in (name for name in PAPER_METHODS if any(row.method == name for row in rows)):
@@ -85,7 +85,7 @@ def _frame(left: "Axes", right: "Axes", rows: Sequence[Learned], solved: Sequenc
 
 
 def _batteries(rows: Sequence[Learned]) -> "Figure":
-    """Draw figure 6: the battery left at the end of the episode, and what the paper has."""
+    """Draw figure 6: the battery left at the end of the episode, beside the values in the paper."""
     figure = new_figure(8.2, 4.4)
     axes = figure.subplots()
     width = 0.8 / len(PAPER_METHODS)

@@ -1,4 +1,4 @@
-"""How claims are tested on the rows: the effect in words, and the verdict."""
+"""Tests of the paper's claims on the rows: the effect in words, and the verdict."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -26,10 +26,10 @@ RIVALS = PAPER_METHODS[1:]
 
 SIGNIFICANT = 0.05
 ENERGY_PER_DISTANCE = 6.0
-"""Of all instances, as `paper_like` makes them."""
+"""That of all instances made by `paper_like`."""
 
 ENOUGH = 8
-"""Runs below which not even the same sign in all of them is significant against four rivals."""
+"""Fewest runs with which a difference can be significant against four rivals."""
 
 HOLDS, NOT, UNKNOWN = "holds", "does not hold", "cannot be checked"
 TOO_FEW = f"{UNKNOWN}: too few runs"
@@ -48,7 +48,7 @@ Finding = tuple[str, str]
 
 
 def told(one: Effect | None, form: str = "+.3f") -> str:
-    """Return an effect with its interval in words, and how many runs are left out of it."""
+    """Return an effect with its interval in words, and the number of runs left out."""
     if one is None:
         return "no runs"
     left_out = f", {one.left_out} left out" if one.left_out else ""
@@ -96,7 +96,7 @@ def described(compared: Sequence[tuple[int, bool]]) -> str:
     Parameters
     ----------
     compared : sequence of (int, bool)
-        Of each comparison the fewest runs of the two sides, and whether it comes out as claimed.
+        For each comparison, the smaller number of runs of the two sides, and whether the result is as claimed.
     """
     if any(runs >= ENOUGH and not as_claimed for runs, as_claimed in compared):
         return NOT
@@ -104,7 +104,7 @@ def described(compared: Sequence[tuple[int, bool]]) -> str:
 
 
 def traditional(data: Data) -> Finding:
-    """Compare with methods that learn nothing, by the median makespan in each scenario."""
+    """Compare with methods that do not learn, by the median makespan in each scenario."""
     parts, compared = [], []
     for scenario in SCENARIOS:
         ours = [run[-1].makespan for run in runs_of(of_scenario(data.learned, scenario), "gappo")]
@@ -120,7 +120,7 @@ def traditional(data: Data) -> Finding:
         ]
         if ours and theirs:
             best = min(theirs.values())
-            parts.append(f"scenario {scenario}: {np.median(ours):.3f}, the best of the others {best:.3f}")
+            parts.append(f"scenario {scenario}: {np.median(ours):.3f}, best of the others {best:.3f}")
     return "; ".join(parts) or "no runs", described(compared)
 
 
@@ -130,7 +130,7 @@ def _infinite_without(makespan: float) -> float:
 
 
 def least_energy(data: Data) -> Finding:
-    """Compare the battery left by plans, flown directly, with that of methods that learn nothing.
+    """Compare the battery left by plans, flown directly, with that of methods that do not learn.
 
     Plans that leave a task unserved are left out on both sides, as agents that stay save energy.
     """
@@ -147,7 +147,7 @@ def least_energy(data: Data) -> Finding:
             (min(len(distances), len(found[name])), name not in means or ours >= means[name] - 0.1) for name in OTHERS
         ]
         if distances and means:
-            parts.append(f"scenario {scenario}: {ours:.1f} %, the best of the others {max(means.values()):.1f} %")
+            parts.append(f"scenario {scenario}: {ours:.1f} %, best of the others {max(means.values()):.1f} %")
     return "; ".join(parts) or "no runs", described(compared)
 
 
@@ -162,28 +162,28 @@ def optimal(data: Data) -> Finding:
 
 
 def every(exceptions: int, ended: Sequence[Runs]) -> str:
-    """Return the verdict of a claim on every run: one exception refutes it, and enough runs in each scenario hold."""
+    """Return the verdict of a claim on every run: one exception refutes it; otherwise enough runs must be there."""
     if exceptions:
         return NOT
     return HOLDS if min(map(len, ended)) >= ENOUGH else TOO_FEW
 
 
 def proven(data: Data) -> Finding:
-    """Count the instances with a plan as long as the bound."""
+    """Count the instances with a plan whose makespan equals the bound."""
     met, total = solved_to_the_bound(data.learned, data.solved)
     if not total:
         return "no runs", UNKNOWN
     rows: list[Learned | Solved] = [*data.learned, *data.solved]
     bounds = [row.lower_bound for row in rows if row.scenario != TESTS]
     low, high = min(bounds), max(bounds)
-    text = f"{met} of {total} instances have a plan as long as the proven bound, "
+    text = f"{met} of {total} instances have a plan whose makespan equals the proven bound, "
     text += f"{low:g} h" if low == high else f"{low:g} to {high:g} h"
     is_an_hour = met == total and max(abs(low - 1), abs(high - 1)) < OPTIMAL - 1
-    return text, "the value holds; 20^100 allocations cannot be searched" if is_an_hour else UNKNOWN
+    return text, "the value holds; 20^100 allocations cannot be enumerated" if is_an_hour else UNKNOWN
 
 
 def scale(data: Data) -> Finding:
-    """Compare the lead over the nearest rival in scenarios 2 to 4 with that in scenario 1."""
+    """Compare the lead over the best rival in scenarios 2 to 4 with that in scenario 1."""
     leads: list[Effect] = []
     for scenario in SCENARIOS:
         rows = of_scenario(data.learned, scenario)
@@ -191,7 +191,7 @@ def scale(data: Data) -> Finding:
         found = [one for one in every_rival if one is not None and one.runs]
         leads += [max(found, key=lambda one: one.mean)] if found else []
     text = (
-        ", ".join(f"{lead.mean:+.3f}" for lead in leads) + " hours, `gappo` less the nearest rival, in scenarios 1 to 4"
+        ", ".join(f"{lead.mean:+.3f}" for lead in leads) + " hours, `gappo` minus the best rival, in scenarios 1 to 4"
     )
     if len(leads) < len(SCENARIOS) or min(lead.runs for lead in leads) < ENOUGH:
         return text if leads else "no runs", TOO_FEW
@@ -231,17 +231,17 @@ def population(data: Data) -> Finding:
 
 
 def sizes(data: Data) -> Finding:
-    """Tell the worst makespan on instances far larger than those that were learned from."""
+    """Return the worst makespan on instances far larger than those of training."""
     ended = [runs_of(of_scenario(data.learned, scenario), "gappo") for scenario in SCENARIOS[1:]]
     makespans = [run[-1].makespan for runs in ended for run in runs]
     if not makespans:
         return "no runs", TOO_FEW
     served = sum(np.isfinite(makespans))
-    text = f"trained with at most 50 agents; with 300 and 500 all tasks served in {served} of {len(makespans)}, "
-    text += f"T at worst {max(makespans):.3f}"
+    text = f"trained with at most 50 agents; with 300 and 500, all tasks served in {served} of {len(makespans)} runs, "
+    text += f"worst T {max(makespans):.3f}"
     return text, every(sum(makespan >= 1.1 for makespan in makespans), ended)
 
 
 def unchecked(reason: str) -> Callable[[Data], Finding]:
-    """Return the finding of a claim that nothing here can test."""
+    """Return the finding of a claim that cannot be tested here."""
     return lambda data: (reason, UNKNOWN)

@@ -1,4 +1,4 @@
-"""What methods that learn nothing make of the same instances."""
+"""Methods that do not learn, on the same instances."""
 
 from alloc.allocators.experiments.reproduction.protocol import INSTANCE_SEED, Job, scenarios_of
 from alloc.allocators.experiments.reproduction.rows import Solved
@@ -8,7 +8,7 @@ from alloc.problems.generate import paper
 
 
 def solve_all(job: Job) -> list[Solved]:
-    """Solve a run's instance of each scenario, the makespan first and then the energy, and return a row for each."""
+    """Solve the instances of a run, makespan first and energy second, and return a row for each."""
     return [_solved(job, scenario) for scenario in scenarios_of(job.run)]
 
 

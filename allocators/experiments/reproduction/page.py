@@ -38,26 +38,26 @@ def page(learned: Sequence[Learned], solved: Sequence[Solved], environments: Seq
     parts = [
         HEAD,
         _extent(rows, solved),
-        "## What becomes of the claims",
+        "## Claims of the paper",
         _claims(data),
         "## Figures",
         FIGURES,
         _optimum(data),
         *(_figure(scenario) for scenario in SCENARIOS),
         "![Battery left](reproduction/figure-6.png)",
-        "Bars are means, lines the least and the most of the runs; grey is what the paper has.",
-        "## Equal decisions",
+        "Bars are means over runs, lines their range; grey marks the values in the paper.",
+        "## Results at equal numbers of decisions",
         *(part for length in _lengths(learned) for part in _budget(learned, length)),
-        "## What each part of GAPPO brings",
+        "## Ablation of GAPPO",
         ablations(rows),
         "## The four scenarios",
         _scenarios(rows),
-        "Battery is that of the episode, where every hop is flown; a mean over the runs, as are hops per agent.",
-        "## Methods that learn nothing, on the same instances",
+        "Battery is what is left after the episode, in which every hop is flown. Battery and hops are means over runs.",
+        "## Methods that do not learn, on the same instances",
         _others(solved),
         PROCEDURE,
         ASSUMPTIONS,
-        table(["open", "ours"], ASSUMED, left=2),
+        table(["open in the paper", "our choice"], ASSUMED, left=2),
         SEEDS,
         "## Versions and machines",
         _environments(environments),
@@ -66,27 +66,29 @@ def page(learned: Sequence[Learned], solved: Sequence[Solved], environments: Seq
 
 
 def _lengths(rows: Sequence[Learned]) -> list[int]:
-    """Return the numbers of iterations of which there are runs, the most first."""
+    """Return the lengths of runs in iterations, in decreasing order."""
     return sorted({row.iterations for row in rows}, reverse=True)
 
 
 def _budget(learned: Sequence[Learned], length: int) -> tuple[str, ...]:
-    """Return title, table and finding of all runs with so many iterations."""
+    """Return title, table and finding of all runs of a given number of iterations."""
     rows = [row for row in learned if row.iterations == length]
     return f"### {length} iterations, {DECISIONS * length:,} decisions", _tests(rows), population(rows)
 
 
 def _extent(rows: Sequence[Learned], solved: Sequence[Solved]) -> str:
-    """Say how many runs there are: the paper has 100."""
+    """State the number of runs of each method, beside the paper's 100."""
     counts = {method: len(runs_of(of_scenario(rows, TESTS), method)) for method in LEARNING}
     named = ", ".join(f"`{method}` {count}" for method, count in counts.items() if count)
     others = len({row.run for row in solved})
     length = max(row.iterations for row in rows)
     fewest = min((count for count in counts.values() if count), default=0)
     short = (
-        "" if fewest >= 100 else f"**The paper has more than 100 runs of each method; here are as few as {fewest}.** "
+        ""
+        if fewest >= 100
+        else f"**The paper reports more than 100 runs of each method; some methods have only {fewest} here.** "
     )
-    tail = f"The methods that learn nothing: {counted(others, 'run')}." if others else ""
+    tail = f"Methods that do not learn: {counted(others, 'run')}." if others else ""
     return f"{short}Runs of {length} iterations: {named}. {tail}".rstrip()
 
 
@@ -99,9 +101,7 @@ def _claims(data: Data) -> str:
         lines.append([claim.where, f"“{claim.words}”", claim.test, found, f"**{verdict}**"])
     fail, unknown = (sum(one.startswith(kind) for one in verdicts) for kind in (NOT, UNKNOWN))
     held = len(verdicts) - fail - unknown
-    total = (
-        f"Of {len(verdicts)} claims, those that hold: {held}, that do not: {fail}, that cannot be checked: {unknown}."
-    )
+    total = f"Of {len(verdicts)} claims, {held} hold, {fail} do not hold, and {unknown} cannot be checked."
     return f"{total}\n\n" + table(["where", "the paper", "our test", "effect", "verdict"], lines, left=5)
 
 
@@ -110,16 +110,16 @@ def _figure(scenario: int) -> str:
 
 
 def _optimum(data: Data) -> str:
-    """Say for how many instances the bound is the optimum."""
+    """State for how many instances the optimum is known."""
     met, total = solved_to_the_bound(data.learned, data.solved)
     if not total:
         return ""
     which = f"all {counted(total, 'instance')}" if met == total else f"{met} of {counted(total, 'instance')}"
-    return f"A plan as long as the bound, which proves it the optimum, is known for {which}."
+    return f"For {which}, a plan is known whose makespan equals the lower bound, which proves it optimal."
 
 
 def _mean(values: Sequence[float], form: str) -> str:
-    """Return the mean of the finite values with its interval, and how many are left out of it."""
+    """Return the mean of the finite values with its interval, and the number of values left out."""
     finite = np.array([value for value in values if np.isfinite(value)])
     left_out = f", {len(values) - len(finite)} left out" if len(finite) < len(values) else ""
     if not len(finite):
@@ -130,7 +130,7 @@ def _mean(values: Sequence[float], form: str) -> str:
 
 
 def _tests(rows: Sequence[Learned]) -> str:
-    """Return the table of the test games, with the differences from `ppo`."""
+    """Return the table of results on the test games, with differences from `ppo`."""
     own = of_scenario(rows, TESTS)
     present = [name for name in LEARNING if runs_of(own, name)]
     effects = {
@@ -166,7 +166,7 @@ def _tests(rows: Sequence[Learned]) -> str:
                 f"{np.mean([run[-1].decisions for run in runs]):,.0f}",
             ]
         )
-    header = ["method", "runs", "final T", "less `ppo`'s", "best of 8 drawn", "less `ppo`'s"]
+    header = ["method", "runs", "final T", "minus `ppo`", "best of 8 sampled", "minus `ppo`"]
     return table([*header, "iterations to T = 1.05", "unserved", "decisions"], lines)
 
 
@@ -218,14 +218,14 @@ def _others(solved: Sequence[Solved]) -> str:
                 )
     header = ["scenario", "method", "median T", "worst T", "proven optimal T", "battery of the plan (%)"]
     limits = sorted({row.time_limit_s for row in solved})
-    told_limits = " and ".join(f"{limit:g} s" for limit in limits)
+    limits_text = " and ".join(f"{limit:g} s" for limit in limits)
     if not lines:
-        return "None was run."
-    return f"Objective makespan-energy, {told_limits} and one thread each.\n\n{table(header, lines, left=2)}"
+        return "No runs."
+    return f"Objective makespan-energy, {limits_text} and one thread each.\n\n{table(header, lines, left=2)}"
 
 
 def _environments(environments: Sequence[dict[str, str]]) -> str:
     lines = [
         [entry["machine"], ", ".join(f"{k} {v}" for k, v in entry.items() if k != "machine")] for entry in environments
     ]
-    return table(["machine", "versions"], lines, left=2) if lines else "None is noted."
+    return table(["machine", "versions"], lines, left=2) if lines else "Not recorded."

@@ -1,4 +1,4 @@
-"""What the parts of GAPPO bring: its population, and each part by a variant that lacks it."""
+"""Ablation of GAPPO: the effect of its population, and of each component by a variant without it."""
 
 from collections.abc import Sequence
 
@@ -10,17 +10,17 @@ from alloc.allocators.experiments.reproduction.summary import Effect, effect, fi
 from alloc.allocators.experiments.statistics import holm
 
 GAIN = 0.01
-"""p-value, corrected by Holm's procedure, below which the population is said to bring something."""
+"""p-value, after Holm's correction, below which the population counts as having an effect."""
 
 DECISIVE = 9
-"""Runs below which not even the same sign in all of them is below `GAIN`, after Holm over two tests."""
+"""Fewest runs with which p can be below `GAIN` after Holm's correction over two tests."""
 
-COMPARED = {"makespan": "final T", "drawn": "best of 8 drawn games"}
-"""Figures by which parts are judged, in words."""
+COMPARED = {"makespan": "final T", "drawn": "best of 8 sampled games"}
+"""Figures that are compared, in words."""
 
 
 def population(rows: Sequence[Learned]) -> str:
-    """Say whether the population of GAPPO brings anything, by a single member; differences from PPO are told apart."""
+    """State the effect of the population of GAPPO against a single member and, separately, against PPO."""
     finding = _against_one_member(rows)
     beside = "; ".join(f"{words} {told(one, '+.4f')}" for words, one in _differences(rows, "ppo").items())
     return finding + (f" Against `ppo`, which differs in more than the population: {beside}." if beside else "")
@@ -37,7 +37,7 @@ def _against_one_member(rows: Sequence[Learned]) -> str:
     """Return the finding on the population, from the runs of `gappo` and `gappo-single` alone."""
     known = _differences(rows, "gappo-single")
     if not known:
-        return "**What the population brings is not measured**: `gappo` and `gappo-single` have no run in common."
+        return "**The effect of the population was not measured**: `gappo` and `gappo-single` have no run in common."
     corrected = holm([one.p for one in known.values()])
     gains = [
         words
@@ -46,17 +46,14 @@ def _against_one_member(rows: Sequence[Learned]) -> str:
     ]
     figures = "; ".join(f"{words} {told(one, '+.4f')}" for words, one in known.items())
     if gains:
-        return (
-            f"**The population brings something** ({', '.join(gains)}; p < {GAIN} after Holm), against one member: "
-            f"{figures}."
-        )
+        return f"**The population helps** ({', '.join(gains)}; p < {GAIN} after Holm), against one member: {figures}."
     few = max(one.runs for one in known.values()) < DECISIVE
-    why = f"fewer than {DECISIVE} runs cannot show it" if few else f"no p < {GAIN} after Holm"
-    return f"**Nothing is shown to come of the population** ({why}), against one member: {figures}."
+    why = f"fewer than {DECISIVE} runs cannot show one" if few else f"no p < {GAIN} after Holm"
+    return f"**No effect of the population is shown** ({why}), against one member: {figures}."
 
 
 def ablations(rows: Sequence[Learned]) -> str:
-    """Return the table of the variants that lack a part of `gappo`, on the test games."""
+    """Return the table of ablations on the test games."""
     own = of_scenario(rows, TESTS)
     effects = {(name, figure): effect(own, name, "gappo", final(figure)) for name in ABLATIONS for figure in COMPARED}
     known = {key: one for key, one in effects.items() if one is not None}
@@ -66,16 +63,16 @@ def ablations(rows: Sequence[Learned]) -> str:
         cells = [tested(effects[name, figure], corrected.get((name, figure)), "+.4f") for figure in COMPARED]
         verdict = _without(effects[name, "makespan"], corrected.get((name, "makespan")), len(known))
         lines.append([part, f"`{name}`", meaning, *cells, f"**{verdict}**"])
-    header = ["part", "without it", "what that means", *(f"{words}, less `gappo`'s" for words in COMPARED.values())]
+    header = ["component", "variant without it", "meaning", *(f"{words}, minus `gappo`" for words in COMPARED.values())]
     return f"{ABLATION}\n\n" + table([*header, "finding on T"], lines, left=6)
 
 
 def _without(one: Effect | None, p: float | None, tests: int) -> str:
-    """Say what the final makespan without a part shows, where p is corrected for so many tests."""
+    """Return the verdict on a component from the final makespan without it, with p corrected over `tests` tests."""
     if one is None:
         return "not measured"
     if p is None or tests * 0.5 ** (one.runs - 1) >= SIGNIFICANT:  # the same sign in all runs would not be enough
         return "too few runs"
     if p >= SIGNIFICANT:
-        return "nothing shown"
-    return "brings something" if one.mean > 0 else "better without"
+        return "no effect shown"
+    return "helps" if one.mean > 0 else "better without"

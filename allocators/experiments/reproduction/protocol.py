@@ -1,4 +1,4 @@
-"""What is run, and all that the paper leaves open about it; does not import torch."""
+"""Design of the experiments, including all that the paper leaves open; does not import torch."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -9,7 +9,7 @@ PAPER_METHODS = ("gappo", "a2c", "ppo", "dqn", "ddpg")
 
 @dataclass(frozen=True)
 class Variant:
-    """What learns: a method, and how it differs from that method as it was tuned.
+    """A method to train, and how it differs from that method as tuned.
 
     Attributes
     ----------
@@ -45,26 +45,29 @@ VARIANTS: Mapping[str, Variant] = {
     "gappo-no-attention": Variant("gappo", _POPULATION, has_attention=False),
     "gappo-on-policy": Variant("gappo", {**_POPULATION, "buffer_size": 0}),
 }
-"""All that can learn: further ones lack one part of `gappo`."""
+"""All that can be trained: `LEARNING`, and ablations of `gappo`."""
 
 ABLATIONS: Mapping[str, tuple[str, str]] = {
     "gappo-unshared": (
         "sharing",
-        "each member has a network and a step size of its own; first members, turns and replay buffer are the same",
+        "each member has its own network and step size; initial members, turns and replay buffer are the same",
     ),
     "gappo-single": ("genes", "one member, which is PPO with the adaptive rate and the replay buffer"),
     "gappo-no-evolution": (
         "genetic algorithm",
-        "genes stay as they are drawn, without selection, crossover and mutation; the policy is the first member's",
+        "initial genes are kept, without selection, crossover and mutation; the policy is the first member's",
     ),
-    "gappo-linear-rate": ("adaptive rate", "the step size falls linearly, as that of `ppo`"),
+    "gappo-linear-rate": ("adaptive rate", "the step size decays linearly, as in `ppo`"),
     "gappo-no-attention": (
         "attention",
-        "of its group and of other tasks an agent sees what the features sum up, such as abilities and their number",
+        "an agent sees its group and other tasks only through aggregate features, such as total ability and count",
     ),
-    "gappo-on-policy": ("replay", "every game is learned from once; fewer gradient steps for the same decisions"),
+    "gappo-on-policy": (
+        "replay",
+        "each game is used for one update only; fewer gradient steps for the same number of decisions",
+    ),
 }
-"""What each lacks, and what that means, by the name of the variant."""
+"""Component that each variant lacks, and what that means."""
 
 _PPO: Mapping[str, object] = {
     "learning_rate": 0.003274,
@@ -100,7 +103,7 @@ TUNED: Mapping[str, Mapping[str, object]] = {
 has those of PPO, which it extends, and the divergence target of twelve trials of its own."""
 
 OTHERS = ("greedy", "ga", "local-search", "milp", "cpsat")
-"""Methods that learn nothing, and are run on the same instances."""
+"""Methods that do not learn, run on the same instances."""
 
 SCENARIOS = (1, 2, 3, 4)
 
@@ -108,13 +111,13 @@ ITERATIONS: Mapping[int, int] = {1: 200, 2: 300, 3: 300, 4: 300}
 """The paper's, of each scenario."""
 
 OTHER_SCENARIO_RUNS = 10
-"""Runs that have instances of scenarios 2 to 4; later ones, up to the paper's hundred, have one of scenario 1 alone."""
+"""Number of runs with instances of scenarios 2 to 4; later runs have one of scenario 1 only."""
 
 DECISIONS = 200
-"""Decisions of agents in an iteration, by all members of a population together; the paper gives no unit."""
+"""Decisions of agents in an iteration, over all members of a population; the paper gives no unit."""
 
 POINTS = (5, 10, 25, 50, 75, 100, 125, 150, 175, 200, 225, 250, 275, 300)
-"""Iterations after which a policy is judged, besides 0; schedules follow them."""
+"""Iterations after which a policy is evaluated, besides 0."""
 
 ENERGY_WEIGHT = 0.3
 """Weight of energy in all games."""
@@ -123,29 +126,29 @@ INSTANCE_SEED = 6000
 """Seed of the instances of the first run; those of the others follow. Nothing is trained or tuned on them."""
 
 TEST_SEED, TEST_GAMES = 5000, 12
-"""Further instances of scenario 1, the same for all runs: the sharpest comparison of methods."""
+"""Further instances of scenario 1, the same for all runs: the comparison with the highest power."""
 
 TESTS = 0
-"""Number of the test games in the rows, where others have that of a scenario."""
+"""Stands for the test games where rows have the number of a scenario."""
 
 DRAWN = 8
-"""Games with drawn bids on each test instance, of which the best counts, at the end of a run."""
+"""Games with sampled bids on each test instance at the end of a run, of which the best counts."""
 
 PAPER_BATTERY: Mapping[str, Mapping[int, tuple[float, float]]] = {
     "gappo": {1: (91.9, 91.9), 2: (91.7, 91.8), 3: (91.7, 91.8), 4: (91.7, 91.8)},
     "others": {1: (52.2, 55.5), 2: (74.2, 81.6), 3: (74.2, 81.6), 4: (74.2, 81.6)},
 }
-"""Least and most battery left in percent that the text to figure 6 gives; that of scenario 2 is not given alone."""
+"""Range of the remaining battery in percent in the text on figure 6, which gives none for scenario 2 alone."""
 
 
 @dataclass(frozen=True, order=True)
 class Job:
-    """One run: a training by a learning method, or the solving of a run's instances by another one.
+    """One run: a training, or the solving of the instances of a run by a method that does not learn.
 
     Attributes
     ----------
     run : int
-        From 0; decides the instances and all random numbers.
+        From 0; determines the instances and all random numbers.
     method : str
         Of `VARIANTS` or `OTHERS`.
     iterations : int
@@ -166,18 +169,18 @@ class Job:
 
 
 def scenarios_of(run: int) -> tuple[int, ...]:
-    """Return the scenarios of which a run has an instance."""
+    """Return the scenarios on which a run is evaluated."""
     return SCENARIOS if run < OTHER_SCENARIO_RUNS else SCENARIOS[:1]
 
 
 def judged(scenario: int, iterations: int) -> list[int]:
-    """Return after which iterations of a training its policy is judged on a scenario, or on the test games."""
+    """Return the iterations after which a policy is evaluated on a scenario or on the test games."""
     most = iterations if scenario == TESTS else min(iterations, ITERATIONS[scenario])
     return [0, *(point for point in POINTS if point <= most)]
 
 
 def expected(job: Job) -> set[tuple[int, int]]:
-    """Return scenario and iteration of each row of a run; a method that learns nothing has no iterations but 0."""
+    """Return scenario and iteration of each row of a run; a method that does not learn has only iteration 0."""
     if not job.learns:
         return {(scenario, 0) for scenario in scenarios_of(job.run)}
     played = (TESTS, *scenarios_of(job.run))
@@ -185,5 +188,5 @@ def expected(job: Job) -> set[tuple[int, int]]:
 
 
 def planned(runs: int, methods: tuple[str, ...], iterations: int, time_limit_s: float) -> list[Job]:
-    """Return all jobs: all methods of a run before the next run, so that a part of them compares all alike."""
+    """Return all jobs, ordered by run, so that any prefix of them compares all methods alike."""
     return [Job(run, method, iterations, time_limit_s) for run in range(runs) for method in methods]

@@ -1,4 +1,4 @@
-"""Figures from rows: runs of a method, paired differences, and when a makespan was reached."""
+"""Statistics of rows: runs of a method, paired differences, and when a makespan was reached."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from alloc.allocators.experiments.statistics import interval, signed_rank
 Row = TypeVar("Row", Learned, Solved)
 
 OPTIMAL = 1 + 1e-4
-"""Makespan over the proven bound up to which it counts as the optimum."""
+"""Ratio of makespan to proven bound up to which a plan counts as optimal."""
 
 Runs = list[list[Learned]]
 """Rows of each run, in the order of their iterations."""
@@ -43,15 +43,12 @@ class Effect:
 
 
 def is_optimal(row: Learned | Solved) -> bool:
-    """Return whether the makespan is that of the proven bound."""
+    """Return whether the makespan equals the proven bound."""
     return row.makespan <= row.lower_bound * OPTIMAL
 
 
 def solved_to_the_bound(learned: Sequence[Learned], solved: Sequence[Solved]) -> tuple[int, int]:
-    """Return of how many instances of the scenarios a plan as long as the proven bound is known, and of how many all.
-
-    The bound of these instances is the optimum.
-    """
+    """Return the number of instances with a plan whose makespan equals the proven bound, and the number of all."""
     rows: list[Learned | Solved] = [*learned, *solved]
     rows = [row for row in rows if row.scenario != TESTS]
     met = {(row.scenario, row.run) for row in rows if is_optimal(row)}
@@ -64,13 +61,13 @@ def of_scenario(rows: Sequence[Row], scenario: int) -> list[Row]:
 
 
 def latest_length(rows: Sequence[Learned]) -> list[Learned]:
-    """Return the rows of the longest runs alone, as shorter ones have other schedules."""
+    """Return the rows of the longest runs only, as shorter ones have other step-size schedules."""
     longest = max((row.iterations for row in rows), default=0)
     return [row for row in rows if row.iterations == longest]
 
 
 def runs_of(rows: Sequence[Learned], method: str) -> Runs:
-    """Return the runs of a method, in their order."""
+    """Return the rows of each run of a method, in order."""
     found: dict[int, list[Learned]] = {}
     for row in sorted(rows, key=lambda row: (row.run, row.iteration)):
         if row.method == method:
@@ -79,9 +76,9 @@ def runs_of(rows: Sequence[Learned], method: str) -> Runs:
 
 
 def effect(rows: Sequence[Learned], method: str, other: str, figure: Callable[[list[Learned]], float]) -> Effect | None:
-    """Return by how much a figure of a run differs between two methods, paired by run; None without a common run.
+    """Return the paired difference of a figure between two methods; None without a common run.
 
-    Runs in which it is not finite for one of the two are left out, and counted.
+    Runs in which the figure is not finite for either method are left out and counted.
     """
     ours, theirs = ({run[0].run: figure(run) for run in runs_of(rows, name)} for name in (method, other))
     pairs = [(ours[run], theirs[run]) for run in sorted(ours.keys() & theirs.keys())]
@@ -94,7 +91,7 @@ def effect(rows: Sequence[Learned], method: str, other: str, figure: Callable[[l
 
 
 def final(name: str) -> Callable[[list[Learned]], float]:
-    """Return the function that gives a figure at the end of a run."""
+    """Return a function that gives a figure at the end of a run."""
     return lambda run: float(getattr(run[-1], name))
 
 

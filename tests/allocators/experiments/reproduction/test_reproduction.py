@@ -149,7 +149,7 @@ def test_figures_and_page_are_made_from_rows(tmp_path: Path) -> None:
     append(place.data / "learning.csv", kept)
     place.publish()
     assert all((place.data / f"figure-{number}.png").stat().st_size > 5000 for number in range(2, 7))
-    assert "here are as few as 1.**" in place.page.read_text("utf-8")
+    assert "some methods have only 1 here.**" in place.page.read_text("utf-8")
 
 
 def test_effects_by_hand() -> None:
@@ -234,10 +234,13 @@ def test_what_is_proven_comes_from_the_rows() -> None:
     learned = [*history("gappo", 0, 2.0, 1.2, scenario=1), *history("gappo", 0, 2.0, 1.2, scenario=2)]
     bounded = [replace(row, lower_bound=1.1) for row in learned]
     short = [replace(SOLVED, makespan=1.1, lower_bound=1.1)]
-    assert "proves it the optimum, is known for 1 of 2 instances" in page(bounded, short, [])
+    assert "For 1 of 2 instances, a plan is known whose makespan equals the lower bound" in page(bounded, short, [])
     short += [replace(SOLVED, scenario=2, makespan=1.1, lower_bound=1.1)]
-    assert "proves it the optimum, is known for all 2 instances" in page(bounded, short, [])
-    assert proven(Data(bounded, short)) == ("2 of 2 instances have a plan as long as the proven bound, 1.1 h", UNKNOWN)
+    assert "For all 2 instances, a plan is known whose makespan equals the lower bound" in page(bounded, short, [])
+    assert proven(Data(bounded, short)) == (
+        "2 of 2 instances have a plan whose makespan equals the proven bound, 1.1 h",
+        UNKNOWN,
+    )
     assert optimal(Data([replace(row, makespan=1.1) for row in bounded], []))[0].startswith("scenario 1: 1 of 1; ")
 
 
@@ -254,10 +257,10 @@ def test_makespans_are_in_hours_over_the_proven_bound() -> None:
 @pytest.mark.parametrize(
     ("rivals", "runs", "words"),
     [
-        ({"ppo": 1.2}, 12, "What the population brings is not measured"),
-        ({"ppo": 1.2, "gappo-single": 1.0}, 12, "Nothing is shown to come of the population** (no p"),
-        ({"ppo": 1.0, "gappo-single": 1.2}, 9, "The population brings something** (final T, best"),
-        ({"ppo": 1.0, "gappo-single": 1.2}, 8, "Nothing is shown to come of the population** (fewer than 9 runs"),
+        ({"ppo": 1.2}, 12, "The effect of the population was not measured"),
+        ({"ppo": 1.2, "gappo-single": 1.0}, 12, "No effect of the population is shown** (no p"),
+        ({"ppo": 1.0, "gappo-single": 1.2}, 9, "The population helps** (final T, best"),
+        ({"ppo": 1.0, "gappo-single": 1.2}, 8, "No effect of the population is shown** (fewer than 9 runs"),
     ],
 )
 def test_the_population_is_judged_by_a_single_member(rivals: dict[str, float], runs: int, words: str) -> None:
@@ -274,7 +277,7 @@ def test_the_population_is_judged_by_a_single_member(rivals: dict[str, float], r
 
 @pytest.mark.parametrize(
     ("change", "runs", "verdict"),
-    [(0.1, 12, "brings something"), (-0.1, 12, "better without"), (0.0, 12, "nothing shown"), (0.1, 5, "too few runs")],
+    [(0.1, 12, "helps"), (-0.1, 12, "better without"), (0.0, 12, "no effect shown"), (0.1, 5, "too few runs")],
 )
 def test_a_part_is_judged_by_the_variant_without_it(change: float, runs: int, verdict: str) -> None:
     """Enough runs of a variant and the sign of their difference decide; variants without runs are not measured."""
