@@ -1,6 +1,6 @@
-"""What is to be solved, and how good an answer is; knows nothing of allocators.
+"""Problem model: instances, allocations, missions, their files, and evaluation; independent of `alloc.allocators`.
 
-Names are loaded when they are asked for, so that a program can have the vocabulary without numpy.
+Public names are imported on first access, so that `alloc.problems.vocabulary` can be used without loading numpy.
 """
 
 import logging
@@ -165,9 +165,9 @@ _MODULE_OF = {
     "write_mission": "missions.files.mission_file",
     "write_model": "formats.model_file",
 }
-"""Where each name is defined; the imports above say the same to type checkers."""
+"""Module that defines each public name; the imports above declare the same for type checkers."""
 
-logging.getLogger("alloc").addHandler(logging.NullHandler())  # silent, unless the program that uses us says otherwise
+logging.getLogger("alloc").addHandler(logging.NullHandler())  # silent by default, as libraries should be
 
 
 def __getattr__(name: str) -> object:

@@ -16,16 +16,16 @@ from alloc.problems.vocabulary import IDLE
 
 @dataclass(frozen=True)
 class CarriedOver:
-    """How an instance differs from the one that a plan was made for, by ids.
+    """Differences between an instance and the one that a plan was made for, by ids.
 
     Attributes
     ----------
     gone_agents, new_agents : tuple of str
-        Agents that only the plan has, and only the instance.
+        Agents that are only in the plan, and agents that are only in the instance.
     gone_tasks : tuple of str
-        Tasks that only the plan has.
+        Tasks that are only in the plan.
     agents_without_task : tuple of str
-        Agents whose task has gone.
+        Agents of the instance whose task in the plan no longer exists.
     """
 
     gone_agents: tuple[str, ...] = ()
@@ -34,7 +34,7 @@ class CarriedOver:
     agents_without_task: tuple[str, ...] = ()
 
     def __str__(self) -> str:
-        """One line, empty where nothing has changed."""
+        """Return a summary in one line; empty if nothing has changed."""
         parts = [
             f"{counted(len(names), kind)} {'has' if len(names) == 1 else 'have'} gone"
             for kind, names in (("agent", self.gone_agents), ("task", self.gone_tasks))
@@ -52,7 +52,7 @@ class Allocation(ReadOnly):
     Parameters
     ----------
     task_of_agent : array_like of int, shape (n,)
-        Task index of each agent, -1 for idle; copied, and read-only from then on.
+        Task index of each agent, -1 for idle; stored as a read-only copy.
     """
 
     task_of_agent: NDArray[np.intp]
@@ -102,14 +102,14 @@ class Allocation(ReadOnly):
 
     @classmethod
     def carried_over(cls, instance: Instance, assignment: Mapping[str, str | None]) -> "tuple[Allocation, CarriedOver]":
-        """Return what is left of a plan for another state of affairs, and what has changed since.
+        """Adapt a plan to an instance that has changed since, and return it with the changes.
 
-        Agents that have gone are left out, and those whose task has gone are idle.
+        Agents that no longer exist are dropped; agents whose task no longer exists are idle.
 
         Raises
         ------
         InputError
-            If the plan has no agent of `instance`, or a task is no string.
+            If the plan contains no agent of `instance`, or a task is not a string.
         """
         for name, task in assignment.items():
             if not isinstance(task, str | None):
@@ -134,12 +134,12 @@ class Allocation(ReadOnly):
 
 
 def require_fit(instance: Instance, allocation: Allocation) -> NDArray[np.intp]:
-    """Return the task of each agent, once it is clear that they are those of `instance`.
+    """Return the task of each agent after checking that the allocation fits `instance`.
 
     Raises
     ------
     InputError
-        If the allocation has another number of agents, or a task index out of range.
+        If the number of agents differs, or a task index is out of range.
     """
     task = of_type(allocation, Allocation, "allocation").task_of_agent
     if len(task) != of_type(instance, Instance, "instance").n:

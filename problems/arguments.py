@@ -1,6 +1,6 @@
-"""What arguments may be: checked at the public door, so that errors name the parameter and nothing fails deep inside.
+"""Validation of arguments at the public interface, so that errors name the parameter and nothing fails deep inside.
 
-Values of other types that mean the same are taken: numpy's numbers, strings for enumerations.
+Equivalent types are accepted and converted: numpy scalars, and strings for members of enumerations.
 """
 
 import math
@@ -18,7 +18,7 @@ Choice = TypeVar("Choice", bound=StrEnum)
 
 
 def whole(value: object, name: str, low: int | None = 0, high: int | None = None) -> int:
-    """Return a whole number from `low` to `high` as an int; None is no limit."""
+    """Return `value` as an int if it is a whole number from `low` to `high`; None means no limit."""
     if isinstance(value, Integral) and not isinstance(value, bool):
         number = int(value)
         if (low is None or low <= number) and (high is None or number <= high):
@@ -29,7 +29,7 @@ def whole(value: object, name: str, low: int | None = 0, high: int | None = None
 
 
 def real(value: object, name: str, low: float = 0.0, high: float = math.inf, *, above: bool = False) -> float:
-    """Return a finite number from `low` to `high`, as Python's own; `above`: `low` itself is out."""
+    """Return `value` as a Python number if it is finite and from `low` to `high`; `above` excludes `low` itself."""
     if isinstance(value, Real) and not isinstance(value, bool | np.bool_):
         plain: Real = value.item() if isinstance(value, np.generic) else value
         number = plain if isinstance(plain, int | float) else float(plain)
@@ -41,21 +41,21 @@ def real(value: object, name: str, low: float = 0.0, high: float = math.inf, *, 
 
 
 def flag(value: object, name: str) -> bool:
-    """Return True or False, numpy's as well."""
+    """Return `value` as a bool if it is a Python or numpy boolean."""
     if isinstance(value, bool | np.bool_):
         return bool(value)
     raise InputError(f"must be True or False, got {shown(value)}", name)
 
 
 def text(value: object, name: str) -> str:
-    """Return a string as Python's own."""
+    """Return `value` as a plain str if it is a string."""
     if isinstance(value, str):
         return str(value)
     raise InputError(f"must be a string, got {shown(value)}", name)
 
 
 def choice(kind: type[Choice], value: object, name: str) -> Choice:
-    """Return the member of an enumeration that `value` is, or is called."""
+    """Return the member of the enumeration `kind` that `value` is or names."""
     try:
         return kind(value)  # type: ignore[arg-type]
     except ValueError as error:
@@ -63,7 +63,7 @@ def choice(kind: type[Choice], value: object, name: str) -> Choice:
 
 
 def of_type(value: object, kind: type[Kind] | tuple[type[Kind], ...], name: str) -> Kind:
-    """Return `value` if it is of this type, or of one of these."""
+    """Return `value` if it is an instance of `kind`, or of one of several types."""
     if isinstance(value, kind):
         return value
     kinds = kind if isinstance(kind, tuple) else (kind,)
@@ -72,23 +72,23 @@ def of_type(value: object, kind: type[Kind] | tuple[type[Kind], ...], name: str)
 
 
 def function(value: Kind, name: str) -> Kind:
-    """Return what can be called, or None."""
+    """Return `value` if it is callable or None."""
     if value is None or callable(value):
         return value
     raise InputError(f"must be a function, got {shown(value)}", name)
 
 
 def event(value: Kind, name: str) -> Kind:
-    """Return None, or what can be set and asked as a `threading.Event` can."""
+    """Return `value` if it is None or has the methods `set` and `is_set` of a `threading.Event`."""
     if value is None or all(callable(getattr(value, method, None)) for method in ("is_set", "set")):
         return value
     raise InputError(f"must be a threading.Event, got {shown(value)}", name)
 
 
 def listed(values: Iterable[Kind], name: str, what: str) -> list[Kind]:
-    """Return the entries of a list, an array or a generator; `what` they should be.
+    """Return the entries of a list, an array or a generator; `what` describes them in error messages.
 
-    A string is one value, not its letters, and a set has no order.
+    Strings, bytes, mappings and sets are rejected: a string counts as one value, and a set has no order.
     """
     if not isinstance(values, str | bytes | Mapping | Set):
         try:
@@ -99,7 +99,7 @@ def listed(values: Iterable[Kind], name: str, what: str) -> list[Kind]:
 
 
 def shown(value: object) -> str:
-    """Return a value for a message: itself if it is short, else its type."""
+    """Return the text for a value in an error message: a scalar, cut to 60 characters, or else its type."""
     if value is None or isinstance(value, str | int | float | np.number | np.bool_):
         words = str(value) if isinstance(value, np.generic) and not isinstance(value, str) else repr(value)
         return words if len(words) <= 60 else f"{words[:57]}..."

@@ -1,7 +1,7 @@
-"""Lower bounds on the makespan, and on the energy at a makespan, that hold for every allocation.
+"""Lower bounds on the makespan, and on the energy at a given makespan, that hold for every allocation.
 
-Those of linear programmes are taken from the multipliers that the solver returns, by weak duality: any multipliers
->= 0 give a bound, so that no tolerance of the solver enters it.
+Bounds by linear programmes are computed from the solver's dual multipliers by weak duality: any multipliers >= 0 give
+a valid bound, so that the solver's tolerances do not matter.
 """
 
 import math
@@ -20,36 +20,36 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
 ROUNDING = 1e-12
-"""Relative amount by which a bound is lowered for what sums of floats may be off."""
+"""Relative amount by which a bound is lowered to allow for rounding errors in sums of floats."""
 
 ORDINARY = (2.0**-7, 2.0**20)
-"""Costs between which solvers get them as they are."""
+"""Range of costs that are passed to solvers without scaling."""
 
 DEAREST = 2.0**40
-"""Scaled costs above this are cut to it, which keeps bounds valid; solvers take much larger ones for infinite."""
+"""Cap on scaled costs, which keeps bounds valid; solvers treat much larger costs as infinite."""
 
 MOST_DOUBLINGS = 1000
-"""A scale of 2 to this is a float still, and so is one over it."""
+"""Largest exponent k of a scale 2^k, such that both 2^k and 2^-k are normal floats."""
 
 SCARCE = 32
-"""Tasks whose agents are counted where the table of who reaches what is too large for all."""
+"""Tasks for which reachable ability is summed where the reachability table is too large to build."""
 
 SAMPLED_PAIRS = 4_000_000
-"""Pairs of a sampled agent and a task by which these are found."""
+"""Pairs of a sampled agent and a task that are examined to find the `SCARCE` tasks."""
 
 LP_SIZE_LIMIT = 500_000
 """Pairs of agent class and task beyond which no linear programme is built."""
 
 LP_PAIRS_PER_SECOND = 200_000
-"""Pairs beyond which a linear programme is not even begun, for each second that it may take."""
+"""Pairs per second of the time limit beyond which a linear programme is not started."""
 
 
 def makespan_lower_bound(instance: Instance) -> float:
     """Return a lower bound on the makespan of every allocation that serves all tasks, in hours.
 
-    The best of four: all abilities against all workloads; each task against all who can reach it; for every k the
-    m - k smallest workloads against all but the k largest abilities, as k agents serve at most k tasks; and, where
-    abilities are integers, the least T at which the demands rounded up, ceil(h_j / T), fit into the sum of abilities.
+    The maximum of four bounds: total workload over total ability; each workload over the ability of all agents that
+    can reach the task; for every k, the m - k smallest workloads over all but the k largest abilities, as k agents
+    serve at most k tasks; and, if abilities are integers, the least T with sum_j ceil(h_j / T) <= total ability.
     Takes O(n log n + origins * m) time.
 
     Parameters
@@ -72,7 +72,7 @@ def makespan_lower_bound(instance: Instance) -> float:
 
 
 def _dropping_bound(work: FloatArray, ability: FloatArray) -> float:
-    """For each k: total of the m - k smallest workloads over total of the n - k smallest abilities."""
+    """Return the maximum over k of the m - k smallest workloads over the n - k smallest abilities, each summed."""
     most = min(len(work), len(ability))
     load = np.cumsum(work)[::-1][:most]
     rate = np.cumsum(ability)[::-1][:most]
@@ -80,7 +80,7 @@ def _dropping_bound(work: FloatArray, ability: FloatArray) -> float:
 
 
 def _reach_bound(instance: Instance) -> float:
-    """Each task alone with all who can reach it."""
+    """Return the longest time that a task needs with all agents that can reach it."""
     reach = instance.reach
     if not reach.has_table:
         return 0.0 if reach.is_complete else _reach_bound_of_scarce(instance)
@@ -91,7 +91,7 @@ def _reach_bound(instance: Instance) -> float:
 
 
 def _reach_bound_of_scarce(instance: Instance) -> float:
-    """The same for `SCARCE` tasks alone: those with the most work for those of a sample who can reach them."""
+    """Return `_reach_bound` over `SCARCE` tasks: those with most work per ability in reach, by a sample of agents."""
     reach, work = instance.reach, instance.workload
     size = min(10 * SCARCE, max(1, SAMPLED_PAIRS // instance.m))
     sample = np.unique(np.linspace(0, instance.n - 1, size).astype(np.intp))
@@ -103,7 +103,7 @@ def _reach_bound_of_scarce(instance: Instance) -> float:
 
 
 def _arrival_bound(instance: Instance) -> float:
-    """All agents at once, each from the hour at which it could reach its nearest task."""
+    """Return the hour at which all work is done if each agent works from its arrival at its nearest task on."""
     needed = instance.workload > 0
     reach = instance.reach
     if reach.has_table:
@@ -119,7 +119,7 @@ def _arrival_bound(instance: Instance) -> float:
 
 
 def _rounding_bound(work: FloatArray, total: float, bound: float) -> float:
-    """Least T >= `bound` with sum_j ceil(h_j / T) <= total."""
+    """Return the least T >= `bound` with sum_j ceil(h_j / T) <= total."""
 
     def demand(time: float) -> FloatArray:
         return np.ceil(work / time * (1 - ROUNDING))
@@ -128,20 +128,20 @@ def _rounding_bound(work: FloatArray, total: float, bound: float) -> float:
         return bound
     low, high = bound, float(work[-1])
     if demand(high).sum() > total:
-        return bound  # fewer units of ability than tasks: nothing that rounding could add
+        return bound  # fewer units of ability than tasks: rounding cannot improve the bound
     while high > low * (1 + 1e-9):
         middle = (low + high) / 2
         if not low < middle < high:
-            return bound  # next to 0, neighbouring floats are too far apart to tell
+            return bound  # near 0, the spacing of floats is too coarse to decide
         low, high = (low, middle) if demand(middle).sum() <= total else (middle, high)
     return max(bound, float((work / demand(high)).max()))
 
 
 def lp_makespan_lower_bound(instance: Instance, time_limit_s: float = 10.0) -> float | None:
-    """Return the makespan of the best fractional allocation, in hours, or None where that is not at hand.
+    """Return the makespan of the best fractional allocation, in hours, or None if it is not available.
 
-    The linear programme gives fractions of agents, per class and task, to the tasks that they can reach. Not for
-    instances with travel times, nor where it would take more than `time_limit_s` or `LP_SIZE_LIMIT` pairs.
+    The linear programme assigns fractions of agents, per class, to the tasks that they can reach. None for
+    instances with travel times, and if it would take more than `time_limit_s` or `LP_SIZE_LIMIT` pairs.
 
     Parameters
     ----------
@@ -176,11 +176,11 @@ def lp_makespan_lower_bound(instance: Instance, time_limit_s: float = 10.0) -> f
 
 
 def energy_lower_bound(instance: Instance, makespan: float, time_limit_s: float = 10.0) -> float | None:
-    """Return a lower bound on the energy of every allocation with at most this makespan, or None if none is at hand.
+    """Return a lower bound on the energy of every allocation with at most this makespan, or None if not available.
 
-    With a price on moves, on energy and price together. The linear programme buys ability for each task at that cost;
-    an agent that could do a task alone within `makespan` counts as just enough for it. None where it would take more
-    than `time_limit_s` or `LP_SIZE_LIMIT` pairs, or if `makespan` is too small.
+    If the instance has a price on moves, the bound is on the sum of both. The linear programme covers the demand of
+    each task at least cost; an agent's ability counts at most as much as the demand of its task. None if it would
+    take more than `time_limit_s` or `LP_SIZE_LIMIT` pairs, or if `makespan` is too small.
 
     Parameters
     ----------
@@ -209,7 +209,7 @@ def energy_lower_bound(instance: Instance, makespan: float, time_limit_s: float 
     price = _multipliers(cost, constraints, limits, time_limit_s)
     if price is None:
         return None
-    # an agent of class k that does its share saves at most max_j price_j share_kj - cost_kj, 0 if it stays idle
+    # the reduced cost of an agent of class k is at least -max(0, max_j price_j share_kj - cost_kj)
     price = price[: instance.m] * (work > 0)
     saved = float(classes.count @ _largest(kind, price[task] * share - cost, classes.size))
     least = max(0.0, float(price.sum()) * (1 - ROUNDING) - saved)
@@ -217,15 +217,15 @@ def energy_lower_bound(instance: Instance, makespan: float, time_limit_s: float 
 
 
 def typical_distance(distance: FloatArray) -> float:
-    """Return the median of the finite distances above 0, 1 if there is none."""
+    """Return the median of the finite distances > 0, or 1 if there are none."""
     away = distance[(distance > 0) & (distance < np.inf)]
     return float(np.median(away)) if len(away) else 1.0
 
 
 def scale_to_one(typical: float) -> float:
-    """Return the power of two, exact in floats, by which costs like `typical` > 0 become about 1.
+    """Return the power of two, exact in floats, that scales costs of the size of `typical` > 0 to about 1.
 
-    The tolerances of solvers are absolute: costs far below 1 drown in them. It is 1 for costs of an `ORDINARY` order.
+    Solvers have absolute tolerances, below which small costs would vanish. The scale is 1 for `ORDINARY` costs.
     """
     if ORDINARY[0] <= typical <= ORDINARY[1]:
         return 1.0
@@ -250,7 +250,7 @@ def _largest(row: IntArray, value: FloatArray, count: int) -> FloatArray:
 
 
 def _rows(row: IntArray, value: FloatArray, count: int) -> "csr_matrix":
-    """One column per pair of class and task, with a single entry in its row."""
+    """Return a matrix with a column per pair of class and task, which has a single entry, in the pair's row."""
     from scipy.sparse import csr_matrix
 
     return csr_matrix((value, (row, np.arange(len(row)))), shape=(count, len(row)))

@@ -1,4 +1,4 @@
-"""Agents alike in all that matters: an exact model counts them per class instead of deciding each one."""
+"""Classes of interchangeable agents, which exact models count instead of deciding on each agent."""
 
 from dataclasses import dataclass
 
@@ -25,7 +25,7 @@ class AgentClasses:
     ability, speed : ndarray, shape (k,)
         Work per hour, and distance per hour (``inf`` where travel takes no time).
     distance, cost : ndarray, shape (k, m)
-        Distance to each task, and `Reach.cost`; those of one member where classes were not told apart by place.
+        Distance to each task, and `Reach.cost`; those of one member if the classes ignore places.
     mask : ndarray of bool, shape (k, m)
         Which tasks the class can take.
     """
@@ -44,12 +44,12 @@ class AgentClasses:
         return len(self.count)
 
     def spread(self, counts: IntArray) -> Allocation:
-        """Turn numbers of agents per class and task into an allocation; the agents left over are idle.
+        """Return an allocation with the given numbers of agents per class and task; the remaining agents are idle.
 
         Parameters
         ----------
         counts : ndarray of int, shape (k, m)
-            Agents of each class on each task; no row sums to more than its class has.
+            Agents of each class on each task; no row may sum to more than the size of its class.
         """
         task = np.full(len(self.class_of_agent), IDLE, dtype=np.intp)
         order = np.argsort(self.class_of_agent, kind="stable")
@@ -78,8 +78,8 @@ def agent_classes(instance: Instance, *, by_place: bool) -> AgentClasses:
     Parameters
     ----------
     by_place : bool
-        Whether the place matters, as it does for energy; if not, agents with the same ability that can take the same
-        tasks are alike wherever they are, unless travel takes time, or the table of who reaches what is too large to
+        Whether places matter, as they do for energy. If not, agents with the same ability and the same reachable tasks
+        are in one class wherever they are, unless travel takes time or the reachability table is too large to
         compare its rows (`Reach.has_table`).
 
     Returns
@@ -103,7 +103,7 @@ def agent_classes(instance: Instance, *, by_place: bool) -> AgentClasses:
 
 
 def count_classes(instance: Instance, *, by_place: bool) -> int:
-    """Return how many classes `agent_classes` would make, without the table of what they can take.
+    """Return the number of classes that `agent_classes` would make, without building their reachability table.
 
     Parameters
     ----------

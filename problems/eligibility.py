@@ -1,4 +1,4 @@
-"""Who may do what: lists of tasks, and the skills that tasks need."""
+"""Eligibility of agents for tasks, by lists of allowed tasks and by skills."""
 
 from collections.abc import Iterable, Sequence
 
@@ -14,19 +14,19 @@ Names = tuple[str, ...]
 def name_sets(
     lists: Iterable[Iterable[str] | None] | None, count: int, kind: str, field_name: str
 ) -> tuple[Names, ...] | None:
-    """Return sorted names without repetitions for each agent or task, empty for None; None where all are empty.
+    """Return the sorted unique names of each agent or task, empty for None; None if all are empty.
 
     Raises
     ------
     InputError
-        If there are not `count` entries, or one is no list of non-empty strings.
+        If the number of entries is not `count`, or an entry is not a list of non-empty strings.
     """
     if lists is None:
         return None
     entries = listed(lists, field_name, "lists of strings, or None")
     if len(entries) != count:
         raise InputError(f"needs {count} entries, got {len(entries)}", field_name)
-    known: dict[tuple[str, ...], Names] = {}  # one tuple for all that have the same names
+    known: dict[tuple[str, ...], Names] = {}  # equal sets of names share one tuple
     named = tuple(_names(entry, f"{kind}s[{row}].{field_name}", known) for row, entry in enumerate(entries))
     return named if any(named) else None
 
@@ -39,7 +39,7 @@ def _names(entry: Iterable[str] | None, place: str, known: dict[tuple[str, ...],
     names = tuple(entry)
     try:
         return known[names]
-    except (KeyError, TypeError):  # new, or no strings
+    except (KeyError, TypeError):  # not seen before, or not strings
         pass
     for name in names:
         if not isinstance(name, str) or not name:
@@ -51,9 +51,9 @@ def _names(entry: Iterable[str] | None, place: str, known: dict[tuple[str, ...],
 def eligible_tasks(
     allowed: Sequence[IntArray | None] | None, skills: Sequence[Names] | None, needs: Sequence[Names] | None, n: int
 ) -> Sequence[IntArray | None] | None:
-    """Return the tasks that each agent may do by its list and by its skills, None for all.
+    """Return the tasks that each agent may do by its list and its skills; None stands for all tasks.
 
-    An agent may do a task if it has all skills that the task needs, and its list allows it.
+    An agent may do a task if it has all skills that the task needs and its list, if any, contains the task.
     """
     if needs is None:
         return allowed

@@ -1,18 +1,18 @@
-"""The family of errors, phrased so that one line tells what to mend."""
+"""Exceptions of the package; their messages are one line that says what to correct."""
 
 import difflib
 from collections.abc import Sequence
 from itertools import islice
 
 MOST_NAMES = 10
-"""Known names that an error lists at the most."""
+"""Maximum number of known names that an error message lists."""
 
 MOST_COMPARED, LONGEST_COMPARED = 1000, 60
-"""Known names that are compared with an unknown one, and characters of each: beyond, it would take seconds."""
+"""Limits on the number and the length of names that are compared with an unknown one, as comparison is slow."""
 
 
 class AllocError(Exception):
-    """Base of all errors that are raised on purpose; anything else is a defect, or comes from a plugin."""
+    """Base class of all errors that are raised on purpose; any other exception is a defect, or from a plugin."""
 
 
 class InputError(AllocError, ValueError):
@@ -21,9 +21,9 @@ class InputError(AllocError, ValueError):
     Parameters
     ----------
     message : str
-        What is wrong and what to do, without the source.
+        What is wrong and how to correct it, without the source.
     place : str, optional
-        The parameter, such as ``time_limit_s``, or where in the data, such as ``agents[3].ability``.
+        The parameter, such as ``time_limit_s``, or the place in the data, such as ``agents[3].ability``.
     source : str, optional
         The file, or ``standard input``; filled in by the readers.
     """
@@ -34,29 +34,29 @@ class InputError(AllocError, ValueError):
 
 
 class MissingPackageError(InputError, ImportError):
-    """What is asked for needs a package that is not installed; the message says which."""
+    """A feature needs a package that is not installed; the message names it."""
 
 
 class RefusedError(AllocError, ValueError):
-    """A method says beforehand that it cannot handle an instance, and why."""
+    """A method refuses an instance before the run, and says why."""
 
 
 class TrainingError(AllocError, RuntimeError):
-    """A training cannot go on, through no fault of its input."""
+    """Training cannot continue, for a reason other than its input."""
 
 
 def closest(name: str, known: Sequence[str]) -> str | None:
-    """Return the known name that may be meant; None if none is near."""
+    """Return the known name that is most similar to `name`; None if none is similar."""
     options = [option for option in islice(known, MOST_COMPARED) if len(option) <= LONGEST_COMPARED]
     close = difflib.get_close_matches(name[:LONGEST_COMPARED], options, n=1)
-    if not close:  # capital letters alone make no other name
+    if not close:  # names that differ only in case are similar
         folded = {option.casefold(): option for option in reversed(options)}
         close = [folded[key] for key in difflib.get_close_matches(name[:LONGEST_COMPARED].casefold(), folded, n=1)]
     return close[0] if close else None
 
 
 def nearest(name: str, known: Sequence[str]) -> str:
-    """Return a hint such as `` (did you mean 'speed'?)``, or of the known names if none is near."""
+    """Return a hint such as `` (did you mean 'speed'?)``, or a list of the known names if none is similar."""
     close = closest(name, known)
     if close is not None:
         return f" (did you mean {close!r}?)"
@@ -67,7 +67,7 @@ def nearest(name: str, known: Sequence[str]) -> str:
 
 
 def of_these(name: str, known: Sequence[str]) -> str:
-    """Return the end of a message on an unknown name: which one may be meant, and all that there are."""
+    """Return the end of a message about an unknown name: the most similar name, if any, and all known names."""
     close = closest(name, known)
     hint = "" if close is None else f" (did you mean {close!r}?)"
     return f"{hint}; there are {', '.join(known)}" if known else ""

@@ -1,4 +1,4 @@
-"""The one scorer of the project: how good an allocation is."""
+"""Evaluation of allocations; the only scorer of the project."""
 
 import sys
 from dataclasses import dataclass
@@ -12,17 +12,17 @@ from alloc.problems.instance import FloatArray, Instance, IntArray
 from alloc.problems.vocabulary import IDLE, Objective
 
 RELATIVE_TOLERANCE = 1e-9
-"""Makespans and energies this close, relatively, are equal."""
+"""Relative difference up to which makespans and energies count as equal."""
 
 
 def last_equal(hours: float) -> float:
-    """Return the largest makespan that counts as equal to `hours`, for all who ask whether a plan is in time."""
+    """Return the largest makespan that counts as equal to `hours`, for comparisons with a limit."""
     return min(hours * (1 + RELATIVE_TOLERANCE), sys.float_info.max)
 
 
 @dataclass(frozen=True)
 class Violation:
-    """An agent sent to a task that it cannot take; its ability does not count there, nor does its flight."""
+    """An agent assigned to a task that it cannot take; neither its ability nor its flight counts."""
 
     agent: int
     task: int
@@ -36,8 +36,8 @@ class Evaluation(ReadOnly):
     Attributes
     ----------
     completion_time : ndarray, shape (m,)
-        T_j in hours (4): 0 without workload, ``inf`` where a workload has no agent; the largest finite float where a
-        group would need longer.
+        T_j in hours (4): 0 without workload, ``inf`` if a task with workload has no agent; capped at the largest
+        finite float.
     group_ability : ndarray, shape (m,)
         W_j, work per hour of the agents on each task.
     coverage : ndarray, shape (m,)
@@ -47,17 +47,17 @@ class Evaluation(ReadOnly):
     served_makespan : float
         max T_j over the served tasks, 0 if there is none.
     distance, energy : float
-        Flown directly from the start to the final task, and back where an agent returns, summed over agents; and the
-        energy for it (19), at each agent's energy per distance. The largest finite float where they would be more.
+        Total distance that agents fly directly from start to task, and back if they return; and the energy for it
+        (19), at each agent's energy per distance. Capped at the largest finite float.
     cost, cost_in_distance : float
-        What is minimised second: the energy, and the price of moves where the instance has one; and the same over the
+        The secondary objective: energy, plus the price of moves if the instance has one; and the same divided by the
         energy per unit of cost, see `Reach.costs`.
     battery_remaining_percent : float or None
         Mean over the agents with a battery, idle ones at 100; None if no agent has one.
     reward : float
         Sum over tasks of (3), R_j = -tau^(W_j - h_j).
     reward_saturated : bool
-        Whether a term of (3) was too large for a float: `reward` then is the most negative finite float.
+        Whether a term of (3) overflows: `reward` is then the most negative finite float.
     unserved_tasks : tuple of int
         Tasks with workload and without an agent.
     unserved_priorities : tuple of float
@@ -84,16 +84,16 @@ class Evaluation(ReadOnly):
 
     @property
     def unserved_rank(self) -> tuple[float, ...]:
-        """What is compared first, smaller is better: how many tasks are unserved, then how urgent these are."""
+        """Number of unserved tasks, then their priorities; compared first, smaller is better."""
         return float(len(self.unserved_tasks)), *self.unserved_priorities
 
     def key(self, objective: Objective) -> tuple[float, ...]:
-        """Return what is compared, in this order; smaller is better."""
+        """Return the values to be compared lexicographically; smaller is better."""
         first = (*self.unserved_rank, self.served_makespan)
         return first if objective is Objective.MAKESPAN else (*first, self.cost)
 
     def is_better_than(self, other: "Evaluation", objective: Objective) -> bool:
-        """Whether this scores better than `other`, with values within 1e-9 relative counted as equal."""
+        """Return whether this scores better than `other`; values within 1e-9 (relative) count as equal."""
         if self.unserved_rank != other.unserved_rank:
             return self.unserved_rank < other.unserved_rank
         for mine, theirs in zip(self.key(objective), other.key(objective), strict=True):
@@ -105,7 +105,7 @@ class Evaluation(ReadOnly):
 def evaluate(instance: Instance, allocation: Allocation) -> Evaluation:
     """Score `allocation` on `instance`.
 
-    Takes O(n + m) time, O(n log n) where agents have speeds.
+    Takes O(n + m) time, or O(n log n) if agents have speeds.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def evaluate(instance: Instance, allocation: Allocation) -> Evaluation:
     Raises
     ------
     InputError
-        If the allocation has another number of agents, or a task index out of range.
+        If the number of agents differs, or a task index is out of range.
 
     References
     ----------
@@ -190,10 +190,10 @@ def _completion_times(
 
 
 def completion_time(workload: float, ability: FloatArray, arrival: FloatArray) -> float:
-    """Return the hour T at which a group is done whose members start on arrival.
+    """Return the hour T at which a group finishes a task, if each member works from its arrival on.
 
-    T is the root of ``sum_i ability_i * max(0, T - arrival_i) = workload``, the least over k of what the first k
-    to arrive would need alone.
+    T is the root of ``sum_i ability_i * max(0, T - arrival_i) = workload``: the minimum over k of the time at which
+    the first k members to arrive would finish alone.
 
     Parameters
     ----------
@@ -237,7 +237,7 @@ def _violations(instance: Instance, agents: IntArray, task: IntArray) -> list[Vi
 
 
 def reason_of(instance: Instance, agent: int, task: int) -> str:
-    """Return why an agent cannot take a task that it cannot take."""
+    """Return the reason why an agent cannot take a task, given that it cannot."""
     reach = instance.reach
     origin, goal = reach.origin[[agent]], np.array([task])
     away = reach.distances_between(origin, goal)
@@ -266,7 +266,7 @@ def _return_name(instance: Instance, agent: int) -> str:
 
 
 def _lacking(instance: Instance, agent: int, task: int) -> list[str]:
-    """Return the skills that a task needs and an agent has not."""
+    """Return the skills that a task needs and an agent lacks."""
     if instance.needs is None:
         return []
     held = () if instance.skills is None else instance.skills[agent]

@@ -1,4 +1,4 @@
-"""The fields of an instance as arrays: what they may hold."""
+"""Conversion and validation of the fields of an instance as arrays."""
 
 from collections.abc import Iterable, Set
 from decimal import Decimal
@@ -17,13 +17,13 @@ IntArray = NDArray[np.intp]
 BoolArray = NDArray[np.bool_]
 
 LARGEST_INDEX = 2**62
-"""Beyond, numbers are no indices on any machine."""
+"""Largest number that is accepted as an index."""
 
 MATRIX = "a matrix of who may do what, not lists of task indices; give those, as numpy.flatnonzero(row) does"
 
 
 class ReadOnly:
-    """Keeps the arrays of an object read-only through pickling and deep copies, which forget that they are."""
+    """Mixin that keeps arrays read-only through pickling and deep copies, which lose the flag."""
 
     def __setstate__(self, state: dict[str, object]) -> None:
         for value in state.values():
@@ -34,7 +34,7 @@ class ReadOnly:
 
 
 def numbers(values: ArrayLike, field_name: str, message: str = "must be a list of numbers") -> FloatArray:
-    """Return an array of numbers, copied; None, and what pandas has for it, become NaN. Texts are no numbers."""
+    """Return a copy as an array of floats; None and missing values of pandas become NaN, strings are rejected."""
     try:
         array = np.asarray(values)
         if array.dtype.kind == "O":
@@ -47,19 +47,19 @@ def numbers(values: ArrayLike, field_name: str, message: str = "must be a list o
 
 
 def _number(value: object) -> float:
-    if value is None or type(value).__name__ == "NAType":  # pandas.NA, known without pandas
+    if value is None or type(value).__name__ == "NAType":  # pandas.NA, without importing pandas
         return float("nan")
     if isinstance(value, Real | Decimal) and not isinstance(value, bool):
         return float(value)
-    raise TypeError(f"{value!r} is no number")
+    raise TypeError(f"{value!r} is not a number")
 
 
 LEAST, MOST = 1e-60, 1e60
-"""Magnitudes between which quotients and products of a few numbers neither under- nor overflow."""
+"""Range of magnitudes within which products and quotients of a few numbers neither underflow nor overflow."""
 
 
 def vector(values: ArrayLike, field_name: str, length: int | None = None) -> FloatArray:
-    """Return numbers in one row, copied."""
+    """Return a copy as a one-dimensional array of floats."""
     array = numbers(values, field_name)
     if array.ndim != 1 or (length is not None and len(array) != length):
         expected = "a list" if length is None else f"a list of {length} numbers"
@@ -68,7 +68,7 @@ def vector(values: ArrayLike, field_name: str, length: int | None = None) -> Flo
 
 
 def limits(values: ArrayLike | None, field_name: str, length: int) -> FloatArray:
-    """Return a limit for each agent; ``inf`` where there is none, which None and NaN stand for."""
+    """Return the limit of each agent; None and NaN become ``inf``, no limit."""
     if values is None:
         return np.full(length, np.inf)
     array = vector(values, field_name, length)
@@ -77,7 +77,7 @@ def limits(values: ArrayLike | None, field_name: str, length: int) -> FloatArray
 
 
 def rates(values: ArrayLike | None, usual: float, length: int) -> FloatArray:
-    """Return a rate for each agent; the usual one where none is given, which None and NaN stand for."""
+    """Return the rate of each agent; None and NaN become `usual`."""
     if values is None:
         return np.full(length, float(usual))
     array = vector(values, "agent_energy_per_distance", length)
@@ -86,17 +86,17 @@ def rates(values: ArrayLike | None, usual: float, length: int) -> FloatArray:
 
 
 def flags(values: ArrayLike | None, field_name: str, length: int) -> BoolArray:
-    """Return True or False for each agent; False where None stands."""
+    """Return a boolean for each agent; None becomes False."""
     if values is None:
         return np.zeros(length, dtype=np.bool_)
     given = [False if value is None else value for value in np.asarray(values, dtype=object).ravel().tolist()]
     if len(given) != length or not all(isinstance(value, bool | np.bool_) for value in given):
-        raise InputError(f"must be a list of {length} times True or False", field_name)
+        raise InputError(f"must be a list of {length} booleans", field_name)
     return np.array(given, dtype=np.bool_)
 
 
 def require_geographic(position: FloatArray, kind: str) -> None:
-    """Raise `InputError` for the first position that is no longitude and latitude in degrees."""
+    """Raise `InputError` for the first position that is not a longitude and a latitude in degrees."""
     lon, lat = position[:, 0], position[:, 1]
     wrong = (np.abs(lat) > 90) | (lon < -180) | (lon > 360)
     if wrong.any():
@@ -106,7 +106,7 @@ def require_geographic(position: FloatArray, kind: str) -> None:
 
 
 def ids(names: Iterable[str] | None, count: int, prefix: str, kind: str) -> tuple[str, ...]:
-    """Return names that are unique; `prefix` and a number where none are given."""
+    """Return unique ids; by default `prefix` and a number."""
     if names is None:
         return tuple(f"{prefix}{index}" for index in range(1, count + 1))
     unique = tuple(listed(names, f"{kind}_ids", "strings"))
@@ -123,7 +123,7 @@ def ids(names: Iterable[str] | None, count: int, prefix: str, kind: str) -> tupl
 
 
 def positions(values: ArrayLike | None, count: int, kind: str) -> FloatArray:
-    """Return three coordinates per row: z = 0 where only x and y are given, a row of NaN where unknown."""
+    """Return three coordinates per row: z = 0 if only x and y are given, NaN for unknown positions."""
     if values is None:
         return np.full((count, 3), np.nan)
     array = numbers(values, f"{kind}_position", "must hold 2 or 3 numbers per row")
@@ -143,7 +143,7 @@ def positions(values: ArrayLike | None, count: int, kind: str) -> FloatArray:
 
 
 def indices(values: ArrayLike, field_name: str, message: str = "must be a list of task indices") -> IntArray:
-    """Return whole numbers as indices, copied; floats will do where they are whole, and nothing is cut off or wraps."""
+    """Return a copy as an array of indices; floats are accepted if they are whole, without truncation or wrapping."""
     try:
         array = np.asarray(values)
     except ValueError as error:  # rows of unequal length
@@ -158,12 +158,12 @@ def indices(values: ArrayLike, field_name: str, message: str = "must be a list o
 
 
 def references(values: ArrayLike | None, field_name: str, n: int, kind: str, count: int) -> IntArray:
-    """Return the index of a task or a base for each agent; -1 for none, which None and NaN stand for."""
+    """Return the index of a task or a base for each agent; None and NaN become -1, none."""
     if values is None:
         return np.full(n, IDLE, dtype=np.intp)
     message = f"must be a list of {n} {kind} indices, -1 for none"
     given = np.asarray(values)
-    if given.dtype.kind not in "iu":  # missing values make floats or objects of a column of whole numbers
+    if given.dtype.kind not in "iu":  # a column of integers with missing values is one of floats or objects
         given = numbers(given, field_name, message)
         given[np.isnan(given)] = IDLE
     array = indices(given, field_name, message)
@@ -178,7 +178,7 @@ def references(values: ArrayLike | None, field_name: str, n: int, kind: str, cou
 
 
 def allowed(lists: Iterable[Iterable[int] | None] | None, n: int, m: int) -> tuple[IntArray | None, ...] | None:
-    """Return the tasks that each agent may do, sorted and without repetitions; None where all agents may do all."""
+    """Return the sorted unique tasks that each agent may do; None if all agents may do all tasks."""
     if lists is None:
         return None
     if isinstance(lists, np.ndarray) and lists.dtype.kind == "b":
@@ -196,7 +196,7 @@ def allowed(lists: Iterable[Iterable[int] | None] | None, n: int, m: int) -> tup
     wrong = (task < 0) | (task >= m)
     if wrong.any():
         raise InputError(f"names a task outside 0 to {m - 1}", f"agents[{owner[np.argmax(wrong)]}].tasks")
-    pairs = np.sort(owner * m + task)  # one sort for all agents: far faster than one for each
+    pairs = np.sort(owner * m + task)  # one sort for all agents is far faster than one per agent
     owner, task = np.divmod(pairs[np.diff(pairs, prepend=-1) > 0], m)
     task.setflags(write=False)
     result: list[IntArray | None] = [None] * n
@@ -207,14 +207,14 @@ def allowed(lists: Iterable[Iterable[int] | None] | None, n: int, m: int) -> tup
 
 
 def _unless_missing(entry: Iterable[int] | None) -> Iterable[int] | None:
-    """Return None for the NaN that pandas puts where there is no list."""
+    """Return `entry`, or None if it is the NaN that pandas uses for a missing list."""
     return None if isinstance(entry, float) and np.isnan(entry) else entry
 
 
 def _is_matrix(arrays: list[IntArray], n: int, m: int, *, always: bool) -> bool:
-    """Whether these look like n rows of m zeros and ones: as indices, some row names a task again, or all name all.
+    """Return whether the rows look like a 0/1 matrix: as indices, a row would repeat a task, or all would name all.
 
-    `always`: whether rows that name all are taken for that as well.
+    `always`: whether rows that name all tasks count as a matrix as well.
     """
     if m < 2 or len(arrays) != n or any(len(array) != m or array.max() > 1 or array.min() < 0 for array in arrays):
         return False
@@ -222,7 +222,7 @@ def _is_matrix(arrays: list[IntArray], n: int, m: int, *, always: bool) -> bool:
 
 
 def _indices(entry: Iterable[int], row: int) -> IntArray:
-    """Return one list of tasks; a set has no order, and needs none here."""
+    """Return the task indices of one agent; unlike elsewhere, a set is accepted, as order does not matter."""
     place, message = f"agents[{row}].tasks", "must be a list of task indices, or None for all"
     if not isinstance(entry, np.ndarray | list | tuple):
         entry = listed(list(entry) if isinstance(entry, Set) else entry, place, "task indices, or None for all")
@@ -235,14 +235,14 @@ def _indices(entry: Iterable[int], row: int) -> IntArray:
 
 
 def metric(name: object) -> str:
-    """Return the name of a metric."""
+    """Return `name` if it is the name of a metric."""
     if name in METRICS:
         return str(name)
     raise InputError(f"must be one of {', '.join(METRICS)}, got {shown(name)}", "metric")
 
 
 def unit_share(tau: float) -> float:
-    """Return a number strictly between 0 and 1."""
+    """Return `tau` if it is a number strictly between 0 and 1."""
     if isinstance(tau, Real) and not isinstance(tau, bool) and 0 < tau < 1:
         return float(tau)
     raise InputError(f"must lie strictly between 0 and 1, got {shown(tau)}", "tau")
@@ -251,7 +251,7 @@ def unit_share(tau: float) -> float:
 def require(
     good: NDArray[np.bool_], values: FloatArray, field_name: str, rule: str, owner: tuple[str, tuple[str, ...]]
 ) -> None:
-    """Raise `InputError` for the first value that is not `good`; `owner`: what they belong to, and its ids."""
+    """Raise `InputError` for the first value that is not `good`; `owner` is ``agent`` or ``task``, and the ids."""
     if not good.all():
         row = int(np.argmin(good))
         kind, ids = owner
@@ -261,7 +261,7 @@ def require(
 def require_magnitude(
     values: FloatArray, field_name: str, owner: tuple[str, tuple[str, ...]], most: float = MOST
 ) -> None:
-    """Raise `InputError` for the first value > 0 that is below `LEAST` or beyond `most`; `owner` as in `require`."""
+    """Raise `InputError` for the first value > 0 that is below `LEAST` or above `most`; `owner` as in `require`."""
     good = (values == 0) | ((values >= LEAST) & (values <= most))
     bounds = f">= {LEAST:g}" if most == np.inf else f"from {LEAST:g} to {most:g}"
     require(good, values, field_name, f"{bounds}, in smaller units or larger ones", owner)

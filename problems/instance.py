@@ -1,4 +1,4 @@
-"""What is to be solved: agents with abilities, tasks with workloads, and who can reach what."""
+"""Instances of the task allocation problem: agents with abilities, tasks with workloads, and reachability."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -27,12 +27,12 @@ __all__ = ["FloatArray", "Instance", "IntArray"]
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
 class Instance(fields.ReadOnly):
-    """A task allocation problem, validated once and read-only from then on.
+    """An immutable instance of the task allocation problem, validated on construction.
 
     Unknown or unlimited values (``null`` in files) are ``inf`` for `battery`, `communication_range` and `speed`,
-    NaN rows for positions and -1 for `start_task`; None and NaN, as in columns of pandas, are taken for them.
-    Units are the user's own, but must agree: with distances in km and times in hours, speeds are km/h, and an ability
-    is work per hour.
+    NaN rows for positions and -1 for `start_task`; None and NaN, as in columns of pandas, are accepted as such.
+    Units are free but must be consistent: with distances in km and times in hours, speeds are in km/h, and abilities
+    are work per hour.
 
     Parameters
     ----------
@@ -47,38 +47,38 @@ class Instance(fields.ReadOnly):
     agent_position, task_position : array_like, shape (n, 2), (n, 3), (m, 2) or (m, 3), optional
         Cartesian coordinates in units of distance, from -1e60 to 1e60; NaN rows where unknown.
     start_task : array_like of int, shape (n,), optional
-        Index of the task where an agent begins, -1 for none; gives its position where `agent_position` is unknown.
+        Index of the task where an agent starts, -1 for none; gives its position if `agent_position` is unknown.
     battery : array_like, shape (n,), optional
-        Energy that an agent has, >= 0.
+        Energy that an agent can spend, >= 0.
     communication_range : array_like, shape (n,), optional
         Farthest task that an agent can take, in units of distance, >= 0.
     speed : array_like, shape (n,), optional
         Distance per hour, >= 1e-60; ``inf`` means that travel takes no time, which is (4) of the paper.
     allowed_tasks : sequence of (sequence of int, or None), optional
-        Task indices that each agent may do; None for all. No matrix of who may do what.
+        Indices of the tasks that each agent may do, not a 0/1 matrix; None for all.
     priority : array_like, shape (m,), optional
-        Weight of each task in the game and in missions, >= 0; where not all can be served, the most urgent are.
+        Weight of each task in the game and in missions, >= 0; if not all tasks can be served, higher ones go first.
     tau : float
         Base of the reward (3), 0 < tau < 1.
     energy_per_distance : float
         Energy per unit of distance, 0 or from 1e-60 to 1e60 (k of (19)).
     agent_energy_per_distance : array_like, shape (n,), optional
-        That of each agent; `energy_per_distance` where it is None or NaN.
+        Energy per unit of distance of each agent; `energy_per_distance` where None or NaN.
     returns : array_like of bool, shape (n,), optional
-        Whether the agent's flight back counts for battery, distance and energy; by default if it has a `return_base`.
+        Whether the flight back counts for battery, distance and energy; by default, if the agent has a `return_base`.
     return_base : array_like of int, shape (n,), optional
-        Index of the base to which the agent returns, -1 where it returns to its start.
+        Index of the base to which the agent returns, -1 for its start.
     skills : sequence of (iterable of str, or None), optional
-        What each agent can do.
+        Skills of each agent.
     needs : sequence of (iterable of str, or None), optional
-        Skills that an agent must have, all of them, to do each task.
+        Skills that each task needs; an agent must have all of them.
     metric : {"euclidean", "manhattan", "geographic"}
-        Distances as in (1), along the axes, or along the surface of the earth; with the last, positions are longitude
-        and latitude in degrees and, if given, altitude in metres, and distances are in km or in `units.distance`.
+        Distances as in (1), along the axes, or along the surface of the earth; for the last, positions are longitude
+        and latitude in degrees, optionally with altitude in metres, and distances are in km or in `units.distance`.
     distances : DistanceTable or iterable of (str, str, float), optional
-        Distances of one's own, by the ids of agents, tasks and bases; see `DistanceTable.of`.
+        User-given distances, by the ids of agents, tasks and bases; see `DistanceTable.of`.
     bases : Bases, or mapping from str to 2 or 3 numbers or None, optional
-        Ids and places to which agents return.
+        Ids and positions of the bases to which agents return.
     units : Units, optional
         Labels of the units.
 
@@ -182,9 +182,9 @@ class Instance(fields.ReadOnly):
     def from_tables(
         cls, agents: object, tasks: object, distances: object | None = None, **options: Unpack[TableOptions]
     ) -> "Instance":
-        """Return the instance that data frames, dicts of columns or lists of dicts describe.
+        """Build an instance from data frames, dicts of columns or lists of dicts.
 
-        Options are those of `tables.reading.read_tables`: `columns`, `units`, `decimal`, `missing`, `bases` and others.
+        The options are those of `tables.reading.read_tables`, such as `columns`, `units`, `missing` and `bases`.
         """
         return read_tables(agents, tasks, distances, **options).built(cls)
 
@@ -236,7 +236,7 @@ class Instance(fields.ReadOnly):
 
     @cached_property
     def start_position(self) -> FloatArray:
-        """Where each agent begins, shape (n, 3): its position, else that of its start task, else NaN."""
+        """Start of each agent, shape (n, 3): its position, or else that of its start task, or else NaN."""
         place = self.agent_position.copy()
         unknown = np.isnan(place[:, 0]) & (self.start_task >= 0)
         place[unknown] = self.task_position[self.start_task[unknown]]
@@ -245,17 +245,17 @@ class Instance(fields.ReadOnly):
 
     @property
     def has_travel_time(self) -> bool:
-        """Whether some agent needs time to reach some task, so that (4) alone does not give completion times."""
+        """Whether any agent has a finite speed, so that completion times include travel, unlike (4)."""
         return bool(np.isfinite(self.speed).any())
 
     @cached_property
     def reach(self) -> Reach:
-        """Which tasks each agent can take, and how far they are (C(i) and (1) of the paper)."""
+        """Tasks that each agent can take, and their distances (C(i) and (1) of the paper)."""
         return build_reach(self)
 
     @cached_property
     def eligible_tasks(self) -> Sequence[IntArray | None] | None:
-        """Tasks that each agent may do by its list and its skills, None for all."""
+        """Tasks that each agent may do by its list and its skills; None for all."""
         return eligibility.eligible_tasks(self.allowed_tasks, self.skills, self.needs, self.n)
 
     @property
@@ -274,25 +274,25 @@ class Instance(fields.ReadOnly):
         return {name: index for index, name in enumerate(self.task_ids)}
 
     def restricted(self, agents: IntArray, tasks: IntArray) -> "Instance":
-        """Return the problem of some agents and tasks alone, by their indices."""
+        """Return the subproblem of the given agents and tasks, by their indices."""
         return remove.restricted(self, agents, tasks)
 
     def without_agents(self, gone: Iterable[str]) -> "Instance":
-        """Return the same problem without these agents, as when they drop out; see `remove.without_agents`."""
+        """Return the instance without these agents, as after failures; see `remove.without_agents`."""
         return remove.without_agents(self, gone)
 
     def without_tasks(self, gone: Iterable[str]) -> "Instance":
-        """Return the same problem without these tasks; see `remove.without_tasks`."""
+        """Return the instance without these tasks; see `remove.without_tasks`."""
         return remove.without_tasks(self, gone)
 
     def with_agents(self, added: Iterable[Mapping[str, object]]) -> "Instance":
-        """Return the same problem with more agents, at the end; see `add.with_agents`."""
+        """Return the instance with agents appended; see `add.with_agents`."""
         return add.with_agents(self, added)
 
     def with_tasks(self, added: Iterable[Mapping[str, object]]) -> "Instance":
-        """Return the same problem with more tasks, at the end; see `add.with_tasks`."""
+        """Return the instance with tasks appended; see `add.with_tasks`."""
         return add.with_tasks(self, added)
 
     def moved_to(self, places: Mapping[str, str | Sequence[float]]) -> "Instance":
-        """Return the same problem with agents at other places; see `move.moved_to`."""
+        """Return the instance with agents at new places; see `move.moved_to`."""
         return move.moved_to(self, places)

@@ -1,18 +1,18 @@
-"""Numbers and names as text for people: in summaries, tables and drawings."""
+"""Formatting of numbers and names for summaries, tables and drawings."""
 
 from collections.abc import Sequence
 
 WRITTEN_OUT = 1e7
-"""Numbers below which whole ones are told by all their digits."""
+"""Number below which large numbers are written without an exponent."""
 
 
 def one_line(text: str) -> str:
-    """Return `text` with line breaks and control characters replaced by blanks."""
+    """Return `text` with line breaks and control characters replaced by spaces."""
     return " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
 
 
 def number(value: float | None, digits: int = 6) -> str:
-    """Return `value` with this many significant digits, a dash for None; below ten millions without an exponent."""
+    """Return `value` with `digits` significant digits, without an exponent below ten million; a dash for None."""
     if value is None:
         return "-"
     text = f"{value:.{digits}g}"
@@ -20,32 +20,32 @@ def number(value: float | None, digits: int = 6) -> str:
 
 
 def counted(count: int, noun: str) -> str:
-    """Return a number of things: ``1 task``, ``2 tasks``."""
+    """Return a count with its noun: ``1 task``, ``2 tasks``."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def percent(share: float | None) -> str:
-    """Return a share of one in per cent; a dash for None."""
+    """Return a fraction as a percentage; a dash for None."""
     if share is None:
         return "-"
     return "0 %" if share < 5e-7 else f"{100 * share:.{2 if share < 0.1 else 3}g} %"
 
 
 def labelled(value: str, unit: str) -> str:
-    """Return a number with its unit behind it, if it has one."""
+    """Return a number followed by its unit, if it has one."""
     return f"{value} {unit}" if unit else value
 
 
 def heading(name: str, unit: str) -> str:
-    """Return the heading of a column or an axis, with its unit in brackets, if it has one."""
+    """Return the heading of a column or an axis, followed by its unit in parentheses, if it has one."""
     return f"{name} ({unit})" if unit else name
 
 
 def short_names(names: Sequence[str], longest: int) -> list[str]:
-    """Return the names on one line each, cut to `longest` characters; names that differ stay different.
+    """Return the names, each on one line and cut to `longest` characters, such that different names stay different.
 
-    A name is cut at its end; where that makes it another's, in its middle, and where that does not help, it is
-    numbered.
+    A name is cut at its end; if it then equals another, it is cut in the middle, and if that does not help, it gets
+    a number.
     """
     whole = [one_line(name) for name in names]
     found = [_cut(name, longest, longest - 1) for name in whole]
@@ -68,12 +68,12 @@ def shortened(name: str, longest: int) -> str:
 
 
 def _cut(name: str, longest: int, head: int) -> str:
-    """Return the name with its middle left out, after `head` characters, if it is too long."""
+    """Return the name, with its middle after `head` characters left out if it is too long."""
     return name if len(name) <= longest else name[:head] + "…" + name[len(name) - (longest - 1 - head) :]
 
 
 def _shared(whole: Sequence[str], found: Sequence[str]) -> set[str]:
-    """Return the names whose short form is that of another name too."""
+    """Return the names that share their short form with another name."""
     owners: dict[str, set[str]] = {}
     for name, short in zip(whole, found, strict=True):
         owners.setdefault(short, set()).add(name)

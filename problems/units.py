@@ -1,4 +1,4 @@
-"""Labels of the units that an instance is in, for text, tables and pictures; only speeds can be in others."""
+"""Labels of an instance's units, for text, tables and pictures; only speeds are converted."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Units:
-    """What one of each quantity is called; empty where the user does not say.
+    """Labels of the units of an instance; empty if not given.
 
     Attributes
     ----------
@@ -29,7 +29,7 @@ class Units:
     work: str = ""
 
     def __post_init__(self) -> None:
-        """Raise `InputError` for a label that is no short text in one line."""
+        """Raise `InputError` for a label that is not a short printable string."""
         for field in fields(self):
             label = getattr(self, field.name)
             if not isinstance(label, str) or not label.isprintable() or len(label) > LONGEST_LABEL:
@@ -39,17 +39,17 @@ class Units:
 
 
 LONGEST_LABEL = 20
-"""Characters of a label."""
+"""Maximum number of characters of a label."""
 
 
 def labels(instance: "Instance") -> Units:
-    """Return what the units of an instance are called: as it says, and km for distances on the earth."""
+    """Return the labels of an instance's units; geographic distances are in km unless it says otherwise."""
     units = instance.units
     return replace(units, distance=instance.distance_unit) if instance.metric == GEOGRAPHIC else units
 
 
 def common_units(units: Iterable[Units]) -> Units:
-    """Return the labels on which all of some units agree."""
+    """Return the labels that are the same in all `units`, and empty ones elsewhere."""
     given = list(units)
     found = {field.name: {getattr(one, field.name) for one in given} for field in fields(Units)}
     return Units(**{name: names.pop() for name, names in found.items() if len(names) == 1})
@@ -58,17 +58,17 @@ def common_units(units: Iterable[Units]) -> Units:
 METRES = {name: Fraction(length) for name, length in (
     ("m", "1"), ("km", "1000"), ("mi", "1609.344"), ("nmi", "1852"), ("ft", "0.3048"),
 )}  # fmt: skip
-"""Metres in each unit of distance that speeds are converted from and to."""
+"""Metres per unit of distance, for the conversion of speeds."""
 
 SECONDS = {"s": 1, "min": 60, "h": 3600, "d": 86_400}
-"""Seconds in each unit of time that speeds are converted from and to."""
+"""Seconds per unit of time, for the conversion of speeds."""
 
 SHORT_SPEEDS = {"kn": ("nmi", "h"), "mph": ("mi", "h")}
-"""Units of speed that do not name distance and time."""
+"""Units of speed that are not written as distance per time."""
 
 
 def speed_factor(unit: str, units: Units) -> float:
-    """Return what a speed in `unit` is multiplied by to be distance per time in `units`.
+    """Return the factor that converts a speed in `unit` to distance per time in `units`.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def speed_factor(unit: str, units: Units) -> float:
     Raises
     ------
     InputError
-        If `unit`, or that of distance or time, is not known.
+        If `unit`, or the unit of distance or time in `units`, is unknown.
     """
     distance, slash, time = unit.partition("/")
     distance, time = (distance, time) if slash else SHORT_SPEEDS.get(unit, ("", ""))
@@ -90,9 +90,9 @@ def speed_factor(unit: str, units: Units) -> float:
         )
     for name, label, known in (("distance", units.distance, METRES), ("time", units.time, SECONDS)):
         if not label:
-            raise InputError(f"is missing; speeds in {unit} are converted by it", f"units.{name}")
+            raise InputError(f"is missing; it is needed to convert speeds in {unit}", f"units.{name}")
         if label not in known:
-            message = f"must be one of {', '.join(known)}, as speeds in {unit} are converted by it, got {shown(label)}"
+            message = f"must be one of {', '.join(known)} to convert speeds in {unit}, got {shown(label)}"
             raise InputError(message, f"units.{name}")
     length, duration = METRES[distance] / METRES[units.distance], Fraction(SECONDS[units.time], SECONDS[time])
     return float(length * duration)

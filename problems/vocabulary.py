@@ -1,4 +1,4 @@
-"""The words of the problem that need no numpy: what is optimised, how instances are made, and how the game goes."""
+"""Enumerations and constants of the problem model that do not need numpy."""
 
 from enum import StrEnum
 
@@ -6,11 +6,11 @@ IDLE = -1
 """The task index of an agent without a task."""
 
 EUCLIDEAN, MANHATTAN, GEOGRAPHIC = METRICS = ("euclidean", "manhattan", "geographic")
-"""How far two places are apart: (1) of the paper, the sum over the axes, or along the surface of the earth."""
+"""Distance between two places: (1) of the paper, the sum over the axes, or along the surface of the earth."""
 
 
 class Objective(StrEnum):
-    """What is optimised, in this order, after the number of unserved tasks."""
+    """Objective, lexicographic in the order of its name, after the number of unserved tasks."""
 
     MAKESPAN = "makespan"
     MAKESPAN_ENERGY = "makespan-energy"
@@ -18,11 +18,11 @@ class Objective(StrEnum):
 
 
 OBJECTIVES = (Objective.MAKESPAN, Objective.MAKESPAN_ENERGY)
-"""What methods optimise; moves are to them a kind of energy, see `replanning`."""
+"""Objectives that methods implement; moves are modelled as energy, see `replanning`."""
 
 
 class Distribution(StrEnum):
-    """How abilities or workloads spread."""
+    """Distribution of abilities or workloads."""
 
     EQUAL = "equal"
     UNIFORM = "uniform"
@@ -32,14 +32,14 @@ class Distribution(StrEnum):
 
 
 class Sites(StrEnum):
-    """How places lie in the world."""
+    """Distribution of places in the world."""
 
     UNIFORM = "uniform"
     CLUSTERED = "clustered"
 
 
 class Starts(StrEnum):
-    """Where agents begin."""
+    """Where agents start."""
 
     TASKS = "tasks"
     OWN = "own"
@@ -62,28 +62,28 @@ class Reward(StrEnum):
 
 
 class ModelFormat(StrEnum):
-    """Files of integer programmes."""
+    """File format of an integer programme."""
 
     LP = "lp"
     MPS = "mps"
 
 
 class ModelKind(StrEnum):
-    """What the variables of an integer programme stand for: classes of agents that are alike, or agents."""
+    """Variables of an integer programme: numbers of agents per class and task, or one per agent and task."""
 
     CLASS = "class"
     PLAIN = "plain"
 
 
 class Knowledge(StrEnum):
-    """What agents know in a mission: all that is so now, or what they sensed and heard."""
+    """What agents know in a mission: the true state, or what they have sensed and received."""
 
     FULL = "full"
     LOCAL = "local"
 
 
 class ForeignFormat(StrEnum):
-    """Files of others that are read as missions."""
+    """Third-party file formats that can be imported as missions."""
 
     CFSTP = "cfstp"
     SPACE = "space"
@@ -92,7 +92,7 @@ class ForeignFormat(StrEnum):
 
 
 class MissionFamily(StrEnum):
-    """What makes a generated mission hard."""
+    """Family of generated missions, named after its main difficulty."""
 
     STEADY = "steady"
     WAVES = "waves"
