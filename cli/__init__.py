@@ -1,1 +1,1 @@
-"""Command line; no logic of its own."""
+"""Command line interface; the logic is in `alloc.problems` and `alloc.allocators`."""

@@ -1,4 +1,4 @@
-"""The command `alloc`: its commands, and the line and exit code of each error."""
+"""The command `alloc`: its subcommands, and the message and exit code of each error."""
 
 import contextlib
 import errno
@@ -48,7 +48,7 @@ app = typer.Typer(
         "alloc generate paper-1 --seed 7 --output demo.json",
         "alloc solve demo.json --method greedy --plot demo.png",
         "alloc compare demo.json --methods greedy,ga,cpsat --time-limit 5",
-        closing="Exit codes: 0 every task is served, 1 not, 2 bad usage or bad input.",
+        closing="Exit codes: 0 every task is served, 1 a task is unserved, 2 bad usage or bad input.",
     ),
 )
 COMMANDS = (
@@ -95,9 +95,9 @@ def _alloc(
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run `alloc` with `arguments`, those of the process by default, and return its exit code.
+    """Run `alloc` with `arguments`, by default those of the process, and return its exit code.
 
-    With the arguments of the process, it ends the process itself if a solver in native code ignored a stop request.
+    If it uses the arguments of the process and a native solver ignored a stop request, it ends the process itself.
     """
     code = _run(arguments)
     if arguments is None:
@@ -118,7 +118,7 @@ def _run(arguments: Sequence[str] | None) -> int:
         if os.environ.get("ALLOC_TRACEBACK"):
             raise
         return _explain(error, sys.argv[1:] if arguments is None else arguments)
-    if code == INTERRUPTED:  # typer turns Ctrl-C within a command into it
+    if code == INTERRUPTED:  # typer's exit code for Ctrl-C within a command
         return interrupted()
     return code if isinstance(code, int) else SERVED
 
@@ -145,7 +145,7 @@ def _leave(code: int) -> NoReturn:
 
 
 def _usage(message: str) -> str:
-    """Return what is wrong with the usage in the words of all other errors: the option, and what it must be."""
+    """Return a usage error in the form of all other errors: the option, and what it must be."""
     words = re.sub("^Invalid value for '?([^':]+)'?: ", r"\1: ", message.rstrip("."))
     words = re.sub(", unable to parse string as an? [a-z]+$", "", words)
     return words.replace(": Value error, ", ": ").replace(": Input should be ", ": must be ")
@@ -167,7 +167,7 @@ def _explain(error: Exception, arguments: Sequence[str]) -> int:
     elif isinstance(error, MemoryError):
         complain("there is not enough memory for this")
     elif isinstance(error, OSError):
-        # our own code names its files: no space without a name is that of the help, which typer prints
+        # our own code names its files; an ENOSPC without a name comes from typer printing the help
         unnamed = OUTPUT if error.errno == errno.ENOSPC else "the operating system"
         complain(f"{error.filename or unnamed}: {error.strerror or error}")
     else:

@@ -1,4 +1,4 @@
-"""Arguments and options that several commands share."""
+"""Arguments and options shared by several commands."""
 
 import re
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ BUILT_IN_METHODS = (
     "dqn",
     "ddpg",
 )
-"""For completion, which must not load numpy; a test compares them with the registry."""
+"""Methods for completion, which must not load numpy; a test compares them with the registry."""
 
 BUILT_IN_POLICIES = (
     "idle",
@@ -43,28 +43,28 @@ BUILT_IN_POLICIES = (
     "local-routes",
     "clairvoyant",
 )
-"""For completion, likewise."""
+"""Policies for completion; see `BUILT_IN_METHODS`."""
 
 READABLE = "a .json or .npz file, a folder with agents.csv and tasks.csv, or - for JSON on standard input"
 
 BETWEEN_SETTINGS = re.compile(r",(?=\s*\w+=)")
-"""A comma before the name of the next parameter; others are part of a value."""
+"""A comma that separates parameters; other commas are part of a value."""
 
 BETWEEN_METHODS = re.compile(r",(?![^\[]*\])")
-"""A comma outside of brackets."""
+"""A comma that separates methods, outside of brackets."""
 
-PLAN = "A result of `alloc solve`, an allocation, a table of it, or a solver's solution of what `alloc export` wrote"
-"""What every command that takes a plan reads."""
+PLAN = "A result of `alloc solve`, an allocation, a table of it, or a solver's solution of a model of `alloc export`"
+"""Forms of a plan that every command with a plan as input reads."""
 
 
 def examples(*lines: str, closing: str = "") -> str:
-    """Return the examples below the help of a command."""
+    """Return the text with examples below the help of a command."""
     parts = ["\b\nExamples:\n" + "\n".join(f"  {line}" for line in lines)]
     return "\n\n".join([*parts, closing] if closing else parts)
 
 
 def complete_methods(incomplete: str) -> list[str]:
-    """Return the methods that begin with `incomplete`, or continue its list after a comma."""
+    """Return the completions of a method name, or of the last name in a list with commas."""
     from importlib.metadata import entry_points
 
     done, comma, last = incomplete.rpartition(",")
@@ -73,7 +73,7 @@ def complete_methods(incomplete: str) -> list[str]:
 
 
 def complete_policies(incomplete: str) -> list[str]:
-    """Return the policies for missions that begin with `incomplete`."""
+    """Return the completions of a policy name."""
     from importlib.metadata import entry_points
 
     names = [*BUILT_IN_POLICIES, *(entry.name for entry in entry_points(group="alloc.policies"))]
@@ -81,7 +81,7 @@ def complete_policies(incomplete: str) -> list[str]:
 
 
 def complete_policy_list(incomplete: str) -> list[str]:
-    """Return the policies that begin with `incomplete`, or continue its list after a comma."""
+    """Return the completions of a policy name, or of the last name in a list with commas."""
     done, comma, last = incomplete.rpartition(",")
     return [done + comma + name for name in complete_policies(last)]
 
@@ -90,7 +90,7 @@ InstanceArgument = Annotated[str, typer.Argument(metavar="INSTANCE", help=f"The 
 
 
 class PlainObjective(StrEnum):
-    """What can be optimised where no plan is in force, so that nothing counts as a move."""
+    """Objectives that do not need a plan in force."""
 
     MAKESPAN = Objective.MAKESPAN.value
     MAKESPAN_ENERGY = Objective.MAKESPAN_ENERGY.value
@@ -105,20 +105,18 @@ MethodOption = Annotated[
 ]
 TimeLimitOption = Annotated[
     float | None,
-    typer.Option(help="Seconds for one run.", show_default="10; none where --iterations is given"),
+    typer.Option(help="Seconds per run.", show_default="10; none if --iterations is given"),
 ]
 IterationsOption = Annotated[
-    int | None, typer.Option(min=0, help="Iterations of one run, in the method's own unit: the same on any machine.")
+    int | None, typer.Option(min=0, help="Iterations per run, in the method's own unit; reproducible on any machine.")
 ]
 TargetGapOption = Annotated[float | None, typer.Option(help="Stop at this relative gap of the makespan; 0.01 is 1 %.")]
-SeedOption = Annotated[int, typer.Option(min=0, max=2**63 - 1, help="Seed of all random numbers.")]
+SeedOption = Annotated[int, typer.Option(min=0, max=2**63 - 1, help="Random seed.")]
 ThreadsOption = Annotated[
     int | None,
-    typer.Option(
-        min=1, max=1024, help="Threads that share the work.", show_default="all processors; 1 with --iterations alone"
-    ),
+    typer.Option(min=1, max=1024, help="Number of threads.", show_default="all processors; 1 with --iterations alone"),
 ]
-PlotOption = Annotated[str | None, typer.Option(metavar="FILE", help="Draw it as .png, .svg or .pdf.")]
+PlotOption = Annotated[str | None, typer.Option(metavar="FILE", help="Draw the result as .png, .svg or .pdf.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON to standard output.")]
 QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Print no summary, no notes, no progress.")]
 SettingsOption = Annotated[
@@ -136,17 +134,17 @@ OPTION_NAMES = {
     "like": "add",
     "pins": "pin",
 }
-"""Options by the parameter of the library that they set, where the two have different names."""
+"""Option for each parameter of the library that has a different name."""
 
 
 Parameter = typer.core.TyperArgument | typer.core.TyperOption
 
 
 def option_of(place: str, parameters: Sequence[Parameter], arguments: Sequence[str] = ()) -> str:
-    """Return the option or argument of a command that sets the parameter `place` of the library, else `place` itself.
+    """Return the option or argument that sets the parameter `place` of the library, or else `place` itself.
 
-    A command that takes several values has the plural: ``seed`` of `solve` is ``--seeds`` of ``alloc compare``. The
-    parameter of a method is the ``--set`` among the `arguments` that names it.
+    Options that take several values are in the plural: ``seed`` of `solve` is ``--seeds`` of ``alloc compare``.
+    Parameters of a method are set by the ``--set`` among the `arguments` that names them.
     """
     name = OPTION_NAMES.get(place, place)
     for known in (name, f"{name}s", f"{name.removesuffix('y')}ies"):
@@ -160,7 +158,7 @@ def option_of(place: str, parameters: Sequence[Parameter], arguments: Sequence[s
 
 
 def time_limit(given: float | None, iterations: int | None) -> float | None:
-    """Return the time limit: 10 s by default, none where iterations are limited, so that runs are reproducible."""
+    """Return the time limit: by default 10 s, or none if iterations are limited, so that runs are reproducible."""
     return 10.0 if given is None and iterations is None else given
 
 
@@ -168,7 +166,7 @@ def assignments(settings: Sequence[str] | None) -> dict[str, str]:
     """Return the names and values of ``--set NAME=VALUE``."""
     for setting in settings or ():
         if "=" not in setting:
-            raise typer.BadParameter(f"{setting!r} is not NAME=VALUE", param_hint="'--set'")
+            raise typer.BadParameter(f"must be NAME=VALUE, got {setting!r}", param_hint="'--set'")
     return dict(setting.split("=", 1) for setting in settings or ())
 
 
@@ -178,7 +176,7 @@ def values(settings: Sequence[str] | None) -> dict[str, object]:
 
 
 def value_of(text: str) -> object:
-    """Return the value that a text stands for, as Python writes it; several with commas are a tuple."""
+    """Return the value of a text in Python's notation; values separated by commas become a tuple."""
     known = {"true": True, "false": False, "none": None}
     if text.lower() in known:
         return known[text.lower()]
@@ -198,12 +196,12 @@ def _number(text: str) -> int | float | None:
 
 
 def listed(text: str, option: str) -> dict[str, tuple[str, dict[str, object] | None]]:
-    """Return names and, where there are brackets, parameters of methods or policies, by how they are written."""
+    """Return the name and, if in brackets, the parameters of each method or policy, by its label in `text`."""
     found: dict[str, tuple[str, dict[str, object] | None]] = {}
     for label in dict.fromkeys(part.strip() for part in BETWEEN_METHODS.split(text) if part.strip()):
         name, bracket, settings = label.partition("[")
         if bracket and not settings.endswith("]"):
-            raise typer.BadParameter(f"{label!r} must be like ga[population=200]", param_hint=f"'{option}'")
+            raise typer.BadParameter(f"{label!r} must have the form ga[population=200]", param_hint=f"'{option}'")
         found[label] = (name, values(BETWEEN_SETTINGS.split(settings[:-1])) if bracket else None)
     if not found:
         see = "see `alloc methods`" if option == "--methods" else f"such as {', '.join(BUILT_IN_POLICIES)}"

@@ -1,11 +1,11 @@
-"""The entry of `alloc`: Ctrl-C gives one line while modules are loaded, and is not lost while loops are compiled."""
+"""Entry point of `alloc`: handles Ctrl-C while modules are loaded and while code is compiled."""
 
 import _thread
 import sys
 import threading
 
 REPEATED_S = 0.05
-"""Seconds after which a Ctrl-C that was lost is repeated."""
+"""Seconds after which a lost Ctrl-C is repeated."""
 
 
 def start() -> int:
@@ -21,10 +21,10 @@ def start() -> int:
 
 
 def repeat_lost_interrupts() -> None:
-    """Raise `KeyboardInterrupt` again, a little later, where it was raised in Python code that native code had called.
+    """Repeat a `KeyboardInterrupt` shortly after it was raised in Python code called by native code.
 
-    An exception cannot leave such code: Python reports it and goes on. A compiler calls Python when it has compiled a
-    loop, which in first runs takes most of the time, so that most Ctrl-C would have no effect then.
+    Such code cannot propagate exceptions: Python only reports them. The compiler calls back into Python, and takes
+    most of the time of a first run, so that most Ctrl-C would otherwise have no effect then.
     """
     report = sys.unraisablehook
 

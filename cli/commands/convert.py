@@ -23,14 +23,12 @@ def convert_command(
     source: options.InstanceArgument,
     target: Annotated[
         str,
-        typer.Argument(
-            metavar="TARGET", help="What to write: .json, .npz, a folder (no suffix) for CSV, or - for JSON."
-        ),
+        typer.Argument(metavar="TARGET", help="Output: .json, .npz, a folder (no suffix) for CSV, or - for JSON."),
     ],
 ) -> None:
-    """Write an instance in another format.
+    """Convert an instance to another format.
 
-    The suffix decides which.
+    The suffix determines the format.
     """
     from alloc.problems.formats import read_instance, write_instance
 

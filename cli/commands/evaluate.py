@@ -17,7 +17,7 @@ EXAMPLES = examples(
     "alloc evaluate demo.json best.json --json",
     "alloc evaluate demo.json demo.sol",
     "alloc solve demo.json --json | alloc evaluate demo.json -",
-    closing="The bounds in a result file are shown if agents and scores agree with this instance, else what differs. "
+    closing="The bounds in a result file are shown if agents and scores match this instance; else, how they differ. "
     "Exit code 1 if a task is unserved or an agent is assigned to a task that it cannot take.",
 )
 
@@ -39,11 +39,11 @@ SCORES = (
     "violations",
     "assignment",
 )
-"""Fields of a result that are about the allocation, not about the run; the limit where one was given."""
+"""Fields of a result that concern the allocation and not the run; `makespan_limit` only if one was given."""
 
 
 class TaskScore(TypedDict):
-    """One entry of ``tasks`` in the JSON; the time is None where the task is unserved."""
+    """One entry of ``tasks`` in the JSON; `completion_time` is None if the task is unserved."""
 
     id: str
     workload: float
@@ -69,7 +69,7 @@ def evaluate_command(
     ],
     json: options.JsonOption = False,
 ) -> None:
-    """Score an allocation, wherever it comes from."""
+    """Score an allocation from any source."""
     from alloc.allocators.conclusion import scored_result, with_claims
 
     problem, answer, claims = read_pair(instance, allocation)
@@ -83,7 +83,7 @@ def evaluate_command(
     if json:
         write_json({"format": "alloc-evaluation/1", **_scores(result), "tasks": _tasks(result)})
         if score.reward_saturated:
-            note("the reward (3) is too large for a float and stands at its most negative value")
+            note("the reward (3) overflows and is given as the most negative float")
     else:
         _tell(result)
     raise typer.Exit(1 if score.unserved_tasks or score.violations else 0)

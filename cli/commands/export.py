@@ -14,12 +14,12 @@ EXAMPLES = examples(
     "alloc export demo.json --model plain --format mps --output -",
     "alloc export demo.json --objective makespan-energy --makespan 1.5 --output demo.lp",
     "alloc evaluate demo.json demo.sol",
-    closing="HiGHS, CBC, Gurobi and SCIP read the model, and `alloc evaluate` their solution of it.",
+    closing="HiGHS, CBC, Gurobi and SCIP read the model, and `alloc evaluate` reads their solutions.",
 )
 
 
 def register(app: typer.Typer) -> None:
-    """Add the command to `app`, by both of its names; the help of the second one says that it is the same."""
+    """Add the command to `app` under both of its names; the help of the second refers to the first."""
     app.command("export", epilog=EXAMPLES)(export_command)
     examples_of_both = EXAMPLES.replace("alloc export ", "alloc export-model ")
     app.command("export-model", help="The same as `alloc export`.", epilog=examples_of_both)(export_command)
@@ -32,7 +32,7 @@ def export_command(
         ModelFormat | None, typer.Option("--format", help="Format of the file.", show_default="by the suffix")
     ] = None,
     model: Annotated[
-        ModelKind, typer.Option(help="Variables count agents that are alike, or there is one per agent and task.")
+        ModelKind, typer.Option(help="class: variables count interchangeable agents; plain: one per agent and task.")
     ] = ModelKind.CLASS,
     objective: Annotated[
         options.PlainObjective, typer.Option(help="What is minimised: the makespan, or the energy at --makespan.")
@@ -41,12 +41,12 @@ def export_command(
         float | None,
         typer.Option(
             metavar="TIME",
-            help="Time by which every task must be done: for the energy, and for agents with speeds.",
+            help="Deadline of all tasks; needed for the energy, and for agents with speeds.",
             show_default="it is minimised",
         ),
     ] = None,
 ) -> None:
-    """Write an instance as an integer programme for any solver."""
+    """Export an instance as an integer programme for any solver."""
     from alloc.problems import read_instance, write_model
 
     check_outputs(("--output", output), read=[("INSTANCE", instance)])

@@ -22,10 +22,10 @@ EXAMPLES = examples(
     "alloc generate covering --agents 40 --tasks 16 --ability-max 100 --workload uniform --seed 3 --output demo.json",
     "alloc generate mission --family failures --agents 20 --tasks 40 --seed 7 --output mission.json",
     "alloc generate cfstp --agents 10 --seed 1 --count 100 --output cfstp",
-    closing="SPREAD is one value for all, LOW:HIGH for a uniform draw, or none for no limit.",
+    closing="SPREAD is a single value, LOW:HIGH for uniform random values, or none for no limit.",
 )
 
-SEED = Annotated[int, typer.Option(min=0, help="Seed of all random numbers; with --count the first of several.")]
+SEED = Annotated[int, typer.Option(min=0, help="Random seed; with --count, the first of several.")]
 SPREADS = ("communication_range", "battery", "speed", "priority")
 COVERING = ("agents", "tasks", "ability_min", "ability_max", "workload", "integer", "choices")
 MISSION = {
@@ -37,7 +37,7 @@ MISSION = {
     "sensing": "sensing",
     "loss": "loss",
 }
-"""Options of missions, and the parameters that they set."""
+"""Parameter of a mission that each option sets."""
 
 
 class Family(StrEnum):
@@ -69,8 +69,8 @@ def generate_command(
             metavar="FAMILY",
             help="paper-1 to paper-4, a scenario of the paper; random, with the options below; covering, machine "
             "covering without places: 100 agents with abilities from 1 to 1000, 25 tasks, workloads equal or uniform; "
-            "mission, 20 agents and 40 tasks in time, of the kind that --family says; or cfstp, a mission of 20 agents "
-            "and 300 tasks with deadlines on a grid.",
+            "mission, 20 agents and 40 tasks over time, of the kind that --family selects; or cfstp, a mission of 20 "
+            "agents and 300 tasks with deadlines on a grid.",
         ),
     ],
     seed: SEED = 0,
@@ -78,24 +78,24 @@ def generate_command(
     output: Annotated[
         str,
         typer.Option(
-            metavar="FILE|DIR", help="File to write, - for standard output; with --count a folder, a file per seed."
+            metavar="FILE|DIR", help="File to write, - for standard output; with --count a folder with a file per seed."
         ),
     ] = STANDARD,
     agents: Annotated[int | None, _option("Number of agents.", "100")] = None,
     tasks: Annotated[int | None, _option("Number of tasks.", "20")] = None,
-    ability: Annotated[Distribution | None, _option("How abilities spread; not dirichlet.", "uniform")] = None,
+    ability: Annotated[Distribution | None, _option("Distribution of abilities; not dirichlet.", "uniform")] = None,
     ability_min: Annotated[float | None, _option("Least ability, work per hour.", "1")] = None,
     ability_max: Annotated[float | None, _option("Largest ability.", "10")] = None,
-    workload: Annotated[Distribution | None, _option("How workloads spread.", "dirichlet")] = None,
+    workload: Annotated[Distribution | None, _option("Distribution of workloads.", "dirichlet")] = None,
     load: Annotated[float | None, _option("Total workload over total ability.", "1")] = None,
     integer: Annotated[
-        bool | None, _option("Whole or real abilities and workloads.", "integer", "--integer/--real")
+        bool | None, _option("Integer or real abilities and workloads.", "integer", "--integer/--real")
     ] = None,
-    sites: Annotated[Sites | None, _option("How places lie.", "uniform")] = None,
+    sites: Annotated[Sites | None, _option("Distribution of places.", "uniform")] = None,
     clusters: Annotated[int | None, _option("Number of clusters.", "4")] = None,
-    dimensions: Annotated[int | None, _option("2 or 3.", "3")] = None,
+    dimensions: Annotated[int | None, _option("Dimensions of the world, 2 or 3.", "3")] = None,
     world_size: Annotated[float | None, _option("Side of the square or cube.", "1")] = None,
-    starts: Annotated[Starts | None, _option("Where agents begin.", "tasks")] = None,
+    starts: Annotated[Starts | None, _option("Where agents start.", "tasks")] = None,
     depots: Annotated[int | None, _option("Number of depots.", "1")] = None,
     communication_range: Annotated[
         str | None, _option("Farthest task, in units of distance.", "none", "--range", metavar="SPREAD")
@@ -109,9 +109,9 @@ def generate_command(
     tau: Annotated[float | None, _option("Base of the reward (3).", "0.5")] = None,
     mission_family: Annotated[MissionFamily | None, _option("Kind of mission.", "steady", "--family")] = None,
     knowledge: Annotated[Knowledge | None, _option("What agents know in the mission.", "local")] = None,
-    radius: Annotated[float | None, _option("How far agents hear each other in the mission.", "0.3")] = None,
-    sensing: Annotated[float | None, _option("How far agents see in the mission.", "0.3")] = None,
-    loss: Annotated[float | None, _option("Share of the messages that is lost in the mission.", "0.2")] = None,
+    radius: Annotated[float | None, _option("Radio radius of agents in the mission.", "0.3")] = None,
+    sensing: Annotated[float | None, _option("Sensing radius of agents in the mission.", "0.3")] = None,
+    loss: Annotated[float | None, _option("Share of messages that are lost in the mission.", "0.2")] = None,
 ) -> None:
     """Generate instances or missions.
 
@@ -129,7 +129,7 @@ def generate_command(
 
 
 def _check_options(family: Family, wanted: dict[str, Any]) -> None:
-    """Raise an error for an option that is not for this family."""
+    """Raise an error for an option that does not apply to this family."""
     for name in wanted:
         owner = "mission" if name in MISSION and name not in ("agents", "tasks") else "random"
         owner = "covering" if name == "choices" else owner
@@ -193,7 +193,7 @@ def _flag(name: str) -> str:
 
 
 def _spread(text: str, name: str) -> float | tuple[float, ...] | None:
-    """``none``, ``VALUE`` or ``LOW:HIGH``; the family checks the values."""
+    """Parse ``none``, ``VALUE`` or ``LOW:HIGH``; the family validates the values."""
     from alloc.problems import InputError
 
     if text == "none":

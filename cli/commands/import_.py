@@ -20,7 +20,7 @@ EXAMPLES = examples(
     "alloc import --agents drones.csv --tasks sites.xlsx --output fleet.json",
     "alloc import --agents fleet.xlsx:Drones --tasks fleet.xlsx:Sites --output fleet.json",
     "alloc import --agents crews.csv --tasks jobs.csv --map ability=Rate,tasks.id=Job --output fleet.json",
-    closing="It says what each column was taken for. Exit code 2 if a table can be read in two ways, or in none.",
+    closing="The interpretation of each column is printed. Exit code 2 if a table is ambiguous or cannot be read.",
 )
 
 TABLE = "text with any separator, .xlsx, or .xlsx:SHEET"
@@ -34,7 +34,7 @@ class Decimal(StrEnum):
 
 
 class Missing(StrEnum):
-    """What holds for pairs without a distance."""
+    """Treatment of pairs without a given distance."""
 
     METRIC = "metric"
     UNREACHABLE = "unreachable"
@@ -45,12 +45,12 @@ MapOption = Annotated[
     typer.Option(
         "--map",
         metavar="FIELD=COLUMN,...",
-        help="The column of a field, or a number for all rows; tasks.id=Job for one table alone. May be repeated.",
+        help="Column of a field, or a number for all rows; tasks.id=Job applies to one table only. May be repeated.",
     ),
 ]
 UnitsOption = Annotated[
     str | None,
-    typer.Option(metavar="QUANTITY=UNIT,...", help="Units of time, distance, energy and work that no header gives."),
+    typer.Option(metavar="QUANTITY=UNIT,...", help="Units of time, distance, energy and work not given in headers."),
 ]
 
 
@@ -64,26 +64,26 @@ def import_command(
     tasks: Annotated[str, typer.Option(metavar="FILE", help="Table of tasks.")],
     output: Annotated[str, typer.Option(metavar="FILE", help="Instance to write: .json, .npz, a folder, or -.")],
     distances: Annotated[
-        str | None, typer.Option(metavar="FILE", help="Table with from, to and distance, or a matrix.")
+        str | None, typer.Option(metavar="FILE", help="Table with columns from, to and distance, or a matrix.")
     ] = None,
     bases: Annotated[
-        str | None, typer.Option(metavar="FILE", help="Table of bases to which agents return: ids and places.")
+        str | None, typer.Option(metavar="FILE", help="Table of the bases to which agents return: ids and places.")
     ] = None,
     columns: MapOption = None,
     units: UnitsOption = None,
-    decimal: Annotated[Decimal | None, typer.Option(help="The decimal mark, where numbers do not show it.")] = None,
+    decimal: Annotated[Decimal | None, typer.Option(help="The decimal mark, if the numbers leave it open.")] = None,
     missing: Annotated[
         Missing | None,
         typer.Option(
-            help="Pairs without a distance: by the metric, or nobody can go there.",
-            show_default="metric where all have places",
+            help="Pairs without a given distance: computed by the metric, or unreachable.",
+            show_default="metric if all have places",
         ),
     ] = None,
     quiet: options.QuietOption = False,
 ) -> None:
-    """Make an instance of spreadsheets of agents and tasks.
+    """Import an instance from spreadsheets of agents and tasks.
 
-    They are read as people keep them; what each column was taken for is told.
+    Columns are recognised by their headers; the interpretation of each is printed.
     """
     from alloc.problems import Instance
     from alloc.problems.formats import write_instance
@@ -115,22 +115,22 @@ def _say(line: str) -> None:
 
 
 def _silent(line: str) -> None:
-    """Take a line and do nothing."""
+    """Discard a line."""
 
 
 def _file(name: str) -> str:
-    """Return the file of a table, without the name of its sheet."""
+    """Return the file name of a table, without the sheet."""
     return re.sub(r"(?i)(\.xls[xm]):.*", r"\1", name)
 
 
 def _pairs(given: list[str] | None, option: str) -> dict[str, str]:
-    """Return names and values of ``NAME=VALUE,NAME=VALUE``; a comma within a value is no end of it."""
+    """Return names and values of ``NAME=VALUE,NAME=VALUE``; values may contain commas."""
     parts = [part for text in given or () for part in re.split(r",(?=\s*[\w.]+\s*=)", text)]
     pairs: dict[str, str] = {}
     for part in parts:
         name, equals, value = part.partition("=")
         if not equals or not name.strip() or not value.strip():
-            raise typer.BadParameter(f"{part!r} is not NAME=VALUE", param_hint=f"'{option}'")
+            raise typer.BadParameter(f"must be NAME=VALUE, got {part!r}", param_hint=f"'{option}'")
         if name.strip() in pairs:
             raise typer.BadParameter(f"{name.strip()!r} is given twice", param_hint=f"'{option}'")
         pairs[name.strip()] = value.strip().strip("'\"")

@@ -16,17 +16,17 @@ EXAMPLES = examples(
     "alloc methods ga",
     "alloc methods --json",
     "alloc methods --prepare",
-    closing="Some methods and policies compile loops when first used; --prepare does this for all of them.",
+    closing="Some methods and policies compile code on first use; --prepare does this for all of them.",
 )
 
 MOVES = (
-    f"Every method with {Objective.MAKESPAN_ENERGY} takes {Objective.MAKESPAN_MOVES} as well: "
+    f"Every method with {Objective.MAKESPAN_ENERGY} also takes {Objective.MAKESPAN_MOVES}: "
     "`alloc solve` with the plan in force as --start."
 )
 
 
 class Fact(TypedDict, total=False):
-    """One entry of the JSON; with ``error`` the plugin cannot be loaded."""
+    """One entry of the JSON; ``error`` is present if the plugin cannot be loaded."""
 
     name: str
     error: str
@@ -71,12 +71,12 @@ def methods_command(
     json: options.JsonOption = False,
     prepare: Annotated[
         bool,
-        typer.Option("--prepare", help="Compile the loops of all methods and policies now, not in first runs."),
+        typer.Option("--prepare", help="Compile the code of all methods and policies now instead of on first use."),
     ] = False,
 ) -> None:
     """List the methods, or the parameters of one.
 
-    The list tells what each method can do, and which packages it still needs.
+    The list shows what each method can do, and which packages it lacks.
     """
     from alloc.allocators import names
 
@@ -97,7 +97,7 @@ def methods_command(
 
 
 def _tell_of(name: str, *, json: bool) -> None:
-    """Print one method: its summary, and each parameter with its values, default and meaning."""
+    """Print a method: its summary, and each parameter with its values, default and meaning."""
     from alloc.allocators import describe, describe_parameters
     from alloc.allocators.contract.parameters import plain_values, written
 
@@ -118,9 +118,9 @@ def _tell_of(name: str, *, json: bool) -> None:
 
 
 def _prepare() -> None:
-    """Load each installed method and policy, which compiles its loops; a plugin that fails gives a note.
+    """Load each installed method and policy, which compiles its code; a note is printed for plugins that fail.
 
-    Methods of one kind share loops, so each kind has a process of its own. The learned ones take longest, and begin.
+    Methods of one kind share code, so there is a process per kind. Learned methods take longest and start first.
     """
     from alloc.allocators import describe, load, names
     from alloc.allocators.exact.makespan import task_prices as bound
@@ -169,7 +169,7 @@ def _load(loaders: list[Callable[[], object]]) -> list[str]:
 
 
 def _facts(name: str) -> Fact:
-    """Describe a method; a plugin that fails has an entry too, with the error."""
+    """Return the facts about a method, or the error of a plugin that cannot be loaded."""
     from alloc.allocators import describe
     from alloc.problems import InputError
 

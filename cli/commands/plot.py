@@ -30,19 +30,19 @@ def register(app: typer.Typer) -> None:
 
 def plot_command(
     instance: Annotated[
-        str, typer.Argument(metavar="INSTANCE|LOG", help="An instance, or alone a log of `alloc simulate --log`.")
+        str, typer.Argument(metavar="INSTANCE|LOG", help="An instance, or a log of `alloc simulate --log`.")
     ],
     output: Annotated[
         str, typer.Option(metavar="FILE", help="Drawing to write: .png, .svg or .pdf; of a log also .html, .gif, .mp4.")
     ],
     result: Annotated[
         str | None,
-        typer.Argument(metavar="RESULT", help=f"{options.PLAN}; - is standard input."),
+        typer.Argument(metavar="RESULT", help=f"{options.PLAN}; - is standard input. Not for a log."),
     ] = None,
 ) -> None:
-    """Draw a stored result, an allocation or a mission's log.
+    """Draw a result, an allocation or the log of a mission.
 
-    Of a plan it shows sites and moves, and when each task is done.
+    For a plan it shows places and flights, and when each task is done.
     """
     from alloc.allocators import plot
     from alloc.problems import InputError
@@ -59,7 +59,7 @@ def plot_command(
     plot(drawn, output)
     if drawn.evaluation is not None and drawn.evaluation.violations:
         count = counted(len(drawn.evaluation.violations), "agent")
-        note(f"{count} cannot take the task given, and drawn there all the same; `alloc evaluate` says why")
+        note(f"{count} cannot take the assigned task, which is drawn anyway; `alloc evaluate` says why")
 
 
 def _draw_log(log: str, output: str) -> None:
@@ -83,7 +83,7 @@ def _draw_log(log: str, output: str) -> None:
 
 
 def _read(path: str, instance: "Instance") -> "Result":
-    """Read a result, or score a plan."""
+    """Read a result, or read a plan and score it."""
     from alloc.allocators import Result
     from alloc.allocators.conclusion import scored_result
     from alloc.problems import InputError

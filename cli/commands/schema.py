@@ -11,7 +11,7 @@ EXAMPLES = examples(
     "alloc schema",
     "alloc schema alloc-instance/1",
     "alloc schema result > result.schema.json",
-    closing="The schemas are of draft 2020-12.",
+    closing="The schemas follow JSON Schema draft 2020-12.",
 )
 
 

@@ -39,7 +39,7 @@ ObjectiveOption = Annotated[
 ]
 SlackOption = Annotated[
     float,
-    typer.Option(help="With energy or moves: accept makespans this much above the shortest one found; 0.02 is 2 %."),
+    typer.Option(help="With energy or moves: accept makespans this far above the shortest one found; 0.02 is 2 %."),
 ]
 LimitOption = Annotated[
     float | None,
@@ -49,26 +49,26 @@ StartOption = Annotated[
     str | None,
     typer.Option(
         metavar="FILE",
-        help="A plan to start from, or the one in force, in any form; what has gone since is left out.",
+        help="A plan to start from, or the plan in force, in any form; agents and tasks now missing are dropped.",
     ),
 ]
 MovePriceOption = Annotated[
     float,
-    typer.Option(help="With energy: what each agent counts for that gets another task than in --start."),
+    typer.Option(help="With energy: cost of each agent whose task differs from --start."),
 ]
 PinOption = Annotated[
     list[str] | None,
-    typer.Option(metavar="AGENT=TASK", help="An agent that must do this task, or none after the =; may be repeated."),
+    typer.Option(metavar="AGENT=TASK", help="Fix the task of an agent, or AGENT= for idle; may be repeated."),
 ]
 PinFileOption = Annotated[
     str | None,
-    typer.Option(metavar="FILE", help="Agents that must do the tasks that this plan gives them; --pin counts more."),
+    typer.Option(metavar="FILE", help="Fix the tasks of all agents in this plan; --pin takes precedence."),
 ]
 PlainOption = Annotated[
     bool,
     typer.Option(
         "--plain",
-        help="milp, cpsat: give the solver the model alone, without our searches; short for --set plain=true.",
+        help="milp, cpsat: run the solver on the plain model, without our searches; short for --set plain=true.",
     ),
 ]
 PolicyOption = Annotated[str | None, typer.Option(metavar="FILE", help="A trained policy, for learned methods.")]
@@ -150,7 +150,7 @@ def solve_command(
 
 
 def _pins(problem: "Instance", pairs: list[str] | None, file: str | None, *, quiet: bool) -> dict[str, str | None]:
-    """Return the task of each agent that is pinned; an option counts more than the file."""
+    """Return the task of each pinned agent; options take precedence over the file."""
     from alloc.allocators.replanning.pins import parse_pins, read_pins
 
     pins, left_out = ({}, None) if file is None else read_pins(problem, file)
@@ -160,7 +160,7 @@ def _pins(problem: "Instance", pairs: list[str] | None, file: str | None, *, qui
 
 
 def _settings(settings: list[str] | None) -> dict[str, Any]:
-    """Return the parameters of the method; what has an option of its own is none of them."""
+    """Return the parameters of the method; raise an error for names that have an option of their own."""
     from inspect import signature
 
     from alloc.allocators import solve
@@ -168,12 +168,12 @@ def _settings(settings: list[str] | None) -> dict[str, Any]:
     found = options.values(settings)
     for name in found:
         if name in ("policy", "device", *signature(solve).parameters):
-            raise typer.BadParameter(f"{name!r} is no parameter of a method; it has an option", param_hint="'--set'")
+            raise typer.BadParameter(f"{name!r} is not a parameter of a method but an option", param_hint="'--set'")
     return found
 
 
 def _save(result: "Result", output: str | None, plot: str | None, *, json: bool, quiet: bool) -> None:
-    """Write, print and draw the result, as asked for."""
+    """Write, print and draw the result as requested."""
     then: list[Callable[[], object]] = [] if quiet else [lambda: _tell(result, summary=not json)]
     if plot is not None:
         from alloc.allocators import plotting
@@ -184,7 +184,7 @@ def _save(result: "Result", output: str | None, plot: str | None, *, json: bool,
 
 
 def _content(result: "Result", output: str) -> Callable[[], bytes] | None:
-    """Return what makes the content of a file of this name; None for the JSON that is printed too."""
+    """Return a function that makes the content of the output file; None if it is JSON, as printed."""
     from alloc.allocators.plan.files import JSON, content, suffix_of
 
     suffix = suffix_of(output)
@@ -200,14 +200,14 @@ def _tell(result: "Result", *, summary: bool) -> None:
         note(line)
     _doubt(result)
     if not summary and result.evaluation is not None and result.evaluation.reward_saturated:
-        note("the reward (3) is too large for a float and stands at its most negative value")
+        note("the reward (3) overflows and is given as the most negative float")
 
 
 def _doubt(result: "Result") -> None:
-    """Tell the first of what may be a mistake in the instance."""
+    """Print the first finding that may be a mistake in the instance."""
     from alloc.problems.diagnosis.plausibility import findings
 
     found = findings(result.instance)
     if found:
-        more = f"; `alloc validate` tells {len(found) - 1} more" if len(found) > 1 else ""
+        more = f"; `alloc validate` lists {len(found) - 1} more" if len(found) > 1 else ""
         note(f"{found[0].field}: {found[0].message}{more}")

@@ -19,8 +19,8 @@ EXAMPLES = examples(
     "alloc validate instances/*.json",
     "alloc validate demo.npz --json",
     "alloc validate mission.json run.jsonl",
-    closing="Exit code 2 if a file is not valid; one line says where and how to correct it, for missions one for each "
-    "fault. A log is valid if its mission, simulated again by its orders, gives the same.",
+    closing="Exit code 2 if a file is not valid; one line says where and how to correct it, for missions one line per "
+    "error. A log is valid if replaying its orders gives the same log.",
 )
 
 
@@ -56,7 +56,7 @@ def validate_command(
 ) -> None:
     """Check instances, missions and logs.
 
-    A summary of each is printed, and what may be a mistake.
+    A summary of each and possible mistakes are printed.
     """
     facts: list[dict[str, object]] = []
     for name in files:
@@ -75,7 +75,7 @@ def validate_command(
 
 
 def _checked(name: str) -> "tuple[Checked | None, list[InputError]]":
-    """Return what is in a valid file, or its faults."""
+    """Return the content of a valid file, or its errors."""
     from alloc.problems import InputError
     from alloc.problems.formats import read_instance
     from alloc.problems.formats.files import is_stream, named, read_text

@@ -1,1 +1,1 @@
-"""What commands print and write."""
+"""Output of commands: console, tables, files and progress."""

@@ -1,4 +1,4 @@
-"""Standard output, which takes JSON and files named ``-``, and standard error, which takes everything else."""
+"""Standard output, for JSON and files named ``-``, and standard error, for everything else."""
 
 import errno
 import json
@@ -13,14 +13,14 @@ STANDARD = "-"
 """The file name that stands for standard input and standard output."""
 
 OUTPUT = "standard output"
-"""What standard output is called in messages."""
+"""Name of standard output in messages."""
 
 INTERRUPTED = 130
-"""Exit code after Ctrl-C, unless it ended a run that has an answer."""
+"""Exit code after Ctrl-C, unless it ended a run with a result."""
 
 
 def write_out(text: str) -> None:
-    """Write to standard output; a reader that has closed it, as in ``| head``, is no error.
+    """Write to standard output; a pipe closed by its reader, as in ``| head``, is not an error.
 
     Raises
     ------
@@ -33,22 +33,22 @@ def write_out(text: str) -> None:
 
 
 def say(text: str) -> None:
-    """Write a line, or several, to standard error."""
+    """Write one or more lines to standard error."""
     _write(sys.stderr, text + "\n")
 
 
 def note(text: str) -> None:
-    """Write a note of one line to standard error."""
+    """Write a note, in one line, to standard error."""
     say(f"note: {one_line(text)}")
 
 
 def complain(text: str) -> None:
-    """Write the one line of an error to standard error."""
+    """Write an error message, in one line, to standard error."""
     say(f"alloc: {one_line(text)}")
 
 
 def interrupted() -> int:
-    """Say that Ctrl-C came before all was done, whatever was printed by then, and return the exit code."""
+    """Report that Ctrl-C ended the command before it was complete, and return the exit code."""
     complain("interrupted before it was done")
     return INTERRUPTED
 
@@ -59,7 +59,7 @@ def write_json(value: object) -> None:
 
 
 def to_json(value: object) -> str:
-    """Return `value` as strict JSON: without NaN, in ASCII, with a line break at the end."""
+    """Return `value` as strict JSON: in ASCII, without NaN, ending with a newline."""
     if isinstance(value, dict) and value:
         entries = (f"  {json.dumps(str(key))}: {_entry(item)}" for key, item in value.items())
         return "{\n" + ",\n".join(entries) + "\n}\n"
@@ -67,7 +67,7 @@ def to_json(value: object) -> str:
 
 
 def _entry(value: object) -> str:
-    """Return the JSON of one value; a flat object by the C encoder, which is fast but does not indent."""
+    """Return the JSON of one value; flat objects use the C encoder, which is fast but does not indent."""
     if isinstance(value, dict) and value and set(map(type, value.values())) <= {str, type(None)}:
         flat = json.dumps(value, separators=(",\n    ", ": "))
         return "{\n    " + flat[1:-1] + "\n  }"
@@ -80,7 +80,7 @@ def table(header: Sequence[str], rows: Sequence[Sequence[str]], *, left: int = 1
     Parameters
     ----------
     left : int
-        How many of the first columns are aligned to the left, as is the last; the others are aligned to the right.
+        Number of leading columns that are left-aligned, as is the last; the others are right-aligned.
     """
     widths = [max(len(row[column]) for row in [header, *rows]) for column in range(len(header))]
 
@@ -95,7 +95,7 @@ def table(header: Sequence[str], rows: Sequence[Sequence[str]], *, left: int = 1
 
 
 def is_terminal(stream: TextIO | None) -> bool:
-    """Return whether `stream` is a terminal; an object without `isatty` is none."""
+    """Return whether `stream` is a terminal; an object without `isatty` is not."""
     isatty = getattr(stream, "isatty", None)
     try:
         return isatty is not None and bool(isatty())

@@ -1,4 +1,4 @@
-"""Files that commands read and write; what is to be written is checked before a long run."""
+"""Files that commands read and write; output files are checked before a long run."""
 
 import os
 from collections.abc import Callable, Iterable
@@ -12,9 +12,9 @@ if TYPE_CHECKING:
 
 
 def read_pair(instance: str, allocation: str) -> "tuple[Instance, Allocation, dict[str, object]]":
-    """Read an instance, and a plan of it, with a note if that names another instance.
+    """Read an instance and a plan for it; print a note if the plan names another instance.
 
-    The third is what a result file states about its plan, which nobody has checked; empty for a plan alone.
+    The third value has the unverified claims of a result file about its plan; it is empty for a plan alone.
     """
     from alloc.problems import InputError
     from alloc.problems.formats import read_instance, read_plan
@@ -39,12 +39,12 @@ def read_instances(name: str) -> "list[Instance]":
         return [read_instance(name)]
     found = [path for path in sorted(folder.iterdir()) if path.suffix in (".json", ".npz") or path.is_dir()]
     if not found:
-        raise InputError("holds no instances", source=name)
+        raise InputError("contains no instances", source=name)
     return [read_instance(str(path)) for path in found]
 
 
 def read_known(instance: str, front: str | None, *, quiet: bool = False) -> "tuple[Instance, list[Allocation]]":
-    """Read an instance, and all allocations of it in a file: a single one, or those of a front."""
+    """Read an instance and the allocations for it in a file: a single one, or those of a front."""
     from alloc.problems import InputError
     from alloc.problems.formats import read_allocations, read_instance
 
@@ -66,21 +66,21 @@ def save(
     then: Iterable[Callable[[], object]] = (),
     content: Callable[[], bytes] | None = None,
 ) -> None:
-    """Write the answer of a run to a file and to standard output, then take further steps such as drawing it.
+    """Write the result of a run to a file and to standard output, then take further steps, such as drawing it.
 
-    If a step fails, the others are still taken. An answer that could not be written anywhere is printed to standard
+    If a step fails, the others are still taken. A result that could not be written anywhere is printed to standard
     output, or to standard error if that fails.
 
     Parameters
     ----------
     found, shown : callable
-        Return the text for `output` and that for standard output, if any; called when needed.
+        Return the text for `output`, and for standard output, if any; called when needed.
     output : str or None
-        A file, or ``-``.
+        Name of a file, or ``-``.
     then : iterable of callable
         Further steps, such as printing a summary and drawing.
     content : callable, optional
-        Return what the file holds, where that is not the text.
+        Returns the content of the file if it is not the text of `found`.
 
     Raises
     ------
@@ -103,14 +103,14 @@ def save(
     is_kept = None in failures
     failures += [_failure(step) for step in then]
     for failure in filter(None, failures):
-        # standard output that has failed once is not tried again
+        # do not retry standard output after a failure
         if not is_kept and (printed is not None or _failure(lambda: write_out(found())) is not None):
             say(found())
         raise failure
 
 
 def _failure(step: Callable[[], object]) -> Exception | None:
-    """Take a step, and return why it failed, None where it did not."""
+    """Take a step, and return its exception, or None if it succeeded."""
     try:
         step()
     except Exception as error:
@@ -123,9 +123,9 @@ Named = tuple[str, str | None]
 
 
 def check_outputs(*written: Named, read: Iterable[Named] = ()) -> None:
-    """Raise an `InputError` if a file cannot be written, or is also read, or written by another option.
+    """Raise an `InputError` if an output file cannot be written, is also read, or is written by another option.
 
-    A file that may be replaced on purpose, as by ``--start FILE --output FILE``, does not belong in `read`.
+    Files that may be replaced on purpose, as by ``--start FILE --output FILE``, do not belong in `read`.
     """
     from alloc.problems import InputError
 
@@ -140,7 +140,7 @@ def check_outputs(*written: Named, read: Iterable[Named] = ()) -> None:
 
 
 def _parts(name: str) -> list[str]:
-    """Return the paths that an instance may be read from: itself, and its tables if it is a folder."""
+    """Return the paths that an instance is read from: the path itself and, for a folder, its tables."""
     from alloc.problems.formats.csv_folder import FILES
 
     tables = FILES if os.path.isdir(name) else ()
@@ -148,12 +148,12 @@ def _parts(name: str) -> list[str]:
 
 
 def _may_be_replaced(name: str) -> bool:
-    """Return whether it is a regular file, or will be: a device such as /dev/null may be written twice."""
+    """Return whether writing may replace a regular file; a device such as /dev/null may be written twice."""
     return os.path.isfile(name) or not os.path.exists(name)
 
 
 def check_result(path: str | None, instance: "Instance | None" = None) -> None:
-    """Raise an error if there is a result to write, and the suffix is unknown or does not go with the instance."""
+    """Raise an error if a result is to be written and the suffix is unknown or does not fit the instance."""
     if path is not None:
         from alloc.allocators.plan.files import check_result_file, suffix_of
 
@@ -164,7 +164,7 @@ def check_result(path: str | None, instance: "Instance | None" = None) -> None:
 
 
 def check_picture(path: str | None) -> None:
-    """Raise an `InputError` if there is a picture to draw, and its suffix is not one of a picture."""
+    """Raise an `InputError` if a picture is to be drawn and its suffix is not one of a picture."""
     if path is not None:
         from alloc.allocators.plotting import check_plot
 
@@ -172,7 +172,7 @@ def check_picture(path: str | None) -> None:
 
 
 def check_film(path: str | None) -> None:
-    """Raise an `InputError` if there is an animation to write, and its suffix is wrong, or a program for it missing."""
+    """Raise an `InputError` if an animation is to be written and its suffix is wrong or a program for it is missing."""
     if path is not None:
         from alloc.allocators.plotting import check_animation
 
@@ -185,6 +185,6 @@ def check_output(name: str | None) -> None:
     from alloc.problems.formats import check_writable
 
     if name == "":
-        raise InputError("is not a name of a file; give one", source="''")
+        raise InputError("is not a file name", source="''")
     if name is not None:
         check_writable(name)

@@ -1,4 +1,4 @@
-"""How a mission went, in words."""
+"""Text of the results of missions."""
 
 from typing import TYPE_CHECKING
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def lines(result: "MissionResult", units: "Units") -> str:
-    """Return the measures of one run, one in a line."""
+    """Return the measures of one run, one per line."""
     time = labelled(number(result.mission_time), units.time)
     figures = [
         (f"{result.mission}, policy {result.policy}, {result.knowledge} knowledge, seed {result.seed}", ""),
@@ -50,7 +50,7 @@ def _decisions(result: "MissionResult") -> str:
 
 
 def rows(results: "list[MissionResult]") -> str:
-    """Return a table with a line for each run."""
+    """Return a table with a row for each run."""
     header = ["seed", "status", "time", "done", "missed", "left", "energy", "switches", "messages"]
     return table(
         header,
@@ -73,7 +73,7 @@ def rows(results: "list[MissionResult]") -> str:
 
 
 def law_lines(laws: "Laws", units: "Units") -> str:
-    """Return the two sides of each law that was found to hold."""
+    """Return the two sides of each conservation law that was verified."""
 
     def work(amount: float) -> str:
         return labelled(number(amount, 10), units.work)
@@ -82,5 +82,5 @@ def law_lines(laws: "Laws", units: "Units") -> str:
         f"Work: {work(laws.work_appeared)} appeared or grew = {work(laws.work_done)} done + {work(laws.work_left)} left"
         f" + {work(laws.work_cancelled)} cancelled + {work(laws.work_missed)} missed\n"
         f"Energy: {number(laws.battery_lost, 10)} lost by batteries = {number(laws.battery_energy, 10)} flown\n"
-        "All laws hold at every event, and every line of the log comes of the orders before it."
+        "All laws hold at every event, and every line of the log follows from the orders before it."
     )

@@ -1,4 +1,4 @@
-"""Who does what, as tables for the terminal."""
+"""Tables of a plan for the terminal."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -11,17 +11,17 @@ if TYPE_CHECKING:
     from alloc.allocators.plan.table import Column, Row, Value
 
 MOST_ROWS = 50
-"""Rows of a table before it is cut."""
+"""Maximum number of rows of a table."""
 
 MOST_NAMES = 6
-"""Agents of a group that are named."""
+"""Maximum number of agents of a group that are listed."""
 
 LONGEST_NAME = 24
-"""Characters of a name before it is shortened."""
+"""Maximum number of characters of a name."""
 
 
 def plan_tables(result: "Result") -> list[str]:
-    """Return a table by task and one by agent, each of up to 50 rows; none where there is no allocation."""
+    """Return a table by task and a table by agent, each of up to 50 rows; empty without an allocation."""
     import numpy as np
 
     from alloc.allocators.plan.table import agent_columns, agent_rows, task_columns, task_rows
@@ -47,7 +47,7 @@ def _table(columns: "Sequence[Column[Row]]", rows: "Sequence[Row]", count: int, 
 
 
 def _cells(values: "list[Value]") -> list[str]:
-    """Return the cells of a column, in which no two names are shortened to the same."""
+    """Return the cells of a column, with different names shortened to different texts."""
     names = [value for value in values if isinstance(value, str)]
     short = dict(zip(names, short_names(names, LONGEST_NAME), strict=True))
     cells = [short[value] if isinstance(value, str) else _cell(value) for value in values]
@@ -65,5 +65,5 @@ def _cell(value: "float | tuple[str, ...] | None") -> str:
 
 
 def _left(values: "list[list[Value]]") -> int:
-    """Return how many of the first columns are names."""
+    """Return the number of leading columns with names."""
     return next((place for place, column in enumerate(values) if any(isinstance(one, float) for one in column)), 1)

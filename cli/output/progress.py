@@ -25,9 +25,9 @@ class Progress:
     Parameters
     ----------
     wanted : bool
-        Nothing is shown if False, or if standard error is no terminal or cannot clear a line (``TERM=dumb``).
+        If False, nothing is shown; nor if standard error is not a terminal or cannot clear a line (``TERM=dumb``).
     time_unit, energy_unit : str
-        Labels behind the figures.
+        Labels of the units.
     """
 
     def __init__(self, wanted: bool = True, time_unit: str = "", energy_unit: str = "") -> None:
@@ -66,9 +66,9 @@ class Progress:
 
 
 def progress_line(elapsed_s: float, best: "Improvement | None", time_unit: str = "", energy_unit: str = "") -> str:
-    """Return the text of the line."""
+    """Return the text of the progress line."""
     if best is None:
-        return f"{elapsed_s:6.1f} s  no allocation yet; the first run of some methods compiles them"
+        return f"{elapsed_s:6.1f} s  no allocation yet; some methods compile code in their first run"
     score = best.evaluation
     energy = labelled(number(score.energy), energy_unit)
     if score.makespan is None:

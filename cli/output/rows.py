@@ -1,4 +1,4 @@
-"""The rows of a comparison: as JSON, as CSV, or as a table for people, and each as soon as it is known."""
+"""Output of the rows of a comparison: as JSON, as CSV, or as a table, and each row as soon as it is complete."""
 
 import csv
 import io
@@ -10,7 +10,7 @@ from alloc.cli.output.files import save
 
 
 def show_done(outcome: str, count: int, total: int) -> None:
-    """On a terminal, print the outcome of a row as soon as it is known; the table follows at the end."""
+    """On a terminal, print the outcome of a row as soon as it is complete; the table follows at the end."""
     if is_terminal(sys.stderr):
         say(f"[{count}/{total}] {outcome}")
 
@@ -18,20 +18,20 @@ def show_done(outcome: str, count: int, total: int) -> None:
 def write_rows(
     document: dict[str, object], columns: Sequence[str], file: str | None, tell: Callable[[], None], *, json: bool
 ) -> None:
-    """Write a comparison where it is wanted.
+    """Write a comparison to the requested outputs.
 
     Parameters
     ----------
     document : dict
-        With a list of ``rows``.
+        JSON document with a list of ``rows``.
     columns : sequence of str
-        Those of the CSV.
+        Columns of the CSV.
     file : str or None
-        For CSV; ``-`` is standard output, in place of the table.
+        CSV file; ``-`` is standard output, in place of the table.
     tell : callable
-        Prints the table, unless standard output takes the rows.
+        Prints the table; called unless the rows go to standard output.
     json : bool
-        Print the document to standard output.
+        Whether to print the document to standard output.
     """
     from alloc.problems.formats import is_standard_output
 
@@ -41,7 +41,7 @@ def write_rows(
 
 
 def _csv(columns: Sequence[str], rows: object) -> str:
-    """Return a header with the names of the fields, and a line per row; None is empty."""
+    """Return CSV with a header of the field names and a line per row; None becomes an empty cell."""
     assert isinstance(rows, list)
     text = io.StringIO()
     writer = csv.DictWriter(text, columns, lineterminator="\n")

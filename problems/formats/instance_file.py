@@ -93,7 +93,7 @@ def _write(instance: Instance, path: PathLike) -> None:
     file = Path(path)
     suffix = file.suffix.lower()
     if not os.fspath(path):
-        raise InputError("is not a name of a file; give one")  # Path("") would be the working folder
+        raise InputError("is not a file name")  # Path("") would be the working folder
     if is_stream(path) or suffix == ".json" or _is_device(path):
         write_text_atomically(path, json_text.lines(to_document(instance)))
     elif suffix == ".npz":

@@ -191,8 +191,8 @@ def test_bad_usage_is_one_line(alloc, small, arguments):
         (("solve", "small.json", "--seed", "x"), "--seed: "),
         (("solve", "small.json", "--threads", "0"), "--threads: "),
         (("generate", "paper-5"), "FAMILY: 'paper-5' is not one of"),
-        (("solve", "small.json", "--set", "hearing"), "--set: 'hearing' is not NAME=VALUE"),
-        (("solve", "small.json", "--set", "seed=3"), "--set: 'seed' is no parameter of a method"),
+        (("solve", "small.json", "--set", "hearing"), "--set: must be NAME=VALUE, got 'hearing'"),
+        (("solve", "small.json", "--set", "seed=3"), "--set: 'seed' is not a parameter of a method"),
         (("solve", "small.json", "--method", "ga", "--set", "hearing=3"), "--set hearing: method 'ga' takes no"),
     ],
 )

@@ -42,7 +42,7 @@ def test_convert_keeps_everything(alloc, small, target):
 def test_convert_needs_a_name(alloc, small):
     """An empty target is an error, not the working folder."""
     ran = alloc("convert", "small.json", "")
-    assert (ran.code, ran.err) == (2, "alloc: '': is not a name of a file; give one\n")
+    assert (ran.code, ran.err) == (2, "alloc: '': is not a file name\n")
     assert not Path("agents.csv").exists()
 
 

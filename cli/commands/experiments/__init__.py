@@ -1,1 +1,1 @@
-"""Comparisons that are kept: where their instances come from, and what is made of their runs."""
+"""Commands for experiments: comparisons and their stores, reports, Pareto fronts and what-if analyses."""

@@ -29,7 +29,7 @@ EXAMPLES = examples(
     "alloc compare demo.json --methods milp,gappo --objective makespan-energy --seeds 7,8,9 --json",
     "alloc compare paper-1:0-99 --methods greedy,gappo --seeds 3 --time-limit 5 --store runs.db --report table.tex",
     "alloc compare missions/*.json --policies nearest,greedy,gappo --seeds 3 --store runs.db",
-    closing="A method or policy that refuses has a row with the reason. Ctrl-C prints the finished rows, with exit "
+    closing="A method or policy that refuses gets a row with the reason. Ctrl-C prints the finished rows, with exit "
     "code 1.",
 )
 
@@ -38,7 +38,7 @@ MethodsOption = Annotated[
     typer.Option(
         metavar="NAME,NAME,...",
         autocompletion=options.complete_methods,
-        help="Methods; see `alloc methods`. Parameters stand in brackets, as in ga[population=200].",
+        help="Methods; see `alloc methods`. Parameters go in brackets, as in ga[population=200].",
     ),
 ]
 PoliciesOption = Annotated[
@@ -46,12 +46,12 @@ PoliciesOption = Annotated[
     typer.Option(
         metavar="NAME,NAME,...",
         autocompletion=options.complete_policy_list,
-        help=f"Policies for missions, likewise, the first to compare with: {', '.join(options.BUILT_IN_POLICIES)}, "
-        "or plugins.",
+        help="Policies for missions, in the same form; the first is the baseline: "
+        f"{', '.join(options.BUILT_IN_POLICIES)}, or plugins.",
     ),
 ]
 SeedsOption = Annotated[
-    str, typer.Option(metavar="SEEDS", help="Seeds such as 0,1,2, or one number N for the seeds 0 to N - 1.")
+    str, typer.Option(metavar="SEEDS", help="Seeds such as 0,1,2, or a number N for the seeds 0 to N - 1.")
 ]
 DeadlineOption = Annotated[
     float | None,
@@ -72,8 +72,8 @@ def compare_command(
         list[str],
         typer.Argument(
             metavar="INSTANCE...",
-            help=f"Instances, or with --policies missions, each {options.READABLE}; folders and patterns of these; "
-            "tables of instances, and families such as paper-1:0-9.",
+            help=f"Instances, or missions with --policies, each {options.READABLE}; folders and patterns of these; "
+            "tables of instances; and families such as paper-1:0-9.",
         ),
     ],
     methods: MethodsOption = None,
@@ -99,9 +99,9 @@ def compare_command(
     engine: kept.EngineOption = None,
     address: kept.AddressOption = None,
 ) -> None:
-    """Compare methods on instances, or policies in missions.
+    """Compare methods on instances, or policies on missions.
 
-    Each runs with every seed, and a table is printed.
+    Each is run with every seed; a table is printed.
     """
     from alloc.allocators import Budget
     from alloc.problems.formats import is_standard_output
@@ -135,14 +135,14 @@ def compare_command(
 def _check_kind(
     methods: str | None, policies: str | None, of_methods: dict[str, object], of_policies: dict[str, object]
 ) -> None:
-    """Raise an error unless either methods or policies are given, with their own options alone."""
+    """Raise an error unless either methods or policies are given, each with their own options only."""
     if (methods is None) == (policies is None):
         message = "give either --methods, for instances, or --policies, for missions"
         raise typer.BadParameter(message, param_hint="'--methods'")
     others, kind = (of_policies, "--policies") if policies is None else (of_methods, "--methods")
     for option, value in others.items():
         if value is not None:
-            raise typer.BadParameter(f"goes with {kind} only", param_hint=f"'{option}'")
+            raise typer.BadParameter(f"can only be used with {kind}", param_hint=f"'{option}'")
 
 
 def _compare_in_store(
@@ -157,7 +157,7 @@ def _compare_in_store(
     *,
     json: bool,
 ) -> int:
-    """Make the runs that the store has not yet, print the rows of all, and return the exit code."""
+    """Make the runs that are missing in the store, print the rows of all runs, and return the exit code."""
     from alloc.cli.commands.experiments.stored import compare_in_store, conclude
     from alloc.problems import Instance
     from alloc.problems.formats import is_standard_output
@@ -215,7 +215,7 @@ def _compare(
 
 
 def _methods(text: str) -> "dict[str, str | Allocator]":
-    """Return the methods by how they are written; those with parameters in brackets are loaded with them."""
+    """Return the methods by label; those with parameters in brackets are loaded with them."""
     from alloc.allocators import describe, load
 
     found: dict[str, str | Allocator] = {}
@@ -227,7 +227,7 @@ def _methods(text: str) -> "dict[str, str | Allocator]":
 
 
 def _seeds(text: str) -> list[int]:
-    """``3`` is 0, 1, 2; ``3,`` is 3 alone."""
+    """Return the seeds of a list or a count: ``3`` stands for 0, 1 and 2, ``3,`` for 3 alone."""
     parts = [part.strip() for part in text.split(",")]
     parts = parts if parts[-1] else parts[:-1]
     if not parts or not all(part.isdecimal() and len(part) < 19 for part in parts):
@@ -235,7 +235,7 @@ def _seeds(text: str) -> list[int]:
     if "," in text:
         return list(dict.fromkeys(int(part) for part in parts))
     if not 1 <= int(text) <= 100_000:
-        raise typer.BadParameter(f"{text} seeds; must be 1 to 100000", param_hint="'--seeds'")
+        raise typer.BadParameter(f"must be 1 to 100000 seeds, got {text}", param_hint="'--seeds'")
     return list(range(int(text)))
 
 

@@ -1,4 +1,4 @@
-"""``alloc compare --policies``: policies in missions, as a part of ``alloc compare``."""
+"""``alloc compare --policies``: the part of ``alloc compare`` that compares policies on missions."""
 
 import contextlib
 import threading
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from alloc.problems import Mission, Units
 
 Listed = Mapping[str, tuple[str, dict[str, object] | None]]
-"""Name and parameters of each policy, by how it is written."""
+"""Name and parameters of each policy, by its label on the command line."""
 
 
 def compare_missions(
@@ -37,7 +37,7 @@ def compare_missions(
     *,
     json: bool,
 ) -> int:
-    """Let the policies lead all missions, print the rows, and return the exit code."""
+    """Run the policies on all missions, print the rows, and return the exit code."""
     from alloc.allocators import describe_policy
     from alloc.allocators.experiments.differences import paired_differences
     from alloc.problems.units import common_units
@@ -64,7 +64,7 @@ def compare_missions(
 
 @dataclass(frozen=True)
 class _Found:
-    """What a comparison came to: its rows, whether they are all, and notes for the user."""
+    """Outcome of a comparison: its rows, whether they are complete, and notes for the user."""
 
     rows: "list[PolicyRow]"
     is_complete: bool
@@ -105,7 +105,7 @@ def _in_store(
     knowledge: Knowledge | None,
     deadline_ms: float | None,
 ) -> _Found:
-    """Make the runs that the store has not yet, write the reports, and return the rows of all."""
+    """Make the runs that are missing in the store, write the reports, and return the rows of all runs."""
     from alloc.allocators import load_policy
     from alloc.allocators.experiments.report.files import write_report
     from alloc.allocators.experiments.report.missions import mission_tables
@@ -114,7 +114,7 @@ def _in_store(
 
     for name, settings in policies.values():
         if settings:
-            with contextlib.suppress(MissingPackageError):  # its runs will tell; what else is wrong is told now
+            with contextlib.suppress(MissingPackageError):  # reported by its runs; other errors are raised now
                 load_policy(name, **settings)
     variants = {label: (name, settings or {}) for label, (name, settings) in policies.items()}
 
@@ -146,7 +146,7 @@ def _tell(rows: "list[PolicyRow]", differences: "list[PolicyDifference]", units:
             note(f"{row.mission}, {row.policy}: {row.reason}")
     late = sum(row.decisions_late for row in rows)
     if late:
-        note(f"{late} decisions came after the deadline and were not followed; see --deadline-ms")
+        note(f"{late} decisions missed the deadline and were ignored; see --deadline-ms")
     for found in difference_tables(differences, len({row.number for row in rows})):
         say(f"\n{found.title}\n{table(found.header, found.rows)}")
         for one in found.notes:

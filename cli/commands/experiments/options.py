@@ -1,4 +1,4 @@
-"""Options of a comparison that is kept in a store."""
+"""Options of ``alloc compare`` for comparisons with a store."""
 
 import re
 from dataclasses import dataclass
@@ -8,14 +8,14 @@ from typing import Annotated
 import typer
 
 SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*([MG])i?B?", re.IGNORECASE)
-"""An amount of memory, such as 800M or 4G."""
+"""Pattern of an amount of memory, such as 800M or 4G."""
 
 LEAST_MB = 100.0
-"""Memory below which no run starts."""
+"""Least memory in which a run can start."""
 
 
 class Engine(StrEnum):
-    """Where the runs of a comparison are made."""
+    """Engine that executes the runs of a comparison."""
 
     PROCESSES = "processes"
     RAY = "ray"
@@ -26,33 +26,33 @@ StoreOption = Annotated[
     typer.Option(
         "--store",
         metavar="FILE",
-        help="Keep every run in this file, each made in a process of its own, with one thread unless --threads says "
-        "otherwise, and make only those that it has not yet.",
+        help="Store every run in this file and make only the missing ones, each in a process of its own, with one "
+        "thread unless --threads says otherwise.",
     ),
 ]
 WorkersOption = Annotated[
     int | None,
-    typer.Option(min=1, max=1024, help="Runs at a time, with --store.", show_default="as many as have own processors"),
+    typer.Option(min=1, max=1024, help="Parallel runs, with --store.", show_default="as many as have own processors"),
 ]
 MemoryOption = Annotated[
     str | None,
     typer.Option(
         metavar="SIZE",
-        help="Memory of a run with all that it starts, such as 4G, with --store.",
-        show_default="its part of 80 % of the machine's",
+        help="Memory of a run with all its processes, such as 4G, with --store.",
+        show_default="its share of 80 % of the machine's",
     ),
 ]
 KillAfterOption = Annotated[
     float | None,
     typer.Option(
         metavar="SECONDS",
-        help="End a run that takes longer, whatever its budget, with --store.",
+        help="Kill a run after this many seconds, whatever its budget, with --store.",
         show_default="1.2 times the time limit and 10 s; none with --iterations",
     ),
 ]
 RetryOption = Annotated[
     bool,
-    typer.Option("--retry", help="Run again what failed, was killed, hung or ran out of memory, with --store."),
+    typer.Option("--retry", help="Repeat runs that failed, were killed, hung or ran out of memory, with --store."),
 ]
 ReportOption = Annotated[
     list[str] | None,
@@ -66,19 +66,19 @@ ReportOption = Annotated[
 
 EngineOption = Annotated[
     Engine | None,
-    typer.Option(help="Where runs are made, with --store.", show_default="processes of this machine"),
+    typer.Option(help="Where runs are executed, with --store.", show_default="processes on this machine"),
 ]
 AddressOption = Annotated[
     str | None,
     typer.Option(
-        help="For --engine ray: head of the cluster.", show_default="RAY_ADDRESS, else the cluster on this machine"
+        help="Address of the cluster, for --engine ray.", show_default="RAY_ADDRESS, else the cluster on this machine"
     ),
 ]
 
 
 @dataclass(frozen=True)
 class Keeping:
-    """The store of a comparison, and what goes with it."""
+    """The store of a comparison and its options."""
 
     store: str
     workers: int | None
@@ -101,18 +101,18 @@ def checked(
     *,
     retry: bool,
 ) -> Keeping | None:
-    """Return the options of a store, None where there is none; raise an error for those that need one."""
+    """Return the store with its options, None if there is none; raise an error for options that need one."""
     if store is None:
         given = {"workers": workers, "memory": memory, "kill-after": kill_after, "report": reports, "retry": retry}
         given |= {"engine": engine, "address": address}
         for name, value in given.items():
             if value not in (None, False):
-                raise typer.BadParameter("goes with --store only", param_hint=f"'--{name}'")
+                raise typer.BadParameter("can only be used with --store", param_hint=f"'--{name}'")
         return None
     if kill_after is not None and not kill_after > 0:
         raise typer.BadParameter("must be more than 0 seconds", param_hint="'--kill-after'")
     if address is not None and engine is not Engine.RAY:
-        raise typer.BadParameter("goes with --engine ray only", param_hint="'--address'")
+        raise typer.BadParameter("can only be used with --engine ray", param_hint="'--address'")
     means = (workers, _megabytes(memory), kill_after)
     return Keeping(store, *means, tuple(reports or ()), retry, engine or Engine.PROCESSES, address)
 
@@ -122,8 +122,8 @@ def _megabytes(text: str | None) -> float | None:
         return None
     found = SIZE.fullmatch(text.strip())
     if found is None:
-        raise typer.BadParameter(f"{text!r} is not like 800M or 4G", param_hint="'--memory'")
+        raise typer.BadParameter(f"must be an amount such as 800M or 4G, got {text!r}", param_hint="'--memory'")
     size = float(found[1]) * (1024 if found[2].upper() == "G" else 1)
     if size < LEAST_MB:
-        raise typer.BadParameter(f"must be at least {LEAST_MB:g}M, or no run starts", param_hint="'--memory'")
+        raise typer.BadParameter(f"must be at least {LEAST_MB:g}M, or no run can start", param_hint="'--memory'")
     return size

@@ -22,7 +22,7 @@ EXAMPLES = examples(
     "alloc pareto demo.json --points 20 --time-limit 5 --plot front.png --output front.json",
     "alloc pareto demo.json --start front.json --time-limit 60 --output front.json",
     "alloc pareto demo.json --method milp --json",
-    closing="Ctrl-C ends the run in progress: the front so far is printed and saved.",
+    closing="Ctrl-C ends the run in progress; the front so far is printed and saved.",
 )
 
 
@@ -36,7 +36,7 @@ def pareto_command(
     method: Annotated[
         str,
         typer.Option(
-            autocompletion=options.complete_methods, help="A method with slack (see `alloc methods`), or auto."
+            autocompletion=options.complete_methods, help="A method that supports slack (see `alloc methods`), or auto."
         ),
     ] = "auto",
     points: Annotated[int, typer.Option(min=1, max=10_000, help="Runs, one for each point of the front.")] = 10,
@@ -57,7 +57,7 @@ def pareto_command(
 ) -> None:
     """Trace the Pareto front of makespan and energy.
 
-    It tells how much energy it costs to save time.
+    It shows how much energy it costs to save time.
     """
     from alloc.allocators.pareto import pareto
 
@@ -93,7 +93,7 @@ def _tell(front: "Front", *, with_table: bool) -> None:
 
 
 def _show_point(result: "Result") -> None:
-    """On a terminal, print each point as soon as it is known; the table follows at the end."""
+    """On a terminal, print a point as soon as it is computed; the table follows at the end."""
     if is_terminal(sys.stderr):
         makespan = labelled(number(result.makespan), result.instance.units.time)
         makespan = f"{counted(left, 'task')} unserved" if (left := result.unserved_count) else f"T {makespan}"
@@ -136,7 +136,7 @@ def _table(front: "Front") -> str:
 
 
 def _change(value: float | None, base: float | None, of: float | None = None) -> str:
-    """Return ``value - base`` as a share of `of`, by default of `base`."""
+    """Return ``value - base`` as a percentage of `of`, by default of `base`."""
     whole = base if of is None else of
     if value is None or base is None or not whole:
         return "-"

@@ -16,7 +16,7 @@ EXAMPLES = examples(
 )
 
 EVERY_S = 1.0
-"""Seconds between two lines of progress."""
+"""Least seconds between two lines of progress."""
 
 
 def register(app: typer.Typer) -> None:
@@ -28,23 +28,23 @@ def report_command(
     stores: Annotated[list[str], typer.Argument(metavar="STORE...", help="Files of `alloc compare --store`.")],
     output: Annotated[
         str,
-        typer.Option("--output", "-o", metavar="FILE", help="The page to write, an .html file that needs no network."),
+        typer.Option("--output", "-o", metavar="FILE", help="Page to write, a self-contained .html file."),
     ],
     against: Annotated[
         str | None,
         typer.Option(
             metavar="METHOD",
             help="Compare all methods with this one, written as in ga[population=200].",
-            show_default="each with every other where these are not too many, else with the first",
+            show_default="all pairs if they are few, else with the first",
         ),
     ] = None,
     title: Annotated[
         str | None, typer.Option(help="Heading of the page.", show_default="the names of the stores")
     ] = None,
 ) -> None:
-    """Write the runs of stores as one page.
+    """Write a report of stored runs as one page.
 
-    It has tables, statistics, charts, failures, and maps of the plans.
+    It contains tables, statistics, charts, failures, and maps of the plans.
     """
     from alloc.allocators import report_html
 
@@ -54,13 +54,13 @@ def report_command(
 
 
 class _Progress:
-    """Says on a terminal what is done, once a second."""
+    """Prints progress on a terminal, at most once a second."""
 
     def __init__(self) -> None:
         self._shows, self._told_at = is_terminal(sys.stderr), time.monotonic()
 
     def tell(self, words: str) -> None:
-        """Print what is done, unless something was printed just before."""
+        """Print a line of progress, unless one was printed less than `EVERY_S` ago."""
         if self._shows and time.monotonic() - self._told_at >= EVERY_S:
             self._told_at = time.monotonic()
             say(words)

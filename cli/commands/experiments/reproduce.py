@@ -20,13 +20,13 @@ if TYPE_CHECKING:
 EXAMPLES = examples(
     "alloc reproduce paper --quick",
     "alloc reproduce paper --runs 100 --workers 8",
-    closing="Runs that the folder has are not made again: the same command goes on after an interruption.",
+    closing="Runs that are in the folder are not repeated: the same command resumes after an interruption.",
 )
 
 QUICK_RUNS, QUICK_ITERATIONS = 2, 100
 
 LOOK_S = 2.0
-"""Seconds between two looks at how many runs have ended."""
+"""Seconds between two polls of how many runs have ended."""
 
 
 def register(app: typer.Typer) -> None:
@@ -35,7 +35,7 @@ def register(app: typer.Typer) -> None:
 
 
 def reproduce_command(
-    folder: Annotated[str, typer.Argument(metavar="FOLDER", help="Where rows, figures and reproduction.md go.")],
+    folder: Annotated[str, typer.Argument(metavar="FOLDER", help="Output folder: rows, figures and reproduction.md.")],
     runs: Annotated[
         int | None, typer.Option(min=1, max=10_000, help="Runs of each method.", show_default="100")
     ] = None,
@@ -44,22 +44,22 @@ def reproduce_command(
     ] = False,
     methods: Annotated[
         str | None,
-        typer.Option(metavar="NAMES", help="Methods, separated by commas.", show_default="the paper's and others"),
+        typer.Option(metavar="NAMES", help="Methods, separated by commas.", show_default="the paper's and baselines"),
     ] = None,
     iterations: Annotated[
-        int | None, typer.Option(min=5, max=300, help="Of each training.", show_default="300")
+        int | None, typer.Option(min=5, max=300, help="Iterations of each training.", show_default="300")
     ] = None,
-    time_limit: Annotated[float, typer.Option(min=0.01, help="Seconds for each method that learns nothing.")] = 1.0,
+    time_limit: Annotated[float, typer.Option(min=0.01, help="Seconds per run of methods that do not learn.")] = 1.0,
     workers: Annotated[
-        int | None, typer.Option(min=1, max=1024, help="Runs at a time.", show_default="one per processor")
+        int | None, typer.Option(min=1, max=1024, help="Parallel runs.", show_default="one per processor")
     ] = None,
     page: Annotated[
-        bool, typer.Option("--page", help="Make no runs: figures and page from those in the folder.")
+        bool, typer.Option("--page", help="Make no runs, only figures and page of those in the folder.")
     ] = False,
 ) -> None:
     """Repeat the paper's experiments.
 
-    Five methods learn from nothing in four scenarios, and figures and a page are made of it.
+    Five methods are trained from scratch in four scenarios; figures and a page show the results.
     """
     from alloc.allocators.experiments.reproduction.folder import Folder
 
@@ -75,7 +75,7 @@ def reproduce_command(
         place.publish()
         say(f"{place.page}: {counted(len({(row.run, row.method) for row in place.learned}), 'training')}")
     if not finished:
-        note("interrupted; the same command goes on from here")
+        note("interrupted; the same command resumes from here")
         raise typer.Exit(1)
 
 
@@ -89,12 +89,12 @@ def _methods(names: str | None) -> tuple[str, ...]:
     chosen = tuple(dict.fromkeys(name.strip() for name in names.split(",")))
     for name in chosen:
         if name not in VARIANTS and name not in OTHERS:
-            raise InputError(f"{name!r} is none of them{nearest(name, (*VARIANTS, *OTHERS))}", "methods")
+            raise InputError(f"unknown method {name!r}{nearest(name, (*VARIANTS, *OTHERS))}", "methods")
     return chosen
 
 
 def _made(place: "Folder", wanted: "Sequence[Job]", workers: int | None) -> bool:
-    """Make the runs that are missing, until all are there or a signal comes."""
+    """Make the missing runs until all are complete or a signal arrives; return whether they are complete."""
     from alloc.allocators.parallel.processes import ProcessEngine
     from alloc.allocators.runtime.interrupts import signals_set
 
@@ -105,14 +105,14 @@ def _made(place: "Folder", wanted: "Sequence[Job]", workers: int | None) -> bool
 
 
 class _Progress:
-    """Says on a terminal how many runs have ended."""
+    """Prints on a terminal how many runs have ended."""
 
     def __init__(self, place: "Folder", wanted: "Sequence[Job]") -> None:
         self._place, self._wanted, self._shows = place, wanted, is_terminal(sys.stderr)
         self._next, self._told = 0.0, -1
 
     def looked(self) -> bool:
-        """Look, not too often, and say what is new; always False."""
+        """Poll at most every `LOOK_S` seconds, print new results, and return False."""
         if self._shows and time.monotonic() >= self._next:
             self._next = time.monotonic() + LOOK_S
             done = len(self._wanted) - len(self._place.missing(self._wanted))

@@ -1,4 +1,4 @@
-"""Instances as a command line names many: files, folders, patterns, tables of them, and generated families."""
+"""Sets of instances on the command line: files, folders, patterns, tables of these, and generated families."""
 
 import csv
 import glob
@@ -15,32 +15,32 @@ if TYPE_CHECKING:
     from alloc.problems import Instance, Mission
 
 FAMILY = re.compile(r"(paper-[1-4]|random|covering)(?:\[(.*)\])?:(\d{1,9})(?:-(\d{1,9}))?")
-"""A generated family with its seeds, both ends included."""
+"""Pattern of a generated family with a range of seeds, both ends included."""
 
 MOST_GENERATED = 100_000
 
 COLUMN = "instance"
-"""That of a table of instances which names them; others are for people."""
+"""Column of a table of instances that names them; other columns are ignored."""
 
 
 def gather(sources: Sequence[str]) -> "list[Instance]":
-    """Return the instances that all sources name, in their order.
+    """Return the instances of all sources, in order.
 
     Raises
     ------
     InputError
-        If a source cannot be read, a pattern matches nothing, or a family is none.
+        If a source cannot be read, a pattern matches nothing, or a family is invalid.
     """
     return [instance for source in sources for instance in _instances(source)]
 
 
 def gather_missions(sources: Sequence[str]) -> "list[Mission]":
-    """Return the missions that all sources name, in their order: files, patterns of them, and folders of .json files.
+    """Return the missions of all sources, in order: files, patterns of them, and folders of .json files.
 
     Raises
     ------
     InputError
-        If a source cannot be read, a pattern matches nothing, or a folder holds none.
+        If a source cannot be read, a pattern matches nothing, or a folder contains no missions.
     """
     from alloc.problems import read_mission
 
@@ -53,13 +53,13 @@ def _mission_files(source: str) -> list[str]:
     if os.path.isdir(source) and not os.path.exists(os.path.join(source, "agents.csv")):
         found = sorted(glob.glob(os.path.join(glob.escape(source), "*.json")))
         if not found:
-            raise InputError("holds no missions", source=source)
+            raise InputError("contains no missions", source=source)
         return found
     return [source] if os.path.exists(source) or not glob.has_magic(source) else _matching(source)
 
 
 def _matching(pattern: str) -> list[str]:
-    """Return the files and folders that a pattern matches, in the order of their names."""
+    """Return the files and folders that match a pattern, sorted by name."""
     from alloc.problems import InputError
 
     found = sorted(glob.glob(pattern, recursive=True))
@@ -82,13 +82,13 @@ def _instances(source: str) -> "list[Instance]":
 
 
 def _listed(table: str) -> list[str]:
-    """Return what the rows of a table name; relative paths are from its folder."""
+    """Return the sources in the rows of a table; relative paths start at its folder."""
     from alloc.problems import InputError
     from alloc.problems.formats.files import read_text
 
     rows = csv.DictReader(read_text(table).splitlines())
     if COLUMN not in (rows.fieldnames or ()):
-        raise InputError(f"has no column {COLUMN!r} that names files or families", source=table)
+        raise InputError(f"has no column {COLUMN!r} with files or families", source=table)
     names = [row[COLUMN].strip() for row in rows if (row[COLUMN] or "").strip()]
     folder = os.path.dirname(table)
     return [name if FAMILY.fullmatch(name) else os.path.join(folder, name) for name in names]
@@ -99,7 +99,7 @@ def _generated(source: str, family: str, settings: str | None, first: str, last:
 
     seeds = range(int(first), int(last or first) + 1)
     if not 0 < len(seeds) <= MOST_GENERATED:
-        raise InputError(f"must be from a seed to a later one, at most {MOST_GENERATED} of them", source=source)
+        raise InputError(f"must be an ascending range of at most {MOST_GENERATED} seeds", source=source)
     try:
         given: dict[str, Any] = values(BETWEEN_SETTINGS.split(settings) if settings else [])
         if family == "covering":
@@ -107,7 +107,7 @@ def _generated(source: str, family: str, settings: str | None, first: str, last:
             return [covering(seed, **given) for seed in seeds]
         if family != "random":
             if settings is not None:
-                raise InputError("takes no parameters; random and covering do", family)
+                raise InputError("takes no parameters; only random and covering do", family)
             return [paper(int(family.removeprefix("paper-")), seed) for seed in seeds]
         _check_known(given, Family.__dataclass_fields__, family)
         title = source.rpartition(":")[0]
@@ -117,12 +117,12 @@ def _generated(source: str, family: str, settings: str | None, first: str, last:
 
 
 def _check_known(given: Collection[str], known: Collection[str], family: str) -> None:
-    """Raise an error for a parameter that a family does not have; its seed stands behind the colon."""
+    """Raise an error for a parameter that a family does not have; seeds follow the colon."""
     from alloc.problems import InputError
 
     unknown = sorted(set(given) - (set(known) - {"seed"}))
     if unknown:
-        raise InputError(f"is no parameter of a {family} family", unknown[0])
+        raise InputError(f"is not a parameter of a {family} family", unknown[0])
 
 
 def covering(
@@ -135,12 +135,12 @@ def covering(
     integer: bool = True,
     choices: int | None = None,
 ) -> "Instance":
-    """Return an instance of machine covering, by the parameters of ``alloc generate covering``.
+    """Return an instance of machine covering with the parameters of ``alloc generate covering``.
 
     Raises
     ------
     InputError
-        If abilities are no whole numbers, or workloads neither equal nor uniform.
+        If abilities are not whole numbers, or workloads are neither equal nor uniform.
     """
     from alloc.problems import InputError, machine_covering
     from alloc.problems.arguments import real

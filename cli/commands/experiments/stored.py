@@ -1,4 +1,4 @@
-"""A comparison whose runs are kept in a store: only those are made that it has not yet."""
+"""Comparisons with a store, which make only the runs that are missing in it."""
 
 import contextlib
 import sys
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Kept:
-    """What a comparison came to.
+    """Outcome of a comparison.
 
     Attributes
     ----------
@@ -35,7 +35,7 @@ class Kept:
     is_complete : bool
         Whether all runs have ended.
     notes : list of str
-        For the user, after the table.
+        Notes for the user, printed after the table.
     """
 
     comparison: "Comparison"
@@ -45,13 +45,13 @@ class Kept:
 
 
 def make_missing(keeping: Keeping, plan: Callable[["Store", str], "Comparison"]) -> Kept:
-    """Make the runs that a store has not yet, until all are there or a signal comes, and return how all ended.
+    """Make the runs that are missing in a store, until all are complete or a signal arrives, and return all endings.
 
     Parameters
     ----------
     keeping : Keeping
     plan : callable
-        Returns all runs, by the store and the machine that makes them.
+        Returns all runs, given the store and the machine that executes them.
     """
     from alloc.allocators.experiments.campaign import Campaign, Means
     from alloc.allocators.experiments.report.files import check_report
@@ -73,15 +73,15 @@ def make_missing(keeping: Keeping, plan: Callable[["Store", str], "Comparison"])
             done = Campaign(store, list(planned.jobs.values()), means, progress.tell, _say_waiting, place).run(stop)
         endings = planned.endings(store)
         notes = [f"{counted(progress.made, 'run')} made; {keeping.store} has {_count(endings)} of {len(planned.jobs)}"]
-        notes += [f"{keeping.store} also holds {other}, which do not count here" for other in planned.others(store)]
+        notes += [f"{keeping.store} also contains {other}, which are ignored here" for other in planned.others(store)]
         notes += doubts(endings)
     if not done:
-        notes.insert(0, "interrupted; the same command goes on from here")
+        notes.insert(0, "interrupted; the same command resumes from here")
     return Kept(planned, endings, done, notes)
 
 
 def _place(keeping: Keeping) -> "Place":
-    """Return where runs are made."""
+    """Return the place where runs are executed."""
     if keeping.engine is Engine.RAY:
         from alloc.allocators.experiments.isolation.cluster import Cluster
 
@@ -100,7 +100,7 @@ def compare_in_store(
     budget: "Budget",
     threads: int | None,
 ) -> "tuple[Kept, list[Row]]":
-    """Compare methods, and return the rows of what was asked for, with gaps against the best bound of any method."""
+    """Compare methods, and return the outcome and its rows, with gaps to the best bound of any method."""
     from alloc.allocators.experiments.compare import share_bounds
     from alloc.allocators.experiments.stored import planned, rows_of
 
@@ -125,7 +125,7 @@ def compare_in_store(
 
 
 def conclude(keeping: Keeping, kept: Kept, rows: "list[Row]", *, quiet: bool) -> int:
-    """Print how methods differ, unless `quiet`, and the notes, write the reports, and return the exit code."""
+    """Print the differences of methods (unless `quiet`) and the notes, write the reports, and return the exit code."""
     from alloc.allocators.experiments.report.files import write_report
     from alloc.allocators.experiments.report.tables import report_tables
 
@@ -149,12 +149,12 @@ def _tell_differences(kept: Kept) -> None:
 
 
 def _check_method(name: str, settings: Mapping[str, object]) -> None:
-    """Raise an error if there is no such method, or it does not take these parameters."""
+    """Raise an error if the method does not exist or does not take these parameters."""
     from alloc.allocators import describe, load
     from alloc.problems import MissingPackageError
 
     if settings:
-        with contextlib.suppress(MissingPackageError):  # its runs will tell
+        with contextlib.suppress(MissingPackageError):  # reported by its runs
             load(name, **settings)
     elif name != "auto":
         describe(name)
@@ -165,11 +165,11 @@ def _count(endings: "Mapping[str, Sequence[Sequence[Ending | None]]]") -> int:
 
 
 def _say_waiting() -> None:
-    note("other commands have all processors; waiting for one")
+    note("other commands use all processors; waiting for one")
 
 
 class _Progress:
-    """Says on a terminal how each run ended."""
+    """Prints on a terminal how each run ended."""
 
     def __init__(self, names: Mapping[str, str]) -> None:
         self._names, self._shows, self.made = names, is_terminal(sys.stderr), 0

@@ -21,14 +21,14 @@ EXAMPLES = examples(
     'alloc whatif demo.json --add "like a2" --up-to 5 --time-limit 2 --plot fleets.png',
     "alloc whatif demo.json --remove a7 --remove a8",
     'alloc whatif demo.json --remove a7 --add "like a2" --up-to 3 --objective makespan-energy --json',
-    closing="Each fleet is solved from the plan of the next smaller one. Ctrl-C ends the run in progress: the fleets "
-    "so far are printed and saved.",
+    closing="Each fleet is solved starting from the plan of the next smaller one. Ctrl-C ends the run in progress; the "
+    "fleets so far are printed and saved.",
 )
 
 LIKE = "like "
 
 MOST_NAMES = 3
-"""Ids of agents in a row of the table, before they are counted."""
+"""Ids of agents that a row of the table lists; more are given as a number."""
 
 
 def register(app: typer.Typer) -> None:
@@ -40,17 +40,15 @@ def whatif_command(
     instance: options.InstanceArgument,
     add: Annotated[
         list[str] | None,
-        typer.Option(metavar='"like ID"', help="Add copies of this agent; may be repeated: one of each per step."),
+        typer.Option(metavar='"like ID"', help="Add a copy of this agent per step; may be repeated."),
     ] = None,
-    up_to: Annotated[int, typer.Option(min=1, max=10_000, help="Steps: how many copies are added at most.")] = 1,
-    remove: Annotated[
-        list[str] | None, typer.Option(metavar="ID", help="An agent that drops out; may be repeated.")
-    ] = None,
+    up_to: Annotated[int, typer.Option(min=1, max=10_000, help="Number of steps.")] = 1,
+    remove: Annotated[list[str] | None, typer.Option(metavar="ID", help="Remove this agent; may be repeated.")] = None,
     method: options.MethodOption = "auto",
     objective: options.ObjectiveOption = options.PlainObjective.MAKESPAN,
     time_limit: Annotated[
         float | None,
-        typer.Option(help="Seconds for each fleet.", show_default="10; none where --iterations is given"),
+        typer.Option(help="Seconds for each fleet.", show_default="10; none if --iterations is given"),
     ] = None,
     iterations: Annotated[int | None, typer.Option(min=0, help="Iterations for each fleet.")] = None,
     seed: options.SeedOption = 0,
@@ -62,9 +60,9 @@ def whatif_command(
     json: options.JsonOption = False,
     quiet: options.QuietOption = False,
 ) -> None:
-    """Say what more or fewer agents bring.
+    """Show the effect of more or fewer agents.
 
-    It tells makespan, energy and bounds by size of the fleet.
+    It prints makespan, energy and bounds by fleet size.
     """
     from alloc.allocators import whatif
     from alloc.problems import read_instance
@@ -97,7 +95,7 @@ def whatif_command(
 def _model(text: str) -> str:
     """Return the id in ``like ID``."""
     if not text.startswith(LIKE):
-        raise typer.BadParameter(f'{text!r} is not "like ID", as in --add "like a2"', param_hint="'--add'")
+        raise typer.BadParameter(f'must be "like ID", as in --add "like a2", got {text!r}', param_hint="'--add'")
     return text.removeprefix(LIKE).strip()
 
 
@@ -115,7 +113,7 @@ def _tell(found: "WhatIf", *, with_table: bool) -> None:
         say(_table(found))
         say(f"\n{found.answer[0].upper()}{found.answer[1:]}.")
     told = {line.partition(":")[0]: line for fleet in reversed(found.fleets) for line in fleet.result.notes}
-    for line in told.values():  # what auto picked is told once for each method
+    for line in told.values():  # auto's choice is printed once per method
         note(line)
 
 
@@ -147,13 +145,13 @@ def _table(found: "WhatIf") -> str:
 
 
 def _changes(fleet: "Fleet") -> str:
-    """Return what a fleet has less and more, such as ``-d7 +2``."""
+    """Return the agents that a fleet lacks and has in addition, such as ``-d7 +2``."""
     less = [f"-{name}" for name in fleet.removed] if len(fleet.removed) <= MOST_NAMES else [f"-{len(fleet.removed)}"]
     return " ".join([*less, *([f"+{len(fleet.added)}"] if fleet.added else [])]) or "as it is"
 
 
 def _against(value: float | None, base: float | None) -> str:
-    """Return by how much a makespan is longer, or shorter, than that of the fleet as it is."""
+    """Return the relative change of a makespan from that of the current fleet."""
     if value is None or base is None or value == base:
         return "-"
     return f"{100 * (value / base - 1):+.3g} %"

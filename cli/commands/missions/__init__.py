@@ -1,1 +1,1 @@
-"""``alloc simulate`` and ``alloc replay``: missions, and what came of them."""
+"""Commands for missions: import, simulation, replay, planning and validation."""

@@ -21,7 +21,7 @@ EXAMPLES = examples(
     "alloc import-mission cfstp printed.txt --output mission.json",
     "alloc import-mission london animal_rescues.csv --from 2019-07-01 --until 2019-07-14 --compress 24 --output m.json",
     "alloc import-mission new-brunswick nbfires.csv --agents 20 --compress 100 --output mission.json",
-    closing="The files are not part of alloc: docs/missions/records.md says where they are and what is made of them.",
+    closing="The files are not part of alloc; docs/missions/records.md says where to get them and how they are read.",
 )
 DAY = "%Y-%m-%d"
 
@@ -36,22 +36,22 @@ def import_mission_command(
         ForeignFormat,
         typer.Argument(
             metavar="FORMAT",
-            help="cfstp, what the tests of lcpz/cfstp print; space, a configuration of the SPACE simulator; or "
-            "records: london, calls of the fire brigade to animals; new-brunswick, forest fires.",
+            help="cfstp, output of the tests of lcpz/cfstp; space, a configuration of the SPACE simulator; or records: "
+            "london, animal rescues by the fire brigade; new-brunswick, forest fires.",
         ),
     ],
     file: Annotated[str, typer.Argument(metavar="FILE", help="The file: text, YAML, or a table.")],
     output: Annotated[str, typer.Option(metavar="FILE", help="Mission to write: .json, or -.")],
     seed: options.SeedOption = 0,
     agents: Annotated[
-        int | None, typer.Option(min=1, help="Agents who answer the records.", show_default="10, or the fleet")
+        int | None, typer.Option(min=1, help="Number of agents for records.", show_default="10, or the fleet")
     ] = None,
-    ability: Annotated[float | None, typer.Option(help="Their work per hour.", show_default="1")] = None,
+    ability: Annotated[float | None, typer.Option(help="Ability of these agents.", show_default="1")] = None,
     speed: Annotated[
-        float | None, typer.Option(help="Their speed in km/h.", show_default="30 in London, else 60")
+        float | None, typer.Option(help="Speed of these agents in km/h.", show_default="30 in London, else 60")
     ] = None,
     compress: Annotated[
-        float | None, typer.Option(help="Hours between records are divided by this.", show_default="1")
+        float | None, typer.Option(help="Factor by which the time between records is divided.", show_default="1")
     ] = None,
     first: Annotated[
         datetime | None, typer.Option("--from", formats=[DAY], help="First day of the records.", show_default="all")
@@ -60,13 +60,13 @@ def import_mission_command(
         datetime | None, typer.Option("--until", formats=[DAY], help="Last day of the records.", show_default="all")
     ] = None,
     fleet: Annotated[
-        str | None, typer.Option(metavar="FILE", help="List of the vehicles of the London Fire Brigade.")
+        str | None, typer.Option(metavar="FILE", help="List of vehicles of the London Fire Brigade.")
     ] = None,
     quiet: options.QuietOption = False,
 ) -> None:
-    """Make a mission of a file of another program.
+    """Import a mission from a file of another program.
 
-    It may be of a benchmark, a simulator's configuration, or a record of what happened.
+    This may be a benchmark, the configuration of a simulator, or a record of real events.
     """
     from alloc.problems import import_mission, write_mission
 
@@ -94,14 +94,14 @@ def import_mission_command(
 
 
 def _options(file_format: ForeignFormat, given: dict[str, object]) -> "RecordOptions | None":
-    """Return the options of records; an error for any of them with a format that is complete by itself."""
+    """Return the options for records; raise an error if one is given with another format."""
     from alloc.problems import RecordOptions
 
     if file_format in (ForeignFormat.LONDON, ForeignFormat.NEW_BRUNSWICK):
         return RecordOptions(**given)  # type: ignore[arg-type]  # which it checks
     for name in given:
         flag = {"first": "from", "last": "until"}.get(name, name)
-        raise typer.BadParameter(f"is for records, not for {file_format}", param_hint=f"'--{flag}'")
+        raise typer.BadParameter(f"is for records only, not for {file_format}", param_hint=f"'--{flag}'")
     return None
 
 

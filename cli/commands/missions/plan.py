@@ -26,11 +26,11 @@ EXAMPLES = examples(
     "alloc plan mission.json --stdio",
     "alloc plan mission.json --stdio --policy greedy --deadline-ms 50 --state planner.json",
     'echo \'{"request": "plan"}\' | alloc plan mission.json --stdio',
-    closing="Each line in is one of alloc-planner-request/1, each line out one of alloc-planner-orders/1.",
+    closing="Input lines have the format alloc-planner-request/1, output lines alloc-planner-orders/1.",
 )
 
 CHUNK = 65536
-"""Bytes that are read at once, if they are there."""
+"""Maximum number of bytes read at once."""
 
 
 def register(app: typer.Typer) -> None:
@@ -44,7 +44,7 @@ def plan_command(
         typer.Argument(
             metavar="MISSION",
             help="A mission as .json, or an instance.",
-            show_default="the first line, or what --state holds",
+            show_default="the first line, or the one in --state",
         ),
     ] = None,
     stdio: Annotated[
@@ -58,7 +58,7 @@ def plan_command(
         ),
     ] = "replan",
     deadline_ms: Annotated[
-        float, typer.Option(min=0, help="Milliseconds for each plan; the last one stands if it takes longer. 0: none.")
+        float, typer.Option(min=0, help="Milliseconds per plan; if exceeded, the last plan stands. 0 for no limit.")
     ] = 100.0,
     seed: options.SeedOption = 0,
     settings: Annotated[
@@ -67,21 +67,21 @@ def plan_command(
     ] = None,
     state: Annotated[
         str | None,
-        typer.Option(metavar="FILE", help="Go on from this file if it is there, by its policy; save to it at the end."),
+        typer.Option(metavar="FILE", help="Resume from this file and its policy if it exists; save to it at the end."),
     ] = None,
 ) -> None:
-    """Plan for a program in any language.
+    """Plan missions for a program in any language.
 
-    Events come in and orders go out, a line of JSON each.
+    It sends events and receives orders, as lines of JSON.
     """
     from alloc.allocators import MissionPlanner, load_policy
     from alloc.allocators.online.planner.lines import Lines
     from alloc.problems import read_mission
 
     if not stdio:
-        raise typer.BadParameter("is needed: there is no other way of planning yet", param_hint="'--stdio'")
+        raise typer.BadParameter("is required: there is no other interface yet", param_hint="'--stdio'")
     if mission == "-":
-        raise typer.BadParameter("cannot be standard input, but for its first line: leave it out", param_hint="MISSION")
+        raise typer.BadParameter("cannot be -: leave it out to read it from the first line", param_hint="MISSION")
     check_outputs(("--state", state), read=[("MISSION", mission)] if mission is not None else [])
     given = options.values(settings)
 
@@ -91,18 +91,18 @@ def plan_command(
     planner = None
     if state is not None and Path(state).exists():
         if mission is not None:
-            why = f"must be left out, as {state} is there: the planner in it goes on; or remove that file"
+            why = f"must be left out, as planning resumes from {state}; or remove that file"
             raise typer.BadParameter(why, param_hint="MISSION")
         planner = MissionPlanner.restore(state)
     elif mission is not None:
         planner = begin(read_mission(mission))
     else:
-        load_policy(policy, **given)  # what is wrong with it is told now
+        load_policy(policy, **given)  # report errors before the first line arrives
     serve(Lines(planner, begin, state))
 
 
 def serve(lines: "Lines") -> None:
-    """Answer all lines that come before the input ends or a signal does, and save the planner."""
+    """Answer all lines until the input ends or a signal arrives, and save the planner."""
     arrived: SimpleQueue[str | None] = SimpleQueue()
     threading.Thread(target=read_lines, args=(arrived,), name="alloc-lines", daemon=True).start()
     with ended_by_signals(arrived):
@@ -115,9 +115,9 @@ def serve(lines: "Lines") -> None:
 
 
 def read_lines(arrived: "SimpleQueue[str | None]") -> None:
-    """Put all lines of standard input on a queue, and None at its end.
+    """Put all lines of standard input on a queue, followed by None.
 
-    Without a buffer, whose lock would hold up the end of the process while this thread waits for input.
+    Input is read unbuffered, as the lock of a buffer would block the exit of the process while this thread waits.
     """
     stream: BinaryIO = sys.stdin.buffer
     source: BinaryIO = getattr(stream, "raw", stream)
@@ -133,9 +133,9 @@ def read_lines(arrived: "SimpleQueue[str | None]") -> None:
 
 @contextlib.contextmanager
 def ended_by_signals(arrived: "SimpleQueue[str | None]", end: Callable[[], object] = lambda: None) -> Iterator[None]:
-    """Let SIGTERM and Ctrl-C be the end of the input, behind the lines that are there, as long as this lasts.
+    """Treat SIGTERM and Ctrl-C within this context as the end of the input, after the lines already received.
 
-    They call `end` as well.
+    They also call `end`.
     """
 
     def request_end(number: int, frame: FrameType | None) -> None:

@@ -12,7 +12,7 @@ EXAMPLES = examples(
     "alloc replay run.jsonl",
     "alloc replay run.jsonl --check",
     "alloc replay run.jsonl --json",
-    closing="Exit code as of the run; 2 if the log is damaged or says what does not come of its orders.",
+    closing="Exit code as of the run; 2 if the log is damaged or does not follow from its orders.",
 )
 
 
@@ -23,13 +23,13 @@ def register(app: typer.Typer) -> None:
 
 def replay_command(
     log: Annotated[str, typer.Argument(metavar="LOG", help="A log of `alloc simulate --log`, - for standard input.")],
-    check: Annotated[bool, typer.Option("--check", help="Tell what was conserved: work and energy.")] = False,
+    check: Annotated[bool, typer.Option("--check", help="Print the conservation of work and energy.")] = False,
     json: options.JsonOption = False,
     quiet: options.QuietOption = False,
 ) -> None:
-    """Simulate a mission again by the orders of its log.
+    """Simulate a mission again from the orders in its log.
 
-    The figures must come out the same.
+    The figures must be the same.
     """
     from alloc.cli.output.mission import law_lines, lines
     from alloc.problems import InputError, read_log, replay

@@ -23,8 +23,8 @@ EXAMPLES = examples(
     "alloc simulate mission.json --policy greedy --plot run.png --animate run.html",
     "alloc simulate mission.json --policy auction --runs 10 --json",
     "alloc generate mission --seed 7 --output - | alloc simulate - --policy hedonic",
-    closing="Exit code 0 if all tasks are done in all runs, 1 if not. An instance is a mission in which "
-    "nothing comes. Ctrl-C ends --runs: those that are complete are printed, with exit code 1.",
+    closing="Exit code 0 if all tasks are done in all runs, 1 if not. An instance is a mission without "
+    "events. Ctrl-C ends --runs; complete ones are printed, with exit code 1.",
 )
 
 
@@ -51,27 +51,27 @@ def simulate_command(
     runs: Annotated[int, typer.Option(min=1, help="Runs, with consecutive seeds.")] = 1,
     deadline_ms: Annotated[
         float,
-        typer.Option(min=0, help="Milliseconds for each decision; later answers are not followed. 0 for no limit."),
+        typer.Option(min=0, help="Milliseconds per decision; late answers are ignored. 0 for no limit."),
     ] = 100.0,
     settings: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the policy; may be repeated."),
     ] = None,
-    log: Annotated[str | None, typer.Option(metavar="FILE", help="Write what happens as JSON lines.")] = None,
+    log: Annotated[str | None, typer.Option(metavar="FILE", help="Write a log of the run as JSON lines.")] = None,
     plot: Annotated[
         str | None,
         typer.Option(metavar="FILE", help="Draw tracks, tasks, work, messages and agents: .png, .svg, .pdf."),
     ] = None,
     animate: Annotated[
         str | None,
-        typer.Option(metavar="FILE", help="Write a page that plays the mission, .html, or a film: .gif, .mp4."),
+        typer.Option(metavar="FILE", help="Animate the mission as a page, .html, or a film: .gif, .mp4."),
     ] = None,
     json: options.JsonOption = False,
     quiet: options.QuietOption = False,
 ) -> None:
-    """Let a policy lead the agents of a mission.
+    """Simulate a mission with a policy that gives the orders.
 
-    Allocation goes on in time: agents are done, fail and join, and tasks appear.
+    Allocation continues over time as tasks appear and are done, and agents fail and join.
     """
     from alloc.allocators import simulate
     from alloc.problems import Recorder, read_mission, write_log
@@ -92,7 +92,7 @@ def simulate_command(
         tell(results, problem, summary=not json)
         if len(results) < runs:
             note(f"interrupted after {len(results)} of {runs} runs")
-    if log is not None:  # of a single run
+    if log is not None:  # there is a single run
         write_log(run.log, log)
     if recorder is not None:
         draw(recorder.course(results[0]), plot, animate)
@@ -100,7 +100,7 @@ def simulate_command(
 
 
 def until_interrupted(lead: "Callable[..., MissionRun]", seeds: Sequence[int]) -> "Iterator[MissionRun]":
-    """Make a run with each seed; Ctrl-C ends them once there is one, and those that are complete count."""
+    """Make a run with each seed; after the first one, Ctrl-C ends the iteration without an error."""
     for done, seed in enumerate(seeds):
         try:
             run = lead(seed=seed)
@@ -112,7 +112,7 @@ def until_interrupted(lead: "Callable[..., MissionRun]", seeds: Sequence[int]) -
 
 
 def load(policy: str, settings: list[str] | None, knowledge: Knowledge) -> "Policy":
-    """Return a policy that can lead by such knowledge; what it lacks is told before its loops are compiled."""
+    """Return a policy, after checking that it can act on this knowledge, before its code is compiled."""
     from alloc.allocators import describe_policy, load_policy
     from alloc.allocators.online.run import require_knowledge
 
@@ -121,7 +121,7 @@ def load(policy: str, settings: list[str] | None, knowledge: Knowledge) -> "Poli
 
 
 def check_files(mission: str, runs: int, written: dict[str, str | None]) -> None:
-    """Raise an error, before anything is simulated, for a file that cannot be written, or not of several runs."""
+    """Raise an error before the simulation if a file cannot be written, or is for a single run only."""
     check_outputs(*written.items(), read=[("MISSION", mission)])
     check_picture(written["--plot"])
     check_film(written["--animate"])
@@ -131,7 +131,7 @@ def check_files(mission: str, runs: int, written: dict[str, str | None]) -> None
 
 
 def draw(course: "Course", plot: str | None, animate: str | None) -> None:
-    """Write the picture and the animation of a run that are wanted."""
+    """Write the requested picture and animation of a run."""
     from alloc.allocators.plotting import animate_mission, plot_mission
 
     if plot is not None:
@@ -141,14 +141,14 @@ def draw(course: "Course", plot: str | None, animate: str | None) -> None:
 
 
 def tell(results: "list[MissionResult]", mission: "Mission", *, summary: bool) -> None:
-    """Print the measures of some runs for people, and notes on what is not as it should be."""
+    """Print the measures of runs, and notes on late and refused orders."""
     from alloc.cli.output.mission import lines, rows
 
     if summary:
         say(lines(results[0], mission.instance.units) if len(results) == 1 else rows(results))
     late = sum(result.decisions_late for result in results)
     if late:
-        note(f"{late} of {sum(result.decisions for result in results)} decisions came after the deadline")
+        note(f"{late} of {sum(result.decisions for result in results)} decisions missed the deadline")
     refused = sum(result.orders_refused for result in results)
     if refused:
-        note(f"{refused} orders were not followed, as the agent could not; --log says which and why")
+        note(f"{refused} orders could not be carried out; --log says which and why")

@@ -13,16 +13,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Checked:
-    """What is in a valid file.
+    """Content of a valid file.
 
     Attributes
     ----------
     facts : dict
         Its entry in the JSON.
     words : str
-        One line for people.
+        Summary in one line.
     findings : sequence of Finding
-        What may be a mistake.
+        Possible mistakes.
     """
 
     facts: dict[str, object]
@@ -31,7 +31,7 @@ class Checked:
 
 
 def checked_mission(file: str, mission: "Mission") -> Checked:
-    """Sum up a mission."""
+    """Return a summary of a mission."""
     from dataclasses import asdict
 
     from alloc.problems.diagnosis.missions import mission_findings
@@ -72,12 +72,12 @@ def checked_mission(file: str, mission: "Mission") -> Checked:
 
 
 def checked_log(file: str, text: str) -> Checked:
-    """Sum up a log that its mission, simulated again by its orders, comes to.
+    """Replay a log from its orders, and return a summary of it.
 
     Raises
     ------
     InputError
-        If it is damaged, or does not come of its orders.
+        If it is damaged, or does not follow from its orders.
     """
     from alloc.problems import replay
     from alloc.problems.missions.files.log_file import LOG_FORMAT, log_from_text

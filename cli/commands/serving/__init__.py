@@ -1,1 +1,1 @@
-"""Commands that go on until they are ended."""
+"""Commands that run as a service until they are stopped."""

@@ -18,12 +18,12 @@ EXAMPLES = examples(
     "alloc serve --stdio --load gappo",
     "alloc serve --http 127.0.0.1:8080 --load 'gappo[policy=mine.safetensors],local-search'",
     "alloc serve --http 8080 --parallel 4 --queue 32 --most-agents 500 --most-ms 1000",
-    closing="Each request is one of alloc-solve-request/1, each answer one of alloc-solve-answer/1. "
+    closing="Requests have the format alloc-solve-request/1, answers alloc-solve-answer/1. "
     "SIGTERM ends all runs as their time limits do.",
 )
 
 LOCAL = "127.0.0.1"
-"""Where the service listens where no host is given: nobody else can reach it there."""
+"""Default host: the service is reachable from this machine only."""
 
 
 def register(app: typer.Typer) -> None:
@@ -37,32 +37,32 @@ def serve_command(
     ] = False,
     http: Annotated[
         str | None,
-        typer.Option(metavar="[HOST:]PORT", help=f"Listen here; {LOCAL} where no host is given.", show_default=False),
+        typer.Option(metavar="[HOST:]PORT", help=f"Listen here; HOST is {LOCAL} by default.", show_default=False),
     ] = None,
     load: Annotated[
         str | None,
         typer.Option(
             metavar="NAME,NAME,...",
             autocompletion=options.complete_methods,
-            help="Methods to load now, perhaps with parameters, as in gappo[policy=mine.safetensors]; "
-            "others are loaded at their first use.",
+            help="Methods to load at start, optionally with parameters, as in gappo[policy=mine.safetensors]; "
+            "others are loaded on first use.",
             show_default=False,
         ),
     ] = None,
     parallel: Annotated[
-        int | None, typer.Option(min=1, max=1024, help="Runs at the same time.", show_default="processors")
+        int | None, typer.Option(min=1, max=1024, help="Parallel runs.", show_default="one per processor")
     ] = None,
-    queue: Annotated[int, typer.Option(min=0, help="Requests that may wait; further ones are turned away.")] = 64,
-    most_agents: Annotated[int, typer.Option(min=1, help="Most agents of an instance.")] = 2_000,
-    most_tasks: Annotated[int, typer.Option(min=1, help="Most tasks of an instance.")] = 500,
+    queue: Annotated[int, typer.Option(min=0, help="Requests that may wait; more are rejected.")] = 64,
+    most_agents: Annotated[int, typer.Option(min=1, help="Maximum number of agents of an instance.")] = 2_000,
+    most_tasks: Annotated[int, typer.Option(min=1, help="Maximum number of tasks of an instance.")] = 500,
     most_ms: Annotated[
-        float, typer.Option(min=0, help="Longest time limit, and that of requests without one.")
+        float, typer.Option(min=0, help="Maximum time limit of a request in milliseconds, and the default.")
     ] = 10_000,
-    most_bytes: Annotated[int, typer.Option(min=1, help="Largest request over HTTP.")] = 4_000_000,
+    most_bytes: Annotated[int, typer.Option(min=1, help="Maximum size of a request over HTTP.")] = 4_000_000,
 ) -> None:
-    """Solve for other programs.
+    """Serve requests to solve from other programs.
 
-    Requests are lines of JSON on standard input, or come over HTTP.
+    Requests are lines of JSON on standard input, or HTTP requests.
     """
     from alloc.allocators.parallel.processors import available_threads
     from alloc.allocators.serving.request import ServiceLimits
@@ -93,7 +93,7 @@ def serve_command(
 
 
 def serve_lines(service: "Service") -> None:
-    """Answer all lines that come before the input ends or a signal does."""
+    """Answer all lines until the input ends or a signal arrives."""
     from alloc.allocators.serving.lines import RequestLines
 
     arrived: SimpleQueue[str | None] = SimpleQueue()
@@ -106,7 +106,7 @@ def serve_lines(service: "Service") -> None:
 
 
 def serve_http(service: "Service", host: str, port: int, most_bytes: int) -> None:
-    """Answer requests until a signal comes; those that are open then are answered still."""
+    """Answer requests until a signal arrives; requests in progress are still answered."""
     from alloc.problems import MissingPackageError
 
     try:
@@ -118,18 +118,18 @@ def serve_http(service: "Service", host: str, port: int, most_bytes: int) -> Non
 
 
 def _methods(text: str) -> dict[str, dict[str, object]]:
-    """Return the parameters of each method that is to be loaded."""
+    """Return the parameters of each method to load."""
     methods: dict[str, dict[str, object]] = {}
     for name, given in options.listed(text, "--load").values():
         if name in methods:
-            raise typer.BadParameter(f"names {name} twice, with other parameters; give it once", param_hint="'--load'")
+            raise typer.BadParameter(f"names {name} twice with different parameters", param_hint="'--load'")
         methods[name] = given or {}
     return methods
 
 
 def _address(text: str) -> tuple[str, int]:
-    """Return host and port of ``HOST:PORT`` or ``PORT``."""
+    """Return the host and port of ``HOST:PORT`` or ``PORT``."""
     host, _, port = text.rpartition(":")
     if not (port.isdecimal() and int(port) < 2**16):
-        raise typer.BadParameter(f"{text!r} is not PORT or HOST:PORT, such as 127.0.0.1:8080", param_hint="'--http'")
+        raise typer.BadParameter(f"must be PORT or HOST:PORT, as {LOCAL}:8080, got {text!r}", param_hint="'--http'")
     return host.strip("[]") or LOCAL, int(port)

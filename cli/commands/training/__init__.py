@@ -1,1 +1,1 @@
-"""``alloc train`` and ``alloc tune``, which make the policies of learned methods."""
+"""``alloc train`` and ``alloc tune``, for the policies of learned methods."""

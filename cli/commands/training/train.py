@@ -32,9 +32,9 @@ EXAMPLES = examples(
     "alloc train ppo --output mine.safetensors --instances my-instances --init policy.safetensors --minutes 10",
     "alloc solve demo.json --method gappo --policy policy.safetensors",
     "alloc train gappo --missions mixed --output missions.safetensors --minutes 150",
-    closing="Ctrl-C ends the training; the last complete generation is stored, and --resume continues from it to the "
-    "same curve, also after a crash. With --steps or --iterations the same seed trains the same policy, on any engine; "
-    "with --minutes alone the schedules follow the clock.",
+    closing="Ctrl-C ends the training; the last complete generation is stored, and --resume continues from it with the "
+    "same results, also after a crash. With --steps or --iterations the same seed gives the same policy on any engine; "
+    "with --minutes alone the schedules depend on elapsed time.",
 )
 
 
@@ -72,7 +72,7 @@ def train_command(
 ) -> None:
     """Train a learned method.
 
-    There is a checkpoint after each generation.
+    A checkpoint is written after each generation.
     """
     state, lines = _files(output, checkpoint, log, init)
     from alloc.allocators.parallel.engines import check_engine, make_engine
@@ -116,7 +116,7 @@ def _train_in_games(
     shared: Shared,
     progress: "Progress",
 ) -> None:
-    """Train on families of instances, or on given ones."""
+    """Train on families of instances, or on given instances."""
     from alloc.allocators import train
 
     train(
@@ -135,7 +135,7 @@ def _train_in_games(
 
 @contextmanager
 def _failures_told(state: str, progress: "Progress") -> Iterator[None]:
-    """After an interrupt or a failure of the engine, say what the checkpoint holds; the latter has exit code 1."""
+    """After an interrupt or a failure of the engine, print the state of the checkpoint; failures exit with code 1."""
     from alloc.allocators import TrainingError
 
     try:
@@ -148,7 +148,7 @@ def _failures_told(state: str, progress: "Progress") -> Iterator[None]:
 
 
 def _files(output: str, checkpoint: str | None, log: str | None, init: str | None) -> tuple[str, str]:
-    """Return the names of checkpoint and log; each file can be written, and none is named twice."""
+    """Return the names of checkpoint and log, after checking that all files can be written and differ."""
     check_output(output)
     state = checkpoint or str(Path(output).with_suffix(".checkpoint"))
     lines = log or str(Path(output).with_suffix(".csv"))
@@ -159,12 +159,12 @@ def _files(output: str, checkpoint: str | None, log: str | None, init: str | Non
 
 
 class Progress:
-    """Prints a line for each generation of a training.
+    """Prints a line for each generation.
 
     Parameters
     ----------
     instances : sequence of Instance
-        Those that it trains on; none if they are generated.
+        Instances for training; empty if they are generated.
     """
 
     def __init__(self, instances: "Sequence[Instance]") -> None:
@@ -178,7 +178,7 @@ class Progress:
         return 0 if self._trainer is None else self._trainer.generation
 
     def start(self, trainer: "Trainer | MissionTrainer", limits: "Limits") -> None:
-        """Note which instances are held out; a callback for `on_start`."""
+        """Print which instances are held out; a callback for `on_start`."""
         self._trainer, self._limits = trainer, limits
         if self._instances:
             from alloc.allocators.learned.training.validation import split_notes
@@ -203,20 +203,20 @@ class Progress:
         )
 
     def close(self, policy: str) -> None:
-        """Say which networks the policy file holds, with exit code 1 if there are none."""
+        """Print which networks the policy file contains; exit with code 1 if there are none."""
         if self._trainer is None or self._trainer.generation == 0:
-            note(f"no generation is complete, and {policy} is not written")
+            note(f"no generation is complete; {policy} is not written")
             raise typer.Exit(1)
         best = self._trainer.history[self._trainer.best_generation - 1]
         say(
-            f"{policy} holds the networks of generation {best.generation}: T {best.time:.4f},"
+            f"{policy} contains the networks of generation {best.generation}: T {best.time:.4f},"
             f" distance {best.distance:.4f}, {number(best.unserved, 3)} tasks unserved"
         )
 
 
 @contextmanager
 def _interrupts() -> Iterator[None]:
-    """Treat SIGTERM as Ctrl-C: files are complete at any moment, so neither has to wait."""
+    """Treat SIGTERM as Ctrl-C; both may interrupt at any time, as files are replaced atomically."""
 
     def interrupt(_number: int, _frame: FrameType | None) -> None:
         raise KeyboardInterrupt

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 class Shared(TypedDict):
-    """Arguments of both kinds of training."""
+    """Arguments common to training on instances and on missions."""
 
     steps: int | None
     minutes: float | None
@@ -31,7 +31,7 @@ class Shared(TypedDict):
 
 
 def check_no_games(family: list[str] | None, instances: str | None, turn: TurnRule, reward: Reward) -> None:
-    """Raise an error of usage for options that mean nothing in missions."""
+    """Raise a usage error for options that do not apply to missions."""
     given = {
         "--family": family is not None,
         "--instances": instances is not None,
@@ -40,13 +40,13 @@ def check_no_games(family: list[str] | None, instances: str | None, turn: TurnRu
     }
     for name, is_given in given.items():
         if is_given:
-            raise typer.BadParameter("means nothing with --missions", param_hint=f"'{name}'")
+            raise typer.BadParameter("cannot be used with --missions", param_hint=f"'{name}'")
 
 
 def train_in_missions(
     method: str, output: str, names: list[str], decisions: int | None, shared: Shared, progress: "Progress"
 ) -> None:
-    """Train on families of missions, or on mission files where names are those of files."""
+    """Train on families of missions, or on mission files if the names are files."""
     from alloc.allocators.learned.missions.training.run import train_on_missions
     from alloc.problems import read_mission
 

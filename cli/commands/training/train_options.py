@@ -1,4 +1,4 @@
-"""Arguments and options of ``alloc train``, and those that ``alloc tune`` shares with it."""
+"""Arguments and options of ``alloc train``, some of which ``alloc tune`` shares."""
 
 from enum import StrEnum
 from typing import Annotated
@@ -8,11 +8,11 @@ import typer
 from alloc.problems.vocabulary import Reward, TurnRule
 
 STEPS = 500_000
-"""Decisions of agents in a training without any other limit."""
+"""Default number of agents' decisions if no other limit is given."""
 
 
 class Engine(StrEnum):
-    """As `alloc.allocators.parallel.engines.ENGINES`, without numpy."""
+    """Names of `alloc.allocators.parallel.engines.ENGINES`, without loading numpy."""
 
     SERIAL = "serial"
     PROCESSES = "processes"
@@ -26,7 +26,7 @@ StepsOption = Annotated[
     typer.Option(
         min=1,
         help="Decisions of agents, of the whole population and including those before --resume.",
-        show_default=f"{STEPS}; none where --minutes or --iterations is given",
+        show_default=f"{STEPS}; none if --minutes or --iterations is given",
     ),
 ]
 MinutesOption = Annotated[float | None, typer.Option(help="Minutes of training, including those before --resume.")]
@@ -34,7 +34,7 @@ GenerationsOption = Annotated[
     int | None, typer.Option("--iterations", min=0, help="Generations, including those before --resume.")
 ]
 PatienceOption = Annotated[
-    int | None, typer.Option(min=1, help="Stop after so many generations without better networks.")
+    int | None, typer.Option(min=1, help="Stop after this many generations without improvement.")
 ]
 FamilyOption = Annotated[
     list[str] | None,
@@ -49,27 +49,27 @@ TrainingInstancesOption = Annotated[
     str | None,
     typer.Option(
         metavar="FILE|DIR",
-        help="Train on these instances instead; of five or more, a random fifth is held out for validation.",
+        help="Train on these instances instead; a random fifth of five or more is held out for validation.",
     ),
 ]
 MissionsOption = Annotated[
     list[str] | None,
     typer.Option(
         metavar="FAMILY|FILE",
-        help="Train in missions instead, for alloc simulate --policy gappo: families of missions, as of "
+        help="Train on missions instead, for alloc simulate --policy gappo: families of "
         "alloc generate mission, mixed for all of them, or mission files; may be repeated.",
     ),
 ]
 InitOption = Annotated[str | None, typer.Option(metavar="POLICY", help="Start from the networks of this policy file.")]
 PopulationOption = Annotated[
-    int | None, typer.Option(min=1, help="Networks that are trained and bred; for gappo only.", show_default="4")
+    int | None, typer.Option(min=1, help="Networks in the population; for gappo only.", show_default="4")
 ]
 GenerationStepsOption = Annotated[
     int | None,
     typer.Option(
         min=1,
         help="Decisions of agents per network and generation.",
-        show_default="20000; 60000 in missions",
+        show_default="20000; 60000 on missions",
     ),
 ]
 FormerGenerationStepsOption = Annotated[
@@ -81,11 +81,11 @@ HyperparametersOption = Annotated[
         "--set",
         metavar="NAME=VALUE",
         help="A hyperparameter of the method, such as clip_coef=0.1; may be repeated. An unknown name, such as help=, "
-        "prints all that the method has, with their defaults.",
+        "prints all hyperparameters with their defaults.",
     ),
 ]
-TurnOption = Annotated[TurnRule, typer.Option(help="Who moves: the highest bids, or all agents at once.")]
-RewardOption = Annotated[Reward, typer.Option(help="Makespan, or the paper's coverage (3).")]
+TurnOption = Annotated[TurnRule, typer.Option(help="Which agents move in a step: the highest bids, or all at once.")]
+RewardOption = Annotated[Reward, typer.Option(help="Reward: the makespan, or the paper's coverage (3).")]
 ResumeOption = Annotated[bool, typer.Option("--resume", help="Continue from the checkpoint.")]
 CheckpointOption = Annotated[
     str | None,
@@ -93,19 +93,19 @@ CheckpointOption = Annotated[
 ]
 LogOption = Annotated[
     str | None,
-    typer.Option(metavar="FILE", help="A CSV line for each generation.", show_default="OUTPUT with .csv"),
+    typer.Option(metavar="FILE", help="CSV file with a row per generation.", show_default="OUTPUT with .csv"),
 ]
 TensorBoardOption = Annotated[
     str | None, typer.Option(metavar="DIR", help="Also write event files for TensorBoard there.")
 ]
 EngineOption = Annotated[Engine, typer.Option(help="Where the networks of the population are trained.")]
 WorkersOption = Annotated[
-    int | None, typer.Option(min=1, max=1024, help="For --engine processes.", show_default="all processors")
+    int | None, typer.Option(min=1, max=1024, help="Workers of --engine processes.", show_default="all processors")
 ]
 AddressOption = Annotated[
     str | None,
     typer.Option(
-        help="For --engine ray: head of the cluster.", show_default="RAY_ADDRESS, else the cluster on this machine"
+        help="Address of the cluster, for --engine ray.", show_default="RAY_ADDRESS, else the cluster on this machine"
     ),
 ]
 TorchThreadsOption = Annotated[

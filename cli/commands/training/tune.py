@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 EXAMPLES = examples(
     "alloc tune ppo --study ppo.db --trials 40 --steps 200000",
     "alloc tune ppo --study ppo.db --trials 80 --steps 200000",
-    closing="The second line continues the first; several processes may share a study. At the end, the options for "
-    "`alloc train` are printed.",
+    closing="The second example continues the study of the first; several processes may share a study. At the end, the "
+    "options for `alloc train` are printed.",
 )
 
 
@@ -30,17 +30,17 @@ def register(app: typer.Typer) -> None:
 def tune_command(
     method: MethodArgument,
     study: Annotated[str, typer.Option(metavar="FILE", help="SQLite file of the study; an existing one is continued.")],
-    trials: Annotated[int, typer.Option(min=1, help="Trainings, including those in the file.")] = 40,
-    steps: Annotated[int, typer.Option(min=1, help="Decisions of agents in each.")] = 100_000,
+    trials: Annotated[int, typer.Option(min=1, help="Number of trials, including those in the file.")] = 40,
+    steps: Annotated[int, typer.Option(min=1, help="Decisions of agents per trial.")] = 100_000,
     family: Annotated[
         list[str] | None,
         typer.Option(metavar="NAME", help="As for `alloc train`; may be repeated.", show_default="mixed"),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, help="Seed of all random numbers.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, help="Random seed.")] = 0,
 ) -> None:
     """Tune the hyperparameters of a learned method.
 
-    Trials are judged by validation games.
+    Trials are scored on validation games.
     """
     check_output(study)
     from alloc.allocators.learned.algorithms.registry import method_parameters

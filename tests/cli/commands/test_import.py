@@ -72,7 +72,7 @@ def test_columns_are_named_by_the_user(alloc):
     [
         (["--map", "foo=Drone"], "alloc: --map: there is no field 'foo'"),
         (["--map", "id=Dron"], "alloc: --map: id=Dron: no table has a column 'Dron'"),
-        (["--map", "ability"], "alloc: --map: 'ability' is not NAME=VALUE"),
+        (["--map", "ability"], "alloc: --map: must be NAME=VALUE, got 'ability'"),
         (["--map", "ability=Paylod"], "alloc: agents.csv: there is no column 'Paylod' (did you mean 'Payload'?)"),
         (["--units", "speed=kmh"], "alloc: --units: there is no quantity 'speed'"),
         (["--distances", "none.csv"], "alloc: none.csv: there is no such file; check the path"),

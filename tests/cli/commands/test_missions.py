@@ -194,8 +194,8 @@ def test_policies_and_methods_are_not_mixed(alloc, mission, small):
         ((mission, "--methods", "greedy"), "`alloc compare --policies` take missions"),
         ((mission,), "give either --methods, for instances, or --policies, for missions"),
         ((mission, "--methods", "greedy", "--policies", "greedy"), "give either --methods"),
-        ((mission, "--policies", "greedy", "--iterations", "3"), "--iterations: goes with --methods only"),
-        (("small.json", "--methods", "greedy", "--knowledge", "full"), "--knowledge: goes with --policies only"),
+        ((mission, "--policies", "greedy", "--iterations", "3"), "--iterations: can only be used with --methods"),
+        (("small.json", "--methods", "greedy", "--knowledge", "full"), "--knowledge: can only be used with --policies"),
         ((mission, "--policies", "gredy"), "--policies: there is no policy 'gredy'"),
     ):
         ran = alloc("compare", *arguments)
@@ -268,7 +268,7 @@ def test_files_of_others_are_imported(alloc):
     ran = alloc("import-mission", "london", str(folder / "calls.csv"), *dated)
     assert len(ran.json["tasks"]) == 3
     for arguments, told in (
-        (("space", str(folder / "space.yaml"), "--compress", "2"), "--compress: is for records, not for space"),
+        (("space", str(folder / "space.yaml"), "--compress", "2"), "--compress: is for records only, not for space"),
         (("london", str(folder / "calls.csv"), "--until", "soon"), "--until"),
         (("london", str(folder / "calls.csv"), "--compress", "0"), "--compress: must be a finite number > 0"),
         (("london", str(folder / "calls.csv"), "--from", "2022-01-01", "--until", "2021-01-01"), "--until: must not"),

@@ -135,6 +135,6 @@ def test_instances_are_named_alike_with_and_without_a_store(alloc):
         alloc("generate", "mission", *sizes, "--output", f"missions/{seed}.json")
     for source, count in (("missions", 2), ("missions/[2-9].json", 1)):
         assert len(alloc("compare", source, "--policies", "nearest", "--json").json["rows"]) == count
-    for source, wrong in (("empty", "empty: holds no missions"), ("*.npz", "*.npz: matches no file")):
+    for source, wrong in (("empty", "empty: contains no missions"), ("*.npz", "*.npz: matches no file")):
         ran = alloc("compare", source, "--policies", "nearest")
         assert (ran.code, ran.err) == (2, f"alloc: {wrong}\n")

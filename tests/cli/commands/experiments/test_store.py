@@ -85,7 +85,7 @@ def test_other_budgets_are_other_runs(alloc):
     alloc("compare", f"{TINY}:0", "--methods", "greedy", *QUICK)
     other = alloc("compare", f"{TINY}:0", "--methods", "greedy", "--iterations", "6", "--store", "runs.db")
     assert "1 run made" in other.err
-    assert "runs.db also holds 1 run with iterations 5, which do not count here" in other.err
+    assert "runs.db also contains 1 run with iterations 5, which are ignored here" in other.err
 
 
 @pytest.mark.usefixtures("in_process")
@@ -129,9 +129,9 @@ def test_sources_of_instances(alloc):
     ("source", "message"),
     [
         ("none/*.json", "none/*.json: matches no file"),
-        ("paper-1:3-2", "paper-1:3-2: must be from a seed to a later one"),
-        ("random[agent=3]:0", "random[agent=3]:0: agent: is no parameter of a random family"),
-        ("covering[agent=3]:0", "covering[agent=3]:0: agent: is no parameter of a covering family"),
+        ("paper-1:3-2", "paper-1:3-2: must be an ascending range of"),
+        ("random[agent=3]:0", "random[agent=3]:0: agent: is not a parameter of a random family"),
+        ("covering[agent=3]:0", "covering[agent=3]:0: agent: is not a parameter of a covering family"),
         ("covering[ability_min=x]:0", "covering[ability_min=x]:0: ability_min: must be a finite number"),
         ("random[agents=0]:0", "random[agents=0]:0: agents: must be"),
         ("paper-1[agents=3]:0", "paper-1[agents=3]:0: paper-1: takes no parameters"),
@@ -153,7 +153,7 @@ def test_wrong_sources_are_one_line(alloc, source, message):
     [
         ("ga[populatoin=3]", "populatoin"),
         ("gredy", "there is no method 'gredy' (did you mean 'greedy'?)"),
-        ("ga[population=3", "must be like ga[population=200]"),
+        ("ga[population=3", "must have the form ga[population=200]"),
     ],
 )
 def test_wrong_methods_are_one_line(alloc, methods, message):
@@ -197,11 +197,11 @@ def test_a_full_disk_is_one_line_and_loses_nothing(alloc, plugin):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("--memory", "4G"), "--memory: goes with --store only"),
-        (("--retry",), "--retry: goes with --store only"),
-        (("--engine", "ray"), "--engine: goes with --store only"),
-        (("--store", "runs.db", "--address", "here:1"), "--address: goes with --engine ray only"),
-        (("--store", "runs.db", "--memory", "4"), "'4' is not like 800M or 4G"),
+        (("--memory", "4G"), "--memory: can only be used with --store"),
+        (("--retry",), "--retry: can only be used with --store"),
+        (("--engine", "ray"), "--engine: can only be used with --store"),
+        (("--store", "runs.db", "--address", "here:1"), "--address: can only be used with --engine ray"),
+        (("--store", "runs.db", "--memory", "4"), "must be an amount such as 800M or 4G, got '4'"),
         (("--store", "runs.db", "--memory", "4M"), "must be at least 100M"),
         (("--store", "runs.db", "--kill-after", "0"), "must be more than 0 seconds"),
         (("--store", "runs.db", "--time-limit", "1", "--workers", "999"), "--workers: 999 timed runs"),
@@ -231,7 +231,7 @@ def test_ctrl_c_keeps_what_has_ended(plugin):
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 1
-    assert "interrupted; the same command goes on from here" in errors
+    assert "interrupted; the same command resumes from here" in errors
     store = sqlite3.connect(plugin / "runs.db")
     assert store.execute("SELECT count(*) FROM leases").fetchone() == (0,)
     assert 1 <= store.execute("SELECT count(*) FROM runs").fetchone()[0] < 500
@@ -283,7 +283,7 @@ def test_policies_in_missions_are_kept(alloc, plugin):
     assert "0 runs made" in alloc(*words, "--store", "runs.db").err
     more = alloc(*words, "--knowledge", "full", "--store", "runs.db")
     assert "4 runs made; runs.db has 4 of 4" in more.err
-    assert "runs.db also holds 4 runs with knowledge local" in more.err
+    assert "runs.db also contains 4 runs with knowledge local" in more.err
     assert "## Against nearest, in the same missions" in Path("table.md").read_text()
     (mean,) = (
         sqlite3.connect("runs.db")
@@ -300,5 +300,5 @@ def test_before_the_first_run_has_ended_there_is_nothing_to_compare(alloc, monke
     monkeypatch.setattr("alloc.allocators.experiments.campaign.Campaign.run", lambda self, stop: False)
     ran = alloc("compare", f"{TINY}:1", "--methods", "greedy,auction", *QUICK)
     assert (ran.code, ran.out) == (1, "")
-    assert "note: interrupted; the same command goes on from here" in ran.err
+    assert "note: interrupted; the same command resumes from here" in ran.err
     assert "Against" not in ran.err

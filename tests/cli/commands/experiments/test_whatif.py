@@ -48,7 +48,7 @@ def test_unserved_tasks_give_exit_code_1(alloc, unservable):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--add", "a1"), """--add: 'a1' is not "like ID\""""),
+        (("--add", "a1"), """--add: must be "like ID\""""),
         (("--add", "like a9"), "--add: no agent 'a9'"),
         (("--remove", "a9"), "--remove: no agent 'a9'"),
         ((), "--add: names no agent"),
