@@ -1,4 +1,4 @@
-"""A ground station around `MissionPlanner`: telemetry in, orders out, while an agent fails and a task comes in.
+"""A ground station with `MissionPlanner`: telemetry in, orders out, with a failing agent and a new task.
 
 Run ``python examples/ground_station.py``.
 """
@@ -10,7 +10,7 @@ from alloc.problems import Instance
 
 STEP_H = 0.25
 WIND = 0.8
-"""The drones are slower than the planner thinks: what they report corrects it."""
+"""Factor on the speed of the drones, which the planner does not know but corrects from their reports."""
 
 FLEET = Instance(
     agent_ids=["d1", "d2", "d3", "d4"],
@@ -25,7 +25,7 @@ FLEET = Instance(
 
 
 class Drones:
-    """Stands for the drones of a real station: flies and works by the orders, and reports."""
+    """Simulated drones: they fly and work as ordered, and report."""
 
     def __init__(self) -> None:
         self.place = dict(zip(FLEET.agent_ids, FLEET.agent_position[:, :2].tolist(), strict=True))
@@ -33,7 +33,7 @@ class Drones:
         self.left = dict(zip(FLEET.task_ids, FLEET.workload.tolist(), strict=True))
 
     def step(self, orders):
-        """Let the drones do for a while what they are ordered; return their telemetry."""
+        """Let the drones follow their orders for a time step; return their telemetry."""
         for name, order in orders.items():
             if order.task is None:
                 continue
@@ -50,7 +50,7 @@ class Drones:
 
 
 def main() -> None:
-    """Lead the drones until all is done."""
+    """Run the station until all tasks are done."""
     drones = Drones()
     with MissionPlanner(FLEET, "routes", deadline_ms=1000) as planner:
         hour, orders = 0.0, planner.plan()

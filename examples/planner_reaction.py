@@ -1,4 +1,4 @@
-"""How long `MissionPlanner.plan` takes after an event, with a fleet of your own or a drawn one: quantiles.
+"""Measure quantiles of the time that `MissionPlanner.plan` takes after an event, with a given or a random fleet.
 
 python examples/planner_reaction.py examples/earthquakes/alaska.json --policy greedy --events 100
 python examples/planner_reaction.py --agents 500 --tasks 50 --events 10000 --policy gappo --deadline-ms 20
@@ -18,7 +18,7 @@ from alloc.problems import Instance, read_instance
 
 
 def fleet(rng: np.random.Generator, n: int, m: int) -> Instance:
-    """Return agents and tasks in a square, with batteries that are enough."""
+    """Return agents and tasks in a square, with sufficient batteries."""
     return Instance(
         ability=rng.uniform(1, 5, n),
         workload=rng.uniform(50, 150, m) * n / m,
@@ -30,7 +30,7 @@ def fleet(rng: np.random.Generator, n: int, m: int) -> Instance:
 
 
 def happening(instance: Instance, rng: np.random.Generator) -> Iterator[dict[str, object]]:
-    """Yield events that can happen, so that about as many agents and tasks are there as at the beginning."""
+    """Yield random valid events that keep the numbers of agents and tasks roughly constant."""
     away, here, tasks = list[str](), list(instance.agent_ids), list(instance.task_ids)
     places = np.concatenate([instance.agent_position, instance.task_position])
     low, high = np.nanmin(places, axis=0), np.nanmax(places, axis=0)
@@ -58,7 +58,7 @@ def happening(instance: Instance, rng: np.random.Generator) -> Iterator[dict[str
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("instance", nargs="?", help="a file with agents and tasks; some are drawn by default")
+    parser.add_argument("instance", nargs="?", help="a file with agents and tasks; random ones by default")
     for name, default in (("agents", 500), ("tasks", 50), ("events", 1000), ("seed", 0)):
         parser.add_argument(f"--{name}", type=int, default=default)
     parser.add_argument("--deadline-ms", type=float, default=100.0)
@@ -87,11 +87,11 @@ def main() -> None:
             old += not plan.is_new
             changed += len(plan.changes)
             assert plan.problem is None, plan.problem
-    for name, times in (("submit", submits), ("plan", plans), ("plan, time of processors", busy)):
+    for name, times in (("submit", submits), ("plan", plans), ("plan, processor time", busy)):
         quantiles = ", ".join(f"{one:.1f}" for one in np.percentile(times, [50, 90, 99, 99.9, 100]))
         print(f"{name}: ms at 50, 90, 99, 99.9, 100 %: {quantiles}")
     late = sum(value > given.deadline_ms for value in plans)
-    print(f"past the deadline: {late} of {given.events}; last plan instead of a new one: {old}; changes {changed}")
+    print(f"past the deadline: {late} of {given.events}; previous plan kept: {old}; changes: {changed}")
 
 
 if __name__ == "__main__":

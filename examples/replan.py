@@ -1,4 +1,4 @@
-"""A planner that re-plans as drones drop out and tasks come in, and leaves as many drones as it can where they are.
+"""A planner that re-plans as drones drop out and tasks are added, and reassigns as few drones as possible.
 
 Run ``python examples/replan.py``.
 """
@@ -17,14 +17,14 @@ SHOWN = 5
 
 
 class Planner:
-    """Keeps a plan for the drones and the tasks that there are.
+    """Keeps a plan for the current drones and tasks.
 
     Parameters
     ----------
     path : Path
         The instance.
     allocator : Allocator
-        Loaded once; a policy would be read once.
+        Loaded once, including its policy, if any.
     """
 
     def __init__(self, path: Path, allocator: Allocator) -> None:
@@ -34,15 +34,15 @@ class Planner:
         self.plan = first.allocation.to_ids(self.instance)
 
     def replan(self) -> Result:
-        """Move as few drones as possible, so that all is done at most `SLACK` later than it could be."""
+        """Reassign as few drones as possible, with a makespan at most `SLACK` above the shortest one found."""
         result = solve(
             self.instance,
             self._allocator,
             objective="makespan-moves",
             makespan_slack=SLACK,
-            start=self.plan,  # drones and tasks that have gone since are left out
+            start=self.plan,  # drones and tasks that no longer exist are dropped
             time_limit_s=BUDGET_S,
-            handle_signals=False,  # the program that embeds this has its own
+            handle_signals=False,  # left to the embedding program
         )
         assert result.allocation is not None
         self.plan = result.allocation.to_ids(self.instance)
@@ -50,14 +50,14 @@ class Planner:
 
 
 def main() -> None:
-    """Plan; then a drone drops out and a task comes in, and forty drones drop out."""
+    """Plan; re-plan after a drone drops out and a task is added, and after forty drones drop out."""
     rng = np.random.default_rng(0)
     planner = Planner(EARTHQUAKES, load("local-search"))
     print(f"{planner.instance.n} drones, {planner.instance.m} sites")
     site = planner.instance.task_position.mean(axis=0)
     busy = [name for name, task in planner.plan.items() if task is not None]
     changes = [
-        ("a drone drops out, and a task comes in", busy[:1], [{"id": "new", "workload": 60.0, "position": site}]),
+        ("a drone drops out, and a task is added", busy[:1], [{"id": "new", "workload": 60.0, "position": site}]),
         ("forty drones drop out", rng.choice(busy[1:], 40, replace=False).tolist(), []),
     ]
     for what, gone, added in changes:

@@ -1,4 +1,4 @@
-"""Solve a small problem from Python, read the scores, and see what is proven.
+"""Solve a small problem from Python, and print scores and proven bounds.
 
 Run ``python examples/solve_from_python.py``.
 """
@@ -8,7 +8,7 @@ from alloc.problems import Instance
 
 
 def main() -> None:
-    """Three crews and two robots, two sites."""
+    """Solve an instance with three crews, two robots and two sites."""
     instance = Instance(
         name="two sites",
         agent_ids=["crew 1", "crew 2", "crew 3", "robot 1", "robot 2"],
@@ -25,7 +25,7 @@ def main() -> None:
 
 
 def report(result: Result) -> None:
-    """Print who goes where, and how good that is."""
+    """Print the assignment and its scores."""
     assert result.allocation is not None
     print(f"{result.objective}: {result.status}, {result.makespan:.3g} h, energy {result.energy:.3g}")
     for agent, task in result.allocation.to_ids(result.instance).items():

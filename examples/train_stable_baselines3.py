@@ -1,7 +1,7 @@
-"""Train PPO of Stable-Baselines3 on a tiny instance, and compare its plan with what is known.
+"""Train PPO of Stable-Baselines3 on a tiny instance, and compare its plan with random, greedy and optimal ones.
 
-Run ``python examples/train_stable_baselines3.py``; it takes ``pip install 'alloc-mrta[env]' stable-baselines3``.
-For action masks put MaskablePPO of sb3-contrib in place of PPO: `BiddingEnv.action_masks` is what it asks for.
+Run ``python examples/train_stable_baselines3.py`` after ``pip install 'alloc-mrta[env]' stable-baselines3``.
+For action masks, replace PPO by MaskablePPO of sb3-contrib, which calls `BiddingEnv.action_masks`.
 """
 
 import argparse
@@ -17,14 +17,14 @@ from alloc.problems.environments import BiddingEnv
 
 
 def train(problem: Instance, steps: int, seed: int) -> PPO:
-    """Play four games at a time; PPO knows of no masks, so that illegal bids must cost a little."""
+    """Train on four parallel games; PPO does not support masks, so that illegal bids have a small penalty."""
     games = make_vec_env(lambda: BiddingEnv([problem], illegal_reward=-0.05), n_envs=4, seed=seed)
     model = PPO("MlpPolicy", games, n_steps=128, batch_size=128, learning_rate=1e-3, seed=seed, device="cpu")
     return model.learn(steps)
 
 
 def plan_of(model: PPO, problem: Instance) -> dict[str, float]:
-    """Play one game without chance, and return the scores of its plan; an illegal bid is taken for stopping."""
+    """Play one deterministic game, and return the scores of its plan; an illegal bid ends the game."""
     game, over, info = BiddingEnv([problem]), False, {}
     seen, _ = game.reset(seed=0)
     while not over:
@@ -36,7 +36,7 @@ def plan_of(model: PPO, problem: Instance) -> dict[str, float]:
 
 
 def random_makespan(problem: Instance, seed: int) -> float:
-    """Mean makespan of random plans that serve every task."""
+    """Return the mean makespan of random plans that serve every task."""
     rng = np.random.default_rng(seed)
     plans = [evaluate(problem, Allocation(rng.integers(0, problem.m, problem.n))) for _ in range(1000)]
     return float(np.mean([plan.makespan for plan in plans if plan.makespan is not None]))

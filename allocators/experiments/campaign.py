@@ -1,4 +1,4 @@
-"""A campaign: all runs of a comparison that a store has not yet, several at a time, each in a process of its own."""
+"""Campaigns: execute all runs of a comparison that are missing in a store, in parallel and in separate processes."""
 
 import contextlib
 import math
@@ -23,18 +23,18 @@ from alloc.problems import InputError, Instance, Mission
 from alloc.problems.text import counted
 
 OTHERS_S = 0.3
-"""Seconds between two looks at what other commands have left to do."""
+"""Seconds between two polls of the runs that other commands have left."""
 
 MOST_WARM = 12
-"""Processes that wait for another run of their method; beyond, the one that has waited longest is ended."""
+"""Maximum number of idle processes kept for further runs of their method; the longest idle one is ended first."""
 
 OVERRUN, OVERRUN_S = 1.2, 10.0
-"""A run is ended, by default, when it takes longer than this factor times its time limit and so many seconds more."""
+"""Default limit on the duration of a run: this factor times its time limit, plus this many seconds."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """A run that is wanted, with what it takes to make it."""
+    """A run to execute, with its problem and parameters."""
 
     run: Run
     settings: dict[str, object]
@@ -43,17 +43,17 @@ class Job:
 
 @dataclass(frozen=True)
 class Means:
-    """With what the runs are made; none of it decides how they end, unless they hit a limit.
+    """Resources for the runs; they do not affect results unless a run exceeds a limit.
 
     Attributes
     ----------
     workers : int, optional
-        Runs at a time; as many as have processors of their own by default.
+        Parallel runs; by default, as many as have their own processors.
     memory_mb : float, optional
-        Memory of one run, with all processes that it starts, in MiB; by default its part of most of the machine's.
+        Memory of a run, including all processes that it starts, in MiB; by default its share of the machine's memory.
     kill_after_s : float, optional
-        Seconds after which a run is ended. By default 1.2 times the time limit and 10 s more; no limit where there is
-        no time limit.
+        Seconds after which a run is killed; by default 1.2 times the time limit plus 10 s, or never without a time
+        limit.
     """
 
     workers: int | None = None
@@ -63,7 +63,7 @@ class Means:
 
 @dataclass
 class _Slot:
-    """A place for one run at a time: its processors, the run, and the idle processes by method."""
+    """A slot for one run at a time: its processors, the current run, and idle processes by method."""
 
     cores: Cores
     idle: dict[str, Handle] = field(default_factory=dict)
@@ -75,25 +75,25 @@ class _Slot:
 
 
 class Campaign:
-    """Makes the runs that a store has not yet.
+    """Executes the runs that are missing in a store.
 
     Parameters
     ----------
     store : Store
     jobs : sequence of Job
-        In the order in which they are made; all with the same budget and threads.
+        In order of execution; all with the same budget and threads.
     means : Means
     on_end : callable
-        Called with each run that this command has made, and how it ended.
+        Called with each run that this command has executed, and its ending.
     on_wait : callable
-        Called once if other commands have all processors.
+        Called once if other commands occupy all processors.
     place : Place, optional
-        Where runs are made; this machine by default.
+        Where runs are executed; by default this machine.
 
     Raises
     ------
     InputError
-        If there are not so many processors; its place is ``workers``.
+        If there are too few processors (`place` is ``workers``).
     """
 
     def __init__(
@@ -126,7 +126,7 @@ class Campaign:
         self._instances: dict[str, bytes] = {}
 
     def run(self, stop: threading.Event) -> bool:
-        """Make the runs, until all have ended here or elsewhere; False if `stop` was set before."""
+        """Execute the runs until all have ended, here or in other commands; return False if `stop` is set before."""
         try:
             while not stop.is_set():
                 self._open_slots()
@@ -146,7 +146,7 @@ class Campaign:
             self._close()
 
     def _open_slots(self) -> None:
-        """Take processors as long as there are too few slots; other commands may free some later."""
+        """Acquire processors while slots are missing; other commands may release some later."""
         if time.monotonic() - self._opened_at < OTHERS_S:
             return
         self._opened_at = time.monotonic()
@@ -162,7 +162,7 @@ class Campaign:
             self._on_wait = lambda: None
 
     def _assign(self) -> None:
-        """Give every free slot a run, as long as there are some that nobody works on."""
+        """Assign a run to every free slot, as long as there are unclaimed runs."""
         for slot in self._slots:
             if slot.worker is not None or not self._pending or time.monotonic() - self._asked_at < OTHERS_S:
                 continue
@@ -191,7 +191,7 @@ class Campaign:
             one.at_once = max(one.at_once, len(busy))
 
     def _pickled(self, job: Job) -> bytes:
-        """Return the instance of a job; only the last one is kept, as runs on one instance follow each other."""
+        """Return the pickled problem of a job; only the last one is cached, as runs on one problem are consecutive."""
         if job.run.instance not in self._instances:
             self._instances = {job.run.instance: pickle.dumps(job.instance)}
         return self._instances[job.run.instance]
@@ -237,7 +237,7 @@ class Campaign:
         for slot in self._slots:
             if slot.worker is not None and slot.job is not None:
                 slot.worker.end()
-                with contextlib.suppress(InputError):  # what is wrong with the file is what led here
+                with contextlib.suppress(InputError):  # closing follows a failure of this file
                     self._store.release(slot.job.run.key)
             for worker in slot.idle.values():
                 worker.end()
@@ -245,11 +245,11 @@ class Campaign:
 
 
 def _check_workers(workers: int | None, threads: int, room: int, *, pinned: bool) -> None:
-    """Raise an error for more timed runs at a time than there are processors, as they never share one."""
+    """Raise an error if there are more parallel timed runs than processors, as these never share one."""
     if pinned and (workers or 1) > room:
         raise InputError(
-            f"{workers or 1} timed runs of {counted(threads, 'thread')} at a time need {(workers or 1) * threads} "
-            f"processors, and there is room for {room}; take fewer workers or threads, or limit iterations instead of "
+            f"{workers or 1} parallel timed runs of {counted(threads, 'thread')} need {(workers or 1) * threads} "
+            f"processors, and there is room for {room}; use fewer workers or threads, or limit iterations instead of "
             "time",
             "workers",
         )

@@ -1,4 +1,4 @@
-"""Several methods on several instances and seeds: one row per method and instance."""
+"""Comparison of methods on instances and seeds: one row per method and instance."""
 
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -21,34 +21,34 @@ from alloc.problems.arguments import event, listed, of_type
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """The figures of one method on one instance, over all seeds.
+    """Results of one method on one instance, over all seeds.
 
     Attributes
     ----------
     instance, method : str
     picked : str
-        The method that ran, where it is ``auto``.
+        The method that ``auto`` picked; empty for other methods.
     agents, tasks : int
     runs : int
-        Runs that the figures are taken over; 0 for a refusal.
+        Number of runs; 0 after a refusal.
     statuses : str
-        The status that all runs ended with, or all of them, separated by ``/``.
+        The distinct statuses of the runs, separated by ``/``.
     unserved : int or None
-        Most tasks left unserved in a run.
+        Maximum number of unserved tasks in a run.
     makespan_mean, makespan_worst : float or None
-        In hours; None if a run left a task unserved, as are the bounds and the gaps.
+        In hours; None, like bounds and gaps, if a run left a task unserved.
     lower_bound : float or None
         Best bound on the makespan that a run proved.
     gap_mean, gap_worst : float or None
-        Of the makespan, each run against the bound that it proved itself; see `share_bounds`.
+        Gap of the makespan of each run to the bound that this run proved; see `share_bounds`.
     energy_mean, energy_worst : float or None
     runtime_mean_s, runtime_worst_s : float or None
     reason : str
-        Why there are no figures: what the method refuses, which package is not installed, or how it failed.
+        Why there are no results: a refusal, a missing package, or a failure.
     number : int
-        Number of the instance, from 1, as names may repeat.
+        Number of the instance, from 1, as names need not be unique.
     makespans : tuple of float
-        Of each run that served all tasks; not in `to_dict`.
+        Makespan of each run that served all tasks; not in `to_dict`.
     """
 
     instance: str
@@ -83,7 +83,7 @@ class Row:
 
 
 Methods = Sequence[str | Allocator] | Mapping[str, str | Allocator]
-"""Names of methods and allocators; where a mapping, with the name that each has in the rows."""
+"""Names of methods, or allocators; in a mapping, by their label in the rows."""
 
 
 def compare(
@@ -104,25 +104,25 @@ def compare(
     ----------
     instances : iterable of Instance
     methods : sequence or dict
-        Names, each of which is loaded once, and allocators with their own parameters, which the rows call such as
-        ``ga[population=20]``. The keys of a dict are names of one's own for the rows:
+        Names, each of which is loaded once, and allocators with their own parameters, whose labels in the rows are
+        such as ``ga[population=20]``. The keys of a dict are custom labels:
         ``{"small": GeneticAlgorithm(population=20), "large": GeneticAlgorithm(population=200)}``.
     seeds : sequence of int
     objective, time_limit_s, iterations, target_gap, threads
-        As in `solve`; the budget is that of each single run.
+        As in `solve`; the budget applies to each run.
     stop : threading.Event, optional
-        Setting it ends the comparison; the run in progress is dropped.
+        Ends the comparison when set; the run in progress is discarded.
 
     Returns
     -------
     iterator of Row
-        Each as soon as all its runs are done. A method that refuses an instance, is not installed, or fails gives a
-        row with the reason; the traceback of a failure goes to the logger ``alloc``.
+        Each row as soon as its runs are complete. If a method refuses an instance, is not installed, or fails, its
+        row has the reason; the traceback of a failure goes to the logger ``alloc``.
 
     Raises
     ------
     InputError
-        If an argument is not what it should be; its place is the parameter.
+        If an argument is invalid; `place` names the parameter.
     """
     given = by_label(methods, Allocator, _label, "methods")  # type: ignore[type-abstract]
     numbers = [checked_seed(seed, "seeds") for seed in listed(seeds, "seeds", "whole numbers")]
@@ -148,12 +148,12 @@ def compare(
 
 
 def _label(method: Allocator) -> str:
-    """Return what an allocator is called in the rows, such as ``ga[population=20]``."""
+    """Return the label of an allocator in the rows, such as ``ga[population=20]``."""
     return labelled_method(method.method.name, method.changed_parameters())
 
 
 def _run(run: Callable[..., Result], instance: Instance, method: str | Allocator, seed: int) -> Result | None:
-    """Return the result of a run, None if it was interrupted."""
+    """Return the result of a run, or None if it was interrupted."""
     result = run(instance, method, seed=seed)
     return None if result.stop_reason is StopReason.INTERRUPTED else result
 
@@ -166,7 +166,7 @@ def summarise(instance: Instance, method: str, results: Sequence[Result], reason
     results : sequence of Result
         One per seed.
     reason : str
-        Why there are none.
+        Why there are no results.
     """
     row = Row(instance=instance.name, method=method, agents=instance.n, tasks=instance.m, reason=reason)
     scores = [result.evaluation for result in results]
@@ -175,18 +175,18 @@ def summarise(instance: Instance, method: str, results: Sequence[Result], reason
 
 
 def with_figures(row: Row, runs: Sequence[Result | Ending], picked: Sequence[str], unserved: Sequence[int]) -> Row:
-    """Return a row with the figures of some runs.
+    """Return a copy of a row with the results of runs filled in.
 
     Parameters
     ----------
     row : Row
-        Without figures.
+        Row without results.
     runs : sequence of Result or Ending
-        One at least, all with a result.
+        At least one; all of them have a result.
     picked : sequence of str
-        The method that each ran.
+        Method that each run used.
     unserved : sequence of int
-        How many tasks each left unserved.
+        Number of unserved tasks of each run.
     """
     makespan, gap, energy, runtime = (
         mean_and_worst([getattr(run, name) for run in runs]) for name in ("makespan", "gap", "energy", "runtime_s")
@@ -211,9 +211,9 @@ def with_figures(row: Row, runs: Sequence[Result | Ending], picked: Sequence[str
 
 
 def share_bounds(rows: Sequence[Row]) -> list[Row]:
-    """Return the rows with all gaps against the best bound that any method proved on the instance.
+    """Return the rows with all gaps computed from the best bound that any method proved on the instance.
 
-    A bound holds for every method; against its own, a method that proves little would look worse than it is.
+    A bound holds for every method; with its own bound, a method that proves little would look worse than it is.
 
     Parameters
     ----------
@@ -236,12 +236,12 @@ def _against(row: Row, bound: float) -> Row:
 
 
 def _load(name: str) -> str | Allocator | Exception:
-    """Load a method once; `auto` stays a name, and an error goes into the rows."""
+    """Load a method once; `auto` stays a name, and an error is returned for the rows."""
     if name == "auto":
         return name
     try:
         return load(name)
     except InputError as error:
         return error
-    except Exception as error:  # the figures of the others do not depend on a faulty plugin
+    except Exception as error:  # a faulty plugin must not affect other methods
         return load_failure(f"method {name!r}", error)

@@ -1,4 +1,4 @@
-"""Policies against the first one: differences in the same missions with the same seeds, with 95 % intervals."""
+"""Paired differences of policies from the first one, on the same missions and seeds, with 95 % intervals."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -14,16 +14,16 @@ MEASURES = ("mission_time", "priority_done_share", "energy")
 
 @dataclass(frozen=True)
 class Interval:
-    """A mean difference, and between which values it lies with a confidence of 95 % (Student's t).
+    """A mean difference with its 95 % confidence interval (Student's t).
 
     Attributes
     ----------
     mean : float or None
-        None where there is no pair.
+        None if there are no pairs.
     low, high : float or None
         None for a single pair.
     pairs : int
-        Missions in which both policies have the figure; seeds, where there is only one mission.
+        Missions, or seeds of a single mission, for which both policies have a value.
     """
 
     mean: float | None
@@ -34,13 +34,13 @@ class Interval:
 
 @dataclass(frozen=True, kw_only=True)
 class PolicyDifference:
-    """A policy against another, over all missions and seeds.
+    """Differences between two policies, over all missions and seeds.
 
     Attributes
     ----------
     policy, against : str
     mission_time, energy : Interval
-        Relative: -0.1 is 10 % less. Mission times of pairs of runs that both did all tasks.
+        Relative differences: -0.1 is 10 % less. Mission times only of pairs of runs that both did all tasks.
     priority_done_share : Interval
         Difference of the two shares.
     """
@@ -62,14 +62,14 @@ class PolicyDifference:
 
 
 def paired_differences(rows: Sequence[PolicyRow]) -> list[PolicyDifference]:
-    """Return how each policy differs from the first one, pair by pair: the same mission, the same seed.
+    """Return the paired differences of each policy from the first one, by mission and seed.
 
-    Runs of one mission are not independent, so that the pairs of several missions are the means over their seeds.
+    Runs of one mission are not independent; with several missions, pairs are therefore means over their seeds.
 
     Parameters
     ----------
     rows : sequence of PolicyRow
-        As `compare_policies` gives them.
+        Rows of `compare_policies`.
 
     Returns
     -------
@@ -96,7 +96,7 @@ def _pairs(
 
 
 def _difference(measure: str, one: MissionResult, other: MissionResult) -> float | None:
-    """Return a relative difference, or that of two shares; None where a run lacks the figure."""
+    """Return a relative difference, or the difference of two shares; None if a run lacks the value."""
     ours, theirs = getattr(one, measure), getattr(other, measure)
     if ours is None or theirs is None:
         return None
@@ -106,7 +106,7 @@ def _difference(measure: str, one: MissionResult, other: MissionResult) -> float
 
 
 def paired_interval(by_mission: Sequence[Sequence[float | None]]) -> Interval:
-    """Return the interval of differences, by mission and seed; None where a pair lacks the figure."""
+    """Return the interval of differences, given by mission and seed; None marks a pair without a value."""
     from scipy import stats
 
     known = [[value for value in values if value is not None] for values in by_mission]

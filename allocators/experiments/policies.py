@@ -1,4 +1,4 @@
-"""Several policies in several missions and with several seeds: one row per policy and mission."""
+"""Comparison of policies on missions and seeds: one row per policy and mission."""
 
 import threading
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -17,34 +17,34 @@ from alloc.problems.vocabulary import Knowledge
 
 @dataclass(frozen=True, kw_only=True)
 class PolicyRow:
-    """The figures of one policy in one mission, over all seeds.
+    """Results of one policy on one mission, over all seeds.
 
     Attributes
     ----------
     mission, policy : str
     knowledge : str
-        What agents knew; empty where there was no run.
+        Knowledge of the agents; empty if there was no run.
     agents, tasks : int
     runs : int
-        Runs that the figures are taken over; 0 for a refusal.
+        Number of runs; 0 after a refusal.
     statuses : str
         ``done``, ``unfinished``, or both, separated by ``/``.
     mission_time_mean, mission_time_worst : float or None
         None if a run did not do all tasks.
     mission_time_lower_bound : float or None
     tasks_done_share, priority_done_share : float or None
-        Means of the share of tasks that were done, by number and by priority, among those that were not cancelled.
+        Mean share of tasks done among those not cancelled, by number and by priority.
     completion_hours_mean : float or None
-        From appearance to completion; None if a run did no task.
+        Mean hours from appearance to completion; None if a run completed no task.
     energy_mean, distance_mean, switches_mean, messages_mean : float or None
     decision_ms_mean, decision_ms_worst : float or None
-        Mean over runs of the mean, and the longest of all.
+        Mean over runs of the mean decision time, and the maximum.
     decisions_late, orders_refused : int
-        In all runs.
+        Totals over all runs.
     reason : str
-        Why there are no figures: what the policy refuses, which package is not installed, or how it failed.
+        Why there are no results: a refusal, a missing package, or a failure.
     number : int
-        Number of the mission, from 1, as names may repeat.
+        Number of the mission, from 1, as names need not be unique.
     results : tuple of MissionResult
         One per seed; not in `to_dict`.
     """
@@ -85,7 +85,7 @@ class PolicyRow:
 
 
 Policies = Sequence[str | Policy] | Mapping[str, str | Policy]
-"""Names of policies, and policies; where a mapping, with the name that each has in the rows."""
+"""Names of policies, or policies; in a mapping, by their label in the rows."""
 
 
 def compare_policies(
@@ -97,30 +97,30 @@ def compare_policies(
     deadline_ms: float | None = None,
     stop: threading.Event | None = None,
 ) -> Iterator[PolicyRow]:
-    """Let every policy lead every mission with every seed; all policies meet the same events.
+    """Simulate every mission with every policy and seed; all policies face the same events.
 
     Parameters
     ----------
     missions : iterable of Mission
     policies : sequence or dict
-        Names, each of which is loaded once, and policies with their own parameters. The keys of a dict name the
-        policies in the rows.
+        Names, each of which is loaded once, and policies with their own parameters. The keys of a dict are the labels
+        in the rows.
     seeds : sequence of int
     knowledge, deadline_ms
         As in `simulate`.
     stop : threading.Event, optional
-        Setting it ends the comparison; of the run in progress there is no row.
+        Ends the comparison when set; the run in progress is discarded.
 
     Returns
     -------
     iterator of PolicyRow
-        Each as soon as all its runs are done. A policy that refuses a mission, is not installed, or fails gives a row
-        with the reason; the traceback of a failure goes to the logger ``alloc``.
+        Each row as soon as its runs are complete. If a policy refuses a mission, is not installed, or fails, its row
+        has the reason; the traceback of a failure goes to the logger ``alloc``.
 
     Raises
     ------
     InputError
-        If an argument is not what it should be; its place is the parameter.
+        If an argument is invalid; `place` names the parameter.
     """
     given = by_label(policies, Policy, lambda policy: policy.info.name, "policies")  # type: ignore[type-abstract]
     loaded = {label: _loaded(policy) for label, policy in given.items()}
@@ -135,7 +135,7 @@ def compare_policies(
     def run(mission: Mission, policy: Policy, seed: int) -> MissionResult | None:
         ended = threading.Event()
         simulation = partial(simulate_until, ended.is_set, mission, policy, known, seed, deadline)
-        found = run_native(simulation, stop.is_set, ended.set)  # on another thread, as a decision cannot be stopped
+        found = run_native(simulation, stop.is_set, ended.set)  # in another thread, as a decision cannot be interrupted
         return None if found is None else found.result
 
     return (
@@ -145,7 +145,7 @@ def compare_policies(
 
 
 def _loaded(policy: str | Policy) -> Policy | Exception:
-    """Load a policy once; that a package is not installed, or that it fails, goes into the rows."""
+    """Load a policy once; a missing package or a failure is returned for the rows."""
     if isinstance(policy, Policy):
         return policy
     try:
@@ -154,14 +154,14 @@ def _loaded(policy: str | Policy) -> Policy | Exception:
         return error
     except InputError:
         raise
-    except Exception as error:  # the figures of the others do not depend on a faulty plugin
+    except Exception as error:  # a faulty plugin must not affect other policies
         return load_failure(f"policy {policy!r}", error)
 
 
 def summarise_runs(
     mission: Mission, policy: str, results: Sequence[MissionResult], reason: str = "", number: int = 1
 ) -> PolicyRow:
-    """Return the row of one policy in one mission.
+    """Return the row of one policy on one mission.
 
     Parameters
     ----------
@@ -170,9 +170,9 @@ def summarise_runs(
     results : sequence of MissionResult
         One per seed.
     reason : str
-        Why there are none.
+        Why there are no results.
     number : int
-        Of the mission.
+        Number of the mission.
 
     Returns
     -------

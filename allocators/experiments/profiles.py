@@ -1,4 +1,4 @@
-"""Performance profiles, and the share of targets that methods reach over time."""
+"""Performance profiles, and shares of targets reached over time."""
 
 from collections.abc import Mapping, Sequence
 
@@ -13,15 +13,15 @@ WITHIN = (0.0, 0.01, 0.05)
 """Relative distances to the best known makespan of an instance that count as targets."""
 
 FACTORS = (1.0, 1.001, 1.01, 1.05, 1.1, 1.2, 1.5, 2.0)
-"""Ratios to the best method on an instance at which performance profiles are told."""
+"""Ratios to the best method on an instance at which performance profiles are evaluated."""
 
 
 def profiles(
     endings: Endings, factors: Sequence[float] = FACTORS, score: str = "makespan"
 ) -> Mapping[str, list[float]]:
-    """Return performance profiles: on which share of the instances a method is within each factor of the best one.
+    """Return performance profiles: the share of instances on which a method is within each factor of the best.
 
-    An instance that no method solved counts for none; one that a method did not solve counts against it.
+    Instances that no method solved are left out; an instance that a method did not solve counts against it.
 
     Parameters
     ----------
@@ -51,17 +51,17 @@ def profiles(
 def targets_reached(
     endings: Endings, times_s: Sequence[float], within: Sequence[float] = WITHIN
 ) -> Mapping[str, list[float]]:
-    """Return which share of its targets a method has reached by each time, over all runs.
+    """Return the share of targets that each method has reached by each time, over all runs.
 
-    A target is a makespan: the best known of an instance, found in any of these runs, or so much more. A run reaches
-    it at the first improvement in its trace that is as good. Runs that have not been made reach none.
+    Targets are makespans: the best one known of an instance, from any of these runs, times 1 plus each value of
+    `within`. A run reaches a target at the first improvement in its trace that is as good. Missing runs reach none.
 
     Parameters
     ----------
     endings : mapping
         How runs ended, by method, instance and seed.
     times_s : sequence of float
-        Seconds by the clock of the run.
+        Seconds since the start of the run.
     within : sequence of float
         Relative distances to the best known makespan.
 
@@ -99,7 +99,7 @@ def _best(lists: Sequence[Sequence[Ending | None]]) -> float | None:
 
 
 def _reached(ending: Ending | None, target: float) -> float:
-    """Return when a run had a makespan of at most `target`; infinity if never."""
+    """Return the time at which a run reached a makespan of at most `target`; infinity if never."""
     points = () if ending is None else ending.trace
     good = (time for time, makespan, *_ in points if makespan is not None and makespan <= target * (1 + EQUAL))
     return min(good, default=float("inf"))

@@ -1,4 +1,4 @@
-"""How methods stand: against the best known of each instance, and beside each other on the same one."""
+"""Rankings of methods, relative to the best known results of each instance and to each other."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,10 +10,10 @@ from alloc.allocators.experiments.store.outcome import Ending, Outcome
 from alloc.allocators.experiments.stored import Endings
 
 ALIKE = 1e-4
-"""Relative difference up to which makespans allow to compare energies."""
+"""Relative difference of makespans up to which energies are compared."""
 
 LATE, LATE_S = 1.2, 0.02
-"""A run is late when it takes longer than this factor times its time limit and so many seconds more."""
+"""A run is late if it exceeds this factor times its time limit plus this many seconds."""
 
 Score = tuple[float, float, float]
 WORST: Score = (np.inf, np.inf, np.inf)
@@ -21,18 +21,18 @@ WORST: Score = (np.inf, np.inf, np.inf)
 
 @dataclass(frozen=True)
 class Best:
-    """What is known of an instance.
+    """Best known values of an instance.
 
     Attributes
     ----------
     bound : float
-        The greatest that was proven of the makespan; 0 where none was.
+        Best proven lower bound on the makespan; 0 if none.
     unserved : int or float
-        The fewest tasks that a run left unserved; infinite where there is none.
+        Minimum number of unserved tasks; infinite if no run has a result.
     makespan : float
-        The least over the served tasks of the runs that left so few unserved; infinite where there is none.
+        Least makespan over the served tasks among runs with that number; infinite if none.
     energy : float
-        The least of these runs at a makespan that is at most 0.01 % more; NaN where there is none.
+        Least energy among these runs at a makespan at most 0.01 % longer; NaN if none.
     """
 
     bound: float
@@ -42,7 +42,7 @@ class Best:
 
     @classmethod
     def of(cls, endings: Sequence[Ending]) -> "Best":
-        """Return the best of all runs on one instance."""
+        """Return the best values of all runs on one instance."""
         unserved = min((one.unserved or 0 for one in endings if one.served_makespan is not None), default=np.inf)
         solved = [
             (one.served_makespan, one.energy)
@@ -57,20 +57,20 @@ class Best:
 
 @dataclass(frozen=True)
 class Stand:
-    """A run that served what it could, against the best known of its instance and beside the others there.
+    """A run relative to the best known values of its instance and to other methods there.
 
     Attributes
     ----------
     ending : Ending
     beyond_bound : float
-        By which part its makespan is above the bound; NaN where a task is unserved, or there is none.
+        Relative excess of its makespan over the bound; NaN without a bound or with an unserved task.
     is_least : bool
-        Whether nothing better is known: fewer tasks unserved, or as few and a lesser makespan over the others.
+        Whether nothing better is known: fewer unserved tasks, or as many and a shorter makespan.
     energy_ratio : float
-        Of its energy to the least known; NaN where there is none, or where it left more tasks unserved.
+        Ratio of its energy to the least known; NaN if none is known or it left more tasks unserved.
     behind, energy_behind : float
-        By which part its makespan, and its energy at no less makespan, are above the least of the others; below 0 it
-        leads. NaN where there is none to compare with.
+        Relative excess of its makespan, and of its energy at an equal or longer makespan, over the best of the other
+        methods; negative if it leads. NaN if there is nothing to compare with.
     """
 
     ending: Ending
@@ -83,17 +83,17 @@ class Stand:
 
 @dataclass(frozen=True)
 class Standing:
-    """How a method stands on some instances.
+    """Ranking of a method over instances.
 
     Attributes
     ----------
     stands : list of Stand
-        Of the runs that have a makespan.
+        One for each run that has a makespan.
     runs : int
-        How many there are of it.
+        Number of runs of the method.
     first : int
-        Runs that no other method had a better answer than: fewer tasks unserved, then less makespan, then, if that is
-        an objective, less energy; several can be. Late runs are never first.
+        Runs for which no other method had a better result: fewer unserved tasks, then shorter makespan, then less
+        energy if that is an objective. Ties count for all; late runs are never first.
     """
 
     stands: list[Stand]
@@ -102,7 +102,7 @@ class Standing:
 
 
 def best_known(endings: Endings) -> list[Best]:
-    """Return the best of each instance that a comparison has."""
+    """Return the best known values of each instance of a comparison."""
     by_instance = zip(*endings.values(), strict=True)
     return [Best.of([one for runs in lists for one in runs if one is not None]) for lists in by_instance]
 
@@ -110,16 +110,16 @@ def best_known(endings: Endings) -> list[Best]:
 def standings(
     endings: Endings, bests: Sequence[Best], time_limit_s: float | None, *, energy: bool
 ) -> dict[str, Standing]:
-    """Return how each method stands.
+    """Return the standing of each method.
 
     Parameters
     ----------
     endings : mapping
         How runs ended, by method, instance and seed.
     bests : sequence of Best
-        By instance.
+        Best known values, by instance.
     time_limit_s : float, optional
-        Of each run.
+        Time limit of each run.
     energy : bool
         Whether the energy is an objective.
     """
@@ -142,7 +142,7 @@ def standings(
 
 
 def _score(ending: Ending | None, limit_s: float, *, energy: bool) -> Score:
-    """Return what is compared, the less the better: figures that are equal are made so, late answers are the worst."""
+    """Return a score, lower is better: nearly equal values are made equal, and late results are worst."""
     if ending is None or ending.outcome is not Outcome.SOLVED or ending.served_makespan is None:
         return WORST
     if (ending.runtime_s or 0.0) > limit_s:

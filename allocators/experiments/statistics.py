@@ -1,7 +1,7 @@
 """Statistics of a comparison: scores by instance, paired differences with intervals, and tests.
 
-What varies is the instance: seeds are averaged within each, so that a hundred runs on three instances are three
-observations and not a hundred. All tests and intervals are those of scipy.
+The instance is the unit of observation: seeds are averaged per instance, so that a hundred runs on three instances are
+three observations, not a hundred. All tests and intervals are computed by scipy.
 """
 
 from collections.abc import Sequence
@@ -16,24 +16,24 @@ from alloc.allocators.experiments.stored import Endings
 CONFIDENCE = 0.95
 
 RESAMPLES = 9999
-"""Of the bootstrap; always from the same seed, so that the same runs give the same interval."""
+"""Number of bootstrap resamples; their seed is fixed, so that the same runs give the same interval."""
 
 SMALL = 10
-"""Instances below which the sample is called small: an interval of so few says little, and a test hardly more."""
+"""Number of instances below which the sample is reported as small, as intervals and tests then say little."""
 
 LEAST = 3
-"""Instances below which there is no interval and no test."""
+"""Minimum number of instances for an interval or a test."""
 
 MOST_DRAWN = 20_000_000
-"""Values that the bootstrap draws at once, for the sake of memory: all of them up to 2,000 instances."""
+"""Maximum number of values that the bootstrap draws at once, to limit memory; enough for 2,000 instances."""
 
 EQUAL = 1e-9
-"""Relative difference up to which two scores are equal, as for the evaluator."""
+"""Relative difference up to which two scores count as equal, as in the evaluator."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Difference:
-    """A method against another, over all instances on which both have the score for every seed.
+    """Comparison of two methods over all instances on which both have the score for every seed.
 
     Attributes
     ----------
@@ -41,20 +41,20 @@ class Difference:
     score : str
         ``makespan`` or ``energy``.
     instances : int
-        How many the figures are of.
+        Number of instances compared.
     left_out : int
-        Instances without the score of one of the two, such as those on which a task was unserved or a run failed, and
-        those on which the other has 0 and this method more, so that there is no ratio.
+        Number of instances on which one of the two lacks the score, for instance because a task was unserved or a run
+        failed, or on which the other has 0 and this method more, so that there is no ratio.
     mean : float or None
-        Mean of the relative differences: -0.1 is 10 % less than the other.
+        Mean relative difference: -0.1 is 10 % less than the other.
     low, high : float or None
-        Its BCa bootstrap interval with a confidence of 95 %; None for fewer than three instances.
+        BCa bootstrap 95 % confidence interval of the mean; None for fewer than three instances.
     p : float or None
-        Of Wilcoxon's signed-rank test, two-sided.
+        p-value of Wilcoxon's signed-rank test, two-sided.
     p_holm : float or None
-        The same, corrected for the number of methods by Holm's procedure.
+        p-value corrected for the number of methods by Holm's procedure.
     better, equal, worse : int
-        Instances on which the method has less, as much, and more than the other.
+        Number of instances on which the method has a lower, equal and higher score than the other.
     """
 
     method: str
@@ -73,17 +73,17 @@ class Difference:
 
     @property
     def is_small(self) -> bool:
-        """Whether there are too few instances to say much."""
+        """Whether the number of instances is small; see `SMALL`."""
         return self.instances < SMALL
 
 
 def scores(endings: Sequence[Sequence[Ending | None]], score: str) -> NDArray[np.float64]:
-    """Return the mean of a score over the seeds of each instance; NaN where a run does not have it.
+    """Return the mean of a score over the seeds of each instance; NaN if a run lacks it.
 
     Parameters
     ----------
     endings : sequence of sequence of Ending or None
-        Of one method, by instance and seed.
+        Endings of one method, by instance and seed.
     score : str
         A field of `Ending`.
 
@@ -99,7 +99,7 @@ def _mean(values: Sequence[float]) -> float:
 
 
 def _score(ending: Ending | None, score: str) -> float:
-    """Return a score, NaN where there is none; energy counts only where all tasks are served, as idling costs none."""
+    """Return a score, or NaN; energy counts only if all tasks are served, as idling costs none."""
     if ending is None or ending.outcome is not Outcome.SOLVED or ending.makespan is None:
         return float("nan")
     value = getattr(ending, score)
@@ -107,7 +107,7 @@ def _score(ending: Ending | None, score: str) -> float:
 
 
 def differences(endings: Endings, score: str = "makespan") -> list[Difference]:
-    """Return how each method differs from the first one, in the same instances.
+    """Return the differences of each method from the first one, on the same instances.
 
     Parameters
     ----------
@@ -153,12 +153,12 @@ def _difference(
 
 
 def interval(values: NDArray[np.float64]) -> tuple[float | None, float | None]:
-    """Return the BCa bootstrap interval of the mean, with a confidence of 95 %; None for fewer than three values.
+    """Return the BCa bootstrap 95 % confidence interval of the mean; None for fewer than three values.
 
     Parameters
     ----------
     values : ndarray, shape (instances,)
-        Finite.
+        Finite values.
 
     References
     ----------
@@ -168,7 +168,7 @@ def interval(values: NDArray[np.float64]) -> tuple[float | None, float | None]:
 
     if len(values) < LEAST:
         return None, None
-    if np.ptp(values) == 0:  # all resamples are the same, and the method is not defined
+    if np.ptp(values) == 0:  # all resamples are equal, and BCa is undefined
         return float(values[0]), float(values[0])
     found = stats.bootstrap(
         (values,),
@@ -186,8 +186,8 @@ def interval(values: NDArray[np.float64]) -> tuple[float | None, float | None]:
 def signed_rank(values: NDArray[np.float64]) -> float | None:
     """Return the p-value of Wilcoxon's signed-rank test, two-sided; None for fewer than three values.
 
-    Zeros are left out, as Wilcoxon did; where nothing else is left nothing speaks for a difference, and p is 1. With
-    ties among few values the distribution is enumerated.
+    Zeros are left out, as by Wilcoxon; if all values are zero, p is 1. With ties among few values, the exact
+    distribution is enumerated.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A comparison in a store: which runs it consists of, and its rows from those that have ended."""
+"""Comparisons in a store: their runs, and their rows from the runs that have ended."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -15,29 +15,29 @@ from alloc.problems.arguments import of_type
 from alloc.problems.text import counted, percent
 
 ENOUGH = 0.9
-"""Share of a processor below which the time that a run was given is not to be believed."""
+"""Share of a processor below which the time limit of a run is not reliable."""
 
 LONG_S = 0.1
-"""Seconds from which on a run's processor time says how much of a processor it had."""
+"""Minimum duration of a run for which its share of a processor is checked."""
 
 Variants = Mapping[str, tuple[str, Mapping[str, object]]]
-"""Name and parameters of a method or policy, by the name that it has in the rows."""
+"""Name and parameters of each method or policy, by its label in the rows."""
 
 Endings = Mapping[str, Sequence[Sequence[Ending | None]]]
-"""How runs ended, by method or policy, instance or mission, and seed; None where one has not."""
+"""Endings of runs, by method or policy, instance or mission, and seed; None for runs that have not ended."""
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """What is compared.
+    """The runs of a comparison.
 
     Attributes
     ----------
     instances : sequence of Instance or Mission
     seeds : sequence of int
     jobs : dict
-        The run of each number of an instance, name of a method in the rows, and seed: in the order in which they are
-        made. Methods take turns, so that what else the machine does meanwhile hits all alike.
+        The run of each instance number, label and seed, in order of execution. Methods alternate, so that other load
+        on the machine affects them equally.
     """
 
     instances: Sequence[Instance | Mission]
@@ -46,11 +46,11 @@ class Comparison:
 
     @property
     def methods(self) -> list[str]:
-        """Names of the methods or policies in the rows."""
+        """Labels of the methods or policies in the rows."""
         return list(dict.fromkeys(label for _, label, _ in self.jobs))
 
     def endings(self, store: Store) -> Endings:
-        """Return how the runs ended, as far as they have."""
+        """Return the endings of the runs that have ended."""
         keys = {place: job.run.key for place, job in self.jobs.items()}
         records = store.records(list(set(keys.values())))
 
@@ -65,7 +65,7 @@ class Comparison:
         }
 
     def others(self, store: Store) -> list[str]:
-        """Return in words which runs the store holds that were made under other conditions than these."""
+        """Return descriptions of the runs in the store that were made under other conditions."""
         ours = {_conditions(job.run) for job in self.jobs.values()}
         base = next(iter(ours), ())
         found = []
@@ -81,7 +81,7 @@ class Comparison:
 
 
 CONDITION_NAMES = {"time_limit_s": "time limit", "target_gap": "target gap", "deadline_ms": "deadline"}
-"""What some of `CONDITIONS` are called, where that is not their own name."""
+"""Names of those `CONDITIONS` whose text differs from the field name."""
 
 
 def _conditions(run: Run) -> tuple[object, ...]:
@@ -103,7 +103,7 @@ def planned(
     threads: int | None = None,
     machine: str | None = None,
 ) -> Comparison:
-    """Return all runs of a comparison of methods, and note the instances in the store.
+    """Return all runs of a comparison of methods, and add the instances to the store.
 
     Parameters
     ----------
@@ -114,16 +114,16 @@ def planned(
     seeds : sequence of int
     objective : Objective or str
     budget : Budget
-        Of each run.
+        Budget of each run.
     threads : int, optional
-        Of each run; one by default, whatever the machine has.
+        Threads of each run; by default one, on any machine.
     machine : str, optional
-        Where the runs are made; this one by default.
+        Machine that executes the runs; by default this one.
 
     Raises
     ------
     InputError
-        If an argument is not what it should be; its place is the parameter.
+        If an argument is invalid; `place` names the parameter.
     """
     common = Run(
         objective=str(checked_objective(objective)),
@@ -145,18 +145,18 @@ def plan(
     seeds: Sequence[int],
     packages: Mapping[str, str],
 ) -> Comparison:
-    """Return all runs of a comparison, and note the problems in the store.
+    """Return all runs of a comparison, and add the problems to the store.
 
     Parameters
     ----------
     store : Store
     problems : sequence
-        Instances or missions, each with what all runs on it have in common.
+        Instances or missions, each with a run that has the fields common to all runs on it.
     compared : mapping
         See `Variants`.
     seeds : sequence of int
     packages : mapping
-        Versions of what is compared, by its name.
+        Version of each method or policy, by name.
     """
     hashes = [store.add(problem) for problem, _ in problems]
     known = {label: (name, canonical(settings), packages[name]) for label, (name, settings) in compared.items()}
@@ -171,9 +171,9 @@ def plan(
 
 
 def rows_of(comparison: Comparison, endings: Endings) -> list[Row]:
-    """Return a row per instance and method, as `compare` does, of the runs that have ended.
+    """Return a row per instance and method, as `compare` does, from the runs that have ended.
 
-    A method with a run that was not solved has a row with the reason: a mean over the others would be too good.
+    If a run of a method has no result, its row has the reason instead, as a mean over the other runs would be biased.
     """
     return [
         replace(
@@ -195,7 +195,7 @@ def _row(instance: Instance, label: str, endings: Sequence[Ending | None], seeds
 
 
 def unsolved(endings: Sequence[Ending | None], seeds: Sequence[int]) -> str:
-    """Return why one of some runs has no result, in a line; empty if all that have ended have one."""
+    """Return why one of the runs has no result, in one line; empty if all runs that have ended have one."""
     for seed, ending in zip(seeds, endings, strict=True):
         if ending is not None and ending.outcome is not Outcome.SOLVED:
             is_told = ending.outcome in (Outcome.REFUSED, Outcome.MISSING_PACKAGE)
@@ -204,7 +204,7 @@ def unsolved(endings: Sequence[Ending | None], seeds: Sequence[int]) -> str:
 
 
 def doubts(endings: Endings) -> list[str]:
-    """Return why the figures may not be what they should, in a sentence each: runs that had to share processors."""
+    """Return warnings about the reliability of the results, one sentence each: runs that had to share processors."""
     runs = [ending for lists in endings.values() for some in lists for ending in some if ending is not None]
     timed = [one for one in runs if one.cores and one.cpu_s is not None and (one.runtime_s or 0.0) >= LONG_S]
     poor = sum((one.cpu_s or 0.0) < ENOUGH * (one.runtime_s or 0.0) for one in timed)

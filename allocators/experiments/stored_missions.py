@@ -1,4 +1,4 @@
-"""A comparison of policies in a store: its runs, and its rows from those that have ended."""
+"""Comparisons of policies in a store: their runs, and their rows from the runs that have ended."""
 
 import json
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ def planned_missions(
     deadline_ms: float | None = None,
     machine: str | None = None,
 ) -> Comparison:
-    """Return all runs of a comparison of policies, and note the missions in the store.
+    """Return all runs of a comparison of policies, and add the missions to the store.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def planned_missions(
     Raises
     ------
     InputError
-        If an argument is not what it should be; its place is the parameter.
+        If an argument is invalid; `place` names the parameter.
     """
     known = None if knowledge is None else choice(Knowledge, knowledge, "knowledge")
     deadline = None if deadline_ms is None else float(real(deadline_ms, "deadline_ms", above=True))
@@ -54,9 +54,9 @@ def planned_missions(
 
 
 def policy_rows(comparison: Comparison, endings: Endings) -> list[PolicyRow]:
-    """Return a row per mission and policy, as `compare_policies` does, of the runs that have ended.
+    """Return a row per mission and policy, as `compare_policies` does, from the runs that have ended.
 
-    A policy with a run that has no result has a row with the reason.
+    If a run of a policy has no result, its row has the reason instead.
     """
     return [
         _row(of_type(mission, Mission, "missions"), label, endings[label][number], comparison.seeds, number + 1)
@@ -75,6 +75,6 @@ def _row(
 
 
 def result_of(ending: Ending) -> MissionResult:
-    """Return the result of a mission, as far as it was measured when the run was made."""
+    """Return the result of a mission, with the measures that existed when the run was made."""
     measures = json.loads(ending.measures or "{}")
     return MissionResult(**{field.name: measures.get(field.name) for field in fields(MissionResult)})

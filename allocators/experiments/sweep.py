@@ -1,4 +1,4 @@
-"""What comparisons of methods and of policies have in common: every one of them, on every problem, with every seed."""
+"""Common part of comparisons of methods and of policies: run each on every problem with every seed."""
 
 import logging
 import threading
@@ -18,7 +18,7 @@ P = TypeVar("P")
 """A problem: an instance, or a mission."""
 
 M = TypeVar("M")
-"""What is compared: methods, or policies."""
+"""A method or a policy."""
 
 R = TypeVar("R")
 """The result of a run."""
@@ -31,14 +31,14 @@ class Runs(Generic[P, R]):
     Attributes
     ----------
     number : int
-        Of the problem, from 1, as names may repeat.
+        Number of the problem, from 1, as names need not be unique.
     problem : Instance or Mission
     label : str
-        Name of the method or policy in the rows.
+        Label of the method or policy in the rows.
     results : list
-        One per seed, up to a stop.
+        One per seed, up to a stop request.
     reason : str
-        Why there are none.
+        Why there are no results.
     """
 
     number: int
@@ -51,23 +51,23 @@ class Runs(Generic[P, R]):
 def by_label(
     given: Sequence[str | M] | Mapping[str, str | M], kind: type[M], name: Callable[[M], str], place: str
 ) -> dict[str, str | M]:
-    """Return what is compared by the name that it has in the rows.
+    """Return the methods or policies by their label in the rows.
 
     Parameters
     ----------
     given : sequence or mapping
-        Names and objects; where a mapping, with the names in the rows.
+        Names and objects; in a mapping, by their labels.
     kind : type
-        Of the objects.
+        Type of the objects.
     name : callable
-        Returns the name of an object.
+        Returns the label of an object.
     place : str
-        The parameter.
+        Name of the parameter, for errors.
 
     Raises
     ------
     InputError
-        If an entry is something else, or two objects of a sequence have one name.
+        If an entry is neither, or two objects of a sequence have the same label.
     """
 
     def checked(one: str | M) -> str | M:
@@ -79,12 +79,12 @@ def by_label(
     entries = [checked(one) for one in listed(given, place, place)]
     found = {one if isinstance(one, str) else name(one): one for one in entries}
     if len(found) < len({one if isinstance(one, str) else id(one) for one in entries}):
-        raise InputError("has several objects of one name; give a dict with a name for each", place)
+        raise InputError("has several objects of the same name; give a dict with a name for each", place)
     return found
 
 
 def load_failure(title: str, error: Exception) -> ImportError:
-    """Log why something called `title` cannot be loaded, and return what stands in its rows."""
+    """Log why a method or policy called `title` cannot be loaded, and return the error for its rows."""
     LOG.warning("%s cannot be loaded", title, exc_info=error)
     return ImportError(f"cannot be loaded: {type(error).__name__}: {error}")
 
@@ -96,18 +96,18 @@ def sweep(
     seeds: Sequence[int],
     stop: threading.Event,
 ) -> Iterator[Runs[P, R]]:
-    """Make all runs, and yield those of one label on one problem as soon as they are done.
+    """Make all runs, and yield those of each label on each problem as soon as they are complete.
 
     Parameters
     ----------
     run : callable
-        Makes one run with a seed; None if it was interrupted.
+        Makes one run with a seed; returns None if it was interrupted.
     problems : iterable
     compared : mapping
-        By their names in the rows; an exception where one could not be loaded.
+        Methods or policies by label; an exception if one could not be loaded.
     seeds : sequence of int
     stop : threading.Event
-        Setting it ends the comparison; what has no result yet is left out.
+        Ends the comparison when set; incomplete runs are left out.
     """
     for number, problem in enumerate(problems, 1):
         for label, one in compared.items():
@@ -124,7 +124,7 @@ def sweep(
 
 
 def _with_seeds(run: Callable[[int], R | None], seeds: Sequence[int], stop: threading.Event) -> tuple[list[R], str]:
-    """Return the results of all seeds up to a stop, or why there are none."""
+    """Return the results of all seeds up to a stop request, or the reason why there are none."""
     results: list[R] = []
     for seed in seeds:
         if stop.is_set():
@@ -133,7 +133,7 @@ def _with_seeds(run: Callable[[int], R | None], seeds: Sequence[int], stop: thre
             result = run(seed)
         except RefusedError as error:
             return [], str(error)
-        except Exception as error:  # the figures of the others do not depend on a faulty plugin
+        except Exception as error:  # a faulty plugin must not affect others
             LOG.warning("a run failed with seed %s", seed, exc_info=error)
             return [], f"failed with seed {seed}: {type(error).__name__}: {error}"
         if result is None:
@@ -143,11 +143,11 @@ def _with_seeds(run: Callable[[int], R | None], seeds: Sequence[int], stop: thre
 
 
 def mean_and_worst(values: Sequence[float | None]) -> tuple[float | None, float | None]:
-    """Return mean and maximum; None where there is no value, or one is missing, as a mean would be too good."""
+    """Return mean and maximum; None if there are no values or one is missing, as a mean of the rest would be biased."""
     known = [value for value in values if value is not None]
     return (float(np.mean(known)), max(known)) if known and len(known) == len(values) else (None, None)
 
 
 def mean(values: Sequence[float | None]) -> float | None:
-    """Return the mean, likewise."""
+    """Return the mean; None if there are no values or one is missing."""
     return mean_and_worst(values)[0]

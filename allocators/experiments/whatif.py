@@ -1,4 +1,4 @@
-"""What more or fewer agents bring: makespan, energy and proven bounds by size of the fleet."""
+"""Effect of more or fewer agents: makespan, energy and proven bounds by fleet size."""
 
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -25,7 +25,7 @@ FIELDS = (
     "method", "status", "stop_reason", "makespan", "lower_bound", "gap", "energy", "energy_lower_bound", "energy_gap",
     "unserved_tasks", "runtime_s", "assignment",
 )  # fmt: skip
-"""Fields of a result that each fleet has."""
+"""Fields of a result that each fleet includes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,9 +35,9 @@ class Fleet:
     Attributes
     ----------
     added, removed : tuple of str
-        Ids of the agents that it has more, and fewer, than the instance.
+        Ids of the agents that it has in addition to, and lacks compared with, the instance.
     result : Result
-        On the instance with this fleet.
+        Result on the instance with this fleet.
     """
 
     added: tuple[str, ...]
@@ -47,15 +47,15 @@ class Fleet:
 
 @dataclass(frozen=True, eq=False)
 class WhatIf:
-    """The plans of several fleets, beginning with that of the instance.
+    """Plans of several fleets, starting with that of the instance.
 
     Attributes
     ----------
     instance : Instance
     like : tuple of str
-        The agents that are copied, one of each per step.
+        Agents that are copied, one of each per step.
     fleets : tuple of Fleet
-        The fleet as it is, then without the agents removed, if any, then with more and more agents.
+        The current fleet, then without the removed agents, if any, then with more agents step by step.
     complete : bool
         Whether no run was interrupted.
     """
@@ -67,7 +67,7 @@ class WhatIf:
 
     @property
     def answer(self) -> str:
-        """One sentence: what the first change brings, and the last."""
+        """One sentence on the effect of the first change and of the last."""
         return answer([(len(fleet.added), fleet.removed, fleet.result) for fleet in self.fleets], self.like)
 
     def to_dict(self) -> dict[str, object]:
@@ -112,28 +112,28 @@ def whatif(
     parameters: object = None,
     **settings: object,
 ) -> WhatIf:
-    """Solve an instance with fewer agents, as it is, and with more.
+    """Solve an instance with its own agents, with fewer, and with more.
 
-    Each run starts from the plan of the next smaller fleet, so that the makespan never rises when an agent is added.
-    What is proven of the makespan of a fleet holds for smaller ones, too.
+    Each run starts from the plan of the next smaller fleet, so that adding an agent never increases the makespan. A
+    proven bound on the makespan of a fleet also holds for smaller ones.
 
     Parameters
     ----------
     instance : Instance
     like : str or sequence of str
-        The agent, or agents, of which each step adds a copy: the same in all, with an id of its own, such as ``d2+1``.
+        The agent or agents of which each step adds a copy with a new id, such as ``d2+1``.
     up_to : int
         Number of steps, >= 1.
     remove : iterable of str
-        Agents that drop out before any is added.
+        Agents that are removed before any is added.
     method, objective, seed, threads
         As in `solve`.
     time_limit_s, iterations
-        Of the run for each fleet.
+        Budget of the run for each fleet.
     on_fleet : callable, optional
-        Called with every fleet, once it is solved.
+        Called with every fleet once it is solved.
     stop : threading.Event, optional
-        Setting it ends the run in progress, and returns the fleets so far.
+        When set, ends the run in progress and returns the fleets so far.
     handle_signals : bool
         Whether SIGINT and SIGTERM do the same.
     parameters, **settings
@@ -152,7 +152,7 @@ def whatif(
     models = _agents(instance, [like] if isinstance(like, str) else like, "like")
     gone = frozenset(_agents(instance, remove, "remove"))
     if not models and not gone:
-        raise InputError("names no agent; give one to add its like, or agents to remove", "like")
+        raise InputError("names no agent; give agents to copy or to remove", "like")
     of_type(method, (str, Allocator), "method")
     Budget(time_limit_s, iterations)
     function(on_fleet, "on_fleet")
@@ -181,7 +181,7 @@ def whatif(
 
 
 def _agents(instance: Instance, names: Iterable[str], place: str) -> tuple[str, ...]:
-    """Return ids of agents, each once, that the instance has."""
+    """Return ids of agents without repetitions, after checking that the instance has them."""
     for name in (found := listed(names, place, "ids of agents")):
         if not isinstance(name, str) or name not in instance.agent_index:
             known = nearest(name, instance.agent_ids) if isinstance(name, str) else ""
@@ -190,7 +190,7 @@ def _agents(instance: Instance, names: Iterable[str], place: str) -> tuple[str, 
 
 
 Copies = list[dict[str, str]]
-"""For each step the id that is copied by each new id."""
+"""For each step, the id of the copied agent by the id of its copy."""
 
 
 def _copies(instance: Instance, models: Sequence[str], steps: int) -> Copies:
@@ -211,7 +211,7 @@ def _solved(
     on_fleet: Callable[[Fleet], None],
     stop: threading.Event,
 ) -> list[Fleet]:
-    """Return the fleet as it is, that without `gone`, and those with more agents, each started from a smaller one."""
+    """Return the current fleet, that without `gone`, and those with more agents, each started from a smaller one."""
     new = [{"id": name, "like": own} for step in steps for name, own in step.items()]
     full = instance.with_agents(new)
 
@@ -238,14 +238,14 @@ def _solved(
 
 
 def _plan(smaller: Result, fleet: Instance) -> Allocation | None:
-    """Return the plan of a smaller fleet for a larger one, in which the others are idle."""
+    """Return the plan of a smaller fleet as one of a larger fleet, whose additional agents are idle."""
     if smaller.allocation is None:
         return None
     return Allocation.from_ids(fleet, smaller.allocation.to_ids(smaller.instance))
 
 
 def _with_shared_bounds(fleets: Sequence[Fleet]) -> tuple[Fleet, ...]:
-    """Raise the bound on the makespan of each fleet to that of the next larger ones."""
+    """Raise the bound on the makespan of each fleet to the bounds of larger fleets."""
     found = list(fleets)
     for k in reversed(range(len(found) - 1)):
         if not found[k + 1].removed or found[k].removed:

@@ -1,4 +1,4 @@
-"""The answer of a comparison of fleets in one sentence."""
+"""One-sentence summary of a comparison of fleets."""
 
 import math
 from collections.abc import Sequence
@@ -8,24 +8,24 @@ from alloc.allocators.result import Result
 from alloc.problems.text import counted, number
 
 FleetFigures = tuple[int, tuple[str, ...], Result]
-"""How many agents are added, which are removed, and the result."""
+"""Number of added agents, ids of removed agents, and the result."""
 
 FEWEST_DIGITS = 4
-"""Significant digits of a makespan, unless it takes more to tell two apart."""
+"""Minimum number of significant digits of a makespan; more are used to distinguish two."""
 
 MOST_NAMES = 3
-"""Ids of agents before they are counted."""
+"""Maximum number of ids of agents that are listed; more are given as a number."""
 
 
 def answer(fleets: Sequence[FleetFigures], like: Sequence[str]) -> str:
-    """Return what the first change brings against the fleet as it is, what the last one, and what makes up for a loss.
+    """Return the effect of the first and last change on the current fleet, and which additions offset a loss.
 
     Parameters
     ----------
     fleets : sequence of FleetFigures
-        The first is the fleet as it is.
+        The first is the current fleet.
     like : sequence of str
-        The agents that are copied, one of each per step.
+        Agents that are copied, one of each per step.
 
     Returns
     -------
@@ -57,7 +57,7 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def _is_worse(result: Result, now: Result) -> bool:
-    """Whether a plan serves fewer tasks than that of the fleet as it is, or is slower by more than what is proven."""
+    """Return whether a plan serves fewer tasks than that of the current fleet, or has a longer makespan."""
     unserved, before = result.unserved_count, now.unserved_count
     if unserved != before or result.makespan is None or now.makespan is None:
         return unserved > before
@@ -65,7 +65,7 @@ def _is_worse(result: Result, now: Result) -> bool:
 
 
 def _change(result: Result, now: Result, *, short: bool = False) -> str:
-    """Return the makespan of a fleet against that of the fleet as it is, or how many tasks are unserved."""
+    """Return the makespan of a fleet compared with the current fleet's, or the number of unserved tasks."""
     unserved, before = result.unserved_count, now.unserved_count
     if result.evaluation is None:
         return "no plan was found"
@@ -78,7 +78,7 @@ def _change(result: Result, now: Result, *, short: bool = False) -> str:
     if abs(share) <= PROVEN:
         is_proven = (result.lower_bound or 0.0) >= now.makespan * (1 - PROVEN)
         limits = _range(result, now)
-        return f"{then} as before{', which is proven' if is_proven else f' ({limits})' if limits else ''}"
+        return f"{then} as before{' (proven)' if is_proven else f' ({limits})' if limits else ''}"
     digits = max(FEWEST_DIGITS, math.ceil(-math.log10(abs(share))) + 1)
     instead = "" if short else f" instead of {_time(now, digits)}"
     changes = "; ".join(filter(None, [f"{_percent(share)} %", _range(result, now)]))
@@ -86,7 +86,7 @@ def _change(result: Result, now: Result, *, short: bool = False) -> str:
 
 
 def _range(result: Result, now: Result) -> str:
-    """Return between which changes that of the optimum lies, where that is not proven to be the one found."""
+    """Return the range of possible changes of the optimum, unless the change found is proven."""
     gaps = (result.gap, now.gap)
     if None in gaps or max(gap or 0.0 for gap in gaps) <= PROVEN or not now.lower_bound or not now.makespan:
         return ""
@@ -94,7 +94,7 @@ def _range(result: Result, now: Result) -> str:
     most = (result.makespan or 0.0) / now.lower_bound - 1
     old, new = set(now.instance.agent_ids), set(result.instance.agent_ids)
     if old < new:
-        most = min(most, 0.0)  # more agents never make it longer
+        most = min(most, 0.0)  # more agents never increase the optimum
     if new < old:
         least = max(least, 0.0)
     return f"the optimum: {_percent(least)} to {_percent(most)} %"

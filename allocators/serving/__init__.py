@@ -1,1 +1,1 @@
-"""Runs for other programs: awaited, by lines of JSON, and over HTTP."""
+"""Solving as a service for other programs: asynchronous, over lines of JSON, and over HTTP."""

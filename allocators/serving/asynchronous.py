@@ -1,4 +1,4 @@
-"""`solve` for programs with an event loop: awaited, and cancelled like any other task."""
+"""`solve` for programs with an event loop, as a coroutine that can be cancelled."""
 
 import asyncio
 import threading
@@ -42,20 +42,20 @@ async def solve_async(
     stop: threading.Event | None = None,
     **arguments: Unpack[Arguments],
 ) -> Result:
-    """Allocate the agents of an instance to its tasks, in a thread of its own, while the event loop goes on.
+    """Allocate the agents of an instance to its tasks in a separate thread, without blocking the event loop.
 
-    Cancelling the task that awaits it ends the run at once: the method stops, native solvers too, and its thread has
-    ended when `asyncio.CancelledError` is raised. Signals remain those of the program.
+    Cancelling the awaiting task ends the run at once: the method stops, including native solvers, and its thread has
+    ended when `asyncio.CancelledError` is raised. Signals are left to the program.
 
     Parameters
     ----------
     instance : Instance
     method : str or Allocator
-        Loading a method by name takes up to seconds, for which the event loop is not held up either; see `load`.
+        Loading a method by name may take seconds, also without blocking the event loop; see `load`.
     on_improvement : callable, optional
-        Called in the event loop with every new best; an exception from it ends the run and propagates.
+        Called in the event loop with every improvement; an exception from it ends the run and propagates.
     stop : threading.Event, optional
-        Setting it ends the run as the time limit does, with an answer.
+        When set, ends the run as the time limit does, with a result.
     **arguments
         As in `solve`.
 
@@ -68,7 +68,7 @@ async def solve_async(
     InputError, RefusedError
         As `solve` does.
     RuntimeError
-        If the method raises `StopIteration`, which no awaitable can.
+        If the method raises `StopIteration`, which an awaitable cannot raise.
     """
     loop = asyncio.get_running_loop()
     tell = function(on_improvement, "on_improvement")
@@ -98,7 +98,7 @@ async def solve_async(
                 **arguments,
             )
             loop.call_soon_threadsafe(done.set_result, result)
-        except StopIteration as error:  # which asyncio takes for the end of a coroutine, so that no future may have it
+        except StopIteration as error:  # asyncio futures cannot hold it, as it ends a coroutine
             failure = RuntimeError("the method raised StopIteration")
             failure.__cause__ = error
             loop.call_soon_threadsafe(done.set_exception, failure)
@@ -117,16 +117,16 @@ async def solve_async(
         raise
     finally:
         thread.join()
-    if failures:  # of the last improvement, told when the run had ended already
+    if failures:  # of the last callback, called after the run had ended
         raise failures[0]
     return result
 
 
 async def _ended(done: "asyncio.Future[Result]") -> None:
-    """Wait for the run to end, however often this is cancelled as well."""
+    """Wait for the run to end, even if this is cancelled repeatedly."""
     while not done.done():
         try:
             await asyncio.wait([done])
         except asyncio.CancelledError:
             continue
-    done.exception()  # it counts as retrieved
+    done.exception()  # marks the exception as retrieved

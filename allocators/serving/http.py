@@ -1,4 +1,4 @@
-"""A service over HTTP: FastAPI, with OpenAPI, health, metrics, and limits on what strangers may ask for."""
+"""HTTP service with FastAPI: OpenAPI, health, metrics, and limits on requests."""
 
 import asyncio
 import contextlib
@@ -24,18 +24,18 @@ STATUS = {
 }
 
 BODY_S = 10.0
-"""Seconds for the body of a request to arrive."""
+"""Time limit for the body of a request to arrive, in seconds."""
 
 
 def build_app(service: Service, *, most_bytes: int = 4_000_000) -> FastAPI:
-    """Return the application.
+    """Return the FastAPI application of a service.
 
     Parameters
     ----------
     service : Service
-        Closed when the application ends.
+        The service, which is closed when the application ends.
     most_bytes : int
-        Largest body of a request.
+        Maximum size of the body of a request.
     """
     metrics = Metrics(service)
 
@@ -54,7 +54,7 @@ def build_app(service: Service, *, most_bytes: int = 4_000_000) -> FastAPI:
             body = await _body_of(request, most_bytes)
             if body is None:
                 timed.outcome = Outcome.CANCELLED
-                return Response()  # to nobody
+                return Response()  # the client has disconnected
             if isinstance(body, HTTPStatus):
                 timed.outcome = Outcome.INPUT
                 limits = f"{body.phrase}; at most {most_bytes} bytes within {BODY_S:g} s"
@@ -67,20 +67,20 @@ def build_app(service: Service, *, most_bytes: int = 4_000_000) -> FastAPI:
 
     @app.get("/health")
     async def health() -> JSONResponse:
-        """Whether requests are taken, and how many are open."""
+        """Return whether requests are accepted, and how many are open."""
         content = {"status": "ending" if service.is_ending else "ok", "open_requests": service.open_requests}
         return JSONResponse(content, HTTPStatus.SERVICE_UNAVAILABLE if service.is_ending else HTTPStatus.OK)
 
     @app.get("/metrics")
     async def read_metrics() -> Response:
-        """Counts and times for Prometheus."""
+        """Return counters and latencies for Prometheus."""
         return Response(metrics.text(), media_type=metrics.media_type)
 
     return app
 
 
 async def _body_of(request: Request, most_bytes: int) -> str | HTTPStatus | None:
-    """Return the body as text, the status where it is too large, too slow or no UTF-8, or None if the client left."""
+    """Return the body as text, a status if it is too large, too slow or not UTF-8, or None if the client is gone."""
     found = bytearray()
     try:
         async with asyncio.timeout(BODY_S):
@@ -98,7 +98,7 @@ async def _body_of(request: Request, most_bytes: int) -> str | HTTPStatus | None
 
 
 async def _answer(service: Service, request: Request, body: str) -> Answer:
-    """Return the answer; a client that leaves cancels its run."""
+    """Return the answer; the run is cancelled if the client disconnects."""
     job = service.submit(body)
     answer = asyncio.wrap_future(job.answer)
     left = asyncio.ensure_future(_left(request))
@@ -137,15 +137,15 @@ def _responses() -> dict[int | str, dict[str, object]]:
     content = {"application/json": {"schema": _schema("alloc-solve-answer/1")}}
     words = {
         HTTPStatus.OK: "The result.",
-        HTTPStatus.BAD_REQUEST: "The request breaks the rules of its format, or a limit.",
+        HTTPStatus.BAD_REQUEST: "The request is invalid or exceeds a limit.",
         HTTPStatus.REQUEST_TIMEOUT: "The body took too long to arrive.",
         HTTPStatus.REQUEST_ENTITY_TOO_LARGE: "The body is too large.",
         HTTPStatus.UNPROCESSABLE_ENTITY: "The method refuses the instance.",
-        HTTPStatus.SERVICE_UNAVAILABLE: "Too many requests are open, or the service is ending.",
+        HTTPStatus.SERVICE_UNAVAILABLE: "Too many requests are open, or the service is shutting down.",
     }
     return {status.value: {"description": text, "content": content} for status, text in words.items()}
 
 
 def _schema(name: str) -> dict[str, object]:
-    """Return the schema of a format as OpenAPI embeds it."""
+    """Return the schema of a format in the form that OpenAPI embeds."""
     return {key: value for key, value in schema(name).items() if not key.startswith("$")}

@@ -1,4 +1,4 @@
-"""A service for one program in any language: each line of JSON is a request, each answer a line."""
+"""Service over lines of JSON for one program in any language: a line per request and per answer."""
 
 import threading
 from collections.abc import Callable
@@ -11,7 +11,7 @@ from alloc.problems.formats.json_text import parse, require_object
 
 
 class RequestLines:
-    """Takes lines, and writes the answers as they come, which need not be in the order of the lines.
+    """Processes request lines, and writes answers as they are ready, not necessarily in order.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ class RequestLines:
         self._open: dict[str | float, Job] = {}
 
     def take(self, line: str) -> None:
-        """Begin what a line asks for."""
+        """Start the request in a line."""
         if not line.strip():
             return
         try:
@@ -46,12 +46,12 @@ class RequestLines:
         key = identity(row.get("id"), "id")
         with self._listing:
             if key in self._open:
-                raise InputError(f"{key!r} is that of another request that is not answered yet", "id")
+                raise InputError(f"{key!r} is used by another request that is not answered yet", "id")
         job = self._service.submit(row, lambda answer: self._end(key, answer))
         if not job.answer.done():
             with self._listing:
                 self._open[key] = job
-        if job.answer.done():  # in the meantime
+        if job.answer.done():  # answered in the meantime
             with self._listing:
                 self._open.pop(key, None)
 
@@ -61,12 +61,12 @@ class RequestLines:
         self._write(answer)
 
     def _cancel(self, row: Row) -> None:
-        """Cancel a request, whose answer says so; one that is unknown, or answered already, is an error."""
+        """Cancel a request, whose answer says so; raise an error if it is unknown or already answered."""
         key = identity(row["cancel"], "cancel")
         with self._listing:
             job = self._open.get(key)
         if job is None:
-            raise InputError(f"there is no open request {key!r}; it may be answered already", "cancel")
+            raise InputError(f"no open request {key!r}; it may have been answered already", "cancel")
         job.cancel()
 
     def _write(self, answer: Answer) -> None:

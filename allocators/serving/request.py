@@ -1,4 +1,4 @@
-"""What a request of a service asks for, checked: a document becomes arguments of `solve`."""
+"""Parsing and validation of requests to a service, from documents to arguments of `solve`."""
 
 import math
 from collections.abc import Mapping
@@ -14,40 +14,40 @@ from alloc.problems.formats.json_text import require_object
 REQUEST_FORMAT, ANSWER_FORMAT = "alloc-solve-request/1", "alloc-solve-answer/1"
 
 ARGUMENTS = ("objective", "target_gap", "start", "makespan_slack", "makespan_limit", "move_price", "pins")
-"""Fields that are arguments of `solve` by the same name, checked there."""
+"""Fields that are passed to `solve` under the same name and validated there."""
 
 COUNTS = ("iterations", "seed", "threads")
-"""Fields that are whole numbers."""
+"""Fields with integer values."""
 
 FIELDS = ("format", "id", "instance", "method", "parameters", "limit_ms", *ARGUMENTS, *COUNTS)
 
 LOCAL_PARAMETERS = ("policy", "device", "plain")
-"""Parameters of built-in methods that strangers do not choose: they name files or hardware, or ask for a model of any
-size, whose time is not limited."""
+"""Parameters of built-in methods that untrusted clients may not set: they name files or hardware, or allow models of
+unlimited size and time."""
 
 LARGEST_WHOLE = 2**53 - 1
-"""Largest whole number that every reader of JSON has exactly, as numbers are floats there."""
+"""Largest integer that is exact in every JSON parser, as some use floats."""
 
 LARGEST_PARAMETER = 10_000
-"""Largest whole number that a stranger sets a parameter to: more could take all memory."""
+"""Largest integer parameter that an untrusted client may set, as larger ones could exhaust memory."""
 
 
 @dataclass(frozen=True)
 class ServiceLimits(CheckedParameters):
-    """What a service takes on.
+    """Limits of a service.
 
     Attributes
     ----------
     agents, tasks : int
-        Most of an instance.
+        Maximum number of agents and of tasks of an instance.
     limit_ms : float
-        Longest time limit, in milliseconds, and that of requests without one.
+        Maximum and default time limit of a request, in milliseconds.
     parallel : int
-        Runs at the same time.
+        Maximum number of parallel runs.
     queue : int
-        Requests that wait for one of them to end; further ones are turned away.
+        Maximum number of waiting requests; further ones are rejected.
     strangers : bool
-        Whether requests come from elsewhere, so that they set no `LOCAL_PARAMETERS` and no large parameters.
+        Whether clients are untrusted, so that requests may not set `LOCAL_PARAMETERS` or large parameters.
     """
 
     agents: int = bounded(2_000, low=1)
@@ -60,14 +60,14 @@ class ServiceLimits(CheckedParameters):
 
 @dataclass(frozen=True)
 class SolveRequest:
-    """One request.
+    """A validated request.
 
     Attributes
     ----------
     instance : Instance
     method : str
     parameters : dict
-        Of the method, by name.
+        Parameters of the method, by name.
     limit_s : float
         Seconds from the arrival of the request to its answer.
     arguments : dict
@@ -82,12 +82,12 @@ class SolveRequest:
 
     @classmethod
     def of(cls, row: Row, limits: ServiceLimits) -> "SolveRequest":
-        """Return what a document asks for.
+        """Return the request in a document.
 
         Raises
         ------
         InputError
-            If a field is unknown, missing or wrong, or exceeds the limits; its place is the field.
+            If a field is unknown, missing or invalid, or exceeds the limits; `place` names the field.
         """
         require_known(row, FIELDS, "")
         if row.get("format", REQUEST_FORMAT) != REQUEST_FORMAT:
@@ -109,35 +109,35 @@ class SolveRequest:
 
 
 def identity(value: object, place: str) -> str | float:
-    """Return the id of a request as its answer repeats it.
+    """Return the id of a request, as repeated in its answer.
 
     Raises
     ------
     InputError
-        If it is neither a string nor a number that comes back unaltered.
+        If it is neither a string nor a number that can be returned unchanged.
     """
     if isinstance(value, str):
         return value
     if isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= LARGEST_WHOLE:  # no NaN
         return int(value) if value == int(value) else value
-    words = f"must be a string, or a number from -{LARGEST_WHOLE} to {LARGEST_WHOLE}, another one for each request"
+    words = f"must be a string or a number from -{LARGEST_WHOLE} to {LARGEST_WHOLE}, unique for each request"
     raise InputError(words, place)
 
 
 def integral(value: object) -> object:
-    """Return a number without a fraction as an int, as which JSON has it."""
+    """Return a float with an integral value as an int; other values unchanged."""
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
 def _instance(given: object, limits: ServiceLimits) -> Instance:
-    """Return the instance, refused before it is read where it is too large."""
+    """Return the instance; raise an error before parsing it if it is too large."""
     if given is None:
-        raise InputError("is missing; give one of the format alloc-instance/1", "instance")
+        raise InputError("is missing; give an instance in the format alloc-instance/1", "instance")
     document = require_object(given, "instance")
     for name, most in (("agents", limits.agents), ("tasks", limits.tasks)):
         rows = document.get(name)
         if isinstance(rows, list) and len(rows) > most:
-            raise InputError(f"has {len(rows)} {name}; this service takes {most} at most", f"instance.{name}")
+            raise InputError(f"has {len(rows)} {name}; this service accepts at most {most}", f"instance.{name}")
     try:
         return from_document({"format": "alloc-instance/1", **document})
     except InputError as error:
@@ -145,11 +145,11 @@ def _instance(given: object, limits: ServiceLimits) -> Instance:
 
 
 def _parameters(given: object, limits: ServiceLimits) -> dict[str, object]:
-    """Return the parameters of the method as Python's own values."""
+    """Return the parameters of the method as Python values."""
     named = {str(name): _value(value) for name, value in of_type(given, Mapping, "parameters").items()}
     for name, value in named.items() if limits.strangers else ():
         if name in LOCAL_PARAMETERS:
-            raise InputError("cannot be chosen by a request to this service", f"parameters.{name}")
+            raise InputError("cannot be set by requests to this service", f"parameters.{name}")
         if isinstance(value, int) and value > LARGEST_PARAMETER:
             raise InputError(f"must be at most {LARGEST_PARAMETER} in this service", f"parameters.{name}")
     return named

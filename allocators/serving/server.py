@@ -1,4 +1,4 @@
-"""The process that serves over HTTP: uvicorn, which a signal ends cleanly."""
+"""HTTP server: uvicorn with a clean shutdown on signals."""
 
 import logging
 import math
@@ -16,24 +16,24 @@ from alloc.allocators.serving.service import Service
 from alloc.problems import InputError
 
 SWITCH_S = 0.001
-"""Seconds after which a thread that computes in Python lets others go on: the event loop must not wait for it."""
+"""Interval in seconds for switching threads, short so that computing threads do not delay the event loop."""
 
 GRACE_S = 5
-"""Seconds that open requests have for their answers once a signal has come."""
+"""Seconds for open requests to be answered after a signal."""
 
 SAME_SIGNAL_S = 0.5
-"""Seconds within which signals are one: some programs send it to a process, and then to its group."""
+"""Seconds within which signals count as one, as some programs signal a process and then its group."""
 
 
 class Server(uvicorn.Server):
-    """Ends its runs on a signal, so that open requests are answered soon; a later one ends it at once."""
+    """Server that ends its runs on a signal, so that open requests are answered soon, and exits on a second one."""
 
     def __init__(self, config: uvicorn.Config, service: Service, tell: Callable[[str], object]) -> None:
         super().__init__(config)
         self._service, self._tell, self._signalled = service, tell, math.inf
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        """Listen, and tell where."""
+        """Listen, and report the address."""
         await super().startup(sockets)
         for server in self.servers:
             for listening in server.sockets:
@@ -41,7 +41,7 @@ class Server(uvicorn.Server):
                 self._tell(f"http://{f'[{host}]' if ':' in host else host}:{port}")
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
-        """Do not raise the signal again at the end, as uvicorn would: this end is a clean one."""
+        """End runs on the first signal, exit on the next; unlike uvicorn, do not re-raise the signal after shutdown."""
         now = time.monotonic()
         self._signalled = min(self._signalled, now)
         self._service.end()
@@ -50,18 +50,18 @@ class Server(uvicorn.Server):
 
 
 class _Reason(logging.Filter):
-    """Keeps why uvicorn could not listen, which it logs before it exits, for the one line that is said of it."""
+    """Filter that captures why uvicorn could not listen, which it logs before it exits, for the error message."""
 
     def __init__(self) -> None:
         super().__init__()
-        self.text = "it does not start"
+        self.text = "the server did not start"
 
     def filter(self, record: logging.LogRecord) -> bool:
-        """Take an error of the operating system out of the log."""
+        """Capture an error of the operating system instead of logging it."""
         error = record.msg
         if not isinstance(error, OSError):
             return True
-        if error.errno is not None and error.errno > 0:  # a host that is not found has numbers below 0
+        if error.errno is not None and error.errno > 0:  # unknown hosts have negative numbers
             self.text = os.strerror(error.errno)
         else:
             self.text = error.strerror or str(error)
@@ -69,16 +69,16 @@ class _Reason(logging.Filter):
 
 
 def run_server(service: Service, host: str, port: int, most_bytes: int, tell: Callable[[str], object]) -> None:
-    """Serve until a signal comes.
+    """Serve until a signal arrives.
 
     Parameters
     ----------
     service : Service
     host : str
     port : int
-        0 for a free one.
+        Port to listen on; 0 for any free port.
     most_bytes : int
-        Largest body of a request.
+        Maximum size of the body of a request.
     tell : callable
         Called with the address once the service listens.
 

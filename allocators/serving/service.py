@@ -1,4 +1,4 @@
-"""Solves requests in a few threads, with methods that are loaded once, a bounded queue, deadlines and cancellation."""
+"""Service that solves requests in threads, with methods loaded once, a bounded queue, deadlines and cancellation."""
 
 import json
 import logging
@@ -27,11 +27,11 @@ from alloc.problems.formats.messages import one_line
 LOG = logging.getLogger("alloc.serve")
 
 MOST_METHODS = 16
-"""Methods with parameters of requests that stay loaded; the one not used for longest goes."""
+"""Maximum number of methods with parameters from requests that stay loaded; the least recently used is dropped."""
 
 
 class Outcome(StrEnum):
-    """What became of a request."""
+    """Outcome of a request."""
 
     SOLVED = "solved"
     INPUT = "input"
@@ -43,7 +43,7 @@ class Outcome(StrEnum):
 
 @dataclass(frozen=True)
 class Answer:
-    """The answer to a request: what became of it, and the document."""
+    """The answer to a request: its outcome, and the document."""
 
     outcome: Outcome
     document: Row
@@ -56,17 +56,17 @@ class Answer:
 
 @dataclass(eq=False)
 class Job:
-    """A request on its way.
+    """A request in progress.
 
     Attributes
     ----------
     given : str or dict
-        The document, as JSON text or read already.
+        The document, as JSON text or parsed.
     cancellation : Cancellation
     arrived : float
-        On the monotonic clock.
+        Time of arrival on the monotonic clock.
     ahead : int
-        Requests that ran or waited then.
+        Number of requests that were running or waiting at that time.
     answer : Future of Answer
     """
 
@@ -77,7 +77,7 @@ class Job:
     answer: "Future[Answer]" = field(default_factory=Future)
 
     def __post_init__(self) -> None:
-        self.answer.set_running_or_notify_cancel()  # who waits for it cannot cancel it, but by `cancel`
+        self.answer.set_running_or_notify_cancel()  # it can only be cancelled by `cancel`
 
     def cancel(self) -> None:
         """End the run at once; the answer says that it was cancelled."""
@@ -85,13 +85,13 @@ class Job:
 
 
 class Service:
-    """Takes requests, and answers each.
+    """Accepts requests and answers each of them.
 
     Parameters
     ----------
     limits : ServiceLimits
     methods : mapping, optional
-        Methods that are loaded now, with the parameters that they have where a request sets none.
+        Methods to load at once, with their default parameters for requests that set none.
 
     Raises
     ------
@@ -113,7 +113,7 @@ class Service:
 
     @property
     def open_requests(self) -> int:
-        """Requests that run or wait."""
+        """Number of running and waiting requests."""
         return self._open
 
     @property
@@ -122,14 +122,14 @@ class Service:
         return self._ending.is_set()
 
     def submit(self, given: str | Row, then: Callable[[Answer], None] = lambda answer: None) -> Job:
-        """Take a request on, or turn it away where the queue is full.
+        """Accept a request, or reject it if the queue is full.
 
         Parameters
         ----------
         given : str or dict
-            A document of the format ``alloc-solve-request/1``, as JSON text or read already.
+            A document in the format ``alloc-solve-request/1``, as JSON text or parsed.
         then : callable
-            Called with the answer, in whichever thread has it.
+            Called with the answer, in the thread that produced it.
 
         Returns
         -------
@@ -149,11 +149,11 @@ class Service:
         return job
 
     def end(self) -> None:
-        """End all runs as their time limits do, and turn further requests away."""
+        """End all runs as their time limits do, and reject further requests."""
         self._ending.set()
 
     def close(self) -> None:
-        """Wait for all requests to be answered, and end the threads."""
+        """Wait until all requests are answered, and end the threads."""
         self._pool.shutdown()
 
     def _answer(self, job: Job) -> None:
@@ -166,7 +166,7 @@ class Service:
             job.answer.set_result(answer)
 
     def _answered(self, job: Job) -> Answer:
-        """Return the answer; whatever fails is one, too."""
+        """Return the answer, also for failures."""
         given = job.given
         try:
             if job.cancellation.is_cancelled:
@@ -185,7 +185,7 @@ class Service:
             return failure(given, Outcome.REFUSED, str(error))
         except MemoryError:
             return failure(given, Outcome.FAILED, "there is not enough memory for this")
-        except BaseException as error:  # such as SystemExit from a plugin, which ends nothing in this thread
+        except BaseException as error:  # including SystemExit from a plugin, which must not end this thread
             LOG.exception("a request failed")
             return failure(given, Outcome.FAILED, f"defect in alloc or a plugin: {type(error).__name__}: {error}")
         notes = {"notes": list(result.notes)} if result.notes else {}
@@ -193,7 +193,7 @@ class Service:
         return Answer(Outcome.SOLVED, {**_head(given), **queue, "result": document, **notes})
 
     def _solve(self, request: SolveRequest, job: Job) -> Result:
-        """Run the method for what is left of the time since the request arrived."""
+        """Run the method for the time left since the request arrived."""
         arguments = dict(request.arguments)
         asked = arguments.pop("threads", None)
         threads = self._threads if asked is None else min(int(str(asked)), self._threads)
@@ -202,7 +202,7 @@ class Service:
         return solve(
             request.instance,
             method,
-            time_limit_s=left_s - bounds_s(left_s),  # the bounds come after the run
+            time_limit_s=left_s - bounds_s(left_s),  # bounds are computed after the run
             threads=max(1, threads),
             stop=job.cancellation,
             handle_signals=False,
@@ -210,18 +210,18 @@ class Service:
         )
 
     def _method(self, request: SolveRequest) -> Allocator | str:
-        """Return the method, loaded at its first use."""
+        """Return the method, loaded on first use."""
         name, parameters = request.method, request.parameters
         if name == "auto":
             if parameters:
-                raise InputError("are for a method that is named", "parameters")
+                raise InputError("can only be set for a named method", "parameters")
             return name
         if not parameters and name in self._own:
             return self._own[name]
         key = f"{name} {sorted(parameters.items())}"
         with self._looking:
             loading = self._loading.setdefault(key, threading.Lock())
-        with loading:  # of this method only: loading takes seconds, for which others are not held up
+        with loading:  # a lock per method, as loading takes seconds and must not block other methods
             method = self._others.get(key)
             if method is None:
                 method = load(name, parameters)
@@ -234,12 +234,12 @@ class Service:
 
 
 def failure(given: str | Row, outcome: Outcome, message: str) -> Answer:
-    """Return the answer to a request that has no result."""
+    """Return the answer to a request without a result."""
     return Answer(outcome, {**_head(given), "error": {"kind": str(outcome), "message": one_line(message)}})
 
 
 def _head(given: str | Row) -> Row:
-    """Return the fields that every answer has: the id is that of the request, if it has a valid one."""
+    """Return the fields common to all answers, with the id of the request if it has a valid one."""
     try:
         known = identity(given.get("id"), "id") if isinstance(given, dict) else None
     except InputError:

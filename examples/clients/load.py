@@ -1,11 +1,11 @@
-"""Load on `alloc serve --http`: many clients with deadlines, some of whose requests are bad or given up.
+"""Load test of `alloc serve --http`: many clients with deadlines, some of whose requests are invalid or aborted.
 
     python examples/clients/load.py --seconds 60
 
-Starts a server, and prints the times to answer, the excess over 50 ms + 15 ms for each request ahead, the processor
-time of an answer, and the memory of the server. Of the requests 5 % are malformed, too large, or given up after 10 ms.
-On a busy machine look at the processor time: below 15 ms, a server with a processor of its own keeps to what is
-promised. Needs `pip install 'alloc-mrta[serve]' httpx`, and Linux.
+Starts a server, and prints the response times, their excess over 50 ms + 15 ms for each request ahead, the processor
+time per answer, and the memory of the server. 5 % of the requests are malformed, too large, or aborted after 10 ms.
+On a busy machine, rely on the processor time: below 15 ms, a server with its own processor meets these response
+times. Requires `pip install 'alloc-mrta[serve]' httpx`, and Linux.
 """
 
 import argparse
@@ -32,7 +32,7 @@ DEADLINE_MS, PER_REQUEST_MS, BAD_SHARE, OVERSIZED = 50.0, 15.0, 0.05, 5_000_000
 
 
 def service(given: argparse.Namespace) -> None:
-    """Start a server, and ask it as many clients do."""
+    """Start a server, and send it the requests of many clients."""
     command = [sys.executable, "-m", "alloc", "serve", "--http", "0", "--load", ",".join(SERVED)]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as server:
         assert server.stderr is not None
@@ -44,7 +44,7 @@ def service(given: argparse.Namespace) -> None:
 
 
 async def ask(address: str, process: int, given: argparse.Namespace) -> None:
-    """Let all clients ask, and print how they were answered."""
+    """Run all clients, and print statistics of the answers."""
     rng = random.Random(0)
     instances = [to_document(paper(1, seed=seed)) for seed in range(10)]
     common = {"limit_ms": DEADLINE_MS, "objective": given.objective}
@@ -62,9 +62,9 @@ async def ask(address: str, process: int, given: argparse.Namespace) -> None:
     taken, ahead = np.array(times).T
     excess = taken - DEADLINE_MS - PER_REQUEST_MS * ahead
     print(f"load of the machine {os.getloadavg()[0]:.1f} on {os.cpu_count()} processors; requests:", dict(counts))
-    print(f"{len(times) / given.seconds:.0f} answers a second, processor time {spent_ms:.1f} ms each")
+    print(f"{len(times) / given.seconds:.0f} answers per second, processor time {spent_ms:.1f} ms each")
     print("ms to answer, p50, p90, p99, worst:", *np.percentile(taken, [50, 90, 99, 100]).round(1))
-    print(f"ahead: mean {ahead.mean():.1f}, most {ahead.max():.0f}; promised are {50 + 15 * ahead.mean():.0f} ms")
+    print(f"ahead: mean {ahead.mean():.1f}, max {ahead.max():.0f}; target {50 + 15 * ahead.mean():.0f} ms")
     print(f"beyond 50 ms + 15 ms for each ahead: {(excess > 0).mean():.2%}, p99 by {np.percentile(excess, 99):.0f} ms")
     print("memory of the server, MB:", *(f"{one:.0f}" for one in memory))
 
@@ -72,7 +72,7 @@ async def ask(address: str, process: int, given: argparse.Namespace) -> None:
 async def client(
     number: int, address: str, bodies: Sequence[str], until: float, counts: Counter[str], times: list[tuple[float, int]]
 ) -> None:
-    """Ask until the time is over; count all answers, and time the good ones, with how many were ahead."""
+    """Send requests until the time is over; count all answers, and record time and requests ahead of the good ones."""
     rng = random.Random(number)
     async with httpx.AsyncClient(base_url=address, timeout=30) as session:
         while time.monotonic() < until:
@@ -92,13 +92,13 @@ async def client(
 
 
 def processor_s(process: int) -> float:
-    """Return the seconds of a processor that a process has had."""
+    """Return the processor time of a process in seconds."""
     user, system = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[11:13]
     return (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
 
 
 def memory_mb(process: int) -> float:
-    """Return the resident memory of a process."""
+    """Return the resident memory of a process in MB."""
     return int(Path(f"/proc/{process}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 2**20
 
 

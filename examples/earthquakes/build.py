@@ -1,6 +1,6 @@
-"""Build `alaska.json`: survey drones at Alaskan airfields, and the sites of one week's earthquakes.
+"""Build `alaska.json`: survey drones at Alaskan airfields, and the sites of one week of earthquakes.
 
-Run ``python examples/earthquakes/build.py``. The data are real, the drones are made up; README.md says which is which.
+Run ``python examples/earthquakes/build.py``. Earthquakes and airfields are real, drones are fictitious; see README.md.
 """
 
 import csv
@@ -19,7 +19,7 @@ OUTPUT = HERE / "alaska.json"
 CENTRE = (62.0, -152.0)
 """Latitude and longitude of the middle of the map, in degrees."""
 WEST, EAST = -166.0, -129.0
-"""Longitudes in degrees: the mainland, Kodiak and the Panhandle; the chain of the Aleutians is left out."""
+"""Longitudes in degrees: the mainland, Kodiak and the Panhandle, without the Aleutian chain."""
 EARTH_RADIUS_KM = 6371.0088
 SITE_RADIUS_KM = 80.0
 KWH_PER_KM = 0.15
@@ -31,7 +31,7 @@ LIGHT, MEDIUM, HEAVY = (
     ("heavy", 20.0, np.inf, 1200.0),
 )
 FLEETS = ((LIGHT, MEDIUM), (LIGHT, LIGHT), (MEDIUM, HEAVY), (LIGHT, MEDIUM), (MEDIUM, MEDIUM))
-"""Airfields, in the order of their codes, take turns in these."""
+"""Pairs of drones, assigned to the airfields cyclically in the order of their codes."""
 
 
 def main() -> None:
@@ -98,7 +98,7 @@ def group_sites(quakes: list[dict[str, str]]) -> Iterator[list[dict[str, str]]]:
 
 
 def area_to_survey(site: list[dict[str, str]]) -> float:
-    """Return the km2 to photograph: that of the widest shock, and a twentieth of each other one. Our choice."""
+    """Return the area to photograph in km2: the largest shaken area plus a twentieth of each other one. Our choice."""
     areas = [shaken_area(quake) for quake in site]
     return max(areas) + 0.05 * (sum(areas) - max(areas))
 

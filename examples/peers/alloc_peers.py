@@ -1,4 +1,4 @@
-"""Published programs and a plain model as methods: `prtpy`, `pygrape` and `classes`; README.md says what they are."""
+"""Published programs and a plain model as methods: `prtpy`, `pygrape` and `classes`; see README.md."""
 
 import sys
 import types
@@ -15,11 +15,11 @@ from alloc.problems import Allocation, RefusedError, agent_classes
 def refuse_ranges(search: Search) -> None:
     """Refuse an instance in which an agent cannot take every task."""
     if not search.instance.reach.is_complete:
-        raise RefusedError("ranges are beyond it")
+        raise RefusedError("does not support ranges")
 
 
 class Prtpy(Allocator):
-    """Maximise the smallest weighted sum; it sorts its bins, so they go to the tasks in order of their workloads."""
+    """Maximise the smallest weighted sum; prtpy sorts its bins, so they are matched to tasks in order of workload."""
 
     method = Method(name="prtpy", summary="the integer programme of prtpy", requires=("prtpy",))
 
@@ -47,12 +47,12 @@ class Prtpy(Allocator):
 
 
 class Classes(Allocator):
-    """Maximise the least share of a task's work that is done in an hour, in millionths."""
+    """Maximise the minimum over tasks of the share of work done in an hour, in millionths."""
 
-    method = Method(name="classes", summary="CP-SAT over classes of agents, as one would state it")
+    method = Method(name="classes", summary="CP-SAT over classes of agents, the straightforward model")
 
     def allocate(self, search: Search) -> Proposal:
-        """Solve, and hand the members of each class out in their order."""
+        """Solve, and assign the members of each class in order."""
         from ortools.sat.python import cp_model
 
         refuse_ranges(search)
@@ -78,22 +78,22 @@ class Classes(Allocator):
 
 @dataclass(frozen=True)
 class PyGrapeParameters(CheckedParameters):
-    """How far agents hear each other from their starts."""
+    """Communication radius of agents, measured between their starts."""
 
     communication_radius: float = bounded(np.inf, 0.0, infinite=True)
 
 
 class PyGrape(Allocator):
-    """Play with its utility for unequal agents, by shares of abilities; agents communicate within a radius."""
+    """pyGRAPE with its utility for heterogeneous agents, by shares of abilities; agents communicate within a radius."""
 
-    method = Method(name="pygrape", summary="the reference of the game that hedonic plays", requires=("pyGRAPE",))
+    method = Method(name="pygrape", summary="reference implementation of hedonic's game", requires=("pyGRAPE",))
     parameters_type: ClassVar[type] = PyGrapeParameters
     parameters: PyGrapeParameters
 
     def allocate(self, search: Search) -> Proposal:
-        """Play to the end, whatever the limit."""
+        """Play to the end, ignoring the time limit."""
         refuse_ranges(search)
-        for name in ("imageio", "imageio.v2"):  # for films alone
+        for name in ("imageio", "imageio.v2"):  # needed for animations only
             sys.modules.setdefault(name, types.ModuleType(name))
         import pyGRAPE  # type: ignore[import-not-found]
 
@@ -105,7 +105,7 @@ class PyGrape(Allocator):
         if not graph.is_complete:
             heard[:] = 0
             heard[np.repeat(np.arange(n), np.diff(graph.begin)), graph.neighbour] = 1
-        np.random.seed(0)  # noqa: NPY002 (the one that it draws from)
+        np.random.seed(0)  # noqa: NPY002 (pyGRAPE uses the global generator)
         scenario = {
             "num_agents": n,
             "num_tasks": instance.m,

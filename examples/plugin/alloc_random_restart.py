@@ -8,17 +8,17 @@ from alloc.problems import IDLE, Allocation, Instance, Objective, serve_all
 
 
 class RandomRestart(Allocator):
-    """Deal the agents out at random, then move agents to the last task until that no longer helps; begin again."""
+    """Assign agents at random, then move agents to the last task while that helps; restart from a new allocation."""
 
     method = Method(
         name="random-restart",
-        summary="descent from random allocations, again and again",
+        summary="repeated descent from random allocations",
         objectives=(Objective.MAKESPAN,),
         anytime=True,
     )
 
     def allocate(self, search: Search) -> Proposal:
-        """Return after the budget; `search` keeps the best allocation and knows when to stop."""
+        """Return when the budget is spent; `search` keeps the best allocation and says when to stop."""
         rng = np.random.default_rng(search.seed)
         while not (search.should_stop() and search.best):
             dealt = serve_all(search.instance, deal(search.instance, rng))
@@ -28,7 +28,7 @@ class RandomRestart(Allocator):
 
 
 def deal(instance: Instance, rng: np.random.Generator) -> Allocation:
-    """Send each agent to a task within its reach, likelier to one with more work."""
+    """Assign each agent to a random task in its reach, with probabilities proportional to workloads."""
     weights = instance.reach.mask * instance.workload
     total = weights.sum(axis=1, keepdims=True)
     bounds = np.cumsum(np.divide(weights, total, out=np.zeros_like(weights), where=total > 0), axis=1)
@@ -39,7 +39,7 @@ def deal(instance: Instance, rng: np.random.Generator) -> Allocation:
 
 
 def descend(search: Search, allocation: Allocation) -> Allocation:
-    """Move one agent at a time to the task that is done last, the one whose old task suffers least."""
+    """Move one agent at a time to the last task, choosing the one whose old task is delayed least."""
     instance, task = search.instance, allocation.task_of_agent.copy()
     work, reach = instance.workload, instance.reach
     busy = task != IDLE
@@ -63,5 +63,5 @@ def descend(search: Search, allocation: Allocation) -> Allocation:
 
 def completion_times(work: NDArray[np.float64], group: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return h / W (4): 0 without work, inf without agents."""
-    empty = group <= 1e-12 * (1 + work)  # what is left after the last agent has gone
+    empty = group <= 1e-12 * (1 + work)  # rounding error left after the last agent is removed
     return np.where(work > 0, np.divide(work, group, out=np.full_like(work, np.inf), where=~empty), 0.0)

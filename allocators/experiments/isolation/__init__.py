@@ -1,1 +1,1 @@
-"""Runs in processes of their own, which can crash, hang or eat memory without harm to anything else."""
+"""Runs in separate processes, which can crash, hang or exhaust memory without affecting others."""

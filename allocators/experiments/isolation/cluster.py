@@ -1,4 +1,4 @@
-"""The machines of a Ray cluster as a place for runs; a run whose machine dies is made again on another."""
+"""Runs on the machines of a Ray cluster; if a machine fails, its runs are repeated on another."""
 
 import contextlib
 import math
@@ -19,19 +19,19 @@ from alloc.allocators.parallel.engine import POLL_S, EngineError
 from alloc.allocators.parallel.ray import MAX_ATTEMPTS, RayEngine
 
 OTHERS_S = 0.3
-"""Seconds between two looks whether other commands have freed processors."""
+"""Seconds between two attempts to take processors that other commands use."""
 
 
 class Cluster(Place):
-    """A Ray cluster, on whose machines this package and all plugins must be installed in the same versions.
+    """A Ray cluster; all machines must have this package and all plugins installed in the same versions.
 
-    The store stays with the command alone: machines get runs and answer how they ended. `machine` tells all kinds of
-    machines that there are at the beginning.
+    Only the command accesses the store; machines receive runs and return their endings. `machine` lists all kinds of
+    machines that the cluster has at the start.
 
     Parameters
     ----------
     address : str, optional
-        Head of the cluster; see `RayEngine`.
+        Address of the cluster; see `RayEngine`.
 
     Raises
     ------
@@ -47,7 +47,7 @@ class Cluster(Place):
         self.machine = " and ".join(sorted(set(self._kinds())))
 
     def _kinds(self) -> list[str]:
-        """Return what each machine is."""
+        """Return a description of each machine."""
         from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
         kind_of = self._ray.remote(num_cpus=0)(_kind)
@@ -56,7 +56,7 @@ class Cluster(Place):
         return kinds
 
     def _with_processors(self) -> list[tuple[str, int]]:
-        """Return the id and the number of processors of each machine that makes runs."""
+        """Return the id and the number of processors of each machine that can execute runs."""
         found = [(node["NodeID"], int(node["Resources"].get("CPU", 0))) for node in self._ray.nodes() if node["Alive"]]
         return [(node, processors) for node, processors in found if processors]
 
@@ -65,11 +65,11 @@ class Cluster(Place):
         return sum(processors // threads for _, processors in self._with_processors())
 
     def take(self, threads: int) -> Cores | None:
-        """Return no processors: each run takes them where it is made."""
+        """Return no processors, as each run takes them on its machine."""
         return Cores()
 
     def memory_mb(self, runs: int) -> float:
-        """Return infinity: each run finds out where it is made."""
+        """Return infinity, as each run determines its limit on its machine."""
         return math.inf
 
     def handle(self, cores: Cores, threads: int, *, is_timed: bool) -> Handle:
@@ -82,7 +82,7 @@ class Cluster(Place):
 
 
 class _Remote(Handle):
-    """Makes runs as tasks of a cluster, which Ray begins again if their machine dies."""
+    """Executes runs as tasks of a cluster, which Ray restarts if their machine fails."""
 
     def __init__(self, ray: ModuleType, threads: int, *, is_timed: bool) -> None:
         self._ray, self._threads, self._is_timed = ray, threads, is_timed
@@ -110,7 +110,7 @@ class _Remote(Handle):
         Raises
         ------
         EngineError
-            If the cluster is lost, or a machine cannot make runs, as where a plugin is missing: no method is at fault.
+            If the cluster is lost or a machine cannot execute runs, for instance without a plugin.
         """
         errors = self._ray.exceptions
         try:
@@ -118,9 +118,9 @@ class _Remote(Handle):
                 return None
             figures: Figures = self._ray.get(self._task)
         except (errors.WorkerCrashedError, errors.OutOfMemoryError) as error:
-            figures = {"outcome": Outcome.KILLED, "reason": f"Ray gave it up: {_reason(error)}"}
+            figures = {"outcome": Outcome.KILLED, "reason": f"Ray gave up the run: {_reason(error)}"}
         except (errors.RayError, OSError) as error:
-            raise EngineError(f"Ray gave a run up: {_reason(error)}") from error
+            raise EngineError(f"Ray gave up a run: {_reason(error)}") from error
         self._task = None
         return figures
 
@@ -140,17 +140,17 @@ def _kind() -> str:
 
 
 def make_run(order: bytes, limits: Limits, threads: int, *, is_timed: bool) -> Figures:
-    """Make one run on this machine, in a process of its own.
+    """Execute one run on this machine, in a separate process.
 
     Parameters
     ----------
     order : bytes
         A pickled `Order`.
     limits : Limits
-        With infinite memory: the part of this machine's that each of its runs has.
+        Infinite memory stands for an equal share of this machine's memory per run.
     threads : int
     is_timed : bool
-        Whether it has processors to itself, for which it waits.
+        Whether the run waits for processors of its own.
     """
     if math.isinf(limits.memory_mb):
         here = Here()

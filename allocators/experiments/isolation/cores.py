@@ -1,4 +1,4 @@
-"""Processors that timed runs have to themselves, also beside other commands on the same machine."""
+"""Exclusive processors for timed runs, coordinated across commands on the same machine."""
 
 import contextlib
 import os
@@ -9,33 +9,33 @@ from dataclasses import dataclass, field
 CAN_PIN = sys.platform == "linux"
 
 LOCK = "\0alloc-core-"
-"""Beginning of the names by which processors are taken, on one machine."""
+"""Prefix of the names by which processors are locked on a machine."""
 
 
 @dataclass(frozen=True)
 class Cores:
-    """Some processors, held until `free` is called here and in every process that got the descriptors.
+    """Locked processors, held until `free` is called here and in every process that inherited the descriptors.
 
     Attributes
     ----------
     numbers : tuple of int
-        Empty where nothing is held: runs go wherever the system puts them.
+        Empty if no processors are held; the system then schedules runs freely.
     locks : tuple of socket
-        Bound names in the abstract name space of Linux, which end with the last process that has them, however it
-        ends, and which leave no files behind.
+        Sockets bound in the abstract namespace of Linux, which are released when the last process that holds them
+        ends, in any way, and leave no files behind.
     """
 
     numbers: tuple[int, ...] = ()
     locks: tuple[socket.socket, ...] = field(default=(), repr=False)
 
     def free(self) -> None:
-        """Let others have them."""
+        """Release the processors."""
         for lock in self.locks:
             lock.close()
 
 
 def take(count: int) -> Cores | None:
-    """Take `count` processors that this process may use and nobody has taken; None if there are not so many."""
+    """Lock `count` free processors that this process may use; None if there are too few."""
     numbers: list[int] = []
     locks: list[socket.socket] = []
     for number in sorted(os.sched_getaffinity(0)):

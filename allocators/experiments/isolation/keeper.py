@@ -1,8 +1,8 @@
-"""A process that starts one worker and sees to it that nothing of it is left behind; run as a script.
+"""A supervisor process that starts one worker and cleans up all its processes; run as a script.
 
-It loads the standard library alone, so that it can fork safely and takes little memory. As the subreaper (Linux) of
-all that the worker starts, it ends what the worker leaves behind, also what has made itself a session of its own. It
-ends everything once the other end of its socket is closed: when the command that it belongs to wants it to, or dies.
+It uses only the standard library, so that it can fork safely and needs little memory. As the subreaper (Linux) of the
+worker's descendants, it ends processes that the worker leaves behind, even those in a session of their own. It ends
+everything once the other end of its socket is closed: when the command that started it requests this, or dies.
 """
 
 import contextlib
@@ -20,16 +20,16 @@ SET_PARENT_DEATH_SIGNAL, SET_SUBREAPER = 1, 36
 
 
 def main(life: int, channel: int, setup: str) -> None:
-    """Start the worker, and wait until it ends, or is to be ended.
+    """Start the worker, and wait until it ends or is to be ended.
 
     Parameters
     ----------
     life : int
-        Descriptor of a socket: how the worker ended is written to it, and its end of file ends everything.
+        Descriptor of a socket: the exit status of the worker is written to it, and end of file ends everything.
     channel : int
-        Descriptor of the socket by which the worker gets its runs and answers.
+        Descriptor of the socket for the worker's orders and answers.
     setup : str
-        A JSON object with the search path for modules, and the cores to run on, if any.
+        JSON object with the module search path, and the cores to run on, if any.
     """
     _control(SET_SUBREAPER, 1)
     wake, woken = socket.socketpair()
@@ -44,7 +44,7 @@ def main(life: int, channel: int, setup: str) -> None:
     os.close(channel)
     for stream in (0, 1, 2):
         with contextlib.suppress(OSError):
-            os.close(stream)  # what the worker prints ends when the worker ends
+            os.close(stream)  # so that the worker's output ends with the worker
     told, status = socket.socket(fileno=life), None
     while status is None and not select.select([told, woken], [], [])[0].count(told):
         woken.recv(4096)
@@ -56,13 +56,13 @@ def main(life: int, channel: int, setup: str) -> None:
 
 
 def _work(keeper: int, channel: int, setup: dict[str, list[str]]) -> None:
-    """Become the worker: a session of its own, with nothing open but its channel and what it prints to."""
+    """Become the worker: in a new session, with no open files but its channel and its output."""
     os.setsid()
     _control(SET_PARENT_DEATH_SIGNAL, signal.SIGKILL)
-    if os.getppid() != keeper:  # it died before that
+    if os.getppid() != keeper:  # the keeper died before
         os._exit(1)
     with contextlib.suppress(OSError):
-        Path("/proc/self/oom_score_adj").write_text("1000")  # of all, a run is what the kernel ends for want of memory
+        Path("/proc/self/oom_score_adj").write_text("1000")  # the kernel's first choice when memory is short
     for name in os.listdir("/dev/fd"):
         if int(name) > 2 and int(name) != channel:
             with contextlib.suppress(OSError):
@@ -77,7 +77,7 @@ def _work(keeper: int, channel: int, setup: dict[str, list[str]]) -> None:
 
 
 def _reaped(worker: int) -> int | None:
-    """Collect processes that have ended; return the status of the worker if it is one of them."""
+    """Reap processes that have ended; return the status of the worker if it is one of them."""
     found = None
     with contextlib.suppress(ChildProcessError):
         while True:
@@ -90,8 +90,8 @@ def _reaped(worker: int) -> int | None:
 
 
 def _end_all(worker: int, *, reaped: bool) -> None:
-    """Kill the worker with its group, and all that it has left, until nothing of it remains."""
-    if not reaped or sys.platform != "linux":  # elsewhere what it has left has another parent now
+    """Kill the worker with its group, and all its descendants, until none remain."""
+    if not reaped or sys.platform != "linux":  # elsewhere, its descendants have been reparented
         with contextlib.suppress(OSError):
             os.killpg(worker, signal.SIGKILL)
     own = Path(f"/proc/{os.getpid()}/task/{os.getpid()}/children")
@@ -106,7 +106,7 @@ def _end_all(worker: int, *, reaped: bool) -> None:
 
 
 def _control(option: int, value: int) -> None:
-    """Call prctl(2), which is there on Linux alone."""
+    """Call prctl(2), which exists only on Linux."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(option, value, 0, 0, 0)
 

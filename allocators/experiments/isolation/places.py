@@ -1,4 +1,4 @@
-"""Where runs are made: on this machine, or on others."""
+"""Places where runs are executed: this machine, or a cluster."""
 
 from multiprocessing.connection import Connection
 from socket import socket
@@ -12,66 +12,66 @@ from alloc.allocators.experiments.store.key import this_machine
 from alloc.allocators.parallel.processors import available_threads
 
 MEMORY_SHARE = 0.8
-"""Part of the memory of a machine that all runs together may take by default."""
+"""Default share of a machine's memory for all runs together."""
 
 
 class Handle(Protocol):
-    """Makes one run at a time; see `Worker`."""
+    """Executes one run at a time; see `Worker`."""
 
     is_reusable: bool
 
     @property
     def handles(self) -> "list[Connection[bytes, bytes] | socket | int]":
-        """What becomes readable when there may be news; empty where one has to ask."""
+        """Objects to wait on, readable when `figures` may have a result; empty if it has to be polled."""
         ...
 
     @property
     def is_alive(self) -> bool:
-        """Whether it can make another run."""
+        """Whether it can execute another run."""
         ...
 
     def send(self, order: Order, limits: Limits) -> None:
-        """Begin a run."""
+        """Start a run."""
         ...
 
     def figures(self) -> Figures | None:
-        """Return how the run ended, None while it goes on."""
+        """Return the ending of the run, or None while it is in progress."""
         ...
 
     def end(self) -> None:
-        """End the run, if there is one, and all that it has started."""
+        """End the run, if any, and all processes that it has started."""
         ...
 
 
 class Place(Protocol):
-    """Processors on which runs are made; a context manager.
+    """Processors on which runs are executed; a context manager.
 
     Attributes
     ----------
     machine : str
-        What decides how fast runs are there; see `this_machine`.
+        Description of the hardware, as it determines the speed of runs; see `this_machine`.
     """
 
     machine: str
 
     def room(self, threads: int) -> int:
-        """Return how many runs of so many threads there is room for at a time, whoever has it now."""
+        """Return how many runs of `threads` threads can execute in parallel, including those of other commands."""
         ...
 
     def take(self, threads: int) -> Cores | None:
-        """Take processors for timed runs; None if others have them."""
+        """Take processors for timed runs; None if others use them."""
         ...
 
     def memory_mb(self, runs: int) -> float:
-        """Return the memory that each of so many runs at a time may take by default, in MiB."""
+        """Return the default memory limit of each of `runs` parallel runs, in MiB."""
         ...
 
     def handle(self, cores: Cores, threads: int, *, is_timed: bool) -> Handle:
-        """Return what makes runs on some processors."""
+        """Return a handle that executes runs on the given processors."""
         ...
 
     def close(self) -> None:
-        """Let go of it."""
+        """Release all resources."""
         ...
 
     def __enter__(self) -> Self:

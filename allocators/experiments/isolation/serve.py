@@ -1,4 +1,4 @@
-"""What a worker does: it makes one run after the other, of one method or policy, and says how each ended."""
+"""Main loop of a worker: execute the runs of one method or policy in turn, and report how each ended."""
 
 import contextlib
 import gc
@@ -29,10 +29,10 @@ from alloc.allocators.solve import solve
 from alloc.problems import Family, Instance, MissingPackageError, Mission, Objective, RefusedError, random_instance
 
 LONGEST_DETAILS = 20_000
-"""Characters of a traceback that are kept, from its end."""
+"""Maximum number of characters of a traceback that are kept, from its end."""
 
 LOADED = b"loaded"
-"""Sent once the method is loaded, when the run begins."""
+"""Message that the method is loaded and the run starts."""
 
 Figures = dict[str, object]
 """Fields of an `Ending`."""
@@ -40,7 +40,7 @@ Figures = dict[str, object]
 
 @dataclass(frozen=True)
 class Order:
-    """A run to be made, and with what.
+    """A run to execute, with its problem and parameters.
 
     Attributes
     ----------
@@ -48,8 +48,8 @@ class Order:
     settings : dict
         Parameters of the method or policy, as `load` and `load_policy` take them.
     instance : bytes
-        An instance or a mission, pickled, so that every run has one of its own: what one remembers would favour
-        whoever comes second.
+        A pickled instance or mission, so that every run has its own copy: values cached in a shared one would
+        favour later runs.
     """
 
     run: Run
@@ -58,7 +58,7 @@ class Order:
 
 
 def serve(channel: int) -> None:
-    """Make runs until the other end of the channel is closed."""
+    """Execute runs until the other end of the channel is closed."""
     connection, make = Connection(channel), None
     _warm_up()
     while True:
@@ -70,12 +70,12 @@ def serve(channel: int) -> None:
         try:
             if make is None:
                 make = maker(order)
-                gc.freeze()  # what is loaded is never searched for garbage again
+                gc.freeze()  # exclude loaded modules from garbage collection
             connection.send_bytes(LOADED)
             problem, begin = pickle.loads(order.instance), time.process_time()
             figures = make(order.run, problem)
             figures["cpu_s"] = time.process_time() - begin
-        except BaseException as error:  # whatever a method raises is how its run ended, also SystemExit
+        except BaseException as error:  # any exception, also SystemExit, is the ending of the run
             figures = failure(error)
         figures["reusable"] = not left_behind()
         connection.send_bytes(json.dumps(figures).encode())
@@ -84,7 +84,7 @@ def serve(channel: int) -> None:
 
 
 def _warm_up() -> None:
-    """Load what every run uses at its beginning and its end, which would count for the first one."""
+    """Load modules that every run uses, so that loading does not count as time of the first run."""
     solve(_warming(), "greedy", objective=Objective.MAKESPAN_ENERGY, iterations=1, threads=1, handle_signals=False)
 
 
@@ -93,22 +93,22 @@ def _warming() -> Instance:
 
 
 def maker(order: Order) -> Callable[[Run, Any], Figures]:
-    """Load what the order names, and return what makes its runs."""
+    """Load the method or policy of an order, and return a function that executes its runs."""
     name = order.run.method
     if order.run.objective == MISSION:
         policy = load_policy(name, **order.settings)
-        with contextlib.suppress(Exception):  # its runs will tell
+        with contextlib.suppress(Exception):  # reported by its runs
             simulate(Mission.from_instance(_warming()), policy, knowledge=order.run.knowledge)
         return partial(_lead, policy)
     if name == "auto":
         for one in PICKED:
-            load(one)  # which one it takes depends on the instance, and is known when the run's time counts already
+            load(one)  # its choice depends on the instance, and is made when the run's time already counts
         return partial(_solve, name)
     return partial(_solve, load(name, **order.settings))
 
 
 def _solve(allocator: str | Allocator, run: Run, instance: Instance) -> Figures:
-    """Make one run, and return what is to be kept of its result."""
+    """Execute one run of a method, and return the fields of its ending."""
     result = solve(
         instance,
         allocator,
@@ -124,7 +124,7 @@ def _solve(allocator: str | Allocator, run: Run, instance: Instance) -> Figures:
 
 
 def _lead(policy: Policy, run: Run, mission: Mission) -> Figures:
-    """Make one run of a policy, likewise."""
+    """Execute one run of a policy, and return the fields of its ending."""
     result = simulate(mission, policy, knowledge=run.knowledge, seed=run.seed, deadline_ms=run.deadline_ms).result
     return {
         "outcome": Outcome.SOLVED,
@@ -172,7 +172,7 @@ OUTCOMES: tuple[tuple[type[BaseException], Outcome], ...] = (
 
 
 def failure(error: BaseException) -> Figures:
-    """Return how a run ended that raised an error."""
+    """Return the fields of the ending of a run that raised an error."""
     outcome = next(outcome for kind, outcome in OUTCOMES if isinstance(error, kind))
     if outcome in (Outcome.REFUSED, Outcome.MISSING_PACKAGE):
         return {"outcome": outcome, "reason": str(error)}

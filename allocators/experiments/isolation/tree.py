@@ -1,4 +1,4 @@
-"""The processes that a process has started, and theirs, and the memory that they hold; on Linux, elsewhere none."""
+"""Descendants of a process and their memory; on Linux only, elsewhere empty."""
 
 import os
 from pathlib import Path
@@ -21,28 +21,28 @@ def _children(pid: int) -> list[int]:
     try:
         threads = os.listdir(f"/proc/{pid}/task")
         return [int(child) for one in threads for child in Path(f"/proc/{pid}/task/{one}/children").read_text().split()]
-    except OSError:  # it has ended meanwhile, or there is no such folder on this system
+    except OSError:  # the process has ended, or the system has no /proc
         return []
 
 
 def resident_mb(pids: list[int]) -> float:
-    """Return the resident memory of processes in MiB, in which what several share counts for each."""
+    """Return the total resident memory of processes in MiB; shared memory counts for each process."""
     pages = sum(_resident_pages(pid) for pid in pids)
     return pages * os.sysconf("SC_PAGE_SIZE") / MIB
 
 
 def proportional_mb(pids: list[int]) -> float:
-    """Return the resident memory of processes in MiB, in which what several share counts once; takes longer."""
+    """Return the total resident memory of processes in MiB, counting shared memory once; slower."""
     return sum(map(_proportional_kb, pids)) / 1024
 
 
 def memory_mb() -> float:
-    """Return the memory that this process may use in MiB: that of the machine, or of its control group if less."""
+    """Return the memory available to this process in MiB: that of the machine, or of its control group if less."""
     found = [os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / MIB]
     for name in ("memory.max", "memory/memory.limit_in_bytes"):
         try:
             found.append(int(Path("/sys/fs/cgroup", name).read_text()) / MIB)
-        except (OSError, ValueError):  # there is none, or it is "max"
+        except (OSError, ValueError):  # there is no such limit, or it is "max"
             continue
     return min(found)
 

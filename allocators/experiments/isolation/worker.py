@@ -1,4 +1,4 @@
-"""The handle of a worker process: it gets runs, is kept to its limits, and is ended with all that it started."""
+"""Handle of a worker process: sends runs, enforces limits, and ends the process with all its descendants."""
 
 import contextlib
 import json
@@ -20,28 +20,28 @@ from alloc.allocators.experiments.isolation.tree import descendants, proportiona
 from alloc.allocators.experiments.store.outcome import Outcome
 
 LOADING_S = 300.0
-"""Seconds that it may take to load a method."""
+"""Time limit for loading a method, in seconds."""
 
 PATIENCE_S = 5.0
-"""Seconds that the end of a worker may take before its keeper is killed as well."""
+"""Seconds to wait for the end of a worker before its keeper is killed as well."""
 
 PRINTED = 4000
-"""Bytes that are kept of what a run prints, from its end."""
+"""Maximum number of bytes of a run's output that are kept, from its end."""
 
 THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
-"""What libraries read when they are loaded."""
+"""Environment variables that libraries read when they are loaded."""
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What a run may take before it is ended.
+    """Limits of a run, which is ended if it exceeds them.
 
     Attributes
     ----------
     seconds : float
-        From the end of loading; ``inf`` for no limit.
+        Seconds from the end of loading; ``inf`` for no limit.
     memory_mb : float
-        Resident memory of the process and all that it has started.
+        Resident memory of the process and all its descendants, in MiB.
     """
 
     seconds: float
@@ -49,14 +49,14 @@ class Limits:
 
 
 class Worker:
-    """A process for the runs of one method, and its keeper; see `keeper`.
+    """A process for the runs of one method, with its keeper; see `keeper`.
 
     Parameters
     ----------
     cores : Cores
-        Where it runs.
+        Processors to run on.
     threads : int
-        Threads of libraries that ask the environment.
+        Number of threads for libraries that read it from the environment.
     """
 
     def __init__(self, cores: Cores, threads: int) -> None:
@@ -85,23 +85,23 @@ class Worker:
 
     @property
     def handles(self) -> "list[Connection[bytes, bytes] | socket.socket | int]":
-        """What becomes readable when there is something for `figures` to look at."""
+        """See `Handle.handles`."""
         return [self._channel, self._life, *([] if self._printed < 0 else [self._printed])]
 
     @property
     def is_alive(self) -> bool:
-        """Whether the process is there: a thread that a run has left may have ended it since."""
+        """Whether the process is alive; a thread left by a run may have ended it."""
         return not select.select([self._life], [], [], 0)[0]
 
     def send(self, order: Order, limits: Limits) -> None:
-        """Begin a run."""
+        """Start a run."""
         self._limits, self._tail, self._loaded = limits, b"", False
         self._sent_at, self.memory_mb = time.monotonic(), 0.0
-        with contextlib.suppress(OSError):  # the process is dead, which `figures` finds
+        with contextlib.suppress(OSError):  # the process is dead; `figures` reports it
             self._channel.send_bytes(pickle.dumps(order))
 
     def figures(self) -> Figures | None:
-        """Return how the run ended, None while it goes on; a run beyond a limit is ended here."""
+        """Return the ending of the run, or None while it is in progress; end a run that exceeds a limit."""
         self._read_printed()
         figures = self._answer()
         if figures is None:
@@ -114,7 +114,7 @@ class Worker:
         return figures
 
     def _answer(self) -> Figures | None:
-        with contextlib.suppress(EOFError, OSError, ValueError):  # it died before or while it wrote
+        with contextlib.suppress(EOFError, OSError, ValueError):  # it died before or while writing
             while self._channel.poll():
                 message = self._channel.recv_bytes()
                 if message == LOADED:
@@ -124,13 +124,13 @@ class Worker:
                 figures["outcome"] = Outcome(str(figures["outcome"]))
                 tree = self._measure()
                 clean = figures["outcome"] in (Outcome.SOLVED, Outcome.REFUSED, Outcome.MISSING_PACKAGE)
-                # a process that the run left behind would take time from those that follow
+                # a process left behind would take time from later runs
                 self.is_reusable = bool(figures.pop("reusable")) and clean and len(tree) <= 1
                 return figures
         return None
 
     def _death(self) -> Figures | None:
-        """Return how the process ended, None while it is there."""
+        """Return how the process ended, or None while it is alive."""
         self._life.setblocking(False)
         try:
             code = self._life.recv(16)
@@ -141,38 +141,38 @@ class Worker:
         self.is_reusable = False
         self._read_printed()
         if not code:
-            return {"outcome": Outcome.KILLED, "reason": "its processes were killed from outside", "exit_code": -9}
+            return {"outcome": Outcome.KILLED, "reason": "its processes were killed externally", "exit_code": -9}
         number = int(code)
         if number >= 0:
             reason = f"it ended its process with exit code {number}"
             return {"outcome": Outcome.EXITED, "reason": reason, "exit_code": number}
-        hint = ", by somebody or for want of memory" if number == -9 else ""
+        hint = ", externally or for lack of memory" if number == -9 else ""
         return {"outcome": Outcome.KILLED, "reason": f"killed by {_signal(-number)}{hint}", "exit_code": number}
 
     def _excess(self) -> Figures | None:
-        """Return which limit the run is beyond, if any, once it was ended for it."""
+        """Return the limit that the run exceeds, if any, after ending the run."""
         now = time.monotonic()
         seconds = self._limits.seconds if self._loaded else LOADING_S
         if now - self._sent_at > seconds:
             self.end()
             task = "running" if self._loaded else "loading"
-            return {"outcome": Outcome.HUNG, "reason": f"still {task} after {seconds:g} s, and ended for it"}
+            return {"outcome": Outcome.HUNG, "reason": f"still {task} after {seconds:g} s, and killed"}
         if now - self._checked_at > 0.05:
             self._checked_at, tree = now, self._measure()
             if self.memory_mb > self._limits.memory_mb and proportional_mb(tree) > self._limits.memory_mb:
                 self.end()
-                reason = f"it took more than {self._limits.memory_mb:.0f} MiB of memory, and was ended for it"
+                reason = f"it used more than {self._limits.memory_mb:.0f} MiB of memory, and was killed"
                 return {"outcome": Outcome.OUT_OF_MEMORY, "reason": reason}
         return None
 
     def _measure(self) -> list[int]:
-        """Note how much memory is taken, and return the processes."""
+        """Measure the memory of the processes, and return their ids."""
         tree = descendants(self._keeper.pid)
         self.memory_mb = max(self.memory_mb, resident_mb(tree))
         return tree
 
     def _read_printed(self) -> None:
-        """Keep the end of what was printed; a run that prints without end does not hold anything up."""
+        """Read available output and keep its end, without blocking on a run that prints endlessly."""
         for _ in range(64):
             if self._printed < 0:
                 return
@@ -186,7 +186,7 @@ class Worker:
             self._tail = (self._tail + part)[-PRINTED:]
 
     def end(self) -> None:
-        """End the process with all that it has started; a second call does nothing."""
+        """End the process with all its descendants; a second call does nothing."""
         self.is_reusable = False
         self._life.close()
         try:

@@ -1,1 +1,1 @@
-"""Runs in a file of SQLite: what ran, how it ended, and who works on what."""
+"""Store of runs in an SQLite file: runs, their endings, and leases on runs in progress."""

@@ -1,4 +1,4 @@
-"""What decides a run, and the hash by which the store knows it."""
+"""The conditions that determine a run, and their hash, which identifies the run in a store."""
 
 import hashlib
 import json
@@ -22,24 +22,24 @@ from alloc.problems.missions.files.document import mission_to_document
 from alloc.problems.missions.mission import Mission
 
 MISSION = "mission"
-"""Objective of a run that a policy makes in a mission."""
+"""Objective of a run of a policy on a mission."""
 
 LATER_FIELDS = {"knowledge": "", "deadline_ms": None}
-"""Fields that were added later, and their defaults, which do not count: older runs keep their hashes."""
+"""Fields added in later versions, with defaults that are left out of the hash, so that older runs keep theirs."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Run:
-    """What is to be run, and all that decides its outcome.
+    """A run, described by everything that determines its outcome.
 
     Attributes
     ----------
     instance : str
-        Hash of the content of the instance or mission, which is not its name; see `fingerprint`.
+        Hash of the content of the instance or mission, without its name; see `fingerprint`.
     method : str
         Name of the method, or of the policy.
     parameters : str
-        Those that were given, as JSON; see `canonical`.
+        Parameters that were given, as JSON; see `canonical`.
     seed : int
     objective : str
         `MISSION` for a policy.
@@ -48,13 +48,13 @@ class Run:
     target_gap : float or None
     threads : int
     version : str
-        Of this package and, for a plugin, of its own; see `versions`.
+        Version of this package and, for a plugin, of its package; see `versions`.
     machine : str
         See `this_machine`.
     knowledge : str
-        What agents in a mission know; empty for a method.
+        Knowledge of agents in a mission; empty for a method.
     deadline_ms : float or None
-        For each decision of a policy.
+        Time limit for each decision of a policy, in milliseconds.
     """
 
     instance: str = ""
@@ -73,24 +73,24 @@ class Run:
 
     @property
     def key(self) -> str:
-        """A hash of all fields: two runs with the same key are the same run."""
+        """Hash of all fields; runs with the same key are identical."""
         values = asdict(self)
         counted = {name: value for name, value in values.items() if LATER_FIELDS.get(name, ...) != value}
         return hashlib.sha256(json.dumps(counted, sort_keys=True).encode()).hexdigest()
 
     @property
     def is_timed(self) -> bool:
-        """Whether the speed of the machine decides its outcome."""
+        """Whether the outcome depends on the speed of the machine."""
         return self.time_limit_s is not None or self.deadline_ms is not None
 
 
 def fingerprint(problem: Instance | Mission) -> str:
-    """Return a hash of all that an instance or a mission holds but for its name.
+    """Return a hash of the content of an instance or a mission, without its name.
 
     Raises
     ------
     InputError
-        If it cannot be written to a file.
+        If the problem cannot be written to a file.
     """
     if isinstance(problem, Mission):
         document = {**mission_to_document(problem), "name": ""}
@@ -109,7 +109,7 @@ def fingerprint_of(content: bytes) -> str:
 
 
 def canonical(settings: Mapping[str, object]) -> str:
-    """Return the parameters of a method or policy as JSON; a file, such as a policy, counts by its content.
+    """Return the parameters of a method or policy as JSON; policy files are represented by their content.
 
     Raises
     ------
@@ -124,16 +124,16 @@ def canonical(settings: Mapping[str, object]) -> str:
 
 
 def versions(name: str, group: str = ENTRY_POINT_GROUP, built_in: Collection[str] = (*BUILT_IN, "auto")) -> str:
-    """Return the version of this package and, behind a plus sign, of the package that a plugin comes from.
+    """Return the version of this package and, for a plugin, after a plus sign, that of its package.
 
     Parameters
     ----------
     name : str
-        Of a method, or of a policy.
+        Name of a method or policy.
     group : str
-        Entry points of plugins of its kind.
+        Entry point group of plugins of its kind.
     built_in : collection of str
-        Names of this package's own.
+        Names of built-in methods or policies.
     """
     own, entry = f"alloc {version('alloc-mrta')}", plugins(group, built_in).get(name)
     return own if entry is None or entry.dist is None else f"{own} + {entry.dist.name} {entry.dist.version}"
@@ -141,7 +141,7 @@ def versions(name: str, group: str = ENTRY_POINT_GROUP, built_in: Collection[str
 
 @cache
 def this_machine() -> str:
-    """Return what the machine is as far as it decides how fast runs are: its processor, how many, and the system."""
+    """Return a description of what determines the machine's speed: processor, number of processors, and system."""
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()
     except OSError:

@@ -1,93 +1,93 @@
-"""How a run ended, whatever became of its process."""
+"""Endings of runs, including failures of their processes."""
 
 from dataclasses import dataclass
 from enum import StrEnum
 
 
 class Outcome(StrEnum):
-    """What became of a run."""
+    """Outcome of a run."""
 
     SOLVED = "solved"
-    """There is a result; its status says how good it is."""
+    """The run has a result; see its status."""
 
     REFUSED = "refused"
-    """The method cannot handle the instance within the budget, and said so."""
+    """The method refused the instance or the budget."""
 
     FAILED = "failed"
-    """An exception, whose traceback is kept."""
+    """The method raised an exception; its traceback is kept."""
 
     EXITED = "exited"
     """The method ended its process, as `os._exit` does."""
 
     KILLED = "killed"
-    """A signal from elsewhere, or a crash in native code, ended the process."""
+    """An external signal, or a crash in native code, ended the process."""
 
     HUNG = "hung"
-    """It was still running long after its budget, and was killed for it."""
+    """The run far exceeded its time limit and was killed."""
 
     OUT_OF_MEMORY = "out of memory"
-    """It ran into the memory limit, or an allocation failed."""
+    """The run exceeded the memory limit, or could not allocate memory."""
 
     MISSING_PACKAGE = "missing package"
     """A package that the method needs is not installed."""
 
 
 TRANSIENT = frozenset({Outcome.MISSING_PACKAGE})
-"""Outcomes that are never final: what was missing may have been installed since."""
+"""Outcomes that are always retried, as the missing package may have been installed since."""
 
 UNSOLVED = frozenset(Outcome) - {Outcome.SOLVED, Outcome.REFUSED}
-"""Outcomes that are tried again where that is asked for."""
+"""Outcomes that are retried on request."""
 
 TracePoints = tuple[tuple[float, float | None, float, float | None], ...]
-"""Seconds, makespan in hours, energy, and lower bound in hours, of each improvement."""
+"""Time in seconds, makespan in hours, energy, and lower bound in hours of each improvement."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Ending:
-    """How a run ended: a row of the store, beside what was run.
+    """Ending of a run: the part of a row of the store that does not describe the run itself.
 
     Attributes
     ----------
     outcome : Outcome
     reason : str
-        Why there is no result, in a line.
+        Why there is no result, in one line.
     details : str
-        The traceback, or the end of what the process printed.
+        The traceback, or the end of the output of the process.
     exit_code : int or None
-        That of the process, where it ended; negative for a signal.
+        Exit code of the process, if it ended; negative for a signal.
     picked : str
-        The method that ran, which differs from the one asked for where that is ``auto``.
+        The method that ran; differs from the requested one if that is ``auto``.
     status, stop_reason : str
-        Of the result; a mission has no reason to stop but its end.
+        Status and stop reason of the result; a mission has no stop reason.
     makespan, served_makespan, lower_bound, gap : float or None
         In hours, and the relative gap; None as in `Result`.
     energy, energy_lower_bound, energy_gap, distance, battery_remaining_percent, reward : float or None
     unserved : int or None
-        Number of unserved tasks; in a mission, of those that were missed or are left.
+        Number of unserved tasks; in a mission, of missed and remaining ones.
     runtime_s : float or None
-        Seconds of the run by its own clock.
+        Duration of the run by its own clock.
     wall_s : float
-        Seconds that passed until the outcome was known.
+        Seconds until the outcome was known.
     cpu_s : float or None
         Processor time of the process during the run.
     memory_mb : float
-        Largest resident memory seen, of the process and all its descendants, in MiB.
+        Peak resident memory observed, of the process and all its descendants, in MiB.
     memory_limit_mb : float
-        The limit on it.
+        Limit on that memory.
     cores : str
-        Processors to which the process was pinned, such as ``0,1``; empty where it was not.
+        Processors to which the process was pinned, such as ``0,1``; empty if it was not.
     at_once : int
-        Runs that this command had going at once at most while this one ran, itself included.
+        Maximum number of parallel runs of this command during the run, including itself.
     started_at, finished_at : float
         Seconds since 1970.
     trace : tuple
         See `TracePoints`.
     measures : str or None
-        Of a mission: a `MissionResult` as JSON.
+        For a mission, its `MissionResult` as JSON.
     host : str
-        The machine of a cluster that made the run; empty for this one.
+        The cluster machine that executed the run; empty for this machine.
     revision : str
-        Commit of alloc, where it ran from a checkout or was installed from one; see `revision`.
+        Commit of alloc, if it ran or was installed from a checkout; see `revision`.
     """
 
     outcome: Outcome

@@ -1,4 +1,4 @@
-"""Plans as a store keeps them: the task of each agent as whole numbers of four bytes, compressed."""
+"""Encoding of plans in a store: the task of each agent as a 4-byte integer, compressed."""
 
 import zlib
 
@@ -7,16 +7,16 @@ import numpy as np
 from alloc.problems import Allocation, InputError
 
 LEVEL = 1
-"""Of the compression: higher ones take ten times as long for a tenth less."""
+"""Compression level; higher ones take ten times as long to save a tenth."""
 
 
 def packed(allocation: Allocation) -> bytes:
-    """Return the bytes of a plan."""
+    """Return a plan as bytes."""
     return zlib.compress(allocation.task_of_agent.astype("<i4").tobytes(), LEVEL)
 
 
 def unpacked(plan: bytes) -> Allocation:
-    """Return the plan in bytes that `packed` gave.
+    """Return the plan in the bytes of `packed`.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The commit of this package, as far as it is known."""
+"""The commit of this package, if known."""
 
 import json
 import subprocess
@@ -7,17 +7,17 @@ from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 
 PATIENCE_S = 5.0
-"""Seconds that git may take."""
+"""Time limit for git, in seconds."""
 
 
 @cache
 def revision() -> str:
-    """Return the commit of alloc, with ``+`` behind it where files have been changed since; empty where not known.
+    """Return the commit of alloc, followed by ``+`` if files have been changed since; empty if unknown.
 
-    It is that of the checkout from which alloc is imported or, after ``pip install git+...``, that which pip has noted.
+    For alloc imported from a checkout, its commit; after ``pip install git+...``, the commit that pip recorded.
     """
     own = Path(__file__).resolve()
-    tracked = _git(own, "ls-files", own.name)  # an environment may lie within the checkout of something else
+    tracked = _git(own, "ls-files", own.name)  # an environment may be inside the checkout of another project
     if tracked:
         changed = _git(own, "status", "--porcelain", "--untracked-files=no")
         return (_git(own, "rev-parse", "HEAD") or "") + ("+" if changed else "")

@@ -1,11 +1,11 @@
-"""The tables of a store, and how those of an older version become those of this one."""
+"""Tables of a store, and migrations from older versions."""
 
 import sqlite3
 
 from alloc.problems import InputError
 
 APPLICATION = 0x616C6C6F
-"""Mark of our files among those of SQLite (``PRAGMA application_id``): "allo"."""
+"""Application id of stores (``PRAGMA application_id``): "allo"."""
 
 MIGRATIONS: tuple[str, ...] = (
     """
@@ -75,11 +75,11 @@ MIGRATIONS: tuple[str, ...] = (
     CREATE TABLE contents (instance TEXT PRIMARY KEY, content BLOB NOT NULL);
     """,
 )
-"""Statements that lead from each version to the next; that of a file (``PRAGMA user_version``) is how many it had."""
+"""Migrations from each version to the next; the version of a file (``PRAGMA user_version``) is their number."""
 
 
 def checked_version(connection: sqlite3.Connection, path: str) -> int:
-    """Return the version of a file, 0 for an empty one; raise an error if it is not ours, or of a later one."""
+    """Return the version of a file, 0 for an empty one; raise an error if it is not a store or of a later version."""
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     (application,) = connection.execute("PRAGMA application_id").fetchone()
     (tables,) = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()

@@ -1,4 +1,4 @@
-"""The store: runs as rows of one file, written as they end, and leases on what is running."""
+"""The store: endings of runs as rows of one file, and leases on runs in progress."""
 
 import json
 import os
@@ -20,15 +20,15 @@ from alloc.problems.formats.files import PathLike, named
 from alloc.problems.formats.npz import to_npz
 
 LEASE_S = 60.0
-"""Seconds until the lease of a process of which nothing is known ends, unless it is renewed."""
+"""Duration of a lease, unless renewed, of a process that cannot be observed."""
 
 MOST_KEYS = 500
-"""Keys in one query: SQLite limits the parameters of a statement."""
+"""Maximum number of keys in a query, as SQLite limits the parameters of a statement."""
 
 LIMITS = ("time_limit_s", "iterations", "target_gap", "deadline_ms")
 
 CONDITIONS = ("objective", *LIMITS, "threads", "version", "machine", "knowledge")
-"""Fields of a run that are the same for all that is compared, but for the versions of plugins."""
+"""Fields that all runs of a comparison share, except for the versions of plugins."""
 
 RUN = tuple(field.name for field in fields(Run))
 ENDING = tuple(field.name for field in fields(Ending))
@@ -36,7 +36,7 @@ ENDING = tuple(field.name for field in fields(Ending))
 
 @dataclass(frozen=True)
 class Record:
-    """A row of the store: what was run, and how it ended."""
+    """A row of the store: a run and its ending."""
 
     run: Run
     ending: Ending
@@ -44,14 +44,14 @@ class Record:
 
 @dataclass(frozen=True)
 class Claim:
-    """What came of asking for a run.
+    """Result of claiming a run.
 
     Attributes
     ----------
     key : str or None
-        The run that is now ours; None where there is none left, or others work on all that are.
+        The claimed run; None if all runs have ended or are leased by others.
     done : frozenset of str
-        Runs among those asked for that have ended, here or elsewhere.
+        Requested runs that have ended, here or elsewhere.
     """
 
     key: str | None
@@ -59,23 +59,24 @@ class Claim:
 
 
 class Store:
-    """Runs in a file; a context manager. For one thread; any number of processes may have the same file open.
+    """Runs in a file; a context manager. For a single thread; any number of processes may open the same file.
 
-    Each run that ends is one transaction, which is on the disk when `finish` returns. A run that somebody works on has
-    a lease, which ends with the process on the same machine, and some time after the last renewal elsewhere.
+    Each ending is one transaction, which is on disk when `finish` returns. A run in progress has a lease, which ends
+    with its process on the same machine, and `LEASE_S` after the last renewal elsewhere.
 
     Parameters
     ----------
     path : str or path
-        Made where it does not exist. WAL, which lets others read while one writes, needs a file system of this
-        machine.
+        Created if it does not exist. WAL mode, which lets others read while one process writes, needs a local file
+        system.
     again : collection of Outcome
-        Outcomes that runs are made again for, once, if they ended so before the store was opened.
+        Outcomes that are retried once, if runs ended with them before the store was opened.
 
     Raises
     ------
     InputError
-        If the file cannot be read or written, is locked, damaged, of a later version, or no store; so do all methods.
+        If the file cannot be read or written, is locked, damaged, of a later version, or not a store; raised by all
+        methods.
     """
 
     def __init__(self, path: PathLike, again: Collection[Outcome] = ()) -> None:
@@ -92,11 +93,11 @@ class Store:
                 raise
 
     def _prepare(self) -> None:
-        self._connection.execute("BEGIN")  # all that is read is of one moment, also while another process begins it
+        self._connection.execute("BEGIN")  # a consistent snapshot, even while another process initialises the file
         version = checked_version(self._connection, self.path)
         self._connection.execute("COMMIT")
         self._use_wal()
-        self._connection.execute("PRAGMA synchronous = NORMAL")  # a lease need not survive the loss of power
+        self._connection.execute("PRAGMA synchronous = NORMAL")  # a lease need not survive a power failure
         if version == len(MIGRATIONS):
             return
         with self._transaction():
@@ -108,7 +109,7 @@ class Store:
             self._connection.execute(f"PRAGMA user_version = {len(MIGRATIONS)}")
 
     def _use_wal(self) -> None:
-        """Let others read while one writes; SQLite does not wait where several processes begin with it at once."""
+        """Switch to WAL mode; retry, as SQLite does not wait if several processes switch at once."""
         limit = time.monotonic() + BUSY_S
         while True:
             try:
@@ -120,7 +121,7 @@ class Store:
             time.sleep(0.01)
 
     def add(self, problem: Instance | Mission) -> str:
-        """Note the name and size of a problem, and the content of an instance; return the hash of its content."""
+        """Store the name and size of a problem, and the content of an instance; return the hash of the content."""
         content = None if isinstance(problem, Mission) else to_npz(problem)
         known = fingerprint(problem) if content is None else fingerprint_of(content)
         sized = problem.instance if isinstance(problem, Mission) else problem
@@ -132,7 +133,7 @@ class Store:
         return known
 
     def claim(self, keys: Sequence[str]) -> Claim:
-        """Take a lease on the first of these runs that has not ended and that nobody else works on."""
+        """Take a lease on the first of these runs that has neither ended nor a lease."""
         done: set[str] = set()
         with self._transaction():
             for start in range(0, len(keys), MOST_KEYS):
@@ -147,14 +148,14 @@ class Store:
         return Claim(None, frozenset(done))
 
     def _ended(self, keys: Sequence[str]) -> set[str]:
-        """Return the runs that have ended, without those to be made again."""
+        """Return the runs that have ended, without those to be retried."""
         rows = self._connection.execute(
             f"SELECT key, outcome, finished_at FROM runs WHERE key IN ({_marks(keys)})", keys
         )
         return {key for key, outcome, at in rows if outcome not in self.again or at >= self._opened_at}
 
     def _leased(self, keys: Sequence[str]) -> set[str]:
-        """Return the runs that somebody works on."""
+        """Return the runs with a valid lease."""
         rows = self._connection.execute(
             f"SELECT key, owner, expires_at FROM leases WHERE key IN ({_marks(keys)})", keys
         )
@@ -169,24 +170,24 @@ class Store:
             )
 
     def release(self, key: str) -> None:
-        """Give a run back that did not end."""
+        """Release the lease on a run that did not end."""
         with self._transaction():
             self._connection.execute("DELETE FROM leases WHERE key = ? AND owner = ?", (key, self.owner))
 
     def finish(self, run: Run, ending: Ending, plan: bytes | None = None) -> bool:
-        """Write a run that has ended, in one transaction.
+        """Write the ending of a run, in one transaction.
 
         Parameters
         ----------
         run : Run
         ending : Ending
         plan : bytes, optional
-            Its allocation; see `packed`.
+            Allocation of the run; see `packed`.
 
         Returns
         -------
         bool
-            False, and nothing is written, if the lease had ended and another process has the run, or ended it.
+            False, and nothing is written, if the lease had expired and another process has claimed or finished the run.
         """
         key = run.key
         with self._transaction(durable=True):
@@ -207,7 +208,7 @@ class Store:
         return True
 
     def records(self, keys: Sequence[str] | None = None) -> dict[str, Record]:
-        """Return the runs that have ended by their keys: all, or those among `keys`."""
+        """Return the runs that have ended, by key: all, or those in `keys`."""
         found: dict[str, Record] = {}
         columns = ", ".join(("key", *RUN, *ENDING))
         with explained(self.path):
@@ -220,20 +221,20 @@ class Store:
         return found
 
     def settings(self) -> dict[tuple[object, ...], int]:
-        """Return under which conditions the runs were made: how many with each combination of `CONDITIONS`."""
+        """Return the number of runs with each combination of `CONDITIONS`."""
         columns = ", ".join(CONDITIONS)
         with explained(self.path):
             rows = self._connection.execute(f"SELECT {columns}, count(*) FROM runs GROUP BY {columns}").fetchall()
         return {tuple(row[:-1]): int(row[-1]) for row in rows}
 
     def leases(self) -> dict[str, str]:
-        """Return who works on what: owners by key, also of leases that have ended."""
+        """Return the owners of leases by key, including expired leases."""
         with explained(self.path):
             return dict(self._connection.execute("SELECT key, owner FROM leases").fetchall())
 
     @contextmanager
     def _transaction(self, *, durable: bool = False) -> Iterator[None]:
-        """Run a block as one transaction; a durable one survives the loss of power once it has ended."""
+        """Run a block as one transaction; a durable one survives a power failure once it is complete."""
         with explained(self.path):
             if durable:
                 self._connection.execute("PRAGMA synchronous = FULL")
@@ -242,7 +243,7 @@ class Store:
                 yield
                 self._connection.execute("COMMIT")
             except BaseException:
-                if self._connection.in_transaction:  # some errors, such as a full disk, end it themselves
+                if self._connection.in_transaction:  # some errors, such as a full disk, end the transaction
                     self._connection.execute("ROLLBACK")
                 raise
             finally:
@@ -250,7 +251,7 @@ class Store:
                     self._connection.execute("PRAGMA synchronous = NORMAL")
 
     def close(self) -> None:
-        """Close the file, and give back what was being run."""
+        """Release all leases of this process and close the file."""
         try:
             with self._transaction():
                 self._connection.execute("DELETE FROM leases WHERE owner = ?", (self.owner,))
@@ -268,7 +269,7 @@ class Store:
             return
         try:
             self.close()
-        except InputError:  # the error that led here says more
+        except InputError:  # the original error is more informative
             self._connection.close()
 
 

@@ -5,7 +5,7 @@ from alloc.allocators.conformance import AllocatorConformance
 
 
 class TestRandomRestart(AllocatorConformance):
-    """Everything that `alloc` asks of an allocator."""
+    """The conformance tests of `alloc` for allocators."""
 
     def allocator(self) -> Allocator:
         return RandomRestart()

@@ -85,7 +85,7 @@ def test_only_what_a_run_did_is_held_against_its_method(error, outcome):
     handle = _Remote(fake, 1, is_timed=False)
     handle.send(None, Limits(1.0, 1.0))
     if outcome is None:
-        with pytest.raises(EngineError, match="Ray gave a run up"):
+        with pytest.raises(EngineError, match="Ray gave up a run"):
             handle.figures()
     else:
         assert handle.figures()["outcome"] == outcome
