@@ -93,7 +93,7 @@ def generate_command(
     ] = None,
     sites: Annotated[Sites | None, _option("Distribution of places.", "uniform")] = None,
     clusters: Annotated[int | None, _option("Number of clusters.", "4")] = None,
-    dimensions: Annotated[int | None, _option("Dimensions of the world, 2 or 3.", "3")] = None,
+    dimensions: Annotated[int | None, _option("Number of dimensions, 2 or 3.", "3")] = None,
     world_size: Annotated[float | None, _option("Side of the square or cube.", "1")] = None,
     starts: Annotated[Starts | None, _option("Where agents start.", "tasks")] = None,
     depots: Annotated[int | None, _option("Number of depots.", "1")] = None,

@@ -76,7 +76,7 @@ def methods_command(
 ) -> None:
     """List the methods, or the parameters of one.
 
-    The list shows what each method can do, and which packages it lacks.
+    The list shows what each method can do, and which packages are missing.
     """
     from alloc.allocators import names
 

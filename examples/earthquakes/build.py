@@ -19,7 +19,7 @@ OUTPUT = HERE / "alaska.json"
 CENTRE = (62.0, -152.0)
 """Latitude and longitude of the middle of the map, in degrees."""
 WEST, EAST = -166.0, -129.0
-"""Longitudes in degrees: the mainland, Kodiak and the Panhandle, without the Aleutian chain."""
+"""Longitudes in degrees: the mainland, Kodiak and the Panhandle, without the Aleutian Islands."""
 EARTH_RADIUS_KM = 6371.0088
 SITE_RADIUS_KM = 80.0
 KWH_PER_KM = 0.15

@@ -1,1 +1,1 @@
-"""What is made of the runs of a comparison: tables and statistics for people and papers, runs for programs."""
+"""Reports on the runs of a comparison: tables and statistics, an HTML page, and exports of all runs."""

@@ -1,4 +1,4 @@
-"""A report as a file; the suffix of its name decides what it holds."""
+"""Reports as files; the suffix of the file name determines the format."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -18,11 +18,11 @@ SPECIAL = {
     "^": r"\textasciicircum{}",
     **{letter: f"\\{letter}" for letter in "&%$#_{}"},
 }
-"""Characters that LaTeX gives a meaning."""
+"""Special characters of LaTeX and their escapes."""
 
 
 def check_report(path: PathLike) -> None:
-    """Raise an error if a report could not be written, for its suffix, a missing package, or its place."""
+    """Raise an error if a report cannot be written because of its suffix, a missing package, or its location."""
     suffix = Path(path).suffix.lower()
     if suffix not in SUFFIXES or is_stream(path):
         raise InputError(f"must end in {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}", source=named(path, output=True))
@@ -34,22 +34,23 @@ def check_report(path: PathLike) -> None:
 def write_report(
     path: PathLike, comparison: Comparison, endings: Endings, tables: Callable[[], Sequence[Table]]
 ) -> None:
-    """Write a report, whole or not at all.
+    """Write a report atomically.
 
     Parameters
     ----------
     path : str or path
-        ``.md`` and ``.tex`` (for the package booktabs) hold tables and statistics, ``.csv`` and ``.parquet`` all runs.
+        ``.md`` and ``.tex`` (with the package booktabs) contain tables and statistics, ``.csv`` and ``.parquet`` all
+        runs.
     comparison : Comparison
     endings : mapping
-        How its runs ended.
+        Endings of its runs.
     tables : callable
-        Makes the tables, such as `report_tables` and `mission_tables`, where they are asked for.
+        Returns the tables, as `report_tables` and `mission_tables` do; called only if they are needed.
 
     Raises
     ------
     InputError
-        If the name has another suffix, or the file cannot be written.
+        If the suffix is unknown or the file cannot be written.
     MissingPackageError
         If pyarrow is needed and not installed.
     """
@@ -66,7 +67,7 @@ def write_report(
 
 
 def markdown(tables: Sequence[Table]) -> str:
-    """Return tables in Markdown, each below its title."""
+    """Return tables in Markdown, each with its title as a heading."""
     parts = []
     for table in tables:
         rule = ["---", *["--:"] * (len(table.header) - 1)]
@@ -80,7 +81,7 @@ def _cell(text: str) -> str:
 
 
 def latex(tables: Sequence[Table]) -> str:
-    """Return tables for LaTeX with booktabs, each in a `table` with its title and notes as the caption."""
+    """Return tables in LaTeX with booktabs, each in a `table` environment with title and notes as its caption."""
     parts = ["% \\usepackage{booktabs}"]
     for table in tables:
         columns = "l" + "r" * (len(table.header) - 1)

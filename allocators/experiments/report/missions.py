@@ -1,4 +1,4 @@
-"""What a report on policies in missions tells people."""
+"""Tables of a report on policies in missions."""
 
 from collections.abc import Sequence
 
@@ -12,23 +12,23 @@ from alloc.problems.text import counted, number, percent
 
 
 def mission_tables(comparison: Comparison, endings: Endings, rows: Sequence[PolicyRow]) -> list[Table]:
-    """Return a table of policies, and tables of how they differ.
+    """Return a table of policies, and tables of their differences.
 
     Parameters
     ----------
     comparison : Comparison
-        Of policies.
+        Comparison of policies.
     endings : mapping
-        How its runs ended.
+        Endings of its runs.
     rows : sequence of PolicyRow
-        Those of the comparison.
+        Rows of the comparison.
     """
     tables = difference_tables(paired_differences(rows), len(comparison.instances))
     return [_policies(comparison, endings, rows), *tables]
 
 
 def _policies(comparison: Comparison, endings: Endings, rows: Sequence[PolicyRow]) -> Table:
-    """Return the means over all missions; of a figure that a mission lacks there is none."""
+    """Return the table of means over all missions; there is no mean of a value that a mission lacks."""
     cells = []
     for policy in comparison.methods:
         own = [row for row in rows if row.policy == policy and not row.reason]
@@ -38,7 +38,7 @@ def _policies(comparison: Comparison, endings: Endings, rows: Sequence[PolicyRow
         )
         cells.append([policy, str(len(own)), number(time, 5), percent(done), number(energy, 4), number(late, 3)])
     run = next(iter(comparison.jobs.values())).run
-    limit = "no deadline" if run.deadline_ms is None else f"{run.deadline_ms:g} ms for each decision"
+    limit = "no deadline" if run.deadline_ms is None else f"{run.deadline_ms:g} ms per decision"
     size = f"{counted(len(comparison.instances), 'mission')}, {counted(len(comparison.seeds), 'seed')}"
     notes = [f"{size}; knowledge {run.knowledge}; {limit}; {run.version}; {run.machine}."]
     notes += [f"{row.mission}, {row.policy}: {row.reason}" for row in rows if row.reason]
@@ -47,20 +47,20 @@ def _policies(comparison: Comparison, endings: Endings, rows: Sequence[PolicyRow
 
 
 def difference_tables(differences: Sequence[PolicyDifference], missions: int) -> list[Table]:
-    """Return how policies differ from the first one in so many missions, as one table; none if there is only one."""
+    """Return a table of the differences of policies from the first one; an empty list for a single policy."""
     if not differences:
         return []
     first, confidence = differences[0].against, percent(CONFIDENCE)
-    title = f"Against {first}, in the same missions with the same seeds ({confidence} interval)"
+    title = f"Differences from {first} on the same missions and seeds ({confidence} interval)"
     header = ["policy", "time", "interval", "pairs", "energy", "interval", "priority done", "interval", "pairs"]
     return [Table(title, header, [_difference(one) for one in differences], _sample(missions))]
 
 
 def _sample(missions: int) -> list[str]:
-    """Return what is to be known of a small sample, in a sentence."""
+    """Return a warning about a small sample, if it is one."""
     if missions == 1:
-        return ["A single mission: pairs are its seeds, and tell nothing of other missions."]
-    return [f"Small sample: intervals from fewer than {SMALL} missions say little."] if missions < SMALL else []
+        return ["A single mission: pairs are its seeds, and do not generalise to other missions."]
+    return [f"Small sample: intervals from fewer than {SMALL} missions are unreliable."] if missions < SMALL else []
 
 
 def _difference(one: PolicyDifference) -> list[str]:
@@ -75,7 +75,7 @@ def _difference(one: PolicyDifference) -> list[str]:
 
 
 def _interval(interval: Interval) -> list[str]:
-    """Return the mean and the two ends in per cent, dashes for what is not known."""
+    """Return the mean and both ends of an interval in per cent, with dashes for unknown values."""
     if interval.mean is None:
         return ["-", "-"]
     mean = f"{_percent(interval.mean)} %"

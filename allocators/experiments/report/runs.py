@@ -1,4 +1,4 @@
-"""All runs of a comparison, a row each, for programs: as CSV, or as Parquet with the traces."""
+"""Export of all runs of a comparison, one row each: as CSV, or as Parquet with traces."""
 
 import csv
 import io
@@ -13,10 +13,10 @@ from alloc.allocators.experiments.stored_missions import result_of
 from alloc.problems import MissingPackageError, MissionResult
 
 NAMES = ("instance_name", "label")
-"""Columns before those of `Run` and `Ending`: the name of the instance, and how the method was written."""
+"""Columns before those of `Run` and `Ending`: the name of the instance, and the label of the method."""
 
 LONG = ("details", "trace")
-"""Fields that are not in the CSV."""
+"""Fields that are left out of the CSV."""
 
 TRACE = ("time_s", "makespan", "energy", "lower_bound")
 
@@ -41,7 +41,7 @@ def run_rows(comparison: Comparison, endings: Endings) -> list[dict[str, object]
 
 
 def _columns(comparison: Comparison) -> dict[str, object]:
-    """Return the columns by their names, with their types: those of `Run`, `Ending` and, of missions, the measures."""
+    """Return the types of the columns by name: the fields of `Run` and `Ending` and, for missions, the measures."""
     is_of_missions = any(job.run.objective == MISSION for job in comparison.jobs.values())
     measures = get_type_hints(MissionResult) if is_of_missions else {}
     hints = {**dict.fromkeys(NAMES, str), **get_type_hints(Run), **get_type_hints(Ending), **measures}
@@ -49,7 +49,7 @@ def _columns(comparison: Comparison) -> dict[str, object]:
 
 
 def runs_csv(comparison: Comparison, endings: Endings) -> str:
-    """Return a header and a line per run; None is empty, and traces are left out."""
+    """Return CSV with a header and a line per run, without traces; None becomes an empty cell."""
     columns = [name for name in _columns(comparison) if name not in LONG]
     text = io.StringIO()
     writer = csv.DictWriter(text, columns, lineterminator="\n", extrasaction="ignore")

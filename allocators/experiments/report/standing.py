@@ -1,4 +1,4 @@
-"""The tables of how methods stand against the best known, and beside each other."""
+"""Tables of methods relative to the best known results, and to each other."""
 
 from collections.abc import Sequence
 
@@ -14,22 +14,23 @@ OF_OTHERS = ["method", "T behind", "worst", "energy behind", "worst", "first", "
 
 
 def standing_tables(found: dict[str, Standing]) -> list[Table]:
-    """Return both tables; the first has a row for each method, and the second the same rows in the same order."""
+    """Return both tables, with a row for each method in the same order."""
     best, others = zip(*(_cells(label, standing) for label, standing in found.items()), strict=True)
     notes_of_best = [
-        "T over the tasks that are served; runs with the least T known, among those with the fewest tasks unserved; "
-        "runs proven optimal; T beyond the greatest bound known; energy over the least known at the least T, and the "
-        "mean of that over runs with the least T; energy gap to the run's own bound.",
+        "T: makespan over the served tasks. Least T: runs with the best known T among those with the fewest unserved "
+        "tasks. Proven: runs proven optimal. Beyond bound: T above the best known bound. Energy / least: energy over "
+        "the least known at that T; at least T: its mean over runs with the best known T. Energy gap: to the bound of "
+        "the run itself.",
     ]
     notes_of_others = [
-        "By how much more T a method has than the best of the others, and by how much more energy than the best of "
-        "those that are no slower; below 0 it leads. First: "
-        "nobody had fewer tasks unserved, then less T, then less energy; never runs that took more than "
-        f"{LATE:g} times their limit. First answer: its T, mean, and its time, median.",
+        "Behind: T relative to the best other method, and energy relative to the best other method that is no slower; "
+        "negative values lead. First: runs for which no other method had fewer unserved tasks, then less T, then less "
+        f"energy; never runs that took more than {LATE:g} times their limit. First T and ms: mean T and median time of "
+        "the first answer.",
     ]
     return [
-        Table("Against the best known", OF_BEST, list(best), notes_of_best),
-        Table("Beside the others", OF_OTHERS, list(others), notes_of_others),
+        Table("Relative to the best known", OF_BEST, list(best), notes_of_best),
+        Table("Relative to the other methods", OF_OTHERS, list(others), notes_of_others),
     ]
 
 
@@ -64,6 +65,6 @@ def _cells(label: str, standing: Standing) -> tuple[list[str], list[str]]:
 
 
 def _figures(values: Sequence[float | None], form: str) -> tuple[str, str]:
-    """Return mean and greatest of what is known."""
+    """Return the mean and the maximum of the known values."""
     known = np.array([value for value in values if value is not None and np.isfinite(value)])
     return (f"{known.mean():{form}}", f"{known.max():{form}}") if len(known) else ("-", "-")

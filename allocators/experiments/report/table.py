@@ -1,11 +1,11 @@
-"""A table of a report, before it is known what it is printed as."""
+"""A table of a report, independent of its output format."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class Table:
-    """A table with a title, and notes that belong to it.
+    """A table with a title and notes.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""The tables of a report, as text in cells, whatever they are printed as."""
+"""Tables of a report, with cells as text, independent of their output format."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -31,9 +31,9 @@ def report_tables(comparison: Comparison, endings: Endings, rows: Sequence[Row])
     ----------
     comparison : Comparison
     endings : mapping
-        How its runs ended.
+        Endings of its runs.
     rows : sequence of Row
-        Those of the comparison, with the gaps that are to be told.
+        Rows of the comparison, with the gaps to report.
     """
     tables = [_methods(comparison, endings, rows)]
     if any(_outcomes(endings, label).keys() - {Outcome.SOLVED} for label in endings):
@@ -47,7 +47,7 @@ def report_tables(comparison: Comparison, endings: Endings, rows: Sequence[Row])
 
 
 def difference_tables(comparison: Comparison, endings: Endings) -> list[Table]:
-    """Return how methods differ from the first one, in the makespan and, where it is an objective, the energy."""
+    """Return tables of the differences of methods from the first one, in makespan and, if an objective, energy."""
     goals = {job.run.objective for job in comparison.jobs.values()}
     scores = ["makespan", "energy"] if Objective.MAKESPAN_ENERGY in goals else ["makespan"]
     return [_difference_table(differences(endings, score)) for score in scores]
@@ -76,7 +76,7 @@ def _methods(comparison: Comparison, endings: Endings, rows: Sequence[Row]) -> T
         [
             f"{counted(len(comparison.instances), 'instance')}, {counted(len(comparison.seeds), 'seed')}; "
             f"{run.objective}; {budget or 'no limit'}, {counted(run.threads, 'thread')}; {run.version}; {run.machine}.",
-            "Means over the instances on which all runs of the method served all tasks, each the mean over its seeds.",
+            "Means over the instances on which all runs of the method served all tasks, averaged over seeds first.",
             *doubts(endings),
         ],
     )
@@ -96,19 +96,19 @@ def _outcome_table(endings: Endings) -> Table:
 def _difference_table(found: Sequence[Difference]) -> Table:
     score = {"makespan": "T", "energy": "energy"}[found[0].score]
     notes = [
-        f"Differences of {score} in the same instances, relative, with {percent(CONFIDENCE)} BCa bootstrap intervals "
-        "of the mean; p of Wilcoxon's signed-rank test, two-sided, and corrected by Holm's procedure."
+        f"Relative differences of {score} on the same instances, with {percent(CONFIDENCE)} BCa bootstrap intervals "
+        "of the mean; p of Wilcoxon's two-sided signed-rank test, also corrected by Holm's procedure."
     ]
     if score == "energy":
-        notes.append("Each at the makespan that the method found: less energy at a longer makespan is not better.")
+        notes.append("Energies are at each method's own makespan; less energy at a longer makespan is not better.")
     smallest = min(one.instances for one in found)
     if smallest < LEAST:
         notes.append(f"Fewer than {LEAST} instances allow neither interval nor test.")
     elif smallest < SMALL:
-        notes.append(f"Small sample: {smallest} instances; intervals and tests of fewer than {SMALL} say little.")
+        notes.append(f"Small sample: {smallest} instances; intervals and tests of fewer than {SMALL} are unreliable.")
     left_out = max(one.left_out for one in found)
     if left_out:
-        notes.append(f"Left out: up to {counted(left_out, 'instance')} on which one of the two has no figure.")
+        notes.append(f"Left out: up to {counted(left_out, 'instance')} on which one of the two methods has no value.")
     header = ["method", f"{score} less", "equal", "more", "difference", "from", "to", "p", "p (Holm)"]
     return Table(f"Against {found[0].against}: {score}", header, [_difference_cells(one) for one in found], notes)
 
@@ -124,7 +124,7 @@ def _signed(share: float | None) -> str:
 
 def _profile_table(endings: Endings) -> Table:
     rows = [[label, *map(percent, shares)] for label, shares in profiles(endings).items()]
-    notes = ["Share of the instances on which T is at most this factor of the best method's (performance profile)."]
+    notes = ["Share of instances on which T is at most this factor times the best method's (performance profile)."]
     return Table("Performance profiles", ["method", *(f"{factor:g}" for factor in FACTORS)], rows, notes)
 
 
@@ -132,12 +132,12 @@ def _target_table(comparison: Comparison, endings: Endings) -> Table:
     times = _times(comparison, endings)
     rows = [[label, *map(percent, shares)] for label, shares in targets_reached(endings, times).items()]
     targets = ", ".join(percent(more) for more in WITHIN)
-    notes = [f"Share of the targets reached by this time: T within {targets} of the best known of each instance."]
+    notes = [f"Share of targets reached by this time: T within {targets} of the best known on each instance."]
     return Table("Targets over time", ["method", *(f"{time:g} s" for time in times)], rows, notes)
 
 
 def _times(comparison: Comparison, endings: Endings) -> list[float]:
-    """Return four moments up to the time limit, or where there is none to the end of the longest run."""
+    """Return four times up to the time limit or, without one, up to the end of the longest run."""
     limits = [job.run.time_limit_s for job in comparison.jobs.values() if job.run.time_limit_s is not None]
     ends = [ending.runtime_s or 0.0 for lists in endings.values() for runs in lists for ending in runs if ending]
     last = max(limits or ends, default=0.0) or 1.0

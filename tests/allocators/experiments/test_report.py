@@ -61,8 +61,8 @@ def test_tables_tell_what_was_compared_and_how_it_ended(compared):
         "Against a_1: T",
         "Against a_1: energy",
         "Performance profiles",
-        "Against the best known",
-        "Beside the others",
+        "Relative to the best known",
+        "Relative to the other methods",
         "Targets over time",
     ]
     assert tables["Methods"].rows == [
@@ -75,7 +75,7 @@ def test_tables_tell_what_was_compared_and_how_it_ended(compared):
     assert cells[:7] == ["b", "0", "0", "3", "+50 %", "+50 %", "+50 %"]
     notes = " ".join(tables["Against a_1: T"].notes)
     assert "Small sample: 3 instances" in notes
-    assert "Left out: up to 1 instance on which one of the two has no figure" in notes
+    assert "Left out: up to 1 instance on which one of the two methods has no value" in notes
     assert tables["Performance profiles"].rows[1][1:] == ["0 %"] * 6 + ["75 %"] * 2
     assert tables["Targets over time"].rows[0][-1] == "100 %"
 
@@ -83,7 +83,7 @@ def test_tables_tell_what_was_compared_and_how_it_ended(compared):
 def test_standings_tell_who_is_first_and_how_far_behind_the_others_are(compared):
     """Who has the best answer, or shares it, is first; late runs never are; behind is told of what served all tasks."""
     tables = {table.title: table for table in report_tables(*compared)}
-    (best, other), beside = tables["Against the best known"].rows, tables["Beside the others"].rows
+    (best, other), beside = tables["Relative to the best known"].rows, tables["Relative to the other methods"].rows
     assert best[:5] == ["a_1", "1", "1", "8 of 8", "0"]
     assert other[:4] == ["b", "1.5", "1.5", "0 of 8"]
     assert best[7:10] == ["1.000", "1.000", "1.000"]

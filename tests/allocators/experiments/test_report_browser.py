@@ -130,7 +130,7 @@ def test_the_page_sorts_filters_and_zooms(folder, tmp_path):
     assert found["groups"] == ["a1, a2", "a3"]
     assert found["traceback"] == f"Traceback\n{ANGRY}"
     assert (found["more"], found["finalized"]) == (0, True)  # tables and charts that are made anew replace others
-    assert "switched off above" in found["off"]
+    assert "deselected above" in found["off"]
     assert found["latest"] == [1, "i1"]  # though what the first one waited for came later
     assert found["dialog"]
 

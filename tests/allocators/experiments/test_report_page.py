@@ -86,7 +86,7 @@ def test_means_are_of_the_instances_that_every_method_served(store, tmp_path):
     assert [greedy[name] for name in figures] == [1.0, 1.0, 0.2, 2.0, 0.5]
     assert [ga[name] for name in figures] == [1.5, 1.5, pytest.approx(1 - 0.8 / 1.5, rel=1e-5), 3.0, 0.5]
     assert [hedonic[name] for name in figures] == [None] * 5
-    assert any(note.startswith("Means are of the 3 of 4 instances") for note in group["notes"])
+    assert any(note.startswith("Means are over the 3 of 4 instances") for note in group["notes"])
     with sqlite3.connect(store) as edited:
         edited.execute("UPDATE runs SET makespan = NULL " + of.format("NOT IN"))
     (group,) = written(store, tmp_path)["main"]["groups"]

@@ -177,10 +177,10 @@ def test_policies_are_compared(alloc, mission):
         ("replan", "nearest"),
     ]
     table = alloc(*arguments, "--csv", "table.csv")
-    assert "Against nearest, in the same missions" in table.err
-    assert "note: Small sample: intervals from fewer than 10 missions say little." in table.err
+    assert "Differences from nearest on the same missions" in table.err
+    assert "note: Small sample: intervals from fewer than 10 missions are unreliable." in table.err
     alone = alloc("compare", mission, "--policies", "nearest,greedy")
-    assert "note: A single mission: pairs are its seeds, and tell nothing of other missions." in alone.err
+    assert "note: A single mission: pairs are its seeds, and do not generalise to other missions." in alone.err
     header, first, *_ = Path("table.csv").read_text().splitlines()
     assert dict(zip(header.split(","), first.split(","), strict=True))["mission_time_mean"] == str(
         rows[0]["mission_time_mean"]

@@ -1,1 +1,1 @@
-"""A report as one page that a browser opens from disk: what is drawn is prepared here, and drawn by the page itself."""
+"""Report as a self-contained HTML page: data are prepared here and drawn by scripts in the page."""

@@ -1,5 +1,5 @@
 "use strict";
-// What is drawn of the runs under the same conditions: for each chart a title, a note, and a Vega-Lite specification.
+// Charts of the runs under the same conditions: for each chart a title, a note, and a Vega-Lite specification.
 
 const isDark = () => document.documentElement.classList.contains("dark");
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
@@ -25,7 +25,7 @@ function config() {
   return { background: "transparent", font: "system-ui, sans-serif", view: { stroke: null }, axis, legend, text: { color: ink } };
 }
 
-// as many columns as there is room for the longest name
+// as many columns as fit with the longest name
 function legendOf(names, width) {
   const longest = Math.min(Math.max(...names.map((name) => 7.2 * name.length), 40), 230);
   return { columns: Math.max(1, Math.floor((width - 70) / (longest + 34))), labelLimit: longest };
@@ -65,7 +65,7 @@ function profiles(page, group, methods, width) {
 
 function targets(page, group, methods, width) {
   const entries = group.series.time.filter((one) => methods.includes(one.method));
-  if (!entries.length) return "There is nothing to draw: no run has a trace of what it found when.";
+  if (!entries.length) return "There is nothing to draw: no run has a trace.";
   const { color, strokeDash } = byMethod(page, methods, width);
   return { data: { values: flat(page, entries, (entry, i) => ({ y: entry.y[i] })) },
     mark: { type: "line", interpolate: "step-after", strokeWidth: 2, tooltip: true },
@@ -109,7 +109,7 @@ function tradeoff(page, group, methods, width) {
 function thinned(group, methods) {
   const entries = group.series.tradeoff.filter((one) => methods.includes(one.method));
   const [drawn, all] = [(one) => one.x.length, (one) => one.points].map((get) => entries.reduce((sum, one) => sum + get(one), 0));
-  return drawn < all ? `Drawn are ${drawn.toLocaleString("en")} of ${counted(all, "point")}.` : "";
+  return drawn < all ? `${drawn.toLocaleString("en")} of ${counted(all, "point")} are drawn.` : "";
 }
 
 const MEASURES = { runtime_s: "time (s)", gap: "gap to the best bound", ratio: "T over the best method's", memory_mb: "memory (MiB)" };
@@ -151,7 +151,7 @@ function gaps(page, group, methods, width) {
 function outcomes(page, group, methods, width) {
   const values = group.methods.filter((one) => methods.includes(one.method)).flatMap((one) => Object.entries(one.outcomes)
     .map(([outcome, runs]) => ({ method: page.labels[one.method], outcome, runs })));
-  if (!values.length) return "There is nothing to draw: no method is chosen.";
+  if (!values.length) return "There is nothing to draw: no method is selected.";
   const domain = Object.keys(OUTCOMES).filter((outcome) => values.some((one) => one.outcome === outcome));
   const range = domain.map((outcome) => OUTCOMES[outcome]);
   return { data: { values }, height: horizontal(methods.length), mark: { type: "bar", tooltip: true }, encoding: {
@@ -181,12 +181,12 @@ const CHARTS = [
   { id: "targets", title: "Targets reached over time", draw: targets,
     note: "A target is the best known T of an instance, or 1 % or 5 % more. Share of all targets that runs have reached by then." },
   { id: "distance", title: "Convergence", draw: distance,
-    note: "T found by then, above the best known of the instance: median over runs, and the middle half of them as a band." },
+    note: "T found so far, above the best known of the instance: median over runs, with the interquartile range as a band." },
   { id: "tradeoff", title: "Makespan against energy", draw: tradeoff, more: thinned,
     note: "Each point is a method on an instance, above the least of any method there; diamonds are medians. The furthest 2 % are drawn at the edge." },
   { id: "scaling", title: "Scaling", draw: scaling, measures: MEASURES,
-    note: "Against the number of agents: median over instances and the middle half of them." },
+    note: "Over the number of agents: median and interquartile range over instances." },
   { id: "gaps", title: "Gap to the best bound", draw: gaps,
-    note: "Against the best bound that any run proved on the instance: median, middle half (bar), and 5 % to 95 % (line)." },
+    note: "To the best bound that any run proved on the instance: median, interquartile range (bar), and 5 % to 95 % (line)." },
   { id: "outcomes", title: "How runs ended", draw: outcomes, note: "Only solved runs have scores." },
 ];

@@ -1,4 +1,4 @@
-"""What a page shows of a single instance: the map with the best plan of each method, and what each run found when."""
+"""Details of single instances on a page: a map with the best plan of each method, and traces of runs."""
 
 import json
 import math
@@ -21,41 +21,41 @@ from alloc.problems.text import one_line
 Entry = dict[str, object]
 
 MOST_AGENTS = 1000
-"""Agents on a map; evenly spaced ones are drawn where there are more."""
+"""Maximum number of agents on a map; if there are more, an evenly spaced subset is drawn."""
 
 MOST_TASKS = 1000
-"""Tasks on a map; those with the largest workload are drawn where there are more."""
+"""Maximum number of tasks on a map; if there are more, those with the largest workloads are drawn."""
 
 MOST_TRACES = 200
-"""Runs of an instance whose traces are drawn."""
+"""Maximum number of runs of an instance whose traces are drawn."""
 
 CHUNK = 200_000
-"""Characters that are compressed together: a browser unpacks them when one of their instances is looked at."""
+"""Characters that are compressed together; a browser unpacks a chunk when one of its instances is shown."""
 
 SIZE = 10_000
-"""Width or height of a map in its own units, which are whole."""
+"""Larger of width and height of a map in its integer units."""
 
 
 def details(
     archive: Archive, layout: Layout, most_bytes: int, told: Callable[[int], None] = lambda count: None
 ) -> tuple[list[str], dict[int, int]]:
-    """Return maps and traces of instances, as many as there is room for.
+    """Return maps and traces of as many instances as fit into a size limit.
 
-    Instances are taken in the order of their hashes, which is as good as random.
+    Instances are taken in the order of their hashes, which is effectively random.
 
     Parameters
     ----------
     archive : Archive
     layout : Layout
     most_bytes : int
-        Room for all of them, compressed.
+        Maximum total size, compressed.
     told : callable
-        Called with the number of instances that are done.
+        Called with the number of instances completed.
 
     Returns
     -------
     chunks : list of str
-        Compressed; in each a mapping from numbers of instances to what is shown of them.
+        Compressed mappings from instance numbers to details.
     chunk_of : dict
         The chunk of each instance.
     """
@@ -98,13 +98,13 @@ def _detail(archive: Archive, layout: Layout, number: int, keys: Sequence[str], 
         return found
     try:
         instance = from_npz(content, layout.names[number])
-    except InputError:  # the page has to do without it
+    except InputError:  # left out of the page
         return found
     return found | {"map": _map(archive, layout, instance, keys)}
 
 
 def _trace(ending: Ending, layout: Layout, key: str) -> Entry:
-    """Return what a run had found at which of `EDGES_S`, where the makespan got better."""
+    """Return the trace of a run: indices of `EDGES_S` at which the makespan improved, and makespans."""
     place = layout.places[key]
     steps: list[float] = []
     best = math.inf
@@ -116,12 +116,12 @@ def _trace(ending: Ending, layout: Layout, key: str) -> Entry:
 
 
 def rounded(value: float) -> float:
-    """Return a value with six significant digits."""
+    """Return a value rounded to six significant digits."""
     return float(f"{value:.6g}")
 
 
 def _map(archive: Archive, layout: Layout, instance: Instance, keys: Sequence[str]) -> Entry:
-    """Return where tasks and agents are, as whole numbers, and the plans; no places where none are known."""
+    """Return positions of tasks and agents in integer units, and the plans; without positions if none are known."""
     where = places(instance)
     begin = [base for base in bases(instance, where, MOST_AGENTS) if len(base.agents)]
     agents, tasks = _drawn_agents(instance, begin), np.sort(np.argsort(-instance.workload, kind="stable")[:MOST_TASKS])
@@ -153,7 +153,7 @@ def _map(archive: Archive, layout: Layout, instance: Instance, keys: Sequence[st
 
 
 def _drawn_agents(instance: Instance, begin: Sequence[Base]) -> IntArray:
-    """Return the agents that are drawn: all, or where there are many some whose places are known."""
+    """Return the agents to draw: all, or a subset with known places if there are many."""
     if instance.n <= MOST_AGENTS:
         return np.arange(instance.n)
     known = np.sort(np.concatenate([base.agents for base in begin])) if begin else np.arange(instance.n)
@@ -161,7 +161,7 @@ def _drawn_agents(instance: Instance, begin: Sequence[Base]) -> IntArray:
 
 
 def _frame(where: Places) -> tuple[FloatArray, float]:
-    """Return the lower left corner of all places, and how much of an axis one unit of the map is."""
+    """Return the lower left corner of all places, and the length of one map unit on the axes."""
     known = where.known
     if not len(known):
         return np.zeros(2), 1.0
@@ -177,15 +177,15 @@ def _whole(place: FloatArray) -> list[list[int] | None]:
 def _plans(
     archive: Archive, layout: Layout, instance: Instance, keys: Sequence[str], agents: IntArray, tasks: IntArray
 ) -> Iterator[Entry]:
-    """Yield the best plan of each method under the same conditions, as far as plans are kept."""
-    shown = np.full(instance.m + 1, -2)  # of a task that is not drawn
+    """Yield the best stored plan of each method under the same conditions."""
+    shown = np.full(instance.m + 1, -2)  # -2 for tasks that are not drawn
     shown[tasks], shown[-1] = np.arange(len(tasks)), -1
     for key, plan in archive.plans(_best_runs(archive, layout, keys)).items():
         place, ending = layout.places[key], archive.records[key].ending
         try:
             task_of_agent = unpacked(plan).task_of_agent
             score = evaluate(instance, Allocation(task_of_agent))
-        except InputError:  # what is damaged is left out
+        except InputError:  # damaged plans are left out
             continue
         count = np.bincount(task_of_agent[task_of_agent >= 0], minlength=instance.m)
         yield {

@@ -1,4 +1,4 @@
-"""Runs that may be compared with each other: those that were made under the same conditions."""
+"""Groups of comparable runs, which were made under the same conditions."""
 
 import json
 from collections import defaultdict
@@ -13,14 +13,14 @@ from alloc.allocators.experiments.stored import Endings
 from alloc.problems.text import one_line, short_names
 
 LONGEST = 48
-"""Characters of the name of a method or an instance on a page."""
+"""Maximum number of characters of the name of a method or an instance on a page."""
 
 Conditions = tuple[object, ...]
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where a run stands on a page: numbers of its group, method, instance, and its seed."""
+    """Position of a run on a page: numbers of its group, method and instance, and its seed."""
 
     group: int
     method: int
@@ -35,13 +35,13 @@ class Group:
     Attributes
     ----------
     run : Run
-        The first of them.
+        The first run.
     methods, instances : list of int
-        Their numbers, in the order in which they were first run.
+        Their numbers, in order of their first run.
     endings : mapping
-        How runs ended, by the name of the method and the instance; of each as many as were made, whatever the seeds.
+        Endings of runs, by name of the method and by instance; numbers of runs and seeds may differ.
     common : list of int
-        Which of `instances`, by position, every method was run on.
+        Positions in `instances` of those on which every method was run.
     """
 
     run: Run
@@ -52,13 +52,13 @@ class Group:
 
     @property
     def endings_in_common(self) -> Endings:
-        """How runs ended on the instances that every method was run on."""
+        """Endings of runs on the instances on which every method was run."""
         return {label: [runs[position] for position in self.common] for label, runs in self.endings.items()}
 
 
 @dataclass(frozen=True)
 class Layout:
-    """All runs of a page by where they stand.
+    """All runs of a page with their positions.
 
     Attributes
     ----------
@@ -69,11 +69,11 @@ class Layout:
     known : list of Known
         The instances.
     hashes : list of str
-        Of their content.
+        Hashes of the instances' content.
     places : dict
-        Of each run, by its key.
+        Place of each run, by its key.
     groups : list of Group
-        The one with most runs first.
+        Groups, the one with most runs first.
     """
 
     labels: list[str]
@@ -85,7 +85,7 @@ class Layout:
 
 
 def laid_out(archive: Archive) -> Layout:
-    """Return where each run stands."""
+    """Return the position of each run."""
     runs = {key: record.run for key, record in archive.records.items()}
     conditions = {key: _conditions(run) for key, run in runs.items()}
     count: dict[Conditions, int] = defaultdict(int)
@@ -109,7 +109,7 @@ def laid_out(archive: Archive) -> Layout:
 
 
 def _conditions(run: Run) -> Conditions:
-    """Return what is the same for all that is compared; the versions of plugins belong to their methods."""
+    """Return the conditions that comparable runs share; versions of plugins are part of the method instead."""
     own = {**asdict(run), "version": run.version.partition(" + ")[0]}
     return tuple(own[name] for name in CONDITIONS)
 
@@ -119,7 +119,7 @@ def _variant(run: Run) -> tuple[str, str, str]:
 
 
 def _labels(runs: Iterable[Run]) -> dict[tuple[str, str, str], str]:
-    """Return the name of each method with its parameters, as a command line has it, and of plugins the version."""
+    """Return the label of each method with its parameters, as on the command line, and the version of plugins."""
     variants = list(dict.fromkeys(map(_variant, runs)))
     plain = {variant: _written(*variant[:2]) for variant in variants}
     versions: dict[str, set[str]] = defaultdict(set)
@@ -142,7 +142,7 @@ def _value(value: object) -> str:
 
 
 def _different(names: Sequence[str]) -> list[str]:
-    """Return names on one line, numbered where several instances have the same."""
+    """Return names on one line, numbered if several instances have the same name."""
     seen: dict[str, int] = defaultdict(int)
     found = []
     for name in map(one_line, names):

@@ -1,5 +1,5 @@
 "use strict";
-// What is shown of a single instance: the map with a plan, its groups, and what each run had found when.
+// Details of a single instance: the map with a plan, its groups, and the traces of runs.
 
 let latest = 0; // call of showInstance: an earlier one draws no more
 async function showInstance(index) {
@@ -13,10 +13,10 @@ async function showInstance(index) {
   const map = detail.map;
   const plans = map ? map.plans.filter((plan) => plan.group === state.group && !state.off.has(plan.method)).sort((one, other) => one.method - other.method) : [];
   let about = `${name[index]}: ${counted(agents[index], "agent")}, ${counted(tasks[index], "task")}.`;
-  if (chunk[index] < 0) about += " Its map and traces are left out, to keep the page small; those of other instances are there.";
-  if (map && map.agents > map.agent.id.length) about += ` Thinned: the map shows ${counted(map.agent.id.length, "agent")}, evenly chosen.`;
-  if (map && map.tasks > map.task.id.length) about += ` Thinned: it shows the ${counted(map.task.id.length, "task")} with the largest workload.`;
-  if (detail.runs > page.most_traces) about += ` Curves are of ${page.most_traces} of its runs.`;
+  if (chunk[index] < 0) about += " Its map and traces are left out to keep the page small; other instances have theirs.";
+  if (map && map.agents > map.agent.id.length) about += ` The map shows an evenly spaced subset of ${counted(map.agent.id.length, "agent")}.`;
+  if (map && map.tasks > map.task.id.length) about += ` The map shows the ${counted(map.task.id.length, "task")} with the largest workload.`;
+  if (detail.runs > page.most_traces) about += ` Traces of ${page.most_traces} of its runs are drawn.`;
   byId("size").textContent = about;
   if (!plans.some((plan) => plan.method === state.plan)) state.plan = plans.length ? plans[0].method : -1;
   byId("plans").replaceChildren();
@@ -28,9 +28,9 @@ async function showInstance(index) {
     chip.onclick = () => { state.plan = plan.method; showInstance(index); };
   }
   const others = map ? map.plans.some((plan) => plan.group === state.group) : false;
-  const none = !detail.groups.includes(state.group) ? "No plan is kept: the instance was not run under these conditions."
-    : others ? "No plan is shown: those that are kept are of methods that are switched off above."
-      : "No plan is kept under these conditions: no run was solved, or they were made before alloc kept plans.";
+  const none = !detail.groups.includes(state.group) ? "No plan is stored: the instance was not run under these conditions."
+    : others ? "No plan is shown: stored plans are of methods that are deselected above."
+    : "No plan is stored under these conditions: no run has a result, or an older version of alloc did not store plans.";
   await showPlan(map, plans.find((plan) => plan.method === state.plan), none, isLatest);
   if (isLatest()) await showTraces(detail.traces);
 }
@@ -50,7 +50,7 @@ async function showPlan(map, plan, none, isLatest) {
   if (!isLatest()) return;
   byId("zoom").hidden = !zoom;
   byId("groups").hidden = !plan;
-  if (!zoom) await draw(chart, map ? "There is no map: the instance has no positions." : "There is no map: the store has no content of this instance, as it was made before alloc kept that, or it is left out here.");
+  if (!zoom) await draw(chart, map ? "There is no map: the instance has no positions." : "There is no map: it is left out here, or an older version of alloc did not store this instance.");
   else if (!plan) add(chart, "p", none, { class: "none" });
   for (const [id, factor] of [["in", 1 / 1.6], ["out", 1.6], ["fit", 0]]) byId(id).onclick = () => zoom(factor);
   if (!plan || !isLatest()) return;
@@ -61,7 +61,7 @@ async function showPlan(map, plan, none, isLatest) {
 async function showTraces(traces) {
   const own = traces.filter((one) => one.group === state.group && !state.off.has(one.method) && one.steps.length);
   const chart = byId("trace").querySelector(".chart");
-  caption("trace", "What each run found when", "Makespan of the best plan so far, a line for each run.");
+  caption("trace", "Traces of runs", "Makespan of the best plan so far, one line per run.");
   if (!own.length) return draw(chart, "There is nothing to draw: no run has a trace with a makespan.");
   const end = Math.max(...own.map((one) => one.steps[one.steps.length - 2])) + 2;
   const last = page.edges_s.length - 1;

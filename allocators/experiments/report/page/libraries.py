@@ -1,4 +1,4 @@
-"""The JavaScript libraries in a page, from Python packages: Vega-Lite draws its charts, DataTables its tables."""
+"""JavaScript libraries of a page, from Python packages: Vega-Lite for charts, DataTables for tables."""
 
 from functools import cache
 from importlib.util import find_spec
@@ -11,7 +11,7 @@ NEEDED = {"jinja2": "Jinja2", "vl_convert": "vl-convert-python", "itables": "ita
 
 
 def require_packages() -> None:
-    """Raise a `MissingPackageError` if what a page is made with is not installed."""
+    """Raise a `MissingPackageError` if a package needed for pages is not installed."""
     missing = [name for module, name in NEEDED.items() if find_spec(module) is None]
     if missing:
         needed = " and ".join(missing)
@@ -20,10 +20,10 @@ def require_packages() -> None:
 
 @cache
 def libraries() -> dict[str, str]:
-    """Return the scripts of Vega-Lite and DataTables and the style of the latter, compressed, by ids of elements."""
+    """Return the scripts of Vega-Lite and DataTables and the style of the latter, compressed, by element id."""
     import vl_convert
 
-    spec = find_spec("itables")  # only its files are used: importing it looks for data frames
+    spec = find_spec("itables")  # not imported, as that looks for data frames; only its files are used
     assert spec is not None
     assert spec.origin is not None
     folder = Path(spec.origin).parent / "html"

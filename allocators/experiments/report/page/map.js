@@ -25,7 +25,7 @@ function layMap(map, plan) {
   return { tasks, bases: bases.filter((base) => base.place), moves: [...moves.values()] };
 }
 
-// the part of the axes that is shown at first: all places, and a unit as long in one direction as in the other
+// the initial window: all places, with equal scales on both axes
 function mapWindow(map, laid, width, height) {
   const places = [...laid.tasks, ...laid.bases].map((one) => one.place).filter(Boolean);
   const [xs, ys] = [0, 1].map((axis) => places.map((place) => place[axis]));
@@ -36,7 +36,7 @@ function mapWindow(map, laid, width, height) {
   return { x: around(left, right, (unit * width) / 2), y: around(bottom, upper, (unit * height) / (2 * map.aspect)) };
 }
 
-// names of agents, of which not all need be known
+// names of agents, of which some may be unknown
 function listed(names, count) {
   const shown = names.slice(0, 12);
   if (!shown.length) return counted(count, "agent");
@@ -86,7 +86,7 @@ function mapSpec(map, laid, plan, width, height) {
     { data: { name: "labels" }, mark: { type: "text", dy: { expr: above }, clip: true, fontSize: 11, color: css("--ink") }, encoding: { x, y, text: { field: "task" } } }] };
 }
 
-// labels of the largest tasks that fit beside each other in a window
+// labels of the largest tasks that fit in a window without overlap
 function mapLabels(sites, domain, width, height) {
   const taken = [];
   const pixel = (value, [low, high], size) => ((value - low) / (high - low)) * size;
@@ -100,7 +100,7 @@ function mapLabels(sites, domain, width, height) {
   return taken;
 }
 
-// draws the map, and returns a function that zooms by a factor, or with none goes back to the whole
+// draws the map, and returns a function that zooms by a factor, or resets the window without one
 async function drawMap(element, map, plan, width, height) {
   const laid = layMap(map, plan);
   const isPlaced = [...laid.tasks, ...laid.bases].some((one) => one.place);

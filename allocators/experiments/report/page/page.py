@@ -1,4 +1,4 @@
-"""The page: what stores hold as one HTML file that a browser opens from disk, without a network."""
+"""Report of stores as one self-contained HTML file."""
 
 import json
 import os
@@ -23,10 +23,10 @@ from alloc.problems.formats.files import PathLike, is_stream, named
 from alloc.problems.text import one_line
 
 DETAIL_BYTES, DETAIL_BYTES_A_RUN = 1_500_000, 150
-"""Room for maps and traces on a page: so much, and so much more for each run."""
+"""Maximum size of maps and traces on a page: a constant, and an addition per run."""
 
 MOST_FAILURES = 500
-"""Different failures whose tracebacks are on a page, those that were most frequent."""
+"""Maximum number of distinct failures whose tracebacks are on a page, the most frequent first."""
 
 FIGURES = ("makespan", "served_makespan", "lower_bound", "gap", "energy", "runtime_s", "cpu_s", "memory_mb", "unserved")
 """Fields of an ending that are columns of the table of runs."""
@@ -34,14 +34,14 @@ FIGURES = ("makespan", "served_makespan", "lower_bound", "gap", "energy", "runti
 SUFFIX = ".html"
 
 PARTS = ("report.html.jinja", "report.css", "charts.js", "tables.js", "map.js", "instance.js", "report.js")
-"""Files beside this module: the frame, the style, and the scripts in the order in which they run."""
+"""Files beside this module: the template, the style, and the scripts in order of execution."""
 
 GREY = "#999999"
-"""The eighth colour of methods, as the palette has no other that can be seen on white."""
+"""The eighth colour of methods, as the palette has no further colour that is visible on white."""
 
 
 def check_page(path: PathLike) -> None:
-    """Raise an error if a page could not be written, for its suffix, a missing package, or its place."""
+    """Raise an error if a page cannot be written because of its suffix, a missing package, or its location."""
     if not os.fspath(path).lower().endswith(SUFFIX) or is_stream(path):
         raise InputError(f"must end in {SUFFIX}", source=named(path, output=True))
     require_packages()
@@ -56,40 +56,40 @@ def report_html(
     against: str | None = None,
     progress: Progress = lambda words: None,
 ) -> int:
-    """Write what stores of runs hold as one page, which a browser opens from disk without a network.
+    """Write a report of all runs in stores as one self-contained HTML page.
 
-    It has tables of runs and methods, paired statistics, performance profiles, convergence, trade-offs, scaling, gaps,
-    failures, and maps of the plans.
+    It contains tables of runs and methods, paired statistics, performance profiles, convergence, trade-offs, scaling,
+    gaps, failures, and maps of the plans.
 
     Parameters
     ----------
     stores : sequence of str or path
-        Files of ``alloc compare --store``. They are read only, and may be written by others meanwhile.
+        Files of ``alloc compare --store``. They are only read, and may be written by others at the same time.
     output : str or path
-        A file that ends in ``.html``; written whole or not at all.
+        A file that ends in ``.html``; written atomically.
     title : str, optional
-        By default the names of the stores.
+        Title of the page; by default the names of the stores.
     against : str, optional
-        The method, written as in the tables, that all others are compared with; by default each with every other
-        where these are not too many, else all with the first one.
+        Method, as written in the tables, that all others are compared with; by default all pairs are compared or, if
+        there are too many, all methods with the first one.
     progress : callable, optional
-        Called now and then with what is done, in words.
+        Called from time to time with a description of the progress.
 
     Returns
     -------
     int
-        How many runs there are.
+        Number of runs.
 
     Raises
     ------
     InputError
-        If a store cannot be read, `against` is no method in it, or the page cannot be written.
+        If a store cannot be read, `against` is not a method in it, or the page cannot be written.
     MissingPackageError
         If Jinja2, vl-convert-python or itables is not installed.
     """
     check_page(output)
     if not stores:
-        raise InputError("must name a store at least", "stores")
+        raise InputError("must name at least one store", "stores")
     archive = read_stores(stores, progress)
     layout = laid_out(archive)
     if against is not None and against not in layout.labels:
@@ -102,7 +102,7 @@ def report_html(
 def _contents(
     archive: Archive, layout: Layout, heading: str, against: str | None, progress: Progress
 ) -> dict[str, str]:
-    """Return the data of the page by the ids of its elements."""
+    """Return the data of the page by element id."""
     groups = []
     for number, group in enumerate(layout.groups, 1):
         progress(f"statistics of {number} of {len(layout.groups)} conditions")
@@ -140,7 +140,7 @@ def _json(value: object) -> str:
 
 
 def _short(value: object) -> object:
-    """Return a value with all its numbers rounded to six significant digits."""
+    """Return a value with all numbers in it rounded to six significant digits."""
     if isinstance(value, float):
         return rounded(value)
     if isinstance(value, dict):
@@ -149,7 +149,7 @@ def _short(value: object) -> object:
 
 
 def _columns(archive: Archive, layout: Layout, failure_of: dict[str, int]) -> Entry:
-    """Return all runs as columns, what repeats as numbers."""
+    """Return all runs as columns, with repeated values encoded as numbers."""
     endings = [record.ending for record in archive.records.values()]
     places = [layout.places[key] for key in archive.records]
     found: Entry = {
@@ -163,7 +163,7 @@ def _columns(archive: Archive, layout: Layout, failure_of: dict[str, int]) -> En
 
 
 def _failures(archive: Archive, layout: Layout) -> tuple[list[Entry], dict[str, int]]:
-    """Return how runs failed, what repeats once and the most frequent first, and which of these each run is."""
+    """Return distinct failures, the most frequent first, and the number of the failure of each run."""
     kinds = {
         key: (layout.places[key].group, layout.places[key].method, record.ending)
         for key, record in archive.records.items()

@@ -1,5 +1,5 @@
 "use strict";
-// The page: what is chosen, and what is drawn when. All that was stored goes in as text, never as HTML.
+// The page: selections and redrawing. All stored data are inserted as text, never as HTML.
 
 const byId = (id) => document.getElementById(id);
 const state = { group: 0, off: new Set(), instance: -1, plan: -1, measure: "runtime_s", against: -1 };
@@ -123,7 +123,7 @@ function tellPaired() {
   place.replaceChildren();
   const references = [...new Set(group().paired.map((one) => one.against))];
   if (!references.length) {
-    add(place, "p", "There is nothing to compare: it takes two methods with results on the same instances.", { class: "none" });
+    add(place, "p", "There is nothing to compare: differences need two methods with results on the same instances.", { class: "none" });
     return;
   }
   if (!references.includes(state.against)) state.against = references[0];
@@ -133,7 +133,7 @@ function tellPaired() {
   select.value = state.against;
   select.onchange = () => { state.against = Number(select.value); tellPaired(); };
   add(place, "p", `Relative differences on the same instances, with 95 % BCa bootstrap intervals of the mean, and Wilcoxon's signed-rank test, two-sided, corrected by
-    Holm's procedure. Instances on which one of the two has no score are left out. Energy is that at the makespan that a method found: less of it at a longer one is not better.`, { class: "hint" });
+    Holm's procedure. Instances on which one of the two has no score are left out. Energies are at each method's own makespan; less energy at a longer one is not better.`, { class: "hint" });
   for (const score of ["makespan", "energy"]) {
     const rows = group().paired.filter((one) => one.score === score && one.against === state.against && !state.off.has(one.method));
     if (!rows.length) continue;
@@ -168,7 +168,7 @@ function showRun(row) {
   const name = page.instances.name[runs.instance[row]];
   add(place, "h3", `${page.labels[runs.method[row]]} on ${name}, seed ${runs.seed[row]}`);
   const list = add(place, "dl");
-  const told = { outcome: "outcome", status: "status", stop_reason: "stopped, because", makespan: "T", served_makespan: "T of served tasks", lower_bound: "bound on T",
+  const told = { outcome: "outcome", status: "status", stop_reason: "stop reason", makespan: "T", served_makespan: "T of served tasks", lower_bound: "bound on T",
     gap: "gap to the best bound", energy: "energy", unserved: "unserved tasks", runtime_s: "time (s)", cpu_s: "processor time (s)", memory_mb: "memory (MiB)" };
   for (const [field, title] of Object.entries(told)) {
     const value = runs[field][row];
@@ -188,7 +188,7 @@ function showRun(row) {
 
 // failures
 function tellFailure(place, failure) {
-  add(place, "p", failure.reason || "no reason is known");
+  add(place, "p", failure.reason || "unknown reason");
   if (failure.details) add(place, "pre", failure.details);
 }
 function tellFailures() {
@@ -197,7 +197,7 @@ function tellFailures() {
   const own = page.failures.filter((one) => one.group === state.group && !state.off.has(one.method));
   const missing = group().methods.filter((one) => !state.off.has(one.method)).reduce((sum, one) => sum + one.runs - (one.outcomes.solved || 0), 0);
   const count = own.reduce((sum, one) => sum + one.runs, 0);
-  if (!missing) add(place, "p", "None: every run was solved.");
+  if (!missing) add(place, "p", "None: every run has a result.");
   else add(place, "p", `${counted(missing, "run")} not solved, the most frequent kinds first; refusals are no faults.${missing > count ? ` ${counted(missing - count, "run")} of rarer kinds are left out, to keep the page small.` : ""}`);
   const lay = (some) => some.forEach((failure) => {
     const box = add(place, "details", "", { class: "failure" });
@@ -240,7 +240,7 @@ async function main() {
     byId("about").textContent = `${page.stores.join(", ")}; written ${page.made} by alloc ${page.version}`;
     byId("problem").hidden = false;
     document.querySelector("nav").hidden = true;
-    byId("problem").textContent = "There are no runs: none has ended yet. `alloc compare ... --store` makes some.";
+    byId("problem").textContent = "There are no completed runs yet; `alloc compare ... --store` adds some.";
     return;
   }
   byId("main").hidden = false;

@@ -1,4 +1,4 @@
-"""What the charts of a page draw: profiles, curves over time, trade-offs, scaling and gaps."""
+"""Data of the charts of a page: profiles, curves over time, trade-offs, scaling and gaps."""
 
 from collections.abc import Sequence
 
@@ -13,23 +13,23 @@ from alloc.allocators.experiments.statistics import scores
 from alloc.allocators.experiments.store.outcome import Ending
 
 MOST_POINTS = 2000
-"""Points of a scatter plot; evenly spaced ones are drawn where there are more."""
+"""Maximum number of points of a scatter plot; if there are more, an evenly spaced subset is drawn."""
 
 MOST_SIZES = 12
-"""Numbers of agents that are told one by one; more are put together, each about so many times the one before."""
+"""Maximum number of distinct numbers of agents; more are grouped into geometrically spaced bins."""
 
 QUARTILES = (0.25, 0.5, 0.75)
 WHISKERS = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 STEPS = 60
-"""Factors at which profiles are drawn."""
+"""Number of factors at which profiles are drawn."""
 
 MEASURES = ("runtime_s", "gap", "ratio", "memory_mb")
-"""What is drawn against the number of agents."""
+"""Measures that are drawn over the number of agents."""
 
 
 def series(layout: Layout, group: Group) -> Entry:
-    """Return what the charts of a group draw, with methods by their numbers."""
+    """Return the data of the charts of a group, with methods as numbers."""
     return {
         "profiles": _profiles(group),
         "time": _over_time(group),
@@ -40,7 +40,7 @@ def series(layout: Layout, group: Group) -> Entry:
 
 
 def _profiles(group: Group) -> list[Entry]:
-    """Return performance profiles, up to the factor within which nineteen of twenty results are, at least 2 %."""
+    """Return performance profiles up to 1.02 times the factor that covers 95 % of the results, within 1.02 and 10."""
     common = group.endings_in_common
     if len(common) < 2 or not group.common:
         return []
@@ -55,7 +55,7 @@ def _profiles(group: Group) -> list[Entry]:
 
 
 def _over_time(group: Group) -> list[Entry]:
-    """Return the share of targets reached, and quartiles of the distance to the best known makespan, at each moment."""
+    """Return the share of targets reached, and quartiles of the distance to the best known makespan, over time."""
     common = group.endings_in_common
     ended = [one for runs in common.values() for some in runs for one in some if one is not None]
     steps = [moment(point[0]) for one in ended for point in one.trace]
@@ -88,7 +88,7 @@ def _best(endings: Sequence[Ending | None]) -> float | None:
 
 
 def _course(ending: Ending, first: int, last: int) -> NDArray[np.float64]:
-    """Return the best makespan that a run had found at each moment; infinite before there was one."""
+    """Return the best makespan that a run had found by each time; infinite before the first."""
     course = np.full(last - first + 1, np.inf)
     for time_s, makespan, *_ in ending.trace:
         if makespan is not None:
@@ -97,13 +97,13 @@ def _course(ending: Ending, first: int, last: int) -> NDArray[np.float64]:
 
 
 def _quantiles(table: NDArray[np.float64], shares: Sequence[float]) -> list[list[float | None]]:
-    """Return quantiles of each column, which are values in it; None where that is infinite."""
+    """Return quantiles of each column without interpolation; None if infinite."""
     found = np.quantile(table, shares, axis=0, method="inverted_cdf")
     return [[float(one) if np.isfinite(one) else None for one in row] for row in found]
 
 
 def _tradeoff(group: Group) -> list[Entry]:
-    """Return makespan and energy of each method on each instance, over the least of any method there."""
+    """Return makespan and energy of each method on each instance, relative to the least of any method there."""
     both = [
         relative_to_best([scores(runs, score) for runs in group.endings.values()]) for score in ("makespan", "energy")
     ]
@@ -127,7 +127,7 @@ def _tradeoff(group: Group) -> list[Entry]:
 
 
 def _scaling(layout: Layout, group: Group) -> list[Entry]:
-    """Return quartiles of several measures of each method by the number of agents."""
+    """Return quartiles of the measures of each method by number of agents."""
     agents = np.array([layout.known[n].agents for n in group.instances], dtype=float)
     bins = _bins(agents)
     ratios = relative_to_best([scores(runs, "makespan") for runs in group.endings.values()])
@@ -146,7 +146,7 @@ def _scaling(layout: Layout, group: Group) -> list[Entry]:
 
 
 def _measured(runs: Sequence[Sequence[Ending | None]], measure: str) -> NDArray[np.float64]:
-    """Return a measure of each instance; how long a run took and what memory also where a task was unserved."""
+    """Return a measure of each instance; time and memory also if a task was unserved."""
     if measure == "gap":
         return scores(runs, measure)
     known = [[getattr(one, measure) for one in some if one is not None and one.runtime_s is not None] for some in runs]
@@ -163,7 +163,7 @@ def _bins(agents: NDArray[np.float64]) -> NDArray[np.intp]:
 
 
 def _gaps(group: Group) -> list[Entry]:
-    """Return quantiles of the gap to the best bound of each method, and on how many instances there is one."""
+    """Return quantiles of the gap to the best bound of each method, and the number of instances with a gap."""
     found: list[Entry] = []
     for method, runs in zip(group.methods, group.endings.values(), strict=True):
         values = scores(runs, "gap")

@@ -1,4 +1,4 @@
-"""What stores hold, read for a page: all runs, with traces no finer than a page draws them."""
+"""Reading of stores for a page: all runs, with traces thinned to the resolution of the page."""
 
 import json
 import math
@@ -20,18 +20,18 @@ from alloc.problems import InputError
 from alloc.problems.formats.files import PathLike, named
 
 EDGES_S = tuple(1e-3 * 10 ** (step / 20) for step in range(256))
-"""Moments, 20 a decade, at which a page tells what a run had found: shares and quantiles at these are exact."""
+"""Times, 20 per decade, at which traces are sampled: shares and quantiles at these times are exact."""
 
 EVERY = 1000
-"""Runs between two calls that tell how far the reading is."""
+"""Number of runs between two calls of the progress callback."""
 
 Progress = Callable[[str], None]
-"""Called now and then with what is done, in words."""
+"""Called from time to time with a description of the progress."""
 
 
 @dataclass(frozen=True)
 class Known:
-    """An instance of a store: its name, which need not be the only one of its kind, and its size."""
+    """An instance of a store: its name, which need not be unique, and its size."""
 
     name: str
     agents: int
@@ -40,17 +40,17 @@ class Known:
 
 @dataclass(frozen=True)
 class Archive:
-    """What several stores hold.
+    """Contents of several stores.
 
     Attributes
     ----------
     paths : sequence of path
     records : dict
-        Runs by key, in the order in which they began. Of a run in several stores, what ended last.
+        Runs by key, in order of their start. Of a run in several stores, the record that ended last.
     instances : dict
-        By the hash of their content.
+        Instances by the hash of their content.
     origins : dict
-        Of each run, which of the paths its record is of.
+        Index in `paths` of the store of each run's record.
     """
 
     paths: Sequence[PathLike]
@@ -59,17 +59,17 @@ class Archive:
     origins: dict[str, int] = field(default_factory=dict)
 
     def contents(self, wanted: Sequence[str]) -> Iterator[tuple[str, bytes]]:
-        """Yield the hash and the .npz of each instance that is wanted and kept, in the order that is wanted."""
+        """Yield the hash and the .npz content of each wanted instance that is stored, in the given order."""
         yield from self._blobs("SELECT content FROM contents WHERE instance = ?", wanted)
 
     def plans(self, wanted: Sequence[str]) -> dict[str, bytes]:
-        """Return the plans that are kept of these runs, packed, by key; each from the store that its record is of."""
+        """Return the stored plans of these runs, packed, by key; each from the store of the run's record."""
         return dict(self._blobs("SELECT plan FROM plans WHERE key = ?", wanted, self.origins))
 
     def _blobs(
         self, query: str, wanted: Sequence[str], origins: Mapping[str, int] | None = None
     ) -> Iterator[tuple[str, bytes]]:
-        """Yield what a query finds of each key in the store that it is of; without `origins`, in the first with it."""
+        """Yield the results of a query per key, in the store given by `origins`, or else in the first that has one."""
         with ExitStack() as stack:
             opened = [(stack.enter_context(_opened(path)), named(path)) for path in self.paths]
             able = {number: one for number, one in enumerate(opened) if _has_plans(one[0])}
@@ -84,19 +84,19 @@ class Archive:
 
 
 def read_stores(paths: Sequence[PathLike], progress: Progress = lambda words: None) -> Archive:
-    """Return what stores hold; they are not changed, also where an earlier version made them.
+    """Return the contents of stores, which are not changed, even if an earlier version wrote them.
 
     Raises
     ------
     InputError
-        If a file cannot be read, is damaged, of a later version, or no store.
+        If a file cannot be read, is damaged, of a later version, or not a store.
     """
     found: dict[str, Record] = {}
     instances: dict[str, Known] = {}
     origins: dict[str, int] = {}
     for number, path in enumerate(paths):
         with _opened(path) as connection:
-            if checked_version(connection, named(path)) == 0:  # an empty file: no run has begun
+            if checked_version(connection, named(path)) == 0:  # an empty file: no run has started
                 continue
             for known, *about in connection.execute("SELECT instance, name, agents, tasks FROM instances"):
                 instances[known] = Known(*about)
@@ -110,7 +110,7 @@ def read_stores(paths: Sequence[PathLike], progress: Progress = lambda words: No
 
 
 def _with_shared_bounds(records: dict[str, Record]) -> dict[str, Record]:
-    """Return runs with their gaps against the best bound that any run proved on the instance: it holds for all."""
+    """Return runs with their gaps to the best bound that any run proved on the instance, as it holds for all."""
     best: dict[str, float] = {}
     for record in records.values():
         if record.ending.lower_bound is not None:
@@ -137,19 +137,19 @@ def _records(connection: sqlite3.Connection) -> Iterator[tuple[str, Record]]:
 
 
 def _of_mission(ending: Ending, measures: Mapping[str, float | None]) -> Ending:
-    """Return how a policy ended in a mission, with the time in which all tasks were done in place of the makespan."""
+    """Return the ending of a policy's run on a mission, with the mission time as the makespan."""
     time = measures.get("mission_time")
     return replace(ending, makespan=time, served_makespan=time, lower_bound=measures.get("mission_time_lower_bound"))
 
 
 def _has_plans(connection: sqlite3.Connection) -> bool:
-    """Return whether a store is of a version that has plans and the content of instances."""
+    """Return whether the version of a store has plans and the content of instances."""
     return connection.execute("SELECT 1 FROM sqlite_master WHERE name = 'plans'").fetchone() is not None
 
 
 @contextmanager
 def _opened(path: PathLike) -> Iterator[sqlite3.Connection]:
-    """Open a store for reading, while others may write it."""
+    """Open a store for reading while others may write to it."""
     if not os.path.exists(path):
         raise InputError("there is no such file; check the path", source=named(path))
     with explained(named(path)):
@@ -159,11 +159,11 @@ def _opened(path: PathLike) -> Iterator[sqlite3.Connection]:
 
 
 def _connected(place: str, name: str) -> sqlite3.Connection:
-    """Return a connection that only reads.
+    """Return a read-only connection.
 
-    In a folder that may not be written, SQLite cannot make the files by which readers and writers find each other.
-    There a store is read without them, which is right only while nobody writes it: a log beside it shows that somebody
-    does, or was ended while writing. Who begins to write later is not noticed.
+    In a read-only folder, SQLite cannot create the files that coordinate readers and writers. A store is then read as
+    immutable, which is correct only while nobody writes to it: a write-ahead log beside it shows that somebody does,
+    or was interrupted. Later writers are not detected.
 
     Raises
     ------
@@ -179,7 +179,7 @@ def _connected(place: str, name: str) -> sqlite3.Connection:
     for log in (f"{place}-wal", f"{place}-journal"):
         if os.path.exists(log) and os.path.getsize(log):
             raise InputError(
-                f"is being written, or was when its writer was ended, which {os.path.basename(log)} shows, and its"
+                f"is being written, or its writer was interrupted, as {os.path.basename(log)} shows, and its"
                 " folder is read-only here; read it when the comparison has ended, or make the folder writable",
                 source=name,
             )
@@ -187,7 +187,7 @@ def _connected(place: str, name: str) -> sqlite3.Connection:
 
 
 def _tried(place: str, mode: str) -> sqlite3.Connection:
-    """Return a connection by which something was read: a file is not looked at before."""
+    """Return a connection after a first query, as SQLite does not open the file before."""
     connection = sqlite3.connect(f"file:{pathname2url(place)}?{mode}", uri=True, timeout=BUSY_S)
     try:
         connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
@@ -198,11 +198,11 @@ def _tried(place: str, mode: str) -> sqlite3.Connection:
 
 
 def moment(time_s: float) -> int:
-    """Return the number of the first of `EDGES_S` at or after a time."""
+    """Return the index of the first of `EDGES_S` at or after a time."""
     return min(bisect_left(EDGES_S, time_s), len(EDGES_S) - 1)
 
 
 def thinned(trace: TracePoints) -> TracePoints:
-    """Return the last point of a trace up to each of `EDGES_S`: what is known at these does not change."""
+    """Return the last point of a trace up to each of `EDGES_S`, so that values at these times do not change."""
     last = {moment(point[0]): point for point in trace if math.isfinite(point[0])}
     return tuple(last.values())

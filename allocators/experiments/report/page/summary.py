@@ -1,4 +1,4 @@
-"""The tables of a page: under which conditions runs were made, what each method came to, and how methods differ."""
+"""Tables of a page: conditions of the runs, results of each method, and differences between methods."""
 
 import time
 from collections import Counter
@@ -18,7 +18,7 @@ from alloc.problems.text import counted
 Entry = dict[str, object]
 
 MOST_PAIRED = 100_000
-"""Pairs of methods times instances up to which every method is compared with every other: intervals take time."""
+"""Pairs of methods times instances up to which all pairs are compared, as intervals take time."""
 
 NAMED = ("objective", "time_limit_s", "iterations", "target_gap", "threads", "version", "machine")
 """Conditions that have their own columns on a page."""
@@ -27,7 +27,7 @@ SCORES = ("makespan", "energy")
 
 
 def conditions(group: Group) -> Entry:
-    """Return under which conditions the runs of a group were made, and when, for a row of a table."""
+    """Return the conditions and dates of the runs of a group, as a row of a table."""
     ended = _flat(group.endings)
     told = {name: value for name, value in asdict(group.run).items() if name in CONDITIONS}
     return {
@@ -52,9 +52,9 @@ def _flat(endings: Endings) -> list[Ending]:
 
 
 def methods(group: Group) -> list[Entry]:
-    """Return what each method came to, a row for each.
+    """Return the results of each method, one row per method.
 
-    Means are of the instances that every method served: over its own, one that fails on the hardest would look best.
+    Means are over the instances that every method served; otherwise, a method that fails on hard ones would look best.
     """
     makespans = {label: scores(runs, "makespan") for label, runs in group.endings.items()}
     ratios = relative_to_best(list(makespans.values()))
@@ -87,7 +87,7 @@ def methods(group: Group) -> list[Entry]:
 
 
 def _served_by_all(makespans: Sequence[NDArray[np.float64]]) -> NDArray[np.bool_]:
-    """Return which instances have a makespan of every method that has one at all, shape (instances,)."""
+    """Return which instances have a makespan of every method that has any makespan, shape (instances,)."""
     known = ~np.isnan(np.array(makespans))
     return np.asarray(known[known.any(axis=1)].all(axis=0))
 
@@ -97,7 +97,7 @@ def _outcomes(ended: Sequence[Ending]) -> Counter[Outcome]:
 
 
 def relative_to_best(values: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
-    """Return values over the least one of each instance, shape (methods, instances); NaN where there is none, or 0."""
+    """Return values divided by the least of each instance, shape (methods, instances); NaN if that is missing or 0."""
     table = np.array(values)
     best = np.fmin.reduce(table, axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -114,14 +114,14 @@ def _finite(value: float) -> float | None:
 
 
 def paired(layout: Layout, group: Group, against: str | None = None) -> list[Entry]:
-    """Return how methods differ from each reference: from every method where that is quick, else from one.
+    """Return the differences of methods from each reference: from every method if that is fast, or else from one.
 
     Parameters
     ----------
     layout : Layout
     group : Group
     against : str, optional
-        The only reference; without it the first is the first method that was run.
+        The only reference; by default the first reference is the first method that was run.
     """
     number = {layout.labels[method]: method for method in group.methods}
     every = len(number) * (len(number) - 1) * len(group.instances) <= MOST_PAIRED
@@ -138,23 +138,23 @@ def paired(layout: Layout, group: Group, against: str | None = None) -> list[Ent
 
 
 def notes(group: Group) -> list[str]:
-    """Return what is to be known about the figures of a group, in a sentence each."""
+    """Return remarks on the results of a group, one sentence each."""
     found = doubts(group.endings)
     every, common = len(group.instances), len(group.common)
     if len(group.endings) == 1:
         found.append("Only one method was run under these conditions: there is nothing to compare it with.")
     elif not common:
-        found.append("No instance was run by every method: there are no profiles, and differences are of pairs alone.")
+        found.append("No instance was run by every method: there are no profiles, only differences between pairs.")
     elif common < every:
         share = f"{common} of {counted(every, 'instance')}"
-        found.append(f"Profiles and curves over time are of the {share} that every method was run on.")
+        found.append(f"Profiles and curves over time are based on the {share} on which every method was run.")
     if len(group.endings) > 1 and common and common < SMALL:
         least = f"; fewer than {LEAST} allow neither interval nor test" if common < LEAST else ""
         found.append(f"Small sample: {counted(common, 'instance')} in common{least}.")
     found += _about_means(group)
     ended = _flat(group.endings)
     if all(one.outcome is not Outcome.SOLVED for one in ended):
-        found.append("No run was solved: there are no scores to draw. See the failures below.")
+        found.append("No run has a result: there are no scores to draw. See the failures below.")
     elif all(one.makespan is None for one in ended):
         found.append("No run has a makespan: all left tasks undone.")
     elif all(one.lower_bound is None for one in ended):
@@ -163,7 +163,7 @@ def notes(group: Group) -> list[str]:
 
 
 def _about_means(group: Group) -> list[str]:
-    """Return what is to be known about the means of methods, where these served different instances."""
+    """Return remarks on the means of methods, if these served different instances."""
     makespans = [scores(runs, "makespan") for runs in group.endings.values()]
     shared = int(_served_by_all(makespans).sum())
     served = int((~np.isnan(np.array(makespans))).any(axis=0).sum())
@@ -172,4 +172,4 @@ def _about_means(group: Group) -> list[str]:
     if not shared:
         return ["No instance was served by every method with results: there are no means; see the paired differences."]
     share = f"{shared} of {counted(served, 'instance')}"
-    return [f"Means are of the {share} that every method with results served, and tell nothing of the others."]
+    return [f"Means are over the {share} that every method with results served, and ignore the others."]

@@ -1,5 +1,5 @@
 "use strict";
-// Tables that sort, and filter by each column; what is in a cell goes in as text.
+// Tables that can be sorted, and filtered by each column; cells are inserted as text.
 
 let DataTable;
 const tables = new Map(); // by their elements
@@ -11,7 +11,7 @@ function dropTable(element) {
   tables.get(element)?.destroy();
   tables.delete(element);
 }
-// rows are whatever `get` of the columns takes; nothing is last in either direction
+// rows are arguments of the columns' `get`; missing values are last in either direction
 function makeTable(element, columns, rows, { order = [], paging = false, filters = false, pick = null } = {}) {
   dropTable(element);
   element.replaceChildren();

@@ -284,7 +284,7 @@ def test_policies_in_missions_are_kept(alloc, plugin):
     more = alloc(*words, "--knowledge", "full", "--store", "runs.db")
     assert "4 runs made; runs.db has 4 of 4" in more.err
     assert "runs.db also contains 4 runs with knowledge local" in more.err
-    assert "## Against nearest, in the same missions" in Path("table.md").read_text()
+    assert "## Differences from nearest on the same missions" in Path("table.md").read_text()
     (mean,) = (
         sqlite3.connect("runs.db")
         .execute("SELECT avg(measures ->> 'mission_time') FROM runs WHERE method = 'nearest' AND knowledge = 'local'")
