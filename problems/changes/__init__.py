@@ -1,1 +1,1 @@
-"""The same problem after a change: agents and tasks that come, go or move."""
+"""Changes of instances: agents and tasks that are added, removed or moved."""

@@ -1,4 +1,4 @@
-"""The same problem with more agents or tasks."""
+"""Instances with additional agents or tasks."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, cast
@@ -22,7 +22,7 @@ NUMBERS_OF_AGENT = {
     "speed": "speed",
     "energy_per_distance": "agent_energy_per_distance",
 }
-"""Fields of an agent in a file that hold a number, and what they are called in an instance."""
+"""Numeric fields of an agent in a file, and their names in an instance."""
 
 AGENT_FIELDS = ("id", "like", "position", "start_task", "returns", "tasks", "skills", *NUMBERS_OF_AGENT)
 
@@ -30,19 +30,19 @@ TASK_FIELDS = ("id", "workload", "position", "priority", "needs")
 
 
 def with_agents(instance: "Instance", added: Iterable[Mapping[str, object]]) -> "Instance":
-    """Return the same problem with more agents, at the end.
+    """Return the instance with agents appended.
 
     Parameters
     ----------
     instance : Instance
     added : iterable of mappings
-        Fields of each as in a file: ``id`` and ``ability`` at least; ``like`` is the id of an agent that it equals in
-        all that is not given, distances of its own included where no other place is given.
+        Fields of each agent as in a file; ``id`` is required, and ``ability`` unless ``like`` is the id of an agent
+        from which all missing fields are copied, including user-given distances if no other place is given.
 
     Raises
     ------
     InputError
-        If a field is unknown or wrong, or an id is not new.
+        If a field is unknown or invalid, or an id is already used.
     """
     rows = [
         _known(row, AGENT_FIELDS, f"agents[{number}]") for number, row in enumerate(listed(added, "added", "agents"))
@@ -77,18 +77,18 @@ def with_agents(instance: "Instance", added: Iterable[Mapping[str, object]]) -> 
 
 
 def with_tasks(instance: "Instance", added: Iterable[Mapping[str, object]]) -> "Instance":
-    """Return the same problem with more tasks, at the end; agents with a list of tasks may not do them.
+    """Return the instance with tasks appended; agents with a list of allowed tasks may not do them.
 
     Parameters
     ----------
     instance : Instance
     added : iterable of mappings
-        Fields of each as in a file: ``id`` and ``workload`` at least.
+        Fields of each task as in a file; ``id`` and ``workload`` are required.
 
     Raises
     ------
     InputError
-        If a field is unknown or wrong, or an id is not new.
+        If a field is unknown or invalid, or an id is already used.
     """
     rows = [_known(row, TASK_FIELDS, f"tasks[{number}]") for number, row in enumerate(listed(added, "added", "tasks"))]
     if not rows:
@@ -132,7 +132,7 @@ def _set_numbers(fields: dict[str, object], row: Mapping[str, object], index: in
 
 
 def _set_return(fields: dict[str, object], instance: "Instance", row: Mapping[str, object], index: int) -> None:
-    """Set whether an agent returns, and to which base: false, true for its start, or the id of a base."""
+    """Set whether an agent returns, and where to: False, True for its start, or the id of a base."""
     given, place = row.get("returns"), f"agents[{index}].returns"
     returns, base = fields["returns"], fields["return_base"]
     assert isinstance(returns, np.ndarray)

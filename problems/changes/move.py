@@ -1,4 +1,4 @@
-"""The same problem with agents at other places."""
+"""Instances with agents at new places."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -18,20 +18,20 @@ if TYPE_CHECKING:
 
 
 def moved_to(instance: "Instance", places: Mapping[str, str | Sequence[float]]) -> "Instance":
-    """Return the same problem with agents at other places.
+    """Return the instance with agents at new places.
 
     Parameters
     ----------
     instance : Instance
     places : mapping
-        For each id of an agent that has moved, the id of the task where it is now, or its coordinates. Distances given
-        for the agent itself are dropped, as they are from where it was. An agent that returns goes on to return to
-        where it started, which becomes a base, or to the base that it has.
+        For each id of an agent that has moved, the id of the task where it is now, or its coordinates. User-given
+        distances of the agent are dropped, as they refer to its old place. An agent that returns still returns to its
+        base or to its original start, which becomes a base.
 
     Raises
     ------
     InputError
-        If an id is unknown, or a place is none.
+        If an id is unknown, or a place is invalid.
     """
     fields: dict[str, object] = {name: np.array(getattr(instance, name)) for name in ("agent_position", "start_task")}
     moved = np.zeros(instance.n, dtype=np.bool_)
@@ -45,15 +45,15 @@ def moved_to(instance: "Instance", places: Mapping[str, str | Sequence[float]]) 
 
 
 def with_starts_as_bases(instance: "Instance", agents: IntArray) -> "Instance":
-    """Return the same problem in which the starts of some agents are bases, to which they return.
+    """Return the instance in which some agents return to bases at their starts.
 
-    Agents that start at one place and have no distances of their own share a base, named after the first of them.
+    Agents with the same start and without user-given distances share a base, named after the first of them.
 
     Parameters
     ----------
     instance : Instance
     agents : ndarray of int
-        Indices.
+        Indices of the agents.
     """
     if not len(agents):
         return instance
@@ -80,7 +80,7 @@ def with_starts_as_bases(instance: "Instance", agents: IntArray) -> "Instance":
 
 
 def without_own(table: DistanceTable | None, agents: BoolArray) -> DistanceTable | None:
-    """Return a table without the distances that are given for the agents marked in `agents`, shape (n,)."""
+    """Return a table without the distances given for the agents in the mask `agents`, shape (n,)."""
     if table is None:
         return None
     dropped = np.append(agents, np.zeros(table.size - table.n, dtype=np.bool_))
@@ -98,7 +98,7 @@ def index_of(instance: "Instance", name: object) -> int:
 
 
 def set_place(fields: dict[str, object], instance: "Instance", row: Mapping[str, object], index: int) -> None:
-    """Set position and start task of an agent to those in a row of fields."""
+    """Set position and start task of an agent to those in `row`."""
     place, start = fields["agent_position"], fields["start_task"]
     assert isinstance(place, np.ndarray)
     assert isinstance(start, np.ndarray)
@@ -110,7 +110,7 @@ def set_place(fields: dict[str, object], instance: "Instance", row: Mapping[str,
 
 
 def position(given: object) -> list[float]:
-    """Return three coordinates, NaN for None."""
+    """Return three coordinates; NaN for None."""
     if given is None:
         return [np.nan] * 3
     place: list[float] = listed(cast("Iterable[float]", given), "position", "2 or 3 numbers")

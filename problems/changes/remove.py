@@ -1,4 +1,4 @@
-"""The same problem with fewer agents or tasks."""
+"""Instances with fewer agents or tasks."""
 
 from collections.abc import Callable, Iterable, Sequence, Set
 from dataclasses import fields
@@ -30,13 +30,13 @@ AGENT_ARRAYS = (
 
 
 def restricted(instance: "Instance", agents: IntArray, tasks: IntArray) -> "Instance":
-    """Return the problem of some agents and tasks alone, in this order; agents stay where they begin.
+    """Return the subproblem of the given agents and tasks, in this order; starts of agents do not change.
 
     Parameters
     ----------
     instance : Instance
     agents, tasks : ndarray of int
-        Indices, none twice.
+        Distinct indices.
     """
     number = np.full(instance.m + 1, IDLE, dtype=np.intp)
     number[tasks] = np.arange(len(tasks))
@@ -45,7 +45,7 @@ def restricted(instance: "Instance", agents: IntArray, tasks: IntArray) -> "Inst
     left = (instance.start_task[agents] != IDLE) & (start == IDLE) & np.isnan(position[:, 0])
     position[left] = instance.start_position[agents[left]]
     lists, table = instance.allowed_tasks, instance.distances
-    if table is not None:  # distances from a start that goes stay those of the agent
+    if table is not None:  # agents keep the distances of removed start tasks
         table = table.with_rows_of_starts(agents[left], instance.start_task[agents[left]])
     rows = agent_rows(instance, agents)
     rows |= {"agent_position": position, "start_task": start}
@@ -60,13 +60,13 @@ def restricted(instance: "Instance", agents: IntArray, tasks: IntArray) -> "Inst
         needs=None if instance.needs is None else tuple(instance.needs[j] for j in tasks.tolist()),
         distances=None if table is None else table.restricted(agents, tasks),
     )
-    if instance.reach.move is not None:  # which the fields do not say
+    if instance.reach.move is not None:  # not part of the fields
         part.__dict__["reach"] = restricted_reach(instance.reach, agents, tasks)
     return part
 
 
 def without_agents(instance: "Instance", gone: Iterable[str]) -> "Instance":
-    """Return the same problem without these agents, as when they drop out.
+    """Return the instance without these agents, as after failures.
 
     Parameters
     ----------
@@ -77,14 +77,14 @@ def without_agents(instance: "Instance", gone: Iterable[str]) -> "Instance":
     Raises
     ------
     InputError
-        If an id is unknown, or no agent is left.
+        If an id is unknown, or no agent remains.
     """
     left = _others(instance.agent_ids, gone, "agent", instance.name)
     return with_rows(instance, left, np.arange(instance.m))
 
 
 def without_tasks(instance: "Instance", gone: Iterable[str]) -> "Instance":
-    """Return the same problem without these tasks; agents that start there stay at their places.
+    """Return the instance without these tasks; agents that start there keep their places.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def without_tasks(instance: "Instance", gone: Iterable[str]) -> "Instance":
     Raises
     ------
     InputError
-        If an id is unknown, or no task is left.
+        If an id is unknown, or no task remains.
     """
     left = _others(instance.task_ids, gone, "task", instance.name)
     if not len(left):
@@ -104,13 +104,13 @@ def without_tasks(instance: "Instance", gone: Iterable[str]) -> "Instance":
 
 
 def replaced(instance: "Instance", **changed: object) -> "Instance":
-    """Return the instance with other values of some fields, which its constructor checks."""
+    """Return a copy of the instance with some fields changed; the constructor validates them."""
     make = cast("Callable[..., Instance]", type(instance))
     return make(**{field.name: getattr(instance, field.name) for field in fields(instance)} | changed)
 
 
 def agent_rows(instance: "Instance", agents: IntArray, names: Sequence[str] = ()) -> dict[str, object]:
-    """Return the fields of some agents, by their indices; the last are called `names`."""
+    """Return the fields of the agents with these indices; the last ones get the ids `names`."""
     kept = agents.tolist()
     rows: dict[str, object] = {name: getattr(instance, name)[agents] for name in AGENT_ARRAYS}
     ids = [instance.agent_ids[i] for i in kept]
@@ -122,7 +122,7 @@ def agent_rows(instance: "Instance", agents: IntArray, names: Sequence[str] = ()
 
 
 def with_rows(instance: "Instance", agents: IntArray, tasks: IntArray, names: Sequence[str] = ()) -> "Instance":
-    """Return the instance with some agents, copies of others among them."""
+    """Return the instance with the agents and tasks of these indices; repeated agents get the ids `names`."""
     table = instance.distances
     return replaced(
         instance,
@@ -136,7 +136,7 @@ def _renamed(tasks: IntArray | None, number: IntArray) -> IntArray | None:
 
 
 def _others(ids: Sequence[str], gone: Iterable[str], kind: str, name: str) -> IntArray:
-    """Return the indices of all but those that are gone."""
+    """Return the indices of all ids that are not in `gone`."""
     dropped = gone if isinstance(gone, Set) else listed(gone, "gone", f"ids of {kind}s")
     known = set(ids)
     for one in dropped:

@@ -1,1 +1,1 @@
-"""What stands in the way of an instance: why tasks stay unserved, and data that may not be what was meant."""
+"""Diagnosis of instances: reasons for unserved tasks, and data that may be mistakes."""

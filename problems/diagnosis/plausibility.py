@@ -1,4 +1,4 @@
-"""Data that are valid and may still not be what was meant: each finding names the field, and says what it does."""
+"""Plausibility checks of instances: data that are valid but may be mistakes."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -12,28 +12,28 @@ from alloc.problems.text import counted, number
 from alloc.problems.vocabulary import GEOGRAPHIC, IDLE
 
 FAR_OFF, WIDEST = 3.0, 45.0
-"""Places look like degrees where they are this many times farther from the origin than wide, and at most so wide."""
+"""Positions look like degrees if they are this many times farther from the origin than wide, and at most this wide."""
 
 MUCH_MORE = 1000.0
-"""Times the median ability at which an ability looks as if it were in other units."""
+"""Multiple of the median ability from which an ability seems to be in other units."""
 
 FEW = 0.05
-"""Share of the agents that may reach no task without a finding: in large fleets some are out of the way."""
+"""Share of agents that may reach no task without a finding, as in large fleets some are remote."""
 
 MOST_NAMES = 3
-"""Ids in a finding before it is cut."""
+"""Maximum number of ids in a finding."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """Something about an instance that may be a mistake.
+    """A possible mistake in an instance.
 
     Attributes
     ----------
     field : str
-        As files call it.
+        Name of the field in files.
     message : str
-        One line.
+        Description in one line.
     """
 
     field: str
@@ -41,9 +41,9 @@ class Finding:
 
 
 def findings(instance: Instance) -> tuple[Finding, ...]:
-    """Return what about an instance may be a mistake, the most serious first; nothing for a plausible one.
+    """Return the possible mistakes in an instance, the most serious first; empty for a plausible one.
 
-    Takes O(n + m) time; who can reach nothing is looked at only where a table of all pairs is small.
+    Takes O(n + m) time; agents without reachable tasks are only looked for if the table of all pairs is small.
 
     Parameters
     ----------
@@ -58,14 +58,14 @@ def findings(instance: Instance) -> tuple[Finding, ...]:
 
 
 def priority_without_effect(instance: Instance) -> Finding | None:
-    """Return the finding on priorities that differ where all tasks can be served, which is to be known."""
+    """Return a finding if priorities differ, given that all tasks can be served."""
     if np.ptp(instance.priority) == 0:
         return None
-    return Finding("priority", "changes no plan, as every task can be served; it weighs rewards in the game alone")
+    return Finding("priority", "has no effect on plans, as every task can be served; it only weights game rewards")
 
 
 def _degrees(instance: Instance) -> Iterator[Finding]:
-    """Longitudes and latitudes that are taken for coordinates in a plane."""
+    """Find longitudes and latitudes that are treated as planar coordinates."""
     if instance.metric == GEOGRAPHIC:
         return
     places = np.concatenate([instance.agent_position, instance.task_position, instance.bases.position])
@@ -78,12 +78,12 @@ def _degrees(instance: Instance) -> Iterator[Finding]:
     if within and 0 < size <= WIDEST and middle.max() > FAR_OFF * size:
         yield Finding(
             "position",
-            'looks like degrees, but is taken for a plane; with "metric": "geographic" it is [longitude, latitude]',
+            'looks like degrees, but is treated as planar; with "metric": "geographic" it is [longitude, latitude]',
         )
 
 
 def _unplaced(instance: Instance) -> Iterator[Finding]:
-    """Agents and tasks without a place among others that have one: nothing is any way from them."""
+    """Find agents and tasks without a place among others that have one; distances from them are 0."""
     lost_agents, lost_tasks = (np.isnan(places[:, 0]) for places in (instance.start_position, instance.task_position))
     if lost_agents.all() or lost_tasks.all():
         return
@@ -98,26 +98,26 @@ def _unplaced(instance: Instance) -> Iterator[Finding]:
     for lost, ids, noun in ((lost_agents, instance.agent_ids, "agent"), (lost_tasks, instance.task_ids, "task")):
         if lost.any():
             verb = "has" if lost.sum() == 1 else "have"
-            yield Finding("position", f"{named(lost, ids, noun)} {verb} no place: the way there counts as 0")
+            yield Finding("position", f"{named(lost, ids, noun)} {verb} no place: the distance there counts as 0")
 
 
 def _bases(instance: Instance) -> Iterator[Finding]:
-    """Bases to which nobody returns, and those to which the way is nowhere given."""
+    """Find bases to which no agent returns, and bases without a place or given distances."""
     table, ids = instance.distances, instance.bases.ids
     used = np.isin(np.arange(len(ids)), instance.return_base)
     if not used.all():
-        yield Finding("bases", f"nobody returns to {named(~used, ids, 'base')}")
+        yield Finding("bases", f"no agent returns to {named(~used, ids, 'base')}")
     lost = used & np.isnan(instance.bases.position[:, 0])
     if table is not None:
         node = instance.n + instance.m + np.arange(len(ids))
         lost &= ~np.isin(node, np.concatenate([table.source, table.target]))
     if lost.any() and not np.isnan(instance.task_position[:, 0]).all():
         verb = "has" if lost.sum() == 1 else "have"
-        yield Finding("bases", f"{named(lost, ids, 'base')} {verb} no place: the way back there counts as 0")
+        yield Finding("bases", f"{named(lost, ids, 'base')} {verb} no place: the distance back counts as 0")
 
 
 def _unreaching(instance: Instance) -> Iterator[Finding]:
-    """Agents whose battery, range or ways end before the first task."""
+    """Find agents whose battery, range or given distances do not let them reach any task."""
     reach, table = instance.reach, instance.distances
     limited = np.isfinite(instance.battery) | np.isfinite(instance.communication_range)
     limited |= table is not None and table.missing == "unreachable"
@@ -144,7 +144,7 @@ def _unreaching(instance: Instance) -> Iterator[Finding]:
 
 
 def _without_effect(instance: Instance) -> Iterator[Finding]:
-    """Limits on ways where there are no ways."""
+    """Find limits on distances if all distances are 0."""
     if instance.distances is not None:
         return
     if not (np.isnan(instance.start_position[:, 0]).all() or np.isnan(instance.task_position[:, 0]).all()):
@@ -157,11 +157,11 @@ def _without_effect(instance: Instance) -> Iterator[Finding]:
     for name, values in limits:
         if np.isfinite(values).any():
             nobody = "agents" if np.isnan(instance.start_position[:, 0]).all() else "tasks"
-            yield Finding(name, f"has no effect: the {nobody} have no place, so that every way is 0")
+            yield Finding(name, f"has no effect: the {nobody} have no place, so that all distances are 0")
 
 
 def _other_units(instance: Instance) -> Iterator[Finding]:
-    """An ability far beyond the others."""
+    """Find an ability far above the others."""
     if instance.n < 2:
         return
     most = int(instance.ability.argmax())
@@ -173,17 +173,17 @@ def _other_units(instance: Instance) -> Iterator[Finding]:
 
 
 def _alike(instance: Instance) -> Iterator[Finding]:
-    """Nothing tells agents or tasks apart."""
+    """Find out whether all agents are identical, and all tasks are."""
     if instance.n < 2 or instance.m < 2 or instance.reach.has_table is False:
         return
     reach = instance.reach
     equal = all(np.ptp(values) == 0 for values in (instance.ability, instance.workload, instance.priority))
     if equal and reach.mask.all() and np.ptp(reach.cost) == 0 and not instance.has_travel_time:
-        yield Finding("agents", "all are alike, and so are the tasks: plans with as many agents on each task are equal")
+        yield Finding("agents", "all are alike, and so are the tasks: only the number of agents on each task matters")
 
 
 def _too_few_agents(instance: Instance) -> Iterator[Finding]:
-    """Fewer agents than tasks, in a problem where an agent does one task."""
+    """Find fewer agents than tasks, as each agent does at most one task."""
     tasks = int((instance.workload > 0).sum())
     if instance.n < tasks:
         few = f"{counted(instance.n, 'agent')} for {tasks} tasks, and each agent does one task"
@@ -191,7 +191,7 @@ def _too_few_agents(instance: Instance) -> Iterator[Finding]:
 
 
 def named(which: BoolArray, ids: Sequence[str], noun: str) -> str:
-    """Return some of the ids that are marked, and how many there are."""
+    """Return a text with some of the ids in a mask, and their number."""
     count = int(which.sum())
     names = ", ".join(ids[index] for index in np.flatnonzero(which)[:MOST_NAMES].tolist())
     cut = ", ..." if count > MOST_NAMES else ""

@@ -1,4 +1,4 @@
-"""Why a task stays unserved: who could take it and does something else, or how much the nearest agent falls short."""
+"""Reasons for unserved tasks: agents that could serve them but do others, or how far the nearest one falls short."""
 
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -13,28 +13,28 @@ from alloc.problems.text import counted, number
 from alloc.problems.vocabulary import IDLE
 
 MOST_TASKS = 10
-"""Tasks whose reason is given, the most urgent first."""
+"""Maximum number of tasks with a reason, those with the highest priority first."""
 
 MOST_AGENTS = 3
-"""Agents that a reason names."""
+"""Maximum number of agents that a reason names."""
 
 
 @dataclass(frozen=True)
 class Unserved:
-    """Why one task stays unserved in an allocation.
+    """The reason why a task is unserved in an allocation.
 
     Attributes
     ----------
     task : int
     priority : float
     able_agents : tuple of int
-        Agents that can take the task, `MOST_AGENTS` at the most.
+        Agents that can take the task, at most `MOST_AGENTS`.
     able : int
-        How many can.
+        Number of all agents that can take it.
     nearest : int or None
-        Where nobody can: an agent that falls short of it by the least.
+        If no agent can take it, the one that falls short by the least.
     reason : str
-        In words, with the ids of the instance.
+        The reason as text, with the ids of the instance.
     """
 
     task: int
@@ -48,18 +48,18 @@ class Unserved:
 def why_unserved(
     instance: Instance, allocation: Allocation, most: int = MOST_TASKS, pinned: Collection[int] = ()
 ) -> tuple[Unserved, ...]:
-    """Return why tasks stay unserved, the most urgent first.
+    """Return the reasons why tasks are unserved, those with the highest priority first.
 
-    Takes O(n) time for each task.
+    Takes O(n) time per task.
 
     Parameters
     ----------
     instance : Instance
     allocation : Allocation
     most : int
-        How many tasks are looked at.
+        Maximum number of tasks.
     pinned : collection of int
-        Agents that had to do what they do.
+        Agents whose tasks were fixed.
 
     Returns
     -------
@@ -68,7 +68,7 @@ def why_unserved(
     Raises
     ------
     InputError
-        If the allocation does not belong to the instance.
+        If the allocation does not fit the instance.
     """
     tasks = np.array(evaluate(instance, allocation).unserved_tasks, dtype=np.intp)
     tasks = tasks[np.argsort(-instance.priority[tasks], kind="stable")][:most]
@@ -84,7 +84,7 @@ def _why(instance: Instance, allocation: Allocation, task: int, pinned: Collecti
 
 
 def _busy(instance: Instance, allocation: Allocation, able: IntArray, pinned: Collection[int]) -> str:
-    """Return what those do who could take the task."""
+    """Return what the agents that could take the task do instead."""
     named = able[:MOST_AGENTS].tolist()
     doing = []
     for agent in named:
@@ -107,7 +107,7 @@ def _has_priorities(instance: Instance) -> bool:
 
 
 def _nearest(instance: Instance, task: int) -> int:
-    """Return an agent that falls short of the task by the least: it may do it, or lacks the fewest skills."""
+    """Return an agent that falls short of the task by the least; eligible ones or those with most skills come first."""
     reach, first = instance.reach, instance.reach.agents_by_origin
     origins = np.arange(len(reach.place))
     listed = np.array([task in tasks for tasks in reach.lists] + [True])
@@ -124,7 +124,7 @@ def _nearest(instance: Instance, task: int) -> int:
 
 
 def _excess(instance: Instance, origins: IntArray, task: int) -> FloatArray:
-    """Return the share by which the way to the task exceeds range or battery of each origin; < 0 if it does not."""
+    """Return the relative excess of the distance to the task over range or battery of each origin; < 0 if within."""
     reach, goal = instance.reach, np.full(len(origins), task)
     distance = reach.distances_between(origins, goal)
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
@@ -136,7 +136,7 @@ def _excess(instance: Instance, origins: IntArray, task: int) -> FloatArray:
 
 
 def _short(instance: Instance, agent: int, task: int) -> str:
-    """Return what an agent lacks that cannot take the task, where nobody can."""
+    """Return why an agent cannot take the task, given that no agent can."""
     reason = reason_of(instance, agent, task)
     needs = () if instance.needs is None else instance.needs[task]
     needed = f" (it needs {', '.join(map(repr, needs))})" if needs else ""

@@ -1,1 +1,1 @@
-"""Distances and reach: how far agents fly to tasks (1), and which tasks they can take, C(i) of the paper."""
+"""Distances from agents to tasks (1), and reachable tasks, C(i) of the paper."""

@@ -1,4 +1,4 @@
-"""Bases: places with a name to which agents return."""
+"""Bases: named places to which agents return."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -11,21 +11,21 @@ from alloc.problems.errors import InputError
 from alloc.problems.fields import BoolArray, FloatArray, IntArray, ReadOnly, flags, positions, references
 
 NO_NAMES = ("", "true", "false")
-"""What no base is called, but for blanks and capitals: tables say so whether an agent returns to its start."""
+"""Reserved names, ignoring case and blanks: in tables, they say whether an agent returns to its start."""
 
 Place = Sequence[float] | None
 
 
 @dataclass(frozen=True, eq=False)
 class Bases(ReadOnly):
-    """Places with a name.
+    """Named places.
 
     Attributes
     ----------
     ids : tuple of str
-        Unique.
+        Unique ids.
     position : ndarray, shape (bases, 3)
-        NaN rows where unknown.
+        Positions; NaN rows where unknown.
     """
 
     ids: tuple[str, ...] = ()
@@ -33,12 +33,12 @@ class Bases(ReadOnly):
 
     @classmethod
     def of(cls, ids: Sequence[str], position: FloatArray | None = None) -> "Bases":
-        """Return bases by their ids and, where these are known, their positions, shape (bases, 2) or (bases, 3).
+        """Build bases from their ids and, if known, their positions, shape (bases, 2) or (bases, 3).
 
         Raises
         ------
         InputError
-            If an id is none, is there twice, or reads as true or false, or a position is none.
+            If an id is invalid, repeated or reserved, or a position is invalid.
         """
         seen: set[str] = set()
         for row, name in enumerate(ids):
@@ -56,7 +56,7 @@ class Bases(ReadOnly):
 
     @classmethod
     def fitting(cls, given: "Bases | Mapping[str, Place] | None") -> "Bases":
-        """Return bases that are given, or those of a mapping from ids to places."""
+        """Return `given` as bases; a mapping from ids to places is converted."""
         if given is None:
             return cls.of(())
         if isinstance(given, Bases):
@@ -67,11 +67,11 @@ class Bases(ReadOnly):
         return cls.of(tuple(given), np.array(places, dtype=np.float64).reshape(-1, 3))
 
     def with_more(self, ids: Sequence[str], position: FloatArray) -> "Bases":
-        """Return these and further bases; `position` has shape (k, 3)."""
+        """Return the bases with further ones appended; `position` has shape (k, 3)."""
         return Bases.of((*self.ids, *ids), np.vstack([self.position, position]))
 
     def new_id(self, wanted: str) -> str:
-        """Return `wanted`, with a number behind it if a base is called so."""
+        """Return `wanted`, followed by a number if a base already has this name."""
         name, number = wanted, 1
         while name in self.ids:
             number += 1
@@ -91,12 +91,12 @@ def _three(place: Sequence[float], row: int) -> list[float]:
 def returning(
     returns: ArrayLike | None, return_base: ArrayLike | None, n: int, bases: Bases
 ) -> dict[str, BoolArray | IntArray]:
-    """Return the fields `returns` and `return_base` of an instance; by default, who has a base returns.
+    """Return the fields `returns` and `return_base` of an instance; by default, agents with a base return.
 
     Raises
     ------
     InputError
-        If one of them is no such list, or an agent with a base to return to does not return.
+        If a field is not a valid list, or an agent with a `return_base` does not return.
     """
     base = references(return_base, "return_base", n, "base", len(bases.ids))
     if returns is None:

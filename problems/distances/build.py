@@ -1,4 +1,4 @@
-"""Reach of an instance: agents that begin alike make one origin."""
+"""Construction of the reach of an instance, with one origin per group of equivalent agents."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -23,10 +23,10 @@ Flags = NDArray[np.bool_]
 
 
 def build_reach(instance: "Instance") -> Reach:
-    """Group agents by origin; takes O(n log n) time and O(n) memory.
+    """Return the reach of an instance, with agents grouped by origin, in O(n log n) time and O(n) memory.
 
-    Agents of one origin share place, given distances, range, battery, energy per distance, whether and to where they
-    return, and their list of tasks.
+    Agents of one origin share place, user-given distances, range, battery, energy per distance, whether and where
+    they return, and their list of tasks.
 
     Parameters
     ----------
@@ -69,16 +69,16 @@ def build_reach(instance: "Instance") -> Reach:
 
 
 class Home(NamedTuple):
-    """Where each agent returns to: a place, and its node and start task in a table of distances.
+    """The place to which each agent returns, with its node and start task in a table of distances.
 
     Attributes
     ----------
     place : ndarray, shape (n, 3)
-        Where it starts for those that return there, or not at all.
+        Base of the agent; its start if it returns there or not at all.
     node, start : ndarray of int, shape (n,)
-        Of the table; -1 for no start task.
+        Node and start task in the table; -1 for no start task.
     rows : ndarray of int, shape (n,)
-        The node that gives distances, -1 for none.
+        Node whose distances apply, -1 for none.
     """
 
     place: Floats
@@ -88,7 +88,7 @@ class Home(NamedTuple):
 
 
 def _home_of(instance: "Instance") -> Home | None:
-    """Return where agents return to; None where each returns to where it starts, if at all."""
+    """Return the places to which agents return; None if all return to their starts or not at all."""
     base, table, agents = instance.return_base, instance.distances, np.arange(instance.n)
     if not (base >= 0).any():
         return None
@@ -100,7 +100,7 @@ def _home_of(instance: "Instance") -> Home | None:
 
 
 def _geometry(instance: "Instance", place: Floats, node: Indices, start: Indices) -> Geometry:
-    """Return the geometry of some places, by what a table gives for their nodes and start tasks."""
+    """Return the geometry of places, with the distances that a table gives for their nodes and start tasks."""
     given = None if instance.distances is None else given_rows(instance.distances, node, start)
     return Geometry(place, instance.task_position, instance.metric, instance.distance_unit, given)
 
@@ -108,21 +108,21 @@ def _geometry(instance: "Instance", place: Floats, node: Indices, start: Indices
 def replanned(
     reach: Reach, task_of_agent: Indices, price: Floats, pinned: Flags, *, energy_counts: bool, cost_counts: bool
 ) -> Reach:
-    """Return a reach in which agents pay for another task than they have, and some keep theirs.
+    """Return a reach with a price on moving agents to other tasks, in which pinned agents keep their tasks.
 
     Parameters
     ----------
     reach : Reach
     task_of_agent : ndarray of int, shape (n,)
-        -1 where it is idle.
+        Current task of each agent, -1 for idle.
     price : ndarray, shape (n,)
-        Energy that an agent's move counts for.
+        Price of each agent's move, in units of energy.
     pinned : ndarray of bool, shape (n,)
-        Agents that can do nothing but the task that they have, at no cost.
+        Agents that can only do their current task, at no cost.
     energy_counts : bool
         Whether the energy of flights is part of the cost.
     cost_counts : bool
-        Whether there is a cost at all; else costs stay as they are, and only pins count.
+        Whether costs change at all; if not, only pins apply.
     """
     first, origin = group_rows([part.astype(np.float64) for part in (reach.origin, task_of_agent, price, pinned)])
     old, task, fixed = reach.origin[first], task_of_agent[first], pinned[first]
@@ -150,7 +150,7 @@ def replanned(
 
 
 def restricted_reach(reach: Reach, agents: Indices, tasks: Indices) -> Reach:
-    """Return the reach of some agents and tasks, numbered anew in this order."""
+    """Return the reach of the given agents and tasks, renumbered in this order."""
     old, origin = np.unique(reach.origin[agents], return_inverse=True)
     number = np.full(len(reach.goal) + 1, -1, dtype=np.intp)
     number[tasks] = np.arange(len(tasks))
@@ -164,7 +164,7 @@ def restricted_reach(reach: Reach, agents: Indices, tasks: Indices) -> Reach:
 
 
 def _chosen(reach: Reach, old: Indices, origin: Indices) -> Reach:
-    """Return the reach of some origins, without the price of moving; `origin` of each agent among them."""
+    """Return the reach of the origins `old`, without the price of moves; `origin` is the new origin of each agent."""
     return Reach(
         origin=origin,
         geometry=reach.geometry.chosen(old),
@@ -179,7 +179,7 @@ def _chosen(reach: Reach, old: Indices, origin: Indices) -> Reach:
 
 
 def _factors(rate: Floats, base: float) -> tuple[float, Floats | None]:
-    """Return energy per unit of cost, and each agent's energy per distance in it; None where all are 1."""
+    """Return the energy per unit of cost, and each agent's energy per distance relative to it; None if all are 1."""
     if (rate == base).all():
         return base, None
     unit = base if base > 0 else float(rate.max())
@@ -187,16 +187,16 @@ def _factors(rate: Floats, base: float) -> tuple[float, Floats | None]:
 
 
 def _rows_of(table: DistanceTable, node: Indices, start: Indices) -> Indices:
-    """Return the node of a table that gives distances, one's own before that of the start task; -1 for none."""
+    """Return the nodes whose distances apply: an agent's own, or else that of its start task; -1 for none."""
     nodes = np.zeros(table.size, dtype=np.bool_)
     nodes[table.source] = nodes[table.target] = True
     return np.where(nodes[node], node, np.where(start >= 0, table.n + start, -1))
 
 
 def _bound_to(geometry: Geometry, list_of: Indices, lists: Sequence[Indices]) -> tuple[Indices, tuple[Indices, ...]]:
-    """Return lists that allow each origin the tasks whose distance is given, there and back home, and no others."""
+    """Return lists that restrict each origin to tasks whose distances there and back home are given."""
     ways = _given_tasks(geometry)
-    if geometry.home is not None:  # where nobody returns to a base, home is where one starts
+    if geometry.home is not None:  # without bases, home is the start
         home = _given_tasks(geometry.home)
         ways = [np.intersect1d(*pair, assume_unique=True) for pair in zip(ways, home, strict=True)]
     own: list[Indices | None] = [*ways]
@@ -208,7 +208,7 @@ def _bound_to(geometry: Geometry, list_of: Indices, lists: Sequence[Indices]) ->
 
 
 def _given_tasks(geometry: Geometry) -> list[Indices]:
-    """Return the tasks whose distance is given, for each origin."""
+    """Return the tasks with given distances for each origin."""
     given = geometry.given
     assert given is not None
     return [given.task[begin:end] for begin, end in pairwise(given.first.tolist())]

@@ -1,4 +1,4 @@
-"""Distances along the surface of the earth (WGS 84), by pyproj."""
+"""Distances along the surface of the earth (WGS 84), computed by pyproj."""
 
 from functools import cache
 from typing import TYPE_CHECKING
@@ -12,16 +12,16 @@ if TYPE_CHECKING:
     from pyproj import Geod
 
 METRES = {unit: float(EXACT_METRES[unit]) for unit in ("m", "km", "mi", "nmi")}
-"""Metres in each unit that distances on the earth may have."""
+"""Metres in each unit of geographic distances."""
 
 EQUATORIAL_RADIUS_M = 6_378_137.0
 FLATTENING = 1 / 298.257223563
 
 
 def geodesic_distances(place: Floats, goal: Floats, unit: str) -> Floats:
-    """Return distances between places that broadcast, 0 where a coordinate is NaN.
+    """Return distances between arrays of places, with broadcasting; 0 where a coordinate is NaN.
 
-    The geodesic by Karney (2013), doi:10.1007/s00190-012-0578-z; altitude differences by Pythagoras.
+    Geodesics by Karney (2013), doi:10.1007/s00190-012-0578-z, combined with altitude differences by Pythagoras.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def geodesic_distances(place: Floats, goal: Floats, unit: str) -> Floats:
     lon, lat, other_lon, other_lat = (
         np.where(unknown, 0.0, part) for part in (a[..., 0], a[..., 1], b[..., 0], b[..., 1])
     )
-    if unknown.size == 1:  # of arrays of one element pyproj makes numbers, of which some versions of numpy warn
+    if unknown.size == 1:  # pyproj converts arrays of one element to scalars, which some versions of numpy warn about
         _, _, surface = _ellipsoid().inv(lon.item(), lat.item(), other_lon.item(), other_lat.item())
     else:
         _, _, surface = _ellipsoid().inv(lon, lat, other_lon, other_lat)
@@ -47,8 +47,8 @@ def geodesic_distances(place: Floats, goal: Floats, unit: str) -> Floats:
 def embedded(place: Floats, unit: str) -> Floats:
     """Return Cartesian coordinates of the places at altitude 0, shape (k, 3).
 
-    Straight lines between them are no longer than geodesics, and short ones about as long, also across the date line
-    and the poles: trees over places are built on them.
+    Straight lines between them are at most as long as geodesics, and about as long at short distances, also across
+    the date line and the poles; spatial trees are built on them.
     """
     lon, lat = np.radians(place[:, 0]), np.radians(place[:, 1])
     squared_eccentricity = FLATTENING * (2 - FLATTENING)

@@ -1,4 +1,4 @@
-"""How far origins are from tasks: by a metric, and as the user gives it for some pairs."""
+"""Distances between origins and tasks, by a metric or as given by the user for some pairs."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -18,12 +18,12 @@ from alloc.problems.fields import IntArray, ReadOnly
 from alloc.problems.vocabulary import EUCLIDEAN, GEOGRAPHIC, MANHATTAN
 
 LONGEST_GEODESIC_M = 20_003_932.0
-"""From pole to pole, the farthest that two places on the earth are apart."""
+"""Distance between the poles, the largest on the earth."""
 
 
 @dataclass(frozen=True, eq=False)
 class GivenRows(ReadOnly):
-    """Pairs whose distances are given: those of origin i are ``first[i]:first[i + 1]``, in ascending order of tasks.
+    """Pairs with given distances: those of origin i are ``first[i]:first[i + 1]``, in ascending order of tasks.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class GivenRows(ReadOnly):
 
     @cached_property
     def _keys(self) -> IntArray:
-        """Origin times m plus task of each pair, and an end that no key equals."""
+        """Keys origin * m + task of all pairs, followed by a sentinel."""
         return np.append(self.origin * self.m + self.task, (len(self.first) - 1) * self.m)
 
     @property
@@ -58,7 +58,7 @@ class GivenRows(ReadOnly):
         return GivenRows(first, self.task[entry], self.there[entry], self.back[entry], self.m)
 
     def renumbered(self, number: IntArray, m: int) -> "GivenRows":
-        """Return what is given for some tasks alone: task j as ``number[j]``, none where that is -1."""
+        """Return the rows with task j renumbered to ``number[j]``, or dropped if that is -1."""
         task = number[self.task]
         kept = np.flatnonzero(task >= 0)
         origin = self.origin[kept]
@@ -67,7 +67,7 @@ class GivenRows(ReadOnly):
         return GivenRows(first, task[order], self.there[order], self.back[order], m)
 
     def replace(self, default: Floats, values: Floats, origin: IntArray, task: IntArray) -> Floats:
-        """Return `default` with the entries of `values` for the pairs that are given; all broadcast to its shape."""
+        """Return `default`, with entries of `values` for given pairs; all arguments broadcast to its shape."""
         wanted = np.broadcast_to(origin * self.m + task, default.shape)
         found = np.searchsorted(self._keys, wanted)
         given = self._keys[found] == wanted
@@ -87,10 +87,10 @@ class Geometry(ReadOnly):
     metric : str
         One of `metric.METRICS`.
     unit : str
-        Of geographic distances.
+        Unit of geographic distances.
     given : GivenRows or None
     home : Geometry or None
-        That of the places to which the origins return; None where each returns to where it starts, if at all.
+        Geometry of the places to which origins return; None if all return to their starts or not at all.
     """
 
     start: Floats
@@ -102,7 +102,7 @@ class Geometry(ReadOnly):
 
     @property
     def is_euclidean(self) -> bool:
-        """Whether distances are those of (1), with no exception."""
+        """Whether all distances are Euclidean (1)."""
         return self.metric == EUCLIDEAN and self.given is None
 
     @cached_property
@@ -122,32 +122,32 @@ class Geometry(ReadOnly):
         return replace(self, start=self.start[origins], given=given, home=home)
 
     def restricted(self, tasks: IntArray, number: IntArray) -> "Geometry":
-        """Return the geometry of some tasks, of which task j is number ``number[j]``, -1 for none."""
+        """Return the geometry of `tasks`, with task j renumbered to ``number[j]``, -1 for dropped ones."""
         given = None if self.given is None else self.given.renumbered(number, len(tasks))
         home = None if self.home is None else self.home.restricted(tasks, number)
         return replace(self, task_position=self.task_position[tasks], given=given, home=home)
 
     def between(self, origin: IntArray, task: IntArray) -> Floats:
-        """Distance from each of these origins to the task beside it; both broadcast."""
+        """Return the distance from each origin to its task; both broadcast."""
         distance = self._by_metric(self.start[origin], self.task_position[task])
         return distance if self.given is None else self.given.replace(distance, self.given.there, origin, task)
 
     def table(self, origins: IntArray, tasks: IntArray | slice = slice(None)) -> Floats:
-        """Distances of all these origins to all these tasks, shape (k, l)."""
+        """Return the distances from all these origins to all these tasks, shape (k, l)."""
         table = distance_table(self.start[origins], self.task_position[tasks], self._by_metric)
         if self.given is None:
             return table
         return self.given.replace(table, self.given.there, origins[:, None], np.arange(self.given.m)[tasks])
 
     def there_and_back(self, origin: IntArray, task: IntArray, distance: Floats) -> Floats:
-        """Length of the flight from each of these origins to the task, which is `distance` away, and back home."""
+        """Return the length of the flight from each origin to its task, which is `distance` away, and back home."""
         if self.home is not None:
             return distance + self.home.back(origin, task)
         back = distance if self.given is None else self.given.replace(distance, self.given.back, origin, task)
         return distance + back
 
     def back(self, origin: IntArray, task: IntArray) -> Floats:
-        """Distance from each task to the origin beside it, or, where `origin` is a column, from all to all."""
+        """Return the distance from each task back to its origin, or all distances if `origin` is a column."""
         if origin.ndim == 2:
             way = distance_table(self.start[origin[:, 0]], self.task_position[task], self._by_metric)
         else:
@@ -155,7 +155,7 @@ class Geometry(ReadOnly):
         return way if self.given is None else self.given.replace(way, self.given.back, origin, task)
 
     def farthest(self, low: Floats, high: Floats) -> Floats:
-        """Return at least how far each origin is from all places in a box, by its farthest corner; shape (origins,)."""
+        """Return an upper bound on each origin's distance to the places in a box, by its corners; shape (origins,)."""
         corner = np.where(self.place > low / 2 + high / 2, low, high)
         if self.metric == MANHATTAN:
             return manhattan_distances(self.place, corner)
@@ -173,15 +173,15 @@ class Geometry(ReadOnly):
 
 
 def given_rows(table: DistanceTable, nodes: IntArray, start_task: IntArray) -> GivenRows:
-    """Return what a table says of agents or bases: a row for each, or, where it has none, that of its start task.
+    """Return the given distances of agents or bases; for nodes without a row, those of the start task.
 
     Parameters
     ----------
     table : DistanceTable
     nodes : ndarray of int, shape (origins,)
-        One agent of each origin, or a base, as the table numbers them.
+        Node of an agent of each origin, or of a base, in the numbering of the table.
     start_task : ndarray of int, shape (origins,)
-        Task at which the agent starts, -1 for none.
+        Task at which each agent starts, -1 for none.
     """
     node, task, there, back = table.to_tasks()
     begin = np.searchsorted(node, np.arange(table.size + 1))
@@ -191,7 +191,7 @@ def given_rows(table: DistanceTable, nodes: IntArray, start_task: IntArray) -> G
     by_task = entries(begin, origins[placed], table.n + start_task[placed])
     origin = np.concatenate([own[0], by_task[0], origins[placed]])
     goal = np.concatenate([task[own[1]], task[by_task[1]], start_task[placed]])
-    none = np.zeros(int(placed.sum()))  # the way to where one is already
+    none = np.zeros(int(placed.sum()))  # the distance to the own place
     out, home = (np.concatenate([way[own[1]], way[by_task[1]], none]) for way in (there, back))
     key, first = np.unique(origin * table.m + goal, return_index=True)
     origin, goal = np.divmod(key, table.m)

@@ -1,4 +1,4 @@
-"""Distances that the user gives: roads, corridors, no-fly zones."""
+"""User-given distances, for roads, corridors or no-fly zones."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -16,25 +16,25 @@ from alloc.problems.fields import BoolArray, IntArray, ReadOnly, numbers
 Missing = Literal["metric", "unreachable"]
 
 MISSING = ("metric", "unreachable")
-"""What holds for pairs that a table leaves out: the distance by the metric, or that nobody can go there."""
+"""Treatment of pairs without a given distance: the metric, or unreachable."""
 
 
 @dataclass(frozen=True, eq=False)
 class DistanceTable(ReadOnly):
-    """Distances of tasks from agents' starts, bases and each other, as far as given; both ways alike unless both are.
+    """Given distances between tasks and agents' starts, bases or other tasks; symmetric unless both ways are given.
 
     Attributes
     ----------
     n, m : int
-        Agents and tasks of the instance.
+        Number of agents and tasks of the instance.
     source, target : ndarray of int, shape (k,)
-        Where each flight begins and ends: agent i as i, task j as n + j, base k as n + m + k. What is given for the
-        task where an agent starts holds for the agent, too.
+        Start and end node of each flight: agent i is node i, task j is n + j, base k is n + m + k. Distances given
+        for the task where an agent starts also apply to the agent.
     distance : ndarray, shape (k,)
     missing : {"metric", "unreachable"}
-        What holds for pairs that are left out.
+        Treatment of other pairs.
     bases : int
-        Bases of the instance.
+        Number of bases of the instance.
     """
 
     n: int
@@ -59,19 +59,19 @@ class DistanceTable(ReadOnly):
         missing: str = "metric",
         base_ids: Sequence[str] = (),
     ) -> "DistanceTable":
-        """Return the table of some rows.
+        """Build a table from rows.
 
         Parameters
         ----------
         rows : iterable of (str, str, float)
-            Id of an agent, a task or a base, id of another, and the distance from the one to the other, >= 0.
+            Id of an agent, a task or a base, id of another, and the distance from the first to the second, >= 0.
         agent_ids, task_ids, base_ids : sequence of str
         missing : {"metric", "unreachable"}
 
         Raises
         ------
         InputError
-            If an id is unknown or stands for two of them, a pair is given twice, or neither of a pair is a task.
+            If an id is unknown or ambiguous, a pair is given twice, or neither of a pair is a task.
         """
         entries = [_row(entry, number) for number, entry in enumerate(listed(rows, "distances", "rows"))]
         source, target = [entry[0] for entry in entries], [entry[1] for entry in entries]
@@ -90,7 +90,7 @@ class DistanceTable(ReadOnly):
         missing: str = "metric",
         base_ids: Sequence[str] = (),
     ) -> "DistanceTable":
-        """Return the table of some rows that are given by columns; takes millions of them in seconds.
+        """Build a table from columns; fast enough for millions of rows.
 
         Parameters
         ----------
@@ -130,14 +130,14 @@ class DistanceTable(ReadOnly):
         task_ids: Sequence[str],
         base_ids: Sequence[str] = (),
     ) -> "DistanceTable":
-        """Return a table that is given, or that of the rows that are given, for an instance with these ids."""
+        """Return `given`, a table or rows, as a table for an instance with these ids."""
         if not isinstance(given, DistanceTable):
             return cls.of(given, agent_ids, task_ids, base_ids=base_ids)
         if (given.n, given.m) != (len(agent_ids), len(task_ids)):
             raise InputError(f"is for {given.n} agents and {given.m} tasks", "distances")
         if given.bases > len(base_ids):
             raise InputError(f"is for {given.bases} bases", "distances")
-        return replace(given, bases=len(base_ids))  # tables without rows of bases need not know of them
+        return replace(given, bases=len(base_ids))  # a table without rows of bases fits any number of bases
 
     def check(self) -> None:
         """Raise `InputError` for the first row that breaks a rule."""
@@ -162,7 +162,7 @@ class DistanceTable(ReadOnly):
         return (node >= self.n) & (node < self.n + self.m)
 
     def with_rows_of_starts(self, agents: IntArray, start_task: IntArray) -> "DistanceTable":
-        """Return the table in which some agents have for their own what is given for the task where they start.
+        """Return the table in which some agents have their own copies of the rows of their start tasks.
 
         Parameters
         ----------
@@ -186,7 +186,7 @@ class DistanceTable(ReadOnly):
         return replace(self, source=source, target=target, distance=distance)
 
     def restricted(self, agents: IntArray, tasks: IntArray) -> "DistanceTable":
-        """Return what the table says of some agents and tasks, numbered anew in this order; agents may be repeated."""
+        """Return the table of the given agents and tasks, renumbered in this order; agents may be repeated."""
         number = np.full(self.size, -1, dtype=np.intp)
         number[self.n + tasks] = len(agents) + np.arange(len(tasks))
         number[self.n + self.m :] = len(agents) + len(tasks) + np.arange(self.bases)
@@ -204,19 +204,19 @@ class DistanceTable(ReadOnly):
         return DistanceTable(len(agents), len(tasks), source, target, distance, self.missing, self.bases)
 
     def with_more_tasks(self, count: int) -> "DistanceTable":
-        """Return the table with `count` tasks more, of which nothing is given."""
+        """Return the table with `count` further tasks without given distances."""
         ends = (np.where(one < self.n + self.m, one, one + count) for one in (self.source, self.target))
         source, target = ends
         return replace(self, m=self.m + count, source=source, target=target)
 
     def with_bases_at(self, starts: Sequence[tuple[int, int]]) -> "DistanceTable":
-        """Return the table with further bases, each of which is where an agent starts.
+        """Return the table with further bases at the starts of agents.
 
         Parameters
         ----------
         starts : sequence of (int, int)
-            Index of the agent, and that of the task where it starts, -1 for none. The base has what is given for the
-            agent, and for other tasks what is given for that task.
+            Index of the agent, and of the task where it starts, -1 for none. The base gets the distances of the agent
+            and, for other tasks, those of the start task.
         """
         rows: dict[tuple[int, int], float] = {}
         for base, (agent, task) in enumerate(starts, start=self.size):
@@ -226,9 +226,9 @@ class DistanceTable(ReadOnly):
                     for row in np.flatnonzero((ends == node) & self._is_task(others)).tolist():
                         pair = base, int(others[row])
                         new[pair if ends is self.source else pair[::-1]] = float(self.distance[row])
-                known = {sum(pair) - base for pair in rows if base in pair}  # the tasks
+                known = {sum(pair) - base for pair in rows if base in pair}  # tasks with a distance
                 rows |= {pair: length for pair, length in new.items() if sum(pair) - base not in known}
-            if task >= 0:  # which is where one is then
+            if task >= 0:  # the base is at this task
                 rows.setdefault((base, self.n + task), 0.0)
         ends = np.array(list(rows), dtype=np.intp).reshape(-1, 2)
         return replace(
@@ -240,12 +240,12 @@ class DistanceTable(ReadOnly):
         )
 
     def to_tasks(self) -> tuple[IntArray, IntArray, Floats, Floats]:
-        """Return node, task, distance there and distance back for all known pairs, in order of node and task."""
+        """Return node, task, distance there and distance back of all given pairs, sorted by node and task."""
         size = self.size
         key, back = self.source * size + self.target, self.target * size + self.source
         keys = np.concatenate([key, back])
         values = np.concatenate([self.distance, self.distance])
-        keys, first = np.unique(keys, return_index=True)  # a row itself comes before the reverse of another
+        keys, first = np.unique(keys, return_index=True)  # a row takes precedence over the reverse of another
         values = values[first]
         node, goal = np.divmod(keys, size)
         reverse = values[np.searchsorted(keys, goal * size + node)] if len(keys) else values
@@ -265,7 +265,7 @@ def _row(entry: object, number: int) -> Row:
 
 
 AMBIGUOUS, UNKNOWN = -1, -2
-"""What stands in for the node of an id that two have, such as an agent and a task, and of one that there is not."""
+"""Node numbers for ambiguous ids, such as those of both an agent and a task, and for unknown ids."""
 
 
 def _nodes(agent_ids: Sequence[str], task_ids: Sequence[str], base_ids: Sequence[str]) -> dict[str, int]:
@@ -277,7 +277,7 @@ def _nodes(agent_ids: Sequence[str], task_ids: Sequence[str], base_ids: Sequence
 
 
 def _numbered(names: Sequence[str], nodes: Mapping[str, int], column: int, kinds: str) -> IntArray:
-    """Return the nodes of some ids, which stand in this column of the rows."""
+    """Return the nodes of the ids in a column of the rows."""
     found = np.array(list(map(nodes.get, names, repeat(UNKNOWN))), dtype=np.intp)
     wrong = found < 0
     if wrong.any():

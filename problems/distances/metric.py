@@ -1,4 +1,4 @@
-"""Distances between places by a metric, in blocks or pair by pair, with the same last bit either way."""
+"""Distances between places by a metric; blocks and single pairs give bitwise identical results."""
 
 from collections.abc import Callable
 
@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 BLOCK = 1 << 16
-"""Distances that are worked out together: as many as fit a cache."""
+"""Number of distances computed together, such that they fit into a cache."""
 
 
 def distances(place: Floats, goal: Floats) -> Floats:
-    """Return Euclidean distances (1) between places that broadcast, 0 where a coordinate is NaN.
+    """Return Euclidean distances (1) between arrays of places, with broadcasting; 0 where a coordinate is NaN.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ def distances(place: Floats, goal: Floats) -> Floats:
 
 
 def manhattan_distances(place: Floats, goal: Floats) -> Floats:
-    """Return the sums of the differences along the axes, of places that broadcast, 0 where a coordinate is NaN.
+    """Return Manhattan distances between arrays of places, with broadcasting; 0 where a coordinate is NaN.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def manhattan_distances(place: Floats, goal: Floats) -> Floats:
 
 
 def distance_table(place: Floats, goal: Floats, between: Callable[[Floats, Floats], Floats] = distances) -> Floats:
-    """Return the distances of all places to all goals by `between`, shape (places, goals)."""
+    """Return the distances from all places to all goals, computed by `between`, shape (places, goals)."""
     table = np.empty((len(place), len(goal)))
     rows = max(1, BLOCK // len(goal))
     columns = np.ascontiguousarray(goal.T).T[None, :, :]

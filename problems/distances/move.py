@@ -1,4 +1,4 @@
-"""The price of moving an agent to another task than it has."""
+"""Price of moving agents away from their current tasks."""
 
 from dataclasses import dataclass
 
@@ -10,16 +10,16 @@ from alloc.problems.fields import FloatArray, IntArray, ReadOnly
 
 @dataclass(frozen=True, eq=False)
 class Move(ReadOnly):
-    """What an agent costs that gets another task than it has.
+    """Price of assigning agents to other tasks than their current ones.
 
     Attributes
     ----------
     task : ndarray of int, shape (origins,)
-        The task that the agents of each origin have, -1 where they are idle.
+        Current task of the agents of each origin, -1 for idle.
     price : ndarray, shape (origins,)
-        In units of cost.
+        Price in units of cost.
     energy_weight : float
-        1 where the energy of flights is part of the cost, 0 where the moves alone are.
+        1 if the energy of flights is part of the cost, 0 if only moves are.
     """
 
     task: IntArray
@@ -27,6 +27,6 @@ class Move(ReadOnly):
     energy_weight: float
 
     def of(self, origin: IntArray, task: IntArray) -> FloatArray:
-        """Return what each of these origins pays for the task beside it; both broadcast."""
+        """Return the price of each origin for its task; both broadcast."""
         moved: NDArray[np.bool_] = self.task[origin] != task
         return self.price[origin] * moved

@@ -1,4 +1,4 @@
-"""The tasks within reach of each origin as compressed rows, for reaches too short to fill a table."""
+"""Tasks within reach of each origin as compressed sparse rows, for short ranges."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -12,13 +12,13 @@ from alloc.problems.distances.origins import entries
 from alloc.problems.vocabulary import MANHATTAN
 
 CHUNK = 1 << 21
-"""Pairs of origin and task that are looked at together, about."""
+"""Approximate number of pairs of origin and task that are processed together."""
 
 SAMPLE = 256
-"""Origins by which numbers of pairs are estimated."""
+"""Number of origins in the sample from which numbers of pairs are estimated."""
 
 MARGIN = 1e-9
-"""Relative amount by which a radius is widened before the exact rule decides."""
+"""Relative margin on radii, before the exact rule is applied."""
 
 
 Floats = NDArray[np.float64]
@@ -26,23 +26,23 @@ Indices = NDArray[np.intp]
 
 
 class ReachRule(Protocol):
-    """What is asked of `Reach`."""
+    """The part of `Reach` that is used here."""
 
     @property
     def place(self) -> Floats:
-        """Where each origin is, shape (origins, 3)."""
+        """Position of each origin, shape (origins, 3)."""
 
     @property
     def goal(self) -> Floats:
-        """Where each task is, shape (m, 3)."""
+        """Position of each task, shape (m, 3)."""
 
     @property
     def geometry(self) -> Geometry:
-        """How far origins are from tasks."""
+        """Distances between origins and tasks."""
 
     @property
     def list_of(self) -> Indices:
-        """The list that each origin is bound to, -1 for none."""
+        """List of allowed tasks of each origin, -1 for none."""
 
     @property
     def lists(self) -> tuple[Indices, ...]:
@@ -50,16 +50,16 @@ class ReachRule(Protocol):
 
     @property
     def radius(self) -> Floats:
-        """Distance beyond which nothing is within reach, shape (origins,)."""
+        """Maximum distance of tasks within reach, shape (origins,)."""
 
     def rows(self, origins: Indices) -> tuple[Floats, NDArray[np.bool_]]:
-        """Return rows of distances, and of who can take what."""
+        """Return rows of distances and of the reachability mask."""
 
     def distances_between(self, origin: Indices, task: Indices) -> Floats:
-        """Return the distance from each origin to the task beside it."""
+        """Return the distance from each origin to its task."""
 
     def is_within(self, origin: Indices, task: Indices, distance: Floats) -> NDArray[np.bool_]:
-        """Whether each origin can take the task beside it."""
+        """Return whether each origin can take its task."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +71,7 @@ class Neighbours:
     first : ndarray of int, shape (origins + 1,)
     task : ndarray of int32, shape (pairs,)
     distance : ndarray, shape (pairs,)
-        As in `Reach.distance`, to the last bit.
+        Bitwise equal to `Reach.distance`.
     """
 
     first: NDArray[np.intp]
@@ -79,7 +79,7 @@ class Neighbours:
     distance: NDArray[np.float64]
 
     def by_task(self, m: int) -> tuple[Indices, Indices]:
-        """Return where each task's origins begin in the second array, shape (m + 1,); and all origins by task."""
+        """Return the pairs in column-major form: the offset of each task, shape (m + 1,), and the origins by task."""
         from scipy.sparse import csr_matrix
 
         ones = np.ones(len(self.task), dtype=np.int8)
@@ -88,7 +88,7 @@ class Neighbours:
 
     @property
     def origin(self) -> NDArray[np.int32]:
-        """The origin of each pair, shape (pairs,)."""
+        """Origin of each pair, shape (pairs,)."""
         return np.repeat(np.arange(len(self.first) - 1, dtype=np.int32), np.diff(self.first))
 
 
@@ -96,7 +96,7 @@ Pairs = tuple[Indices, Indices]
 
 
 def find_neighbours(reach: ReachRule) -> Neighbours:
-    """Gather the tasks within reach of each origin; time and memory are in proportion to their number, as a rule."""
+    """Return the tasks within reach of each origin, usually in time and memory proportional to their number."""
     origins, m = len(reach.place), len(reach.goal)
     rows, tasks, flown = [], [], []
     for origin, task in _candidates(reach):
@@ -108,7 +108,7 @@ def find_neighbours(reach: ReachRule) -> Neighbours:
         flown.append(distance[keep])
     row, column, away = np.concatenate(rows), np.concatenate(tasks), np.concatenate(flown)
     del rows, tasks, flown
-    if (row[1:] < row[:-1]).any():  # each origin came in one piece, but not in order
+    if (row[1:] < row[:-1]).any():  # the pairs of an origin are consecutive, but origins are not sorted
         order = np.argsort(row, kind="stable")
         column, away = column[order], away[order]
     first = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=origins))]).astype(np.intp)
@@ -118,17 +118,17 @@ def find_neighbours(reach: ReachRule) -> Neighbours:
 
 
 def estimated_pairs(reach: ReachRule) -> float:
-    """Return about how many pairs of origin and task are within reach, by a sample of the origins."""
+    """Return an estimate of the number of pairs within reach, from a sample of the origins."""
     origins = len(reach.place)
     sample = np.unique(np.linspace(0, origins - 1, SAMPLE).astype(np.intp))
     return float(reach.rows(sample)[1].sum(axis=1).mean() * origins)
 
 
 def nearest_distance(reach: ReachRule, wanted: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Return how far the nearest of the `wanted` tasks within reach is, ``inf`` where there is none; shape (origins,).
+    """Return the distance to the nearest of the `wanted` tasks within reach, ``inf`` if none; shape (origins,).
 
-    Origins bound to a list get the nearest on it, the others the nearest of all, by a tree. Where distances are not
-    Euclidean, it may be less than that: the length of a straight line.
+    Origins with a list use the tasks on it, others a spatial tree of all tasks. If distances are not Euclidean, the
+    result may be a lower bound, the length of a straight line.
     """
     from scipy.spatial import cKDTree
 
@@ -146,7 +146,7 @@ def nearest_distance(reach: ReachRule, wanted: NDArray[np.bool_]) -> NDArray[np.
     if len(placed) and len(known):
         axes = 1 if reach.geometry.metric == MANHATTAN else 2
         straight, found = cKDTree(reach.goal[known]).query(reach.place[placed], p=axes)
-        if reach.geometry.is_euclidean and reach.geometry.home is None:  # then the nearest is the first within reach
+        if reach.geometry.is_euclidean and reach.geometry.home is None:  # the nearest is then the first within reach
             distance = reach.distances_between(placed, known[found])
             within = reach.is_within(placed, known[found], distance)
         else:
@@ -162,7 +162,7 @@ def nearest_distance(reach: ReachRule, wanted: NDArray[np.bool_]) -> NDArray[np.
 
 
 def _candidates(reach: ReachRule) -> Iterator[Pairs]:
-    """Pairs that may be within reach, every origin in one piece."""
+    """Yield pairs that may be within reach; those of an origin are consecutive."""
     nothing = np.zeros(0, dtype=np.intp)
     yield nothing, nothing
     listed = reach.list_of >= 0
@@ -190,7 +190,7 @@ def _everywhere(reach: ReachRule, origins: Indices) -> Iterator[Pairs]:
 
 
 def _around(reach: ReachRule, origins: Indices, radius: NDArray[np.float64]) -> Iterator[Pairs]:
-    """Tasks in a ball around each origin, by a tree; those without a place are within every reach."""
+    """Yield tasks in a ball around each origin, by a spatial tree; tasks without a place are always included."""
     from scipy.spatial import cKDTree
 
     known = np.flatnonzero(~np.isnan(reach.goal[:, 0]))
@@ -213,12 +213,12 @@ def _around(reach: ReachRule, origins: Indices, radius: NDArray[np.float64]) -> 
             origin, entry = entries(given.first, part, part)
             pairs.append((origin, given.task[entry]))
         origin, task = (np.concatenate([pair[side] for pair in pairs]) for side in (0, 1))
-        if given is not None:  # some are near as well
+        if given is not None:  # exclude duplicates with given pairs
             origin, task = np.divmod(np.unique(origin * len(reach.goal) + task), len(reach.goal))
         yield origin, task
         origins = origins[size:]
 
 
 def _cuts(lengths: Indices) -> Indices:
-    """Where to cut so that the lengths in each part sum up to about `CHUNK`."""
+    """Return the boundaries of parts whose lengths sum to about `CHUNK`."""
     return np.flatnonzero(np.diff(np.cumsum(lengths) // CHUNK)) + 1

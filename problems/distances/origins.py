@@ -1,4 +1,4 @@
-"""Agents that begin alike: the same place, range, battery and list of tasks make one *origin*."""
+"""Origins: groups of agents with the same place, range, battery and list of tasks."""
 
 from collections.abc import Iterable, Sequence
 
@@ -9,10 +9,10 @@ Indices = NDArray[np.intp]
 
 
 def group_rows(columns: Iterable[NDArray[np.float64]]) -> tuple[Indices, Indices]:
-    """Return the first row of each kind, and the kind of each row; NaN equals NaN, and 0.0 equals -0.0.
+    """Group equal rows; return the first row of each group, and the group of each row; NaN equals NaN, 0.0 equals -0.0.
 
-    Kinds are in the order of the columns, the first column first. Takes O(n log n) time per column, as far as columns
-    are needed to tell the rows apart.
+    Groups are sorted lexicographically by the columns. Takes O(n log n) time per column that is needed to distinguish
+    the rows.
     """
     kind, kinds = np.zeros(0, dtype=np.intp), 1
     for column in columns:
@@ -34,7 +34,7 @@ def group_rows(columns: Iterable[NDArray[np.float64]]) -> tuple[Indices, Indices
 def number_lists(
     lists: Sequence[NDArray[np.intp] | None] | None, n: int
 ) -> tuple[Indices, tuple[NDArray[np.intp], ...]]:
-    """Return the number of each agent's list, -1 where it may do all tasks, and the distinct lists."""
+    """Return the number of each agent's list, -1 if it may do all tasks, and the distinct lists."""
     if lists is None:
         return np.full(n, -1, dtype=np.intp), ()
     numbers: dict[bytes, int] = {}
@@ -49,12 +49,12 @@ def number_lists(
 
 
 def list_keys(lists: Sequence[NDArray[np.intp]], m: int) -> Indices:
-    """Return list times m plus task for every entry of every list, ascending, and an end that no key equals."""
+    """Return the keys list * m + task of all entries of all lists, ascending, followed by a sentinel."""
     return np.concatenate([*(number * m + tasks for number, tasks in enumerate(lists)), [len(lists) * m]])
 
 
 def entries(begin: Indices, origins: Indices, nodes: Indices) -> tuple[Indices, Indices]:
-    """Return row and entry for all entries of compressed rows that begin at `begin`: those of `nodes`, as `origins`."""
+    """Return row, as in `origins`, and index of all entries of the compressed rows `nodes` with offsets `begin`."""
     length = begin[nodes + 1] - begin[nodes]
     total = int(length.sum())
     shift = np.repeat(begin[nodes] - (np.cumsum(length) - length), length)

@@ -1,7 +1,7 @@
-"""Reach: which tasks an agent can take (C(i) of the paper) and how far it flies to them (1).
+"""Reach: the tasks that an agent can take (C(i) of the paper) and their distances (1).
 
-Agents that start at one place with the same range, battery and list of tasks share one row: their *origin*. Paper
-instances have as many origins as tasks, whatever the number of agents.
+Agents at the same place with the same range, battery and list of tasks share one row, their *origin*. Instances of the
+paper have as many origins as tasks, whatever the number of agents.
 """
 
 from dataclasses import dataclass
@@ -17,13 +17,13 @@ from alloc.problems.distances.origins import list_keys
 from alloc.problems.fields import ReadOnly
 
 TOLERANCE = 1e-9
-"""Slack on ranges (in distance) and batteries (in energy)."""
+"""Absolute tolerance on ranges (distance) and batteries (energy)."""
 
 TABLE_LIMIT = 4_000_000
-"""Pairs of origin and task up to which all questions are answered from a table."""
+"""Number of pairs of origin and task up to which full tables are used."""
 
 MOST_NEIGHBOURS = 100_000_000
-"""Pairs within reach beyond which they are not gathered."""
+"""Maximum number of pairs within reach that are stored as sparse rows."""
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -39,21 +39,21 @@ class Reach(ReadOnly):
     origin : ndarray of int, shape (n,)
         Origin of each agent.
     geometry : Geometry
-        Where origins and tasks are, and how far apart.
+        Positions of origins and tasks, and distances between them.
     communication_range, battery : ndarray, shape (origins,)
-        Limits on the distance, and on the energy for it.
+        Limits on the distance and on the energy of a flight.
     energy_per_distance : float
         Energy per unit of cost.
     factor : ndarray, shape (origins,), or None
-        Energy per unit of distance of each origin over `energy_per_distance`; None where all are 1.
+        Energy per unit of distance of each origin divided by `energy_per_distance`; None if all are 1.
     returns : ndarray of bool, shape (origins,), or None
-        Whether the flight back counts, see `Geometry.home`; None where no agent returns.
+        Whether the flight back counts, see `Geometry.home`; None if no agent returns.
     list_of : ndarray of int, shape (origins,)
-        Which of `lists` the origin is bound to; -1 where it may do all tasks.
+        Index in `lists` of each origin's allowed tasks; -1 if it may do all tasks.
     lists : tuple of ndarray of int
         Distinct lists of tasks, each sorted.
     move : Move or None
-        What an agent costs that gets another task than it has.
+        Price of moving agents away from their current tasks, if any.
     """
 
     origin: Indices
@@ -69,39 +69,39 @@ class Reach(ReadOnly):
 
     @property
     def place(self) -> Floats:
-        """Where each origin is, in Cartesian coordinates, shape (origins, 3); NaN where unknown."""
+        """Cartesian position of each origin, shape (origins, 3); NaN where unknown."""
         return self.geometry.place
 
     @property
     def goal(self) -> Floats:
-        """Where each task is, in Cartesian coordinates, shape (m, 3); NaN where unknown."""
+        """Cartesian position of each task, shape (m, 3); NaN where unknown."""
         return self.geometry.goal
 
     @property
     def cost_is_distance(self) -> bool:
-        """Whether the cost of a flight is its distance, whoever flies."""
+        """Whether the cost of every flight is its distance."""
         return self.factor is None and self.returns is None and self.move is None
 
     @property
     def is_plain(self) -> bool:
-        """Whether costs are distances, and these Euclidean (1): compiled code then needs coordinates alone."""
+        """Whether costs are Euclidean distances (1), so that compiled code only needs coordinates."""
         return self.cost_is_distance and self.geometry.is_euclidean
 
     @property
     def pairs(self) -> int:
-        """Number of pairs of origin and task, within reach or not."""
+        """Number of all pairs of origin and task."""
         return len(self.place) * len(self.goal)
 
     @property
     def has_table(self) -> bool:
-        """Whether `distance` and `mask` are small enough to be made without a thought, whatever was asked before."""
+        """Whether `distance` and `mask` are small enough for full tables; independent of earlier calls."""
         return self.pairs <= TABLE_LIMIT
 
     @cached_property
     def distance(self) -> Floats:
         """Distance from each origin to each task, 0 where either place is unknown (1); shape (origins, m).
 
-        Takes O(origins * m) time and memory: nothing for instances of any size, unless `has_table`.
+        Takes O(origins * m) time and memory; avoid it unless `has_table`.
         """
         table = self.geometry.table(np.arange(len(self.place)))
         table.setflags(write=False)
@@ -109,7 +109,7 @@ class Reach(ReadOnly):
 
     @cached_property
     def cost(self) -> Floats:
-        """What the flight from each origin to each task costs, see `costs`; shape (origins, m), like `distance`."""
+        """Cost of the flight from each origin to each task, see `costs`; shape (origins, m), like `distance`."""
         if self.cost_is_distance:
             return self.distance
         cost = self.costs(np.arange(len(self.place))[:, None], np.arange(len(self.goal)), self.distance)
@@ -120,7 +120,7 @@ class Reach(ReadOnly):
     def mask(self) -> Flags:
         """Whether each task is in C(i): allowed, within range, and within the battery; shape (origins, m).
 
-        Takes O(origins * m) time and memory: nothing for instances of any size, unless `has_table`.
+        Takes O(origins * m) time and memory; avoid it unless `has_table`.
         """
         mask = self._mask_of(np.arange(len(self.place)), self.distance)
         mask.setflags(write=False)
@@ -128,7 +128,7 @@ class Reach(ReadOnly):
 
     @cached_property
     def radius(self) -> Floats:
-        """Distance beyond which nothing is within reach, before any tolerance on it; shape (origins,)."""
+        """Maximum distance of tasks within reach, without tolerance; shape (origins,)."""
         radius = self.communication_range + TOLERANCE
         if self.energy_per_distance > 0:
             with np.errstate(over="ignore", divide="ignore"):
@@ -145,14 +145,14 @@ class Reach(ReadOnly):
 
     @cached_property
     def neighbours(self) -> Neighbours | None:
-        """The tasks within reach of each origin; None where there are more than can be held (`MOST_NEIGHBOURS`)."""
+        """Tasks within reach of each origin; None if there are more than `MOST_NEIGHBOURS` pairs."""
         if not self.has_table and estimated_pairs(self) > MOST_NEIGHBOURS:
             return None
         return find_neighbours(self)
 
     @cached_property
     def density(self) -> float:
-        """Share of the tasks that an agent can take, on average; by a sample where nobody could count them all."""
+        """Mean share of tasks that an agent can take; estimated from a sample if there are too many pairs to count."""
         m = len(self.goal)
         if self.has_table:
             return float(self.mask.mean(axis=1)[self.origin].mean())
@@ -164,31 +164,31 @@ class Reach(ReadOnly):
 
     @cached_property
     def agents_by_origin(self) -> tuple[Indices, Indices]:
-        """Where each origin's agents begin in the second array, shape (origins + 1,); and all agents by origin."""
+        """Offset of each origin's agents in the second array, shape (origins + 1,); and all agents by origin."""
         order = np.argsort(self.origin, kind="stable")
         return np.searchsorted(self.origin[order], np.arange(len(self.place) + 1)), order
 
     def allows(self, agent: Indices, task: Indices) -> Flags:
-        """Whether each of the agents can take the task beside it; both of shape (k,), and so is the answer."""
+        """Return whether each agent can take its task; arguments and result have shape (k,)."""
         origin = self.origin[agent]
         if self.has_table:
             return self.mask[origin, task]
         return self.is_within(origin, task, self.distances_between(origin, task))
 
     def distance_of(self, agent: Indices, task: Indices) -> Floats:
-        """Distance from each agent's start to the task beside it; both of shape (k,), and so is the answer."""
+        """Return the distance from each agent's start to its task; arguments and result have shape (k,)."""
         origin = self.origin[agent]
         return self.distance[origin, task] if self.has_table else self.distances_between(origin, task)
 
     def rows(self, origins: Indices) -> tuple[Floats, Flags]:
-        """Return these rows of `distance` and `mask`, each of shape (k, m)."""
+        """Return rows of `distance` and `mask`, each of shape (k, m)."""
         if self.has_table:
             return self.distance[origins], self.mask[origins]
         distance = self.geometry.table(origins)
         return distance, self._mask_of(origins, distance)
 
     def block(self, origins: Indices, tasks: Indices) -> tuple[Floats, Flags]:
-        """Return these rows and columns of `distance` and `mask`, each of shape (k, l), without a table."""
+        """Return blocks of `distance` and `mask`, each of shape (k, l), without building the full table."""
         distance = self.geometry.table(origins, tasks)
         return distance, self.is_within(origins[:, None], tasks, distance)
 
@@ -204,27 +204,27 @@ class Reach(ReadOnly):
         return np.flatnonzero(able[self.origin])
 
     def distances_between(self, origin: Indices, task: Indices) -> Floats:
-        """Distance from each of these origins to the task beside it, without a table."""
+        """Return the distance from each origin to its task, without building the full table."""
         return self.geometry.between(origin, task)
 
     def cost_of(self, agent: Indices, task: Indices) -> Floats:
-        """Cost of each agent's flight to the task beside it; both of shape (k,), and so is the answer."""
+        """Return the cost of each agent's flight to its task; arguments and result have shape (k,)."""
         origin = self.origin[agent]
         if self.has_table:
             return self.cost[origin, task]
         return self.costs(origin, task, self.distances_between(origin, task))
 
     def costs(self, origin: Indices, task: Indices, distance: Floats) -> Floats:
-        """Cost of the flight from each of these origins to the task, which is `distance` away, in units of distance.
+        """Return the cost of the flight from each origin to its task, which is `distance` away, in units of distance.
 
-        The energy of the flight, back again where the agent returns, over `energy_per_distance`; and the price of
-        moving to another task.
+        This is the energy of the flight, including the way back if the agent returns, divided by `energy_per_distance`,
+        plus the price of moving to another task.
         """
         cost = self.flown(origin, task, distance)
         return cost if self.move is None else cost * self.move.energy_weight + self.move.of(origin, task)
 
     def trips(self, origin: Indices, task: Indices, distance: Floats) -> Floats:
-        """Length of the flight from each of these origins to the task, `distance` away, back again if it returns."""
+        """Return the length of the flight from each origin to its task, `distance` away, and back if it returns."""
         if self.returns is None:
             return distance
         both = self.geometry.there_and_back(origin, task, distance)
@@ -232,12 +232,12 @@ class Reach(ReadOnly):
         return trips
 
     def flown(self, origin: Indices, task: Indices, distance: Floats) -> Floats:
-        """Cost without the price of moving: energy over `energy_per_distance`."""
+        """Return the cost without the price of moves: energy divided by `energy_per_distance`."""
         trips = self.trips(origin, task, distance)
         return trips if self.factor is None else trips * self.factor[origin]
 
     def is_within(self, origin: Indices, task: Indices, distance: Floats) -> Flags:
-        """Whether each of these origins can take the task beside it, which is `distance` away; without a table."""
+        """Return whether each origin can take its task, which is `distance` away, without building the full table."""
         within = self._is_near(origin, task, distance)
         if self.lists:
             within &= self._is_allowed(self.list_of[origin], task)
@@ -249,7 +249,7 @@ class Reach(ReadOnly):
             return self._is_enough(origin, distance, self.flown(origin, task, distance) if limited else None)
 
     def _is_enough(self, origin: Indices, distance: Floats, flown: Floats | None) -> Flags:
-        """Whether range and battery are enough for flights of these lengths, `flown` as in `flown`, None for none."""
+        """Return whether range and, unless `flown` is None, battery suffice for flights with these lengths."""
         near: Flags = distance <= self.communication_range[origin] + TOLERANCE
         if flown is not None:
             near &= self.energy_per_distance * flown <= self.battery[origin] + TOLERANCE
@@ -276,7 +276,7 @@ class Reach(ReadOnly):
         return mask
 
     def _is_complete_by_place(self) -> bool:
-        """Look at the farthest corner of the tasks' box, then at all tasks of those that it leaves in doubt."""
+        """Return whether all tasks are within reach, by the box of all tasks, then exactly for undecided origins."""
         if not (np.isfinite(self.communication_range).any() or np.isfinite(self.battery).any()):
             return True
         known = self.goal[~np.isnan(self.goal[:, 0])]

@@ -1,4 +1,4 @@
-"""The game, and missions, for other people's learners: PettingZoo and Gymnasium; needs the extra ``env``."""
+"""PettingZoo and Gymnasium environments of the game and of missions; needs the extra ``env``."""
 
 try:
     from alloc.problems.environments.bidding import BiddingEnv

@@ -1,4 +1,4 @@
-"""The game with one bid a step as a Gymnasium environment, for learners with a single agent."""
+"""The game with one bid per step as a Gymnasium environment, for single-agent learners."""
 
 from __future__ import annotations
 
@@ -29,33 +29,34 @@ ONE_BY_ONE = Rules(most_moves=1)
 
 
 class BiddingEnv(gymnasium.Env[NDArray[np.float32], np.int64]):
-    """A planner moves one agent a step, until it stops.
+    """A planner moves one agent per step, until it stops.
 
-    Action ``agent * (m + 1) + task`` sends an agent to a task, with m for being idle; ``n * (m + 1)`` stops.
-    Observations are `observe_pairs` and then `observe_tasks`, laid flat: all within -2 and 2, and the same as the
-    policies of this package see. The reward is the marginal contribution of the move: rewards of an episode add up to
-    the rise of `utility`.
+    Action ``agent * (m + 1) + task`` sends an agent to a task, where task m means idle; ``n * (m + 1)`` stops.
+    Observations are the flattened `observe_pairs` and `observe_tasks`, as the policies of this package use them, with
+    values within -2 and 2. The reward is the marginal contribution of the move: the rewards of an episode sum to the
+    increase of `utility`.
 
-    Illegal actions - going where the agent is, cannot go, or has been before - change nothing, bring `illegal_reward`
-    and cost a step; `action_masks` names the legal ones, as MaskablePPO of sb3-contrib asks for them. Infos hold
-    ``episode_energy``, ``episode_battery`` (in percent) and ``illegal``, at the end also the scores of the plan.
+    Illegal actions - to a task where the agent is, cannot go, or has been before - change nothing, give
+    `illegal_reward` and use up a step; `action_masks` returns the legal ones, as MaskablePPO of sb3-contrib expects.
+    Infos contain ``episode_energy``, ``episode_battery`` (in percent) and ``illegal``, at the end also the scores of
+    the plan.
 
     Parameters
     ----------
     instances : sequence of Instance, or callable
-        Drawn from at every reset, or called with a numpy generator.
+        Sampled at every reset, or a function that is called with a numpy generator.
     rules : Rules
-        Agents must bid; one bid a step is granted, whatever `most_moves` says.
+        Rules with bidding; one bid per step is granted, whatever `most_moves` is.
     energy_weight : float
         Weight of energy in the reward.
     max_steps : int, optional
-        Steps after which the game is truncated; four per agent by default.
+        Steps after which the game is truncated; by default four per agent.
     illegal_reward : float
 
     Raises
     ------
     InputError
-        If agents are to choose at once, or instances differ in size.
+        If the rules are not bidding, or instances differ in size.
 
     References
     ----------
@@ -75,7 +76,7 @@ class BiddingEnv(gymnasium.Env[NDArray[np.float32], np.int64]):
     ) -> None:
         if rules.turn != TurnRule.BIDDING:
             raise InputError(
-                "agents of this environment bid; SimultaneousEnv is the one where they choose at once", "turn"
+                "must be bidding in this environment; use SimultaneousEnv for simultaneous choices", "turn"
             )
         self._source, self._sizes = instances, sizes_of(instances)
         n, m = self._sizes
@@ -91,7 +92,7 @@ class BiddingEnv(gymnasium.Env[NDArray[np.float32], np.int64]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, object] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, object]]:
-        """Begin a game on an instance drawn anew; with a seed, the same games follow."""
+        """Start a game on a new random instance; with a seed, the sequence of games is reproducible."""
         super().reset(seed=seed)
         self._game = draw(self._source, self._sizes, self.energy_weight, self.np_random)
         self._state, self._steps = reset(self._game.board), 0

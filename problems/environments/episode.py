@@ -1,4 +1,4 @@
-"""What both environments share: where instances come from, and the figures of an episode."""
+"""Common parts of the game environments: sampling of instances, and figures of an episode."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from alloc.problems.instance import Instance
 from alloc.problems.vocabulary import IDLE
 
 Source = Sequence[Instance] | Callable[[np.random.Generator], Instance]
-"""Instances to draw from, or what makes one with a generator; all of the same numbers of agents and tasks."""
+"""Instances to sample from, or a function that makes one with a generator; all of the same size."""
 
 Info = dict[str, float | int | bool]
 
@@ -30,27 +30,27 @@ class Game:
 
 
 def sizes_of(source: Source) -> tuple[int, int]:
-    """Return numbers of agents and tasks; of what `source` makes first, where it makes instances.
+    """Return the numbers of agents and tasks; if `source` is a function, those of its first instance.
 
     Raises
     ------
     InputError
-        If there is no instance, or they differ in size.
+        If there are no instances, or they differ in size.
     """
     instances = [source(np.random.default_rng(0))] if callable(source) else source
     found = {(instance.n, instance.m) for instance in instances}
     if len(found) != 1:
-        raise InputError(f"an environment needs instances of one size, got {sorted(found) or 'none'}", "instances")
+        raise InputError(f"an environment needs instances of equal size, got {sorted(found) or 'none'}", "instances")
     return found.pop()
 
 
 def draw(source: Source, sizes: tuple[int, int], energy_weight: float, rng: np.random.Generator) -> Game:
-    """Return a game on an instance drawn at random, with needs at the lower bound on its makespan.
+    """Return a game on a random instance, with needs at the lower bound on its makespan.
 
     Raises
     ------
     InputError
-        If the instance has other sizes than those before.
+        If the instance does not have the expected size.
     """
     instance = source(rng) if callable(source) else source[int(rng.integers(len(source)))]
     if not instance.reach.is_plain:
@@ -65,14 +65,14 @@ def draw(source: Source, sizes: tuple[int, int], energy_weight: float, rng: np.r
 
 
 def episode_figures(game: Game, state: State) -> Info:
-    """Return energy of all hops so far, and the mean share of the battery left, in percent (figure 6 of the paper)."""
+    """Return the energy of all hops so far, and the mean battery left in percent (figure 6 of the paper)."""
     distance = float(state.flown.double().sum()) / game.board.scale.item()
     energy = min(distance * game.instance.energy_per_distance, np.finfo(float).max)
     return {"episode_energy": energy, "episode_battery": 100 * battery_left(game.board, state).item()}
 
 
 def plan_figures(game: Game, state: State) -> Info:
-    """Return the scores of `evaluate` of where everybody is: those of the plan, flown directly."""
+    """Return the scores of the current allocation as a plan, flown directly, by `evaluate`."""
     task = current_tasks(game.board, state)[0].numpy()
     scores = evaluate(game.instance, Allocation(np.where(task == game.instance.m, IDLE, task)))
     return {

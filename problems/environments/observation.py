@@ -1,4 +1,4 @@
-"""What each agent sees of the paper's state (section 2.2): itself, the tasks, and who is where within its range."""
+"""Observations of agents in the paper's game (section 2.2): itself, the tasks, and the occupancy within its range."""
 
 import numpy as np
 import torch
@@ -12,18 +12,18 @@ from alloc.problems.game.rules import TOLERANCE
 AGENT_FIGURES, TASK_FIGURES = 7, 9
 
 LIMIT = 10.0
-"""Figures beyond are cut off, on either side of 0."""
+"""Observations are clipped to [-LIMIT, LIMIT]."""
 
 Floats = NDArray[np.float32]
 
 
 def observe(game: Game, state: State, share: float) -> tuple[Floats, Floats]:
-    """Return what agents see: of themselves, shape (n, AGENT_FIGURES), and of the tasks, shape (n, m, TASK_FIGURES).
+    """Return observations of the agents themselves, shape (n, AGENT_FIGURES), and of tasks, shape (n, m, TASK_FIGURES).
 
     Parameters
     ----------
     share : float
-        Share of the steps that are gone.
+        Share of the steps that have passed.
     """
     return _bounded(_itself(game, state, share)), _bounded(_tasks(game, state))
 
@@ -42,7 +42,7 @@ def _itself(game: Game, state: State, share: float) -> Tensor:
 
 
 def _position(game: Game, state: State) -> Floats:
-    """Where agents are, seen from the mean place of the tasks in scaled distances; 0 where unknown; shape (n, 3)."""
+    """Return scaled positions of agents relative to the mean of the tasks; 0 where unknown; shape (n, 3)."""
     instance, at = game.instance, state.location[0].numpy()
     known = instance.task_position[~np.isnan(instance.task_position[:, 0])]
     scale = game.board.scale.item()

@@ -1,4 +1,4 @@
-"""The paper's game as a PettingZoo environment: all agents choose at once, each sees what is in its range."""
+"""The paper's game as a PettingZoo environment: agents choose simultaneously, and see what is in their range."""
 
 from __future__ import annotations
 
@@ -17,27 +17,28 @@ Observation = dict[str, NDArray[np.generic]]
 
 
 class SimultaneousEnv(ParallelEnv[str, Observation, int]):  # type: ignore[misc]
-    """Every agent goes to a task in C(i), becomes idle, or stays, all at once.
+    """All agents simultaneously go to a task in C(i), become idle, or stay.
 
-    The action of an agent is a task by number, m for being idle. An action that the mask bars is taken for staying.
-    Observations are dictionaries of
+    The action of an agent is the number of a task, or m to become idle. Masked actions count as staying. Observations
+    are dictionaries of
 
     - ``agent``, shape (7,): position, share of the battery left, ability, whether idle, and share of the steps gone;
-    - ``tasks``, shape (m, 9): of each task the ability that it needs, its priority, the flight there, what the agent
-      would bring, and whether it is within communication range; and if it is, the occupancy map: ability there, number
+    - ``tasks``, shape (m, 9): for each task the ability that it needs, its priority, the flight there, what the agent
+      would contribute, and whether it is within communication range; if so, the occupancy map: ability there, number
       of members, shortfall of ability; last, whether the agent is there;
     - ``action_mask``, shape (m + 1,).
 
-    They have the units of `Board` and are cut off at `LIMIT`. The reward of an agent is what all would lose had it
-    alone stayed (`difference_rewards`). A step in which nobody moves ends the game. Infos hold ``episode_energy``,
-    ``episode_battery`` (in percent) and whether the action was ``illegal``, at the end also the scores of the plan.
+    They have the units of `Board` and are clipped at `LIMIT`. The reward of an agent is the loss of total utility if it
+    alone had stayed (`difference_rewards`). A step in which no agent moves ends the game. Infos contain
+    ``episode_energy``, ``episode_battery`` (in percent) and whether the action was ``illegal``, at the end also the
+    scores of the plan.
 
     Parameters
     ----------
     instances : sequence of Instance, or callable
-        Drawn from at every reset, or called with a numpy generator.
+        Sampled at every reset, or a function that is called with a numpy generator.
     rules : Rules
-        Agents must take their turns at once; the paper's by default.
+        Rules with simultaneous turns; by default those of the paper.
     energy_weight : float
         Weight of energy in the reward.
     max_steps : int
@@ -46,7 +47,7 @@ class SimultaneousEnv(ParallelEnv[str, Observation, int]):  # type: ignore[misc]
     Raises
     ------
     InputError
-        If the rules have agents bid, or instances differ in size.
+        If the rules are not simultaneous, or instances differ in size.
 
     References
     ----------
@@ -59,7 +60,7 @@ class SimultaneousEnv(ParallelEnv[str, Observation, int]):  # type: ignore[misc]
         self, instances: Source, *, rules: Rules = PAPER, energy_weight: float = 0.5, max_steps: int = 20
     ) -> None:
         if rules.turn != TurnRule.SIMULTANEOUS:
-            raise InputError("agents of this environment choose at once; BiddingEnv is the one where they bid", "turn")
+            raise InputError("must be simultaneous in this environment; use BiddingEnv for bidding", "turn")
         self._source, self._sizes = instances, sizes_of(instances)
         self.rules, self.energy_weight, self.max_steps = rules, energy_weight, max_steps
         n, m = self._sizes
@@ -85,7 +86,7 @@ class SimultaneousEnv(ParallelEnv[str, Observation, int]):  # type: ignore[misc]
     def reset(
         self, seed: int | None = None, options: dict[str, object] | None = None
     ) -> tuple[dict[str, Observation], dict[str, Info]]:
-        """Begin a game on an instance drawn anew; with a seed, the same games follow."""
+        """Start a game on a new random instance; with a seed, the sequence of games is reproducible."""
         if seed is not None or self._rng is None:
             self._rng = np.random.default_rng(seed)
         self._game = draw(self._source, self._sizes, self.energy_weight, self._rng)
@@ -96,7 +97,7 @@ class SimultaneousEnv(ParallelEnv[str, Observation, int]):  # type: ignore[misc]
     def step(
         self, actions: dict[str, int]
     ) -> tuple[dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], dict[str, Info]]:
-        """Have everybody go where it chose; agents without an action stay."""
+        """Apply the actions of all agents; agents without an action stay."""
         if not self.agents:
             return {}, {}, {}, {}, {}
         board, before, mask = self._game.board, self._state, self._mask()

@@ -1,1 +1,1 @@
-"""Missions for other people's learners: one decision after the other, as agents become free."""
+"""Environments of missions, in which agents decide one at a time as they become free."""

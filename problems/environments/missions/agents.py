@@ -1,4 +1,4 @@
-"""Missions as a PettingZoo environment: agents decide one by one, as they become free, by what each of them knows."""
+"""Missions as a PettingZoo environment: agents decide in turn as they become free, with their own knowledge."""
 
 from __future__ import annotations
 
@@ -24,44 +24,44 @@ from alloc.problems.vocabulary import Knowledge
 
 
 class Observation(TypedDict):
-    """What an agent gets to see."""
+    """Observation of an agent."""
 
     observation: Floats
     action_mask: Mask
 
 
 class MissionEnv(AECEnv[str, Observation, int]):  # type: ignore[misc]
-    """Each free agent chooses a task, a place to look around, or to go on as it is.
+    """Each free agent chooses a task, a place to explore, or to continue with its last order.
 
-    A mission goes on in continuous time; whoever is to decide is the next agent (`agent_selection`): under local
-    knowledge each free agent at every period of the radio, and when its task or flight ends, under full knowledge when
-    something has happened. Agents tell each other all that they know. Action j is task j, action m + k the place k on a
-    grid over the area, and the last action goes on with the last order: an idle agent stays idle. An action that the
-    mask bars is taken for the last one.
+    A mission runs in continuous time; `agent_selection` is the next agent to decide: with local knowledge, each free
+    agent at every radio period and when its task or flight ends; with full knowledge, each free agent after every
+    event. Agents share all their knowledge. Action j is task j, action m + k is place k on a grid over the area, and
+    the last action continues with the last order, so that an idle agent stays idle. Masked actions count as the last
+    one.
 
-    Observations are dictionaries as in PettingZoo's classic games: ``observation``, what the agent senses or was told
-    and nothing else, as `Lens` of `observation.py` describes, all within -10 and 10; and ``action_mask``. All agents
-    get the same reward: the share of the priority that is done, less the weighted hours that tasks wait and the energy.
-    Over a mission these add up to what was achieved. When a mission is over, all agents are terminated. Infos hold
-    hour, tasks done, energy and whether the agent's last action was ``illegal``, at the end also mission time (``inf``
-    if not all is done), priority done, switches and messages.
+    Observations are dictionaries as in PettingZoo's classic games: ``observation``, only what the agent has sensed or
+    received, as described by `Lens` of `observation.py`, within -10 and 10; and ``action_mask``. All agents get the
+    same reward: the share of priority done, minus the weighted waiting hours of tasks and the weighted energy, which
+    sum to the result of the mission. When a mission is over, all agents are terminated. Infos contain hour, tasks done,
+    energy and whether the agent's last action was ``illegal``, at the end also mission time (``inf`` if not all tasks
+    are done), priority done, switches and messages.
 
     Parameters
     ----------
     missions : sequence of Mission, or callable
-        Drawn from at every reset, or called with a numpy generator; all of one size.
+        Sampled at every reset, or a function that is called with a numpy generator; all of the same size.
     knowledge : {"full", "local"}, optional
-        As each mission says by default.
+        By default, as each mission says.
     grid : int
-        Places on each side of the grid where an agent can look around; 0 for none.
+        Places on each side of the grid of places to explore; 0 for none.
     switching : bool
-        Whether agents that fly or work decide as well.
+        Whether agents that fly or work also decide.
     waiting_weight, energy_weight : float
-        In the reward.
+        Weights in the reward.
     max_steps : int, optional
-        Decisions after which the mission is truncated; none by default, as missions end by themselves.
+        Decisions after which the mission is truncated; by default none, as missions end by themselves.
     render_mode : {"ansi", "human"}, optional
-        Whether `render` returns what is so now as text, or prints it.
+        Whether `render` returns the true state as text, or prints it.
 
     Raises
     ------
@@ -114,14 +114,14 @@ class MissionEnv(AECEnv[str, Observation, int]):  # type: ignore[misc]
         return self._acts[agent]
 
     def reset(self, seed: int | None = None, options: dict[str, object] | None = None) -> None:
-        """Begin a mission drawn anew; with a seed, the same missions follow."""
+        """Start a new random mission; with a seed, the sequence of missions is reproducible."""
         if seed is not None or self._rng is None:
             self._rng = np.random.default_rng(seed)
         mission = draw(self._source, self._sizes, self._rng)
         number = int(self._rng.integers(2**63))
         self._course = Decisions(mission, self._knowledge, number, switching=self._switching, weights=self._weights)
         if not self._course.queue:
-            raise InputError("is over before anybody decides", mission.name)
+            raise InputError("is over before the first decision", mission.name)
         self._lens, self._truth, self._steps = Lens(mission, self._grid), Truth(mission), 0
         self.agents = list(self.possible_agents)
         self.rewards = dict.fromkeys(self.agents, 0.0)
@@ -134,23 +134,23 @@ class MissionEnv(AECEnv[str, Observation, int]):  # type: ignore[misc]
         show_step(self._course.state, self.render_mode)
 
     def observe(self, agent: str) -> Observation:
-        """Return what an agent knows now, and what it can choose."""
+        """Return what an agent knows now, and its action mask."""
         view = self._course.view(self.possible_agents.index(agent))
         return {"observation": self._lens.observe(view), "action_mask": self._lens.mask(view)}
 
     def state(self) -> Floats:
-        """Return what is so now, whoever knows it, as `Truth` of `truth.py` describes: for a critic of all agents."""
+        """Return the true state, as described by `Truth` of `truth.py`, for a centralised critic."""
         return self._truth.array(self._course.state)
 
     def render(self) -> str | None:
-        """Return what is so now as text, or print it, by the render mode."""
+        """Return the true state as text, or print it, depending on the render mode."""
         return rendered(self._course.state, self.render_mode)
 
     def close(self) -> None:
-        """Do nothing: there is no window."""
+        """Do nothing, as there is no window."""
 
     def step(self, action: int | None) -> None:
-        """Let the agent whose turn it is choose, and go on to the next decision."""
+        """Apply the action of the selected agent, and advance to the next decision."""
         agent = self.agent_selection
         if self.terminations[agent] or self.truncations[agent]:
             self._was_dead_step(action)

@@ -1,4 +1,4 @@
-"""A mission as a sequence of decisions: who is to decide, by what it knows, and what that brings."""
+"""A mission as a sequence of decisions of agents, with views and rewards."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ from alloc.problems.missions.simulation.state import AgentStatus, MissionState, 
 from alloc.problems.vocabulary import Knowledge
 
 Source = Sequence[Mission] | Callable[[np.random.Generator], Mission]
-"""Missions to draw from, or what makes one with a generator; all of the same numbers of agents and tasks."""
+"""Missions to sample from, or a function that makes one with a generator; all of the same size."""
 
 Info = dict[str, float | int | bool]
 
 
 @dataclass(frozen=True)
 class Weights:
-    """What counts how much in the reward.
+    """Weights in the reward.
 
     Attributes
     ----------
     waiting : float
-        Of the hours that tasks wait, by priority, over the least hours in which all could be done.
+        Weight of the waiting hours of tasks, by priority, relative to a lower bound on the mission time.
     energy : float
-        Of the energy of flights, over that of one flight through the whole area for each agent.
+        Weight of the energy of flights, relative to one flight across the area per agent.
     """
 
     waiting: float = 0.5
@@ -40,27 +40,27 @@ class Weights:
 
 
 def sizes_of(source: Source) -> tuple[int, int]:
-    """Return numbers of agents and tasks; of what `source` makes first, where it makes missions.
+    """Return the numbers of agents and tasks; if `source` is a function, those of its first mission.
 
     Raises
     ------
     InputError
-        If there is no mission, or they differ in size.
+        If there are no missions, or they differ in size.
     """
     missions = [source(np.random.default_rng(0))] if callable(source) else source
     found = {(mission.instance.n, mission.instance.m) for mission in missions}
     if len(found) != 1:
-        raise InputError(f"an environment needs missions of one size, got {sorted(found) or 'none'}", "missions")
+        raise InputError(f"an environment needs missions of equal size, got {sorted(found) or 'none'}", "missions")
     return found.pop()
 
 
 def draw(source: Source, sizes: tuple[int, int], rng: np.random.Generator) -> Mission:
-    """Return a mission drawn at random.
+    """Return a random mission.
 
     Raises
     ------
     InputError
-        If it has other sizes than those before.
+        If it does not have the expected size.
     """
     mission = source(rng) if callable(source) else source[int(rng.integers(len(source)))]
     size = (mission.instance.n, mission.instance.m)
@@ -70,17 +70,17 @@ def draw(source: Source, sizes: tuple[int, int], rng: np.random.Generator) -> Mi
 
 
 class Decisions:
-    """A mission that stops wherever a free agent is to decide.
+    """A simulation that pauses whenever a free agent has to decide.
 
-    Agents tell each other all that they know whenever they may.
+    Agents share all their knowledge whenever they can communicate.
 
     Parameters
     ----------
     mission : Mission
     knowledge : {"full", "local"}, optional
-        That of the mission by default.
+        By default that of the mission.
     seed : int
-        Of the radio.
+        Seed of the radio.
     switching : bool
         Whether agents that fly or work decide as well.
     weights : Weights
@@ -89,7 +89,7 @@ class Decisions:
     ----------
     mission : Mission
     queue : list of int
-        Agents, by number, that are to decide now, one after the other; empty once the mission is over.
+        Numbers of the agents that have to decide now, in order; empty once the mission is over.
     """
 
     def __init__(
@@ -108,7 +108,7 @@ class Decisions:
 
     @property
     def state(self) -> MissionState:
-        """What is so now, whoever knows it."""
+        """The true state."""
         return self._simulation.state
 
     def view(self, agent: int) -> View:
@@ -116,12 +116,12 @@ class Decisions:
         return self._simulation.view(self.mission.instance.agent_ids[agent])
 
     def decide(self, order: Order | None) -> float:
-        """Let the first of the queue follow an order, None for its last one, and go on to the next decision.
+        """Give an order to the first agent in the queue, None for its last one, and advance to the next decision.
 
         Returns
         -------
         float
-            The reward of all agents since the last decision.
+            The common reward since the last decision.
         """
         if order is not None:
             self._simulation.order(self.mission.instance.agent_ids[self.queue[0]], order)
@@ -132,7 +132,7 @@ class Decisions:
         return self._value - before
 
     def figures(self) -> Info:
-        """Return hour, tasks done and energy so far; at the end also how well the mission went."""
+        """Return hour, tasks done and energy so far; at the end also the measures of the mission."""
         state = self._simulation.state
         done = sum(task.status is TaskStatus.DONE for task in state.tasks)
         found: Info = {
@@ -149,7 +149,7 @@ class Decisions:
         return found
 
     def _advance(self) -> None:
-        """Go on until somebody is to decide, or to the end."""
+        """Advance the simulation to the next decision or to the end."""
         simulation = self._simulation
         while not self.queue and (request := simulation.advance()) is not None:
             if request.wanted is Wanted.ORDERS:
@@ -165,7 +165,7 @@ class Decisions:
         return self._switching or self._simulation.state.agents[agent].status is AgentStatus.IDLE
 
     def _value_so_far(self) -> float:
-        """Return the sum of all rewards so far: priority done, less hours of waiting and energy, each by its weight."""
+        """Return the sum of all rewards so far: priority done, minus weighted waiting hours and weighted energy."""
         state, weights = self._simulation.state, self._weights
         done = waited = 0.0
         for task in state.tasks:

@@ -1,4 +1,4 @@
-"""Missions as a Gymnasium environment: one learner leads all agents, and knows all that is so now."""
+"""Missions as a Gymnasium environment: one learner gives orders to all agents, with full knowledge."""
 
 from __future__ import annotations
 
@@ -15,30 +15,30 @@ from alloc.problems.vocabulary import Knowledge
 
 
 class MissionFleetEnv(gymnasium.Env[Floats, np.int64]):
-    """A planner decides for one free agent a step.
+    """A planner decides for one free agent per step.
 
-    Whenever something has happened - a task appears or is done, an agent joins, fails or arrives - each free agent gets
-    an order, one after the other: action j sends it to task j, action m leaves it as it is. Observations are those of
-    `MissionEnv` for the agent whose turn it is, with full knowledge; so is the reward. The mission is over when all is
-    done, nobody is left, or its horizon is reached.
+    After every event - a task appears or is done, an agent joins, fails or arrives - each free agent gets an order in
+    turn: action j sends it to task j, action m continues with its last order. Observations and rewards are those of
+    `MissionEnv` for the selected agent, with full knowledge. The mission is over when all tasks are done, no agents
+    remain, or its horizon is reached.
 
-    Illegal actions - a task that is not there, is over, or that the agent cannot take - leave the agent as it is and
-    bring `illegal_reward`; `action_masks` names the legal ones, as MaskablePPO of sb3-contrib asks for them. Infos hold
-    ``agent``, the number of whose turn it is, hour, tasks done, energy and ``illegal``, at the end also the measures.
+    Illegal actions - a task that has not appeared, is over, or that the agent cannot take - change nothing and give
+    `illegal_reward`; `action_masks` returns the legal ones, as MaskablePPO of sb3-contrib expects. Infos contain
+    ``agent``, the number of the selected agent, hour, tasks done, energy and ``illegal``, at the end also the measures.
 
     Parameters
     ----------
     missions : sequence of Mission, or callable
-        Drawn from at every reset, or called with a numpy generator; all of one size.
+        Sampled at every reset, or a function that is called with a numpy generator; all of the same size.
     switching : bool
-        Whether agents that fly or work get orders as well.
+        Whether agents that fly or work also get orders.
     waiting_weight, energy_weight : float
-        In the reward; see `MissionEnv`.
+        Weights in the reward; see `MissionEnv`.
     max_steps : int, optional
-        Decisions after which the mission is truncated; none by default.
+        Decisions after which the mission is truncated; by default none.
     illegal_reward : float
     render_mode : {"ansi", "human"}, optional
-        Whether `render` returns what is so now as text, or prints it.
+        Whether `render` returns the true state as text, or prints it.
 
     Raises
     ------
@@ -78,19 +78,19 @@ class MissionFleetEnv(gymnasium.Env[Floats, np.int64]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, object] | None = None
     ) -> tuple[Floats, dict[str, object]]:
-        """Begin a mission drawn anew; with a seed, the same missions follow."""
+        """Start a new random mission; with a seed, the sequence of missions is reproducible."""
         super().reset(seed=seed)
         mission = draw(self._source, self._sizes, self.np_random)
         self._course = Decisions(mission, Knowledge.FULL, 0, switching=self._switching, weights=self._weights)
         if not self._course.queue:
-            raise InputError("is over before anybody decides", mission.name)
+            raise InputError("is over before the first decision", mission.name)
         self._lens, self._truth = Lens(mission, 0), Truth(mission)
         self._agent, self._steps = self._course.queue[0], 0
         show_step(self._course.state, self.render_mode)
         return self._observation(), self._info(illegal=False)
 
     def step(self, action: np.int64) -> tuple[Floats, float, bool, bool, dict[str, object]]:
-        """Give an order to the agent whose turn it is, and go on to the next decision."""
+        """Give an order to the selected agent, and advance to the next decision."""
         number = int(action)
         is_legal = bool(self.action_masks()[number])
         gained = self._course.decide(self._lens.order(number) if is_legal else None)
@@ -103,11 +103,11 @@ class MissionFleetEnv(gymnasium.Env[Floats, np.int64]):
         return self._observation(), gained, over, cut, self._info(illegal=not is_legal)
 
     def state(self) -> Floats:
-        """Return what is so now, as `Truth` of `truth.py` describes."""
+        """Return the true state, as described by `Truth` of `truth.py`."""
         return self._truth.array(self._course.state)
 
     def render(self) -> str | None:
-        """Return what is so now as text, or print it, by the render mode."""
+        """Return the true state as text, or print it, depending on the render mode."""
         return rendered(self._course.state, self.render_mode)
 
     def action_masks(self) -> NDArray[np.bool_]:

@@ -1,4 +1,4 @@
-"""What an agent knows of a mission, as numbers in a row of fixed length, and what it can choose."""
+"""Observations and action masks of agents in a mission, as arrays of fixed length."""
 
 import math
 
@@ -13,20 +13,20 @@ from alloc.problems.missions.simulation.state import ACTIVE, AgentStatus, Order,
 OWN_FIGURES, TASK_FIGURES, AGENT_FIGURES = 8, 15, 8
 
 LIMIT = 10.0
-"""Figures beyond are cut off, on either side of 0."""
+"""Observations are clipped to [-LIMIT, LIMIT]."""
 
 Floats = NDArray[np.float32]
 Mask = NDArray[np.int8]
 
 
 class Lens:
-    """How agents of a mission see it, and what they can choose.
+    """Encoder of observations and actions of agents in a mission.
 
-    An observation has, laid flat, `OWN_FIGURES` of the agent itself; `TASK_FIGURES` of each task, in their order in the
-    mission; and `AGENT_FIGURES` of each agent, likewise. What an agent knows nothing of is 0 throughout. Positions are
-    in units of the longest side of the mission's area, which all know; hours are log(1 + h), and so are other amounts.
-
-    Actions are numbers: of the tasks, then of places on a grid over the area, and last to go on with the last order.
+    An observation is the concatenation of `OWN_FIGURES` of the agent itself, `TASK_FIGURES` of each task, and
+    `AGENT_FIGURES` of each agent, in their order in the mission. Tasks and agents that the agent does not know are all
+    zeros. Positions are in units of the longest side of the mission's area, which all agents know; hours and other
+    amounts x are log(1 + x). Actions are integers: the tasks, then places on a grid over the area, and last to continue
+    with the last order.
 
     Parameters
     ----------
@@ -50,14 +50,14 @@ class Lens:
         ]
 
     def order(self, action: int) -> Order | None:
-        """Return the order of an action; None for going on with the last one."""
+        """Return the order of an action; None to continue with the last one."""
         if action < len(self._tasks):
             return Order(list(self._tasks)[action])
         place = action - len(self._tasks)
         return Order(position=self._places[place].position) if place < len(self._places) else None
 
     def mask(self, view: View) -> Mask:
-        """Return which actions an agent can take, by what it knows, shape (m + grid^2 + 1,)."""
+        """Return which actions an agent can take, as far as it knows, shape (m + grid^2 + 1,)."""
         can = np.zeros(len(self._tasks) + len(self._places) + 1, np.int8)
         for task in view.open_tasks(view.own):
             can[self._tasks[task.facts.id]] = 1
@@ -68,7 +68,7 @@ class Lens:
         return can
 
     def observe(self, view: View) -> Floats:
-        """Return what an agent knows, shape (OWN_FIGURES + m TASK_FIGURES + n AGENT_FIGURES,)."""
+        """Return the observation of an agent, shape (OWN_FIGURES + m TASK_FIGURES + n AGENT_FIGURES,)."""
         tasks = np.zeros((len(self._tasks), TASK_FIGURES))
         groups = self._groups(view)
         for name, task in view.tasks.items():
@@ -123,7 +123,7 @@ class Lens:
         ]
 
     def _groups(self, view: View) -> dict[str, list[AgentReport]]:
-        """Return who else is at each task, or on its way there, by the last that was heard."""
+        """Return the other agents at or on their way to each task, by the latest reports."""
         groups: dict[str, list[AgentReport]] = {}
         for name, agent in view.agents.items():
             if name != view.id and agent.task is not None and agent.status in ACTIVE:
@@ -147,5 +147,5 @@ def length(n: int, m: int) -> int:
 
 
 def _log(value: float) -> float:
-    """Return log(1 + x), with the sign of x."""
+    """Return sign(x) log(1 + |x|)."""
     return math.copysign(math.log1p(abs(value)), value)

@@ -1,4 +1,4 @@
-"""What is so in a mission, whoever knows it: as numbers for a critic of all agents, and as text."""
+"""The true state of a mission, as an array for a centralised critic, and as text."""
 
 import math
 import sys
@@ -28,15 +28,14 @@ RENDER_MODES = (HUMAN, "ansi")
 
 
 class Truth:
-    """What is so now, and nothing of what is to come.
+    """Encoder of the true state, without future events.
 
-    The array has, laid flat: the hour, as a share of the mission; `AGENT_TRUTHS` of each agent, in their order in the
-    mission: whether it is in the mission, flies, works; its position, and that to which its order leads; its battery in
-    flights through the whole area, and its ability; and `TASK_TRUTHS` of each task: whether it is open, or done; its
-    position; work left, growth, priority, hours to its deadline; and the number of agents that work there. Positions
-    are in units of the longest side of the mission's area; battery, ability and all of tasks from work left on are
-    log(1 + x). Agents that have not joined, or are gone, and tasks that have not appeared are 0 throughout. All within
-    -10 and 10.
+    The array is the concatenation of the hour, as a share of the mission; `AGENT_TRUTHS` of each agent, in their order
+    in the mission: whether it is present, flies, works; its position, and the destination of its order; its battery in
+    flights across the area, and its ability; and `TASK_TRUTHS` of each task: whether it is open, or done; its position;
+    work left, growth, priority, hours to its deadline; and the number of agents that work there. Positions are in units
+    of the longest side of the mission's area; battery, ability and the amounts of tasks from work left on are
+    log(1 + x). Absent agents and tasks that have not appeared are all zeros. Values are within -10 and 10.
 
     Parameters
     ----------
@@ -50,7 +49,7 @@ class Truth:
         self._side = max(mission.longest_flight, 1e-12)
 
     def array(self, state: MissionState) -> Floats:
-        """Return it as numbers, shape (1 + n AGENT_TRUTHS + m TASK_TRUTHS,)."""
+        """Return the state as an array, shape (1 + n AGENT_TRUTHS + m TASK_TRUTHS,)."""
         flat = [state.hour / self._end]
         for agent in state.agents:
             flat += self._agent(state, agent) if agent.status in ACTIVE else [0.0] * AGENT_TRUTHS
@@ -98,27 +97,27 @@ def state_length(n: int, m: int) -> int:
 
 
 def checked_mode(mode: str | None) -> str | None:
-    """Return how to render; what is none of the `RENDER_MODES` is an `InputError`."""
+    """Return `mode` if it is None or one of `RENDER_MODES`, or raise an `InputError`."""
     if mode is not None and mode not in RENDER_MODES:
-        raise InputError(f"is {shown(mode)}, which is none of {', '.join(RENDER_MODES)}", "render_mode")
+        raise InputError(f"must be one of {', '.join(RENDER_MODES)}, got {shown(mode)}", "render_mode")
     return mode
 
 
 def rendered(state: MissionState, mode: str | None) -> str | None:
-    """Return what is so now as text, or print it; nothing without a mode."""
+    """Return the state as text, or print it, depending on the mode; None without a mode."""
     if mode == HUMAN:
         sys.stdout.write(as_text(state))
     return as_text(state) if mode == "ansi" else None
 
 
 def show_step(state: MissionState, mode: str | None) -> None:
-    """Print what is so now in the mode for people: environments do after each step, without being asked."""
+    """Print the state in mode ``human``, as environments do after each step."""
     if mode == HUMAN:
         rendered(state, mode)
 
 
 def as_text(state: MissionState) -> str:
-    """Return what is so now as lines of text: a line for each agent, and each open task."""
+    """Return the state as text, with a line for each agent and each open task."""
     done = sum(task.status is TaskStatus.DONE for task in state.tasks)
     lines = [f"hour {state.hour:.4g}: {done} of {len(state.tasks)} tasks done"]
     for agent in state.agents:

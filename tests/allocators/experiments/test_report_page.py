@@ -275,7 +275,7 @@ def test_what_cannot_be_read_or_written_is_an_error(store, tmp_path, monkeypatch
     assert not (tmp_path / "no.db").exists()
     with pytest.raises(InputError, match=r"must end in \.html"):
         report_html([store], tmp_path / "report.pdf")
-    with pytest.raises(InputError, match="stores: must name a store"):
+    with pytest.raises(InputError, match="stores: must name at least one store"):
         report_html([], tmp_path / "report.html")
     monkeypatch.setattr(libraries, "find_spec", lambda name: None)
     with pytest.raises(MissingPackageError, match=r"Jinja2 and vl-convert-python and itables.*alloc-mrta\[report\]"):

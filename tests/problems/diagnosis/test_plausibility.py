@@ -35,7 +35,7 @@ DOUBTFUL = [
     (
         {"agent_position": ((0, 0), (np.nan, np.nan), (3, 1))},
         "position",
-        "agent a2 has no place: the way there counts as 0",
+        "agent a2 has no place: the distance there counts as 0",
     ),
     ({"task_position": ((0, 0), (np.nan, np.nan))}, "position", "task t2 has no place"),
     ({"battery": (9, 9, 0.5)}, "battery", "a3 reaches no task; to t1, its nearest, energy 1.5 exceeds the battery 0.5"),
@@ -49,11 +49,11 @@ DOUBTFUL = [
         "distances",
         "a3 reaches no task; to t1, its nearest, there is no way to it in the table of distances",
     ),
-    ({"bases": {"north": (0, 1)}}, "bases", "nobody returns to base north"),
+    ({"bases": {"north": (0, 1)}}, "bases", "no agent returns to base north"),
     (
         {"bases": {"north": None}, "return_base": (0, -1, -1)},
         "bases",
-        "base north has no place: the way back there counts as 0",
+        "base north has no place: the distance back counts as 0",
     ),
     (
         {"bases": {"north": (0, 9)}, "return_base": (-1, 0, -1), "battery": (9, 3, 9)},
@@ -93,7 +93,7 @@ def test_priority_without_effect() -> None:
     assert priority_without_effect(fleet()) is None
     found = priority_without_effect(fleet(priority=(1, 2)))
     assert found is not None
-    assert "changes no plan" in found.message
+    assert "has no effect on plans" in found.message
 
 
 @pytest.mark.parametrize("scenario", [1, 2, 3, 4])

@@ -30,7 +30,7 @@ async function showInstance(index) {
   const others = map ? map.plans.some((plan) => plan.group === state.group) : false;
   const none = !detail.groups.includes(state.group) ? "No plan is stored: the instance was not run under these conditions."
     : others ? "No plan is shown: stored plans are of methods that are deselected above."
-    : "No plan is stored under these conditions: no run has a result, or an older version of alloc did not store plans.";
+    : "No plan is stored under these conditions: no run was solved, or an older version of alloc did not store plans.";
   await showPlan(map, plans.find((plan) => plan.method === state.plan), none, isLatest);
   if (isLatest()) await showTraces(detail.traces);
 }

@@ -197,7 +197,7 @@ function tellFailures() {
   const own = page.failures.filter((one) => one.group === state.group && !state.off.has(one.method));
   const missing = group().methods.filter((one) => !state.off.has(one.method)).reduce((sum, one) => sum + one.runs - (one.outcomes.solved || 0), 0);
   const count = own.reduce((sum, one) => sum + one.runs, 0);
-  if (!missing) add(place, "p", "None: every run has a result.");
+  if (!missing) add(place, "p", "None: every run was solved.");
   else add(place, "p", `${counted(missing, "run")} not solved, the most frequent kinds first; refusals are no faults.${missing > count ? ` ${counted(missing - count, "run")} of rarer kinds are left out, to keep the page small.` : ""}`);
   const lay = (some) => some.forEach((failure) => {
     const box = add(place, "details", "", { class: "failure" });

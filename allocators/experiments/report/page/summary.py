@@ -154,7 +154,7 @@ def notes(group: Group) -> list[str]:
     found += _about_means(group)
     ended = _flat(group.endings)
     if all(one.outcome is not Outcome.SOLVED for one in ended):
-        found.append("No run has a result: there are no scores to draw. See the failures below.")
+        found.append("No run was solved: there are no scores to draw. See the failures below.")
     elif all(one.makespan is None for one in ended):
         found.append("No run has a makespan: all left tasks undone.")
     elif all(one.lower_bound is None for one in ended):
