@@ -1,4 +1,4 @@
-"""The contract of a policy: what it may know, and what it answers when it is asked for orders."""
+"""The policy contract: what a policy may know, and the orders that it returns."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
@@ -18,12 +18,12 @@ from alloc.problems.vocabulary import Knowledge
 
 
 class PolicyError(AllocError):
-    """A policy answered what is no order: a defect of the policy."""
+    """A policy returned something that is not an order: a defect of the policy."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class PolicyInfo:
-    """What is known of a policy before it is loaded.
+    """Description of a policy, available before it is loaded.
 
     Attributes
     ----------
@@ -32,15 +32,15 @@ class PolicyInfo:
     summary : str
         One line.
     central : bool
-        Whether it decides for all agents at once, which needs full knowledge; else each agent decides for itself.
+        Whether it decides for all agents at once, which needs full knowledge; otherwise each agent decides for itself.
     clairvoyant : bool
-        Whether it is told all that is to come: no policy for use, but what others are measured against.
+        Whether it knows the future: a reference for other policies, not a policy for use.
     requires : tuple of str
         Modules that must be installed.
     options : tuple of str
         Options that its constructor takes besides its parameters.
     citation : str
-        Where it comes from.
+        Publication that it is based on.
     """
 
     name: str
@@ -59,28 +59,28 @@ class PolicyInfo:
 
 @dataclass(frozen=True)
 class Briefing:
-    """What is known before a mission begins.
+    """What a decider knows before a mission begins.
 
     Attributes
     ----------
     agent : str or None
-        Who will decide; None for who leads all agents.
+        Id of the agent that decides; None for a central policy.
     knowledge : Knowledge
     seed : tuple of int
-        Of this agent's random numbers.
+        Seed of the decider's random numbers.
     deadline_s : float or None
-        Seconds for each decision; None for no limit.
+        Time limit of each decision in seconds; None for no limit.
     end : float
         Hour at which the mission ends at the latest.
     sensing : float
-        Distance up to which an agent sees; ``inf`` for everything.
+        Sensing radius; ``inf`` if agents see everything.
     radio : Radio
     area : tuple of two positions
-        Least and largest coordinates of all places in the mission.
+        Smallest and largest coordinates of all places in the mission.
     pace : Pace or None
-        Between what the work of groups is drawn; not what is drawn.
+        Range from which the factors on the work of groups are drawn, but not the factors themselves.
     mission : Mission or None
-        All that will happen, for a policy that is `clairvoyant`; None for all others.
+        The whole mission, future events included, for a `clairvoyant` policy; None for all others.
     """
 
     agent: str | None
@@ -105,7 +105,7 @@ class Briefing:
         *,
         clairvoyant: bool = False,
     ) -> "Briefing":
-        """Return what an agent, or who leads all, is told of a mission; all of it, if the policy is clairvoyant."""
+        """Return the briefing of an agent, or of a central policy if `agent` is None."""
         number = 0 if agent is None else mission.instance.agent_index[agent] + 1
         return cls(
             agent=agent,
@@ -121,16 +121,16 @@ class Briefing:
         )
 
     def generator(self) -> np.random.Generator:
-        """Return a source of random numbers of its own."""
+        """Return a new random generator with this seed."""
         return np.random.default_rng(self.seed)
 
 
 class AgentDecider(ABC):
-    """Decides for one agent in one mission: it is told what the agent knows, and nothing else."""
+    """Decides for one agent in one mission, from what this agent knows and nothing else."""
 
     @abstractmethod
     def decide(self, view: View) -> Order | None:
-        """Return where the agent is to go; None for where its last order says.
+        """Return the agent's new order; None to keep the last one.
 
         Parameters
         ----------
@@ -143,12 +143,12 @@ class AgentDecider(ABC):
         """
 
     def message(self, view: View) -> Message | None:
-        """Return what the agent sends now; all that it knows by default, None for nothing.
+        """Return the message that the agent sends now: by default all that it knows; None to send nothing.
 
         Parameters
         ----------
         view : View
-            What the agent knows now; messages that came stay in ``heard`` until it decides.
+            What the agent knows now; received messages stay in ``heard`` until its next decision.
 
         Returns
         -------
@@ -158,11 +158,11 @@ class AgentDecider(ABC):
 
 
 class FleetDecider(ABC):
-    """Decides for all agents in one mission, knowing all that is so now."""
+    """Decides for all agents in one mission, with full knowledge of its present state."""
 
     @abstractmethod
     def decide(self, view: View) -> Mapping[str, Order]:
-        """Return where agents are to go, by their ids; the last orders of all others stand.
+        """Return new orders by agent id; agents without one keep their last order.
 
         Parameters
         ----------
@@ -175,51 +175,51 @@ class FleetDecider(ABC):
 
 
 class TurnsDecider(ABC):
-    """Decides for agents in turn, as each would for itself, where everything is known to all."""
+    """Decides for agents one after another, as each would for itself, under full knowledge."""
 
     @abstractmethod
     def turns(self, view: View, names: Sequence[str]) -> Iterator[tuple[str, Order | None]]:
-        """Return where agents are to go, one after the other; each knows what those before it were told.
+        """Yield the orders of agents one after another; each decision takes the orders before it into account.
 
         Parameters
         ----------
         view : View
-            Of nobody in particular.
+            Not of a particular agent.
         names : sequence of str
-            Ids of the agents, in their turn. Whoever asks may stop before the last.
+            Ids of the agents in the order of their decisions. The caller may stop before the last.
 
         Yields
         ------
         name : str
         order : Order or None
-            None for where its last order says.
+            None to keep the last order.
         """
 
 
 class Policy(Parameterised):
-    """A policy, loaded and ready; one object serves many missions.
+    """A policy, loaded and ready for use in any number of missions.
 
-    Subclasses set `info`, and `parameters_type` if they have parameters, as allocators do; `begin` changes no
-    attribute.
+    Subclasses set `info`, and `parameters_type` if they have parameters, as allocators do; `begin` must not change
+    attributes.
 
     Parameters
     ----------
     parameters : parameters_type, optional
-        Its parameters; the defaults if None.
+        Parameters of the policy; the defaults if None.
     **settings
         Single parameters by name.
 
     Attributes
     ----------
     info : PolicyInfo
-        Name and needs.
+        Name, summary and requirements.
     parameters_type : type or None
         Frozen dataclass of the parameters, with a default for each; None for a policy without parameters.
 
     Raises
     ------
     InputError
-        If there is no such parameter, or its value is wrong; its place is the name of the parameter.
+        If a parameter is unknown or its value is invalid; the error's ``place`` is the name of the parameter.
     """
 
     info: ClassVar[PolicyInfo]
@@ -230,7 +230,7 @@ class Policy(Parameterised):
 
     @abstractmethod
     def begin(self, briefing: Briefing) -> AgentDecider | FleetDecider:
-        """Return who decides in a mission: for one agent, or for all if the policy is central.
+        """Return the decider of a mission: for one agent, or for all agents if the policy is central.
 
         Parameters
         ----------
@@ -242,12 +242,12 @@ class Policy(Parameterised):
         """
 
     def begin_turns(self, briefing: Briefing) -> TurnsDecider | None:
-        """Return who decides for agents in turn, faster than one by one; None where nobody does.
+        """Return a decider for all agents in turn, faster than one decider for each; None if there is none.
 
         Parameters
         ----------
         briefing : Briefing
-            Of who leads all agents.
+            As for a central policy.
 
         Returns
         -------

@@ -1,4 +1,4 @@
-"""Policies by name, imported on first use; third parties add theirs by entry point."""
+"""Registry of policies by name: imported on first use, extended by third parties through entry points."""
 
 from importlib.metadata import EntryPoint
 from typing import cast
@@ -33,7 +33,7 @@ def policy_names() -> list[str]:
     Returns
     -------
     list of str
-        Those built in, then those of installed plugins.
+        Built-in policies, then those of installed plugins.
     """
     return [*POLICIES, *_plugins()]
 
@@ -59,7 +59,7 @@ def describe_policy(name: str) -> PolicyInfo:
 
 
 def load_policy(name: str, parameters: object = None, **settings: object) -> Policy:
-    """Return a policy, ready to be used in many missions.
+    """Load a policy, ready for use in any number of missions.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def load_policy(name: str, parameters: object = None, **settings: object) -> Pol
     parameters : object, optional
         All parameters of the policy.
     **settings
-        Single ones by name; None stands for the default.
+        Single parameters by name; None stands for the default.
 
     Returns
     -------
@@ -77,9 +77,9 @@ def load_policy(name: str, parameters: object = None, **settings: object) -> Pol
     Raises
     ------
     InputError
-        If there is no such policy, it has no such parameter, or a value is wrong.
+        If the policy or a parameter is unknown, or a value is invalid.
     MissingPackageError
-        If what it requires is not installed.
+        If a required package is not installed.
     """
     kind = _class(name)
     require_installed(kind.info.missing, f"policy {name!r}", "policy")

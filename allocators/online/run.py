@@ -1,4 +1,4 @@
-"""Missions under a policy: it is asked for orders, and what it does not answer in time is the last order."""
+"""Simulation of missions under a policy; where it misses its deadline, the last orders stay in force."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -22,7 +22,7 @@ from alloc.problems.vocabulary import Knowledge
 
 @dataclass(frozen=True)
 class MissionRun:
-    """A mission that is over.
+    """A finished mission.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ def simulate(
     observe: Callable[[Simulation], None] | None = None,
     **settings: object,
 ) -> MissionRun:
-    """Let a policy lead the agents of a mission to its end.
+    """Simulate a mission to its end under a policy.
 
     Parameters
     ----------
@@ -53,15 +53,15 @@ def simulate(
     policy : str or Policy
         A name, or a policy with its own parameters.
     knowledge : {"full", "local"}, optional
-        What agents know; as the mission says by default.
+        What agents know; by default as the mission says.
     seed : int
-        Seed of the policy, and of the radio's chances beside that of the mission; from 0 to 2^63 - 1.
+        Seed of the policy and, together with the mission's seed, of message loss; from 0 to 2^63 - 1.
     deadline_ms : float, optional
-        Milliseconds for each decision; a later answer is not followed, the last order stands.
+        Time limit of each decision in milliseconds; a later answer is ignored, and the last orders stay in force.
     parameters : object, optional
         Parameters of a policy that is given by name.
     observe : callable, optional
-        Called with the simulation before it begins, such as a `Recorder`.
+        Called with the simulation before it begins, e.g. a `Recorder`.
     **settings
         Single parameters of a policy that is given by name.
 
@@ -72,11 +72,11 @@ def simulate(
     Raises
     ------
     InputError
-        If the policy or a parameter is unknown, or an argument is wrong; its place is the parameter.
+        If the policy or a parameter is unknown, or an argument is invalid; the error's ``place`` is the parameter.
     RefusedError
-        If the policy needs full knowledge.
+        If the policy needs full knowledge and agents have only local knowledge.
     PolicyError
-        If the policy answers what is no order.
+        If the policy returns something that is not an order.
     """
     run = simulate_until(
         never_stop, mission, policy, knowledge, seed, deadline_ms, parameters, observe=observe, **settings
@@ -96,7 +96,7 @@ def simulate_until(
     observe: Callable[[Simulation], None] | None = None,
     **settings: object,
 ) -> MissionRun | None:
-    """Do as `simulate`, and return None if `should_stop` returns True between two decisions."""
+    """Simulate as `simulate` does, but stop and return None once `should_stop` returns True before a decision."""
     began = time.perf_counter()
     of_type(mission, Mission, "mission")
     of_type(policy, (str, Policy), "policy")
@@ -104,7 +104,7 @@ def simulate_until(
     number = whole(seed, "seed", 0, 2**63 - 1)
     deadline_s = None if deadline_ms is None else real(deadline_ms, "deadline_ms", above=True) / 1000
     if isinstance(policy, Policy) and (settings or parameters is not None):
-        raise InputError("is an object with its own parameters; set them where it is made", "policy")
+        raise InputError("is an object with its own parameters; set them when you create it", "policy")
     require_knowledge(describe_policy(policy) if isinstance(policy, str) else policy.info, known)
     leader = load_policy(policy, parameters, **settings) if isinstance(policy, str) else policy
     simulation = Simulation(mission, known, number)
@@ -121,7 +121,7 @@ def simulate_until(
 
 
 def require_knowledge(policy: PolicyInfo, knowledge: Knowledge) -> None:
-    """Raise an error where a policy needs to know more; before it is loaded, as some compile loops for a minute then.
+    """Raise an error if a policy needs full knowledge; called before loading it, which may compile for a minute.
 
     Parameters
     ----------
@@ -131,21 +131,21 @@ def require_knowledge(policy: PolicyInfo, knowledge: Knowledge) -> None:
     Raises
     ------
     RefusedError
-        If the policy leads all agents, and knowledge is local.
+        If the policy is central and knowledge is local.
     """
     if policy.central and knowledge is Knowledge.LOCAL:
         raise RefusedError(f"policy {policy.name!r} leads all agents, and needs full knowledge (--knowledge full)")
 
 
 class _Control:
-    """The link of a policy to a simulation: hands over what may be known, and passes on what is answered in time.
+    """Connects a policy to a simulation: hands over views and passes on orders that arrive in time.
 
     Attributes
     ----------
     seconds : list of float
-        How long each decision took.
+        Duration of each decision.
     late : int
-        Decisions that came after the deadline.
+        Number of decisions after the deadline.
     """
 
     def __init__(self, policy: Policy, simulation: Simulation, seed: int, deadline_s: float | None) -> None:
@@ -170,7 +170,7 @@ class _Control:
             self._agents[name] = decider
 
     def answer(self, request: Request) -> None:
-        """Send messages, or give orders, as the policy says."""
+        """Send the policy's messages or give its orders, as the simulation requests."""
         if request.wanted is Wanted.MESSAGES:
             for name in () if self._fleet is not None else request.agents:
                 self._send(name)
@@ -194,10 +194,10 @@ class _Control:
         orders = fleet.decide(view)
         in_time = self._is_in_time(began)
         if not isinstance(orders, Mapping):
-            raise PolicyError(f"policy {self._name!r} answered {type(orders).__name__}, not orders by agent")
+            raise PolicyError(f"policy {self._name!r} returned {type(orders).__name__}, not a mapping of orders")
         for name, order in orders.items():
             if name not in request.agents:
-                raise PolicyError(f"policy {self._name!r} has an order for {name!r}, who can take none now")
+                raise PolicyError(f"policy {self._name!r} gave an order to {name!r}, which cannot take orders now")
             if in_time:
                 self._give(name, order)
 
@@ -217,5 +217,5 @@ class _Control:
 
     def _give(self, name: str, order: Order) -> None:
         if not isinstance(order, Order):
-            raise PolicyError(f"policy {self._name!r} answered {order!r}, which is no Order")
+            raise PolicyError(f"policy {self._name!r} returned {order!r}, which is not an Order")
         self._simulation.order(name, order)

@@ -1,1 +1,1 @@
-"""Policies with local knowledge that are no networks, in compiled loops: to tune them, and to compare many missions."""
+"""Compiled versions of the policies with local knowledge, for tuning and for comparisons over many missions."""

@@ -22,13 +22,13 @@ def bid(state: MissionArrays, number: int, room: Room, parameters: FloatArray, n
     ----------
     state : MissionArrays
     number : int
-        Of the agent.
+        Index of the agent.
     room : Room
     parameters : ndarray
         In the order of `AuctionPolicyParameters`.
     notes : Notes
     rank : ndarray of int, shape (n,)
-        Of the ids of agents in the order of letters.
+        Rank of each agent's id in alphabetical order.
     """
     memory, stay, seats_factor, flight, age = parameters
     situation, bids, n = room.situation, notes.own[number], len(notes.own)
@@ -59,7 +59,7 @@ def bid(state: MissionArrays, number: int, room: Room, parameters: FloatArray, n
 
 @compiled_in_place
 def count_seats(state: MissionArrays, number: int, bids: FloatArray, factor: float) -> int:
-    """Return the seats of a task; bids of those who were seen to go elsewhere since are forgotten."""
+    """Return the seats of a task; drop the bids of agents that have since been seen on their way to another task."""
     row, agents, tasks, n = state.agents[number].known, 0, 0, len(state.agents)
     for i in range(n):
         report = state.reports[state.known_report[row, i]]
@@ -75,7 +75,7 @@ def count_seats(state: MissionArrays, number: int, bids: FloatArray, factor: flo
 def is_outbid(
     bids: FloatArray, number: int, task: int, amount: float, hour: float, memory: float, seats: int, rank: IntArray
 ) -> bool:
-    """Whether others hold all seats of a task with higher bids that are remembered; ids decide between equals."""
+    """Whether other agents hold all seats of a task with higher, unexpired bids; ids break ties."""
     higher, n = 0, len(rank)
     for i in range(n):
         if bids[i] == task and i != number and hour - bids[HOUR * n + i] <= memory:

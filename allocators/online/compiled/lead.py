@@ -1,4 +1,4 @@
-"""Missions under policies that are no networks, in compiled loops."""
+"""Compiled simulation of missions under policies other than networks."""
 
 from typing import NamedTuple
 
@@ -22,14 +22,14 @@ from alloc.problems.fields import FloatArray, IntArray
 from alloc.problems.missions.chance import EXPLORING
 
 NEAREST, GREEDY, HEDONIC, AUCTION = range(4)
-"""Who leads."""
+"""Codes of the policies."""
 
 NAMES = ("nearest", "greedy", "hedonic", "auction")
 NOTES = (0, 0, PARTITION, BIDS)
 
 
 class Memory(NamedTuple):
-    """What agents remember: notes, how many chances and changes there were, and the order of their ids; and nothing."""
+    """Memory of all agents: notes, counts of random draws and of moves, ranks of ids, and an empty array."""
 
     notes: Notes
     drawn: IntArray
@@ -69,7 +69,7 @@ def choose(
 def lead(
     state: MissionArrays, room: Room, leader: int, kind: int, parameters: FloatArray, memory: Memory, seed: int
 ) -> None:
-    """Let a policy lead all agents to the end of a mission; its notes are of some kind."""
+    """Run a mission to its end under a policy; `kind` is that of its notes, 0 for none."""
     head, key = state.head[0], keyed(first_key(EXPLORING), seed)
     while True:
         wanted = advance(state)
@@ -93,20 +93,20 @@ def lead(
 
 
 def led(arrays: MissionArrays, policy: str, parameters: FloatArray, seed: int, rank: IntArray) -> MissionArrays:
-    """Return a mission that is over.
+    """Run a mission to its end under a policy, and return its final state.
 
     Parameters
     ----------
     arrays : MissionArrays
-        As `pack` makes them.
+        As returned by `pack`.
     policy : str
         One of `NAMES`.
     parameters : ndarray
-        Of the policy, in the order of their fields.
+        Parameters of the policy in the order of their fields.
     seed : int
-        Of the run.
+        Seed of the run.
     rank : ndarray of int, shape (n,)
-        Of the ids of agents in the order of letters.
+        Rank of each agent's id in alphabetical order.
     """
     state, leader = begun(arrays, seed), NAMES.index(policy)
     n, m, slots = len(state.agents), len(state.tasks), len(state.sent)

@@ -1,4 +1,4 @@
-"""Looking around at random places, compiled: see `alloc.allocators.online.policies.exploring`."""
+"""Exploration of random places, compiled: see `alloc.allocators.online.policies.exploring`."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from alloc.problems.fields import FloatArray, IntArray
 
 @compiled_in_place
 def draw(area: FloatArray, axis: int, number: int, key: int, drawn: IntArray) -> float:
-    """Return a coordinate at random."""
+    """Return a random coordinate in the area."""
     drawn[number] += 1
     chance = fraction(keyed(keyed(key, number + 1), drawn[number]))
     return float(area[0, axis] + (area[1, axis] - area[0, axis]) * chance)
@@ -27,11 +27,11 @@ def look_around(state: MissionArrays, number: int, key: int, drawn: IntArray) ->
     ----------
     state : MissionArrays
     number : int
-        Of the agent.
+        Index of the agent.
     key : int
         State of the hash after the seed of the run.
     drawn : ndarray of int, shape (n,)
-        How many numbers each agent has drawn.
+        How many random numbers each agent has drawn.
     """
     head, agent = state.head[0], state.agents[number]
     nowhere = (0.0, 0.0, 0.0)

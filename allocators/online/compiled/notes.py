@@ -1,7 +1,7 @@
-"""What policies add to messages, compiled: sent with the message of a slot, and heard with it.
+"""Notes that policies add to messages, compiled: they are sent and received with the messages of a slot.
 
-Notes of an agent are a row of numbers: a partition, which is the task of each agent, the number of changes and a stamp;
-or the bids of all agents, which are a task, an amount and an hour for each.
+The notes of an agent are a row of numbers: a partition (the task of each agent, the number of changes and a stamp), or
+the bids of all agents (a task, an amount and an hour for each).
 """
 
 from typing import NamedTuple
@@ -16,13 +16,13 @@ from alloc.problems.fields import FloatArray
 from alloc.problems.missions.simulation.reports import BYTES_OF_VALUE
 
 PARTITION, BIDS = 1, 3
-"""Kinds of notes: how many numbers there are for each agent."""
+"""Kinds of notes; the value is how many numbers there are for each agent."""
 
 MOST_NOTES = 250_000_000
-"""Numbers of all agents, up to which missions are run."""
+"""Largest total size of the notes of all agents; larger missions are refused."""
 
 TASK, AMOUNT, HOUR = range(3)
-"""Numbers of a bid; the parts of a row with those of all agents are in this order."""
+"""Fields of a bid; a row has one field of all agents after another, in this order."""
 
 
 class Notes(NamedTuple):
@@ -31,11 +31,11 @@ class Notes(NamedTuple):
     Attributes
     ----------
     own, heard : ndarray, shape (n, length)
-        Those of each agent, and what it has heard since it last decided.
+        Notes of each agent, and those that it has received since its last decision.
     sent : ndarray, shape (k, n, length)
-        Those that are on the air, by slot.
+        Notes in transit, by slot.
     hour : ndarray, shape (k,)
-        When they were sent, ``inf`` where none are on the air.
+        Hour at which they were sent, ``inf`` for unused slots.
     """
 
     own: FloatArray
@@ -45,15 +45,15 @@ class Notes(NamedTuple):
 
 
 def notes_for(kind: int, n: int, slots: int) -> Notes:
-    """Return the notes at hour 0; none of kind 0.
+    """Return the notes at hour 0; rows are empty for kind 0.
 
     Raises
     ------
     RefusedError
-        If agents are too many for notes on all others.
+        If there are too many agents for notes on all others.
     """
     if kind * n * n * (2 + slots) > MOST_NOTES:
-        raise RefusedError(f"{n} agents are too many for a policy whose agents note something of each other one")
+        raise RefusedError(f"{n} agents are too many for a policy in which each agent keeps notes on all others")
     row = np.zeros(kind * n + 2 * (kind == PARTITION))
     row[: n * (kind > 0)] = NOBODY
     heard = row.copy()
@@ -76,7 +76,7 @@ def precedes(one: FloatArray, other: FloatArray) -> bool:
 
 @compiled_in_place
 def take_newer(bids: FloatArray, told: FloatArray) -> None:
-    """Replace bids by those that are newer."""
+    """Replace bids by newer ones."""
     n = len(bids) // BIDS
     for i in range(n):
         is_known = bids[i] != NOBODY
@@ -87,7 +87,7 @@ def take_newer(bids: FloatArray, told: FloatArray) -> None:
 
 @compiled_in_place
 def hear(state: MissionArrays, notes: Notes, kind: int) -> None:
-    """Let agents hear the notes that have arrived by now."""
+    """Deliver the notes that have arrived by now."""
     head = state.head[0]
     for slot in range(len(notes.hour)):
         if not notes.hour[slot] + head.delay <= head.hour:
@@ -105,7 +105,7 @@ def hear(state: MissionArrays, notes: Notes, kind: int) -> None:
 
 @compiled_in_place
 def send(state: MissionArrays, notes: Notes, kind: int) -> None:
-    """Send the notes of all agents with the messages that are sent now."""
+    """Send the notes of all agents with their present messages."""
     head, n = state.head[0], len(notes.own)
     slot = head.tick % len(notes.hour)
     notes.hour[slot] = head.hour

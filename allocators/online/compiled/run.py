@@ -1,4 +1,4 @@
-"""Runs of policies with local knowledge in the compiled simulation, with the measures of the reference."""
+"""Runs of policies in the compiled simulation, with the same measures as the reference simulation."""
 
 import dataclasses
 import math
@@ -20,7 +20,7 @@ from alloc.problems.missions.simulation.measures import MissionResult
 
 
 def run_compiled(mission: Mission, policy: Policy, seed: int = 0) -> MissionResult:
-    """Return the measures of a mission under a policy: those of `simulate`, but for the times of decisions.
+    """Return the measures of a mission under a policy, equal to those of `simulate` except for decision times.
 
     Parameters
     ----------
@@ -28,14 +28,14 @@ def run_compiled(mission: Mission, policy: Policy, seed: int = 0) -> MissionResu
     policy : Policy
         `nearest`, `greedy`, `hedonic`, `auction`, `gappo` or `ppo`, with its parameters.
     seed : int
-        Of the run.
+        Seed of the run.
 
     Raises
     ------
     InputError
-        If the policy has no compiled loops.
+        If the policy has no compiled version.
     RefusedError
-        If the mission has distances that they do not know, or is too large.
+        If the mission is too large, or has distances that the compiled simulation does not support.
     """
     name = policy.info.name
     arrays = pack(mission, memory=memory_of(policy, mission))
@@ -46,12 +46,12 @@ def run_compiled(mission: Mission, policy: Policy, seed: int = 0) -> MissionResu
     elif name in NAMES:
         state = led(arrays, name, parameters_of(policy), seed, rank_of(mission.instance.agent_ids))
     else:
-        raise InputError(f"policy {name!r} has no compiled loops", "policy")
+        raise InputError(f"policy {name!r} has no compiled version", "policy")
     return measure(mission, state, name, seed)
 
 
 def memory_of(policy: Policy, mission: Mission) -> float:
-    """Return for how many hours a policy uses what was heard of other agents."""
+    """Return for how many hours a policy uses reports of other agents."""
     if isinstance(policy, NetworkPolicy):
         return MEMORY * mission.radio.period
     if policy.parameters_type is None or not issubclass(policy.parameters_type, UtilityParameters):
@@ -65,5 +65,5 @@ def parameters_of(policy: Policy) -> FloatArray:
 
 
 def rank_of(names: tuple[str, ...]) -> IntArray:
-    """Return the rank of each name in the order of letters."""
+    """Return the rank of each name in alphabetical order."""
     return np.argsort(np.argsort(np.array(names))).astype(np.intp)

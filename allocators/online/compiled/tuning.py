@@ -1,4 +1,4 @@
-"""The parameters of a policy, tuned by the optimiser and on the missions that `gappo` is evolved with.
+"""Tuning of a policy's parameters by CMA-ES, on the missions on which `gappo` is evolved.
 
 References
 ----------
@@ -35,11 +35,11 @@ FIRST = {
     "hedonic": {"stay": 1.5, "memory": 2.0, "missed": 0.05, "crowding": 0.5, "flight": 0.05, "age": 0.05},
     "auction": {"memory": 1.0, "stay": 3.0, "seats": 1.0, "flight": 1.0, "age": 0.05},
 }
-"""Where the parameters of each policy begin."""
+"""Initial parameters of each policy."""
 
 
 VALIDATED_EVERY = 5
-"""Generations from one validation to the next."""
+"""Number of generations between two validations."""
 
 
 class _Fitness(base.Fitness):  # type: ignore[misc]
@@ -47,7 +47,7 @@ class _Fitness(base.Fitness):  # type: ignore[misc]
 
 
 class _Candidate(list[float]):
-    """Logarithms of parameters, as DEAP expects individuals."""
+    """Logarithms of parameters as an individual of DEAP."""
 
     def __init__(self, values: FloatArray, cost: float) -> None:
         super().__init__(values.tolist())
@@ -62,11 +62,11 @@ class Tuned:
     ----------
     generation : int
     parameters : dict
-        Of the mean.
-    cost : float
-        On the missions of validation, as `validate` counts it.
+        Parameters at the mean of the search distribution.
+    cost : float or None
+        Cost on the validation missions, as in `validate`; None for generations without a validation.
     missions : int
-        Runs of training missions up to now.
+        Number of training missions run so far.
     """
 
     generation: int
@@ -82,22 +82,22 @@ def tune(
     state: Path | None = None,
     setting: MissionTrainingParameters | None = None,
 ) -> Iterator[Tuned]:
-    """Tune the parameters of a policy, and tell each generation; the one of lowest cost is best.
+    """Tune the parameters of a policy; yield every generation, of which that with the lowest cost is best.
 
     Parameters
     ----------
     policy : {"greedy", "hedonic", "auction"}
     generations : int
-        Those of `gappo` in which scores are evolved, for the same budget.
+        Number of generations; as many as `gappo` evolves scores in gives both the same budget.
     seed : int
-        Of all random numbers.
+        Seed of all random numbers.
     state : Path, optional
-        File (.npz) from which an interrupted tuning of the same policy and seed goes on.
+        File (.npz) with the state; an interrupted tuning of the same policy and seed resumes from it.
     setting : MissionTrainingParameters, optional
-        Candidates, missions and validations, those of `gappo` by default.
+        Numbers of candidates, missions and validations; by default those of `gappo`.
     """
     if policy not in FIRST:
-        raise InputError(f"{policy!r} is not to be tuned; {', '.join(FIRST)} are", "policy")
+        raise InputError(f"{policy!r} cannot be tuned; choose one of {', '.join(FIRST)}", "policy")
     setting = setting or MissionTrainingParameters()
     fields = dataclasses.fields(load_policy(policy).parameters)
     names, lows = [field.name for field in fields], np.array([field.metadata["low"] for field in fields])
@@ -108,7 +108,7 @@ def tune(
         with np.load(state) as archive:
             kept = dict(archive)
         if (str(kept["policy"]), int(kept["seed"])) != (policy, seed):
-            raise InputError("is of another policy or seed; name another file", source=named(state))
+            raise InputError("belongs to another policy or seed; choose another file", source=named(state))
         restore(strategy, kept)
     for generation in range(strategy.update_count, generations):
         rng = np.random.default_rng((seed, generation))
@@ -133,7 +133,7 @@ def _write(path: Path, arrays: Mapping[str, NDArray[np.generic]]) -> None:
 
 
 def _cost(policy: str, parameters: FloatArray, missions: list[tuple[PackedMission, int]]) -> float:
-    """Return the mean cost of missions."""
+    """Return the mean cost of a policy over missions."""
     rows = []
     for one, seed in missions:
         ranks = rank_of(tuple(f"a{number}" for number in range(1, len(one.arrays.agents) + 1)))

@@ -14,17 +14,17 @@ from alloc.problems.fields import FloatArray
 
 @compiled_in_place
 def fill_with(state: MissionArrays, number: int, situation: Situation, memory: float, goals: FloatArray) -> None:
-    """Fill in what an agent knows, and of others what it heard at most `memory` hours ago.
+    """Fill in what an agent knows; reports of other agents count up to `memory` hours.
 
     Parameters
     ----------
     state : MissionArrays
     number : int
-        Of the agent.
+        Index of the agent.
     situation : Situation
     memory : float
     goals : ndarray, shape (n,) or (0,)
-        Task of each agent, -1 for none, where that is agreed; where they were going by the last that was heard else.
+        Agreed task of each agent, -1 for none; if empty, the tasks in the last reports count.
     """
     fill_own(state, number, situation.own)
     fill_tasks(state, number, situation.task, situation.can)
@@ -35,7 +35,7 @@ def fill_with(state: MissionArrays, number: int, situation: Situation, memory: f
 
 @compiled_in_place
 def redirect(state: MissionArrays, number: int, situation: Situation, memory: float, goals: FloatArray) -> None:
-    """Let others whose tasks are agreed go to these, from where they were by the last that was heard."""
+    """Replace the tasks of other agents by the agreed ones, with arrivals from their last reported places."""
     head, row, found = state.head[0], state.agents[number].known, 0
     for i in range(len(state.agents)):
         report = state.reports[state.known_report[row, i]]
@@ -52,13 +52,13 @@ def redirect(state: MissionArrays, number: int, situation: Situation, memory: fl
 
 @compiled_in_place
 def best_task(room: Room, home: int, parameters: FloatArray) -> int:
-    """Return the task of highest utility in the situation that is filled in, -1 for none.
+    """Return the task of highest utility in the situation of `room`, -1 for none.
 
     Parameters
     ----------
     room : Room
     home : int
-        Task that the agent has already, -1 for none.
+        The agent's present task, -1 for none.
     parameters : ndarray
         In the order of `UtilityParameters`.
     """

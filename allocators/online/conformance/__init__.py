@@ -1,8 +1,8 @@
-"""Tests that every policy passes; subclass `PolicyConformance` in the tests of your own. Needs pytest."""
+"""Conformance tests for policies: subclass `PolicyConformance` in the tests of your own policy. Needs pytest."""
 
 import pytest
 
-pytest.register_assert_rewrite("alloc.allocators.online.conformance.suite")  # failed checks then show their values
+pytest.register_assert_rewrite("alloc.allocators.online.conformance.suite")  # makes failures show values
 
 from alloc.allocators.online.conformance.suite import PolicyConformance  # noqa: E402
 

@@ -1,4 +1,4 @@
-"""Missions small enough to be run many times, and pairs of missions that differ in what nobody can know yet."""
+"""Small missions for the conformance tests, and pairs that differ only in what no agent can know yet."""
 
 from functools import cache
 
@@ -11,10 +11,10 @@ from alloc.problems.vocabulary import Knowledge, MissionFamily
 FAMILIES = (MissionFamily.STEADY, MissionFamily.RECHARGING, MissionFamily.DEADLINES, MissionFamily.SILENCE)
 
 CHANGE = 2.0
-"""Hour at which the missions of a pair begin to differ."""
+"""Hour from which the missions of a pair differ."""
 
 HIDDEN_UNTIL = 1.5
-"""Hour before which no agent can have seen the task in which the missions of a pair differ, nor heard of it."""
+"""Hour before which no agent can have seen or heard of the task in which the missions of a pair differ."""
 
 
 @cache
@@ -25,7 +25,7 @@ def case(family: MissionFamily, knowledge: Knowledge) -> Mission:
 
 
 def short_of_energy(knowledge: Knowledge, horizon: float = 8.0) -> Mission:
-    """Return a mission in which agents see all tasks, and their batteries are enough for the nearest alone."""
+    """Return a mission in which agents see all tasks, but their batteries last only for the nearest ones."""
     instance = _instance((0.9, 0.9), 3.0, battery=2.0)
     return Mission(instance, knowledge=knowledge, horizon=horizon, seed=3)
 
@@ -49,7 +49,7 @@ def _mission(instance: Instance, knowledge: Knowledge, **fields: object) -> Miss
 
 
 def futures(knowledge: Knowledge) -> tuple[Mission, Mission]:
-    """Return two missions that are the same up to `CHANGE`: later tasks, work and failures differ."""
+    """Return two missions that are identical up to `CHANGE`; afterwards tasks, workloads and failures differ."""
     appears = np.array([0, 0, 0, 0, 0, CHANGE])
     calm = _mission(_instance((0.9, 0.2), 5), knowledge, appears=appears)
     events = [
@@ -60,5 +60,5 @@ def futures(knowledge: Knowledge) -> tuple[Mission, Mission]:
 
 
 def hidden() -> tuple[Mission, Mission]:
-    """Return two missions that differ in a task that is far from all agents, for agents with local knowledge."""
+    """Return two missions with local knowledge that differ only in a task far from all agents."""
     return tuple(_mission(_instance((0.9, 0.9), work), Knowledge.LOCAL) for work in (1.0, 40.0))  # type: ignore[return-value]

@@ -1,4 +1,4 @@
-"""The suite as one class."""
+"""The conformance tests of policies as a class."""
 
 from typing import ClassVar
 
@@ -16,18 +16,18 @@ Orders = list[tuple[object, ...]]
 
 
 class PolicyConformance:
-    """What the contract of `Policy` asks for, as tests; subclass it as ``class TestMine(PolicyConformance)``.
+    """Tests of the `Policy` contract; subclass it as ``class TestMine(PolicyConformance)``.
 
-    Give the subclass either `name` or a method `policy`.
+    The subclass sets `name` or overrides `policy`.
 
     Attributes
     ----------
     name : str
-        What to load; not needed where `policy` is overridden.
+        Name of the policy to load; not needed if `policy` is overridden.
     settings : dict
-        Parameters to load it with; where the clock counts for its orders, choose them so that it does not.
+        Parameters of the policy; choose them so that its orders do not depend on the clock.
     deadline_ms : float
-        Milliseconds that a decision may take on average, in missions of 3 agents.
+        Limit on the mean time of a decision in milliseconds, in missions of 3 agents.
     """
 
     name: ClassVar[str] = ""
@@ -39,7 +39,7 @@ class PolicyConformance:
         return load_policy(self.name, **self.settings)
 
     def knowledge(self) -> Knowledge:
-        """Return the least knowledge that the policy can do with."""
+        """Return the least knowledge that the policy works with."""
         return Knowledge.FULL if self.policy().info.central else Knowledge.LOCAL
 
     def run(self, mission: Mission, policy: Policy | None = None) -> MissionRun:
@@ -55,7 +55,7 @@ class PolicyConformance:
         assert "\n" not in info.summary
 
     def test_it_begins_as_it_says(self) -> None:
-        """Who begins decides for one agent, or for all if the policy is central."""
+        """The decider decides for one agent, or for all agents if the policy is central."""
         policy, mission = self.policy(), cases.case(MissionFamily.STEADY, Knowledge.FULL)
         agent = None if policy.info.central else "a1"
         decider = policy.begin(
@@ -65,25 +65,25 @@ class PolicyConformance:
 
     @pytest.mark.parametrize("family", cases.FAMILIES)
     def test_its_orders_can_be_followed(self, family: MissionFamily) -> None:
-        """No order is one that the agent cannot follow: unknown, over, out of range, or beyond its battery."""
+        """No order is refused: for an unknown or closed task, out of range, or beyond the battery."""
         run = self.run(cases.case(family, self.knowledge()))
         assert [record for record in run.log.records if record["record"] == "refused"] == []
         assert replay(run.log)[0] == run.result
 
     def test_nobody_is_sent_beyond_its_battery(self) -> None:
-        """Where batteries are enough for the nearest tasks alone, no order is for any other."""
+        """Where batteries last only for the nearest tasks, agents are sent to no other."""
         run = self.run(cases.short_of_energy(self.knowledge()))
         assert [record for record in run.log.records if record["record"] == "refused"] == []
 
     def test_the_same_seed_gives_the_same_orders(self) -> None:
-        """Its orders depend on the seed and on what it knows alone, also when it is used again."""
+        """Its orders depend only on the seed and on what it knows, also when the object is used again."""
         mission, policy = cases.case(MissionFamily.STEADY, self.knowledge()), self.policy()
         first = self.run(mission, policy).log.records
         assert self.run(mission, policy).log.records == first
         assert self.run(mission).log.records == first
 
     def test_it_answers_in_time(self) -> None:
-        """A decision takes no longer than its deadline on average; the first are left to what is loaded then."""
+        """Decisions meet the deadline on average, in a second run: the first one may still load and compile."""
         mission = cases.short_of_energy(self.knowledge(), horizon=1.0)
         self.run(mission)
         result = self.run(mission).result
@@ -91,9 +91,9 @@ class PolicyConformance:
         assert result.decision_ms_mean <= self.deadline_ms
 
     def test_it_knows_nothing_of_the_future(self) -> None:
-        """In two missions that differ from an hour on its orders and messages are the same before.
+        """In two missions that differ only from some hour on, its orders and messages before that hour are the same.
 
-        A policy that says that it is clairvoyant is told the future, and is no subject of this test.
+        Clairvoyant policies are exempt.
         """
         if self.policy().info.clairvoyant:
             return
@@ -101,14 +101,14 @@ class PolicyConformance:
         assert one == other
 
     def test_an_agent_knows_only_what_it_saw_and_heard(self) -> None:
-        """What is far from all agents changes none of their orders before one of them can have seen it."""
+        """A task far from all agents changes none of their orders before one of them can have seen it."""
         if self.policy().info.central:
             return
         one, other = (self.told(self.run(mission), cases.HIDDEN_UNTIL) for mission in cases.hidden())
         assert one == other
 
     def test_agents_share_nothing_but_messages(self) -> None:
-        """Orders are the same if each agent has a policy of its own."""
+        """Orders are the same if each agent has its own policy object."""
         if self.policy().info.central:
             return
         mission, suite = cases.case(MissionFamily.STEADY, Knowledge.LOCAL), self
@@ -117,7 +117,7 @@ class PolicyConformance:
             info = self.policy().info
 
             def __init__(self) -> None:
-                """Have no parameters."""
+                """Take no parameters."""
 
             def begin(self, briefing: Briefing) -> AgentDecider | FleetDecider:
                 return suite.policy().begin(briefing)
@@ -125,7 +125,7 @@ class PolicyConformance:
         assert self.run(mission, Separate()).log.records == self.run(mission).log.records
 
     def told(self, run: MissionRun, until: float) -> Orders:
-        """Return the orders and messages before an hour."""
+        """Return the orders and messages before hour `until`."""
         kinds = ("order", "refused", "message")
         records = (record for record in run.log.records if record["record"] in kinds)
         return [tuple(sorted(map(repr, record.items()))) for record in records if float(str(record["hour"])) < until]

@@ -1,1 +1,1 @@
-"""Groups of agents that hear of each other: what was planned for whom."""
+"""Groups of agents in radio contact, and the routes that they announce to each other."""

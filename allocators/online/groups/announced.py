@@ -1,4 +1,4 @@
-"""Routes that were planned for agents, as messages tell of them."""
+"""Routes that were planned for agents, as announced in messages."""
 
 import math
 from collections.abc import Sequence, Set
@@ -7,16 +7,16 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Route:
-    """What was planned for one agent.
+    """The route that was planned for one agent.
 
     Attributes
     ----------
     hour : float
-        When it was planned.
+        Hour at which it was planned.
     planner : str
-        By whom.
+        Id of the agent that planned it.
     visits : tuple of (str, float)
-        Tasks in their order, and the hour at which each was to be done.
+        Tasks in order, with the hour at which each is to be done.
     """
 
     hour: float
@@ -25,12 +25,12 @@ class Route:
 
     @property
     def end(self) -> float:
-        """Hour at which it was to be over."""
+        """Hour at which the last task is to be done."""
         return max((until for _, until in self.visits), default=self.hour)
 
     @property
     def tasks(self) -> list[str]:
-        """Ids of its tasks, in their order."""
+        """Ids of the tasks in order."""
         return [name for name, _ in self.visits]
 
 
@@ -47,13 +47,13 @@ class Announced:
         self.routes: dict[str, Route] = {}
 
     def plan(self, agent: str, route: Route) -> None:
-        """Take notice of a route, unless a newer one is known; of two of one hour and planner the last counts."""
+        """Record a route unless a newer one is known; at equal hour and planner, it replaces the known one."""
         known = self.routes.get(agent)
         if known is None or (route.hour, known.planner) >= (known.hour, route.planner):
             self.routes[agent] = route
 
     def _is_news(self, agent: str, hour: float, planner: str) -> bool:
-        """Whether a route is newer than the one that is known; of two of one hour that of the first planner counts."""
+        """Whether a route is newer than the known one; at equal hours, the planner with the smaller id wins."""
         known = self.routes.get(agent)
         return known is None or (hour, known.planner) > (known.hour, planner)
 
@@ -66,7 +66,7 @@ class Announced:
         return tuple(values)
 
     def hear(self, notes: Sequence[str | float]) -> None:
-        """Take over what is newer in the notes of a message."""
+        """Adopt those routes in the notes of a message that are newer than the known ones."""
         begin = 0
         while begin < len(notes):
             agent, hour, planner, count = notes[begin : begin + 4]
@@ -78,10 +78,10 @@ class Announced:
             begin = end
 
     def taken(self, group: Set[str], hour: float, patience: float) -> dict[str, float]:
-        """Return the tasks that are left to agents outside a group, and when each is to be done.
+        """Return the tasks that are reserved for agents outside a group, with the hour at which each is to be done.
 
-        A task belongs to the newest route that has it. A route counts until it ends, and `patience` times as long as it
-        was to take after that.
+        A task belongs to the newest route that contains it. A route is valid until its end plus `patience` times its
+        planned duration.
         """
         newest: dict[str, tuple[float, float, str]] = {}
         for agent, route in self.routes.items():
@@ -91,7 +91,7 @@ class Announced:
         return {name: until for name, (_, until, agent) in newest.items() if agent not in group}
 
     def joined(self, group: Sequence[str]) -> dict[str, list[str]]:
-        """Return the routes of a group; of routes of several plans that have a task in common the earliest keeps it."""
+        """Return the routes of a group; where several plans contain a task, the one that finishes it first keeps it."""
         routes = {agent: self.routes[agent] for agent in group if agent in self.routes}
         first: dict[str, tuple[float, float, str]] = {}
         for route in routes.values():

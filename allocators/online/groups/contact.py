@@ -1,4 +1,4 @@
-"""Who is in contact with an agent, directly or by others that pass messages on."""
+"""Agents that are in contact with an agent, directly or through others that relay messages."""
 
 import numpy as np
 
@@ -9,24 +9,24 @@ from alloc.problems.missions.simulation.state import ACTIVE
 
 
 def in_contact(view: View, radius: float, since: float) -> list[str]:
-    """Return the agents that messages of an agent reach in one or more steps, the agent itself included.
+    """Return the agents that an agent's messages reach in one or more hops, the agent itself included.
 
-    Agents that see farther than their radio reaches know of others that do not hear them. Those within the radius of
-    each other can have flown apart since they were reported. Where distances do not come of positions in a plane, all
-    count that are known well enough.
+    An agent that senses farther than its radio reaches knows of agents that cannot hear it. Two agents count as
+    connected if they may be within the radius, given how far each can have flown since it was reported. Where distances
+    do not follow from positions in a plane, all recently reported agents count.
 
     Parameters
     ----------
     view : View
     radius : float
-        Of the radio.
+        Radio radius.
     since : float
-        Hour; reports from before do not count.
+        Hour; older reports do not count.
 
     Returns
     -------
     list of str
-        In the order of their ids.
+        Sorted ids.
     """
     names = sorted(
         name for name, one in view.agents.items() if name == view.id or (one.status in ACTIVE and one.hour >= since)

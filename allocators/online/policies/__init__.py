@@ -1,1 +1,1 @@
-"""The policies that are built in."""
+"""The built-in policies."""

@@ -1,4 +1,4 @@
-"""The policy `auction`: agents bid for tasks, and agree on the winners by what they hear (CBAA)."""
+"""The policy `auction`: agents bid for tasks and agree on the winners through their messages (CBAA)."""
 
 import math
 from dataclasses import dataclass
@@ -18,16 +18,16 @@ class AuctionPolicyParameters(CheckedParameters):
     Attributes
     ----------
     memory : float
-        Hours after which a bid that was not renewed no longer counts.
+        Hours after which a bid that is not renewed expires.
     stay : float
-        Factor on the bid for the task that an agent has, when it looks for a better one; ``inf``: it never does while
-        it has a seat there.
+        Factor on an agent's bid for its present task when compared with bids for others; with ``inf`` it keeps the task
+        as long as it has a seat there.
     seats : float
-        Factor on the seats of a task.
+        Factor on the number of seats of a task.
     flight : float
-        How much an hour of flight counts beside an hour of work.
+        Weight of an hour of flight relative to an hour of work.
     age : float
-        How fast bids fall with the age, in hours, of what is known of the task.
+        Rate, per hour, at which bids decay with the age of the information on the task.
     """
 
     memory: float = bounded(1.0, low=0)
@@ -45,11 +45,11 @@ class _Bid:
 
 
 class ConsensusAuction(Policy):
-    """Each agent bids for one task at a time; a task has as many seats as there are agents for each open task.
+    """Each agent bids for one task at a time; a task has as many seats as there are agents per open task.
 
-    Bids are sent with every message, and newer ones replace older ones. Who is outbid for all seats of its task bids
-    for another where it is not. A bid is the share of the time that an agent would work rather than fly, times the
-    priority. Differences from the paper: several winners of a task, and single bids rather than bundles.
+    Every message carries bids, and newer ones replace older ones. An agent that is outbid for all seats of its task
+    bids for another one. A bid is the fraction of time that the agent would work rather than fly, times the priority.
+    Unlike in the paper, a task has several winners, and agents bid for single tasks rather than bundles.
 
     References
     ----------
@@ -64,7 +64,7 @@ class ConsensusAuction(Policy):
     parameters_type: ClassVar[type] = AuctionPolicyParameters
 
     def begin(self, briefing: Briefing) -> AgentDecider:
-        """Return who bids."""
+        """Return the bidder of an agent."""
         return _Bidder(briefing, self.parameters)
 
 
@@ -107,7 +107,7 @@ class _Bidder(AgentDecider):
         return (task.facts.priority + 1e-6) * share * math.exp(-self._parameters.age * (view.hour - task.hour))
 
     def _is_outbid(self, view: View, task: str, amount: float, seats: int) -> bool:
-        """Whether others hold all seats of a task with higher bids; ids decide between equals."""
+        """Whether other agents hold all seats of a task with higher bids; ids break ties."""
         own = view.own.facts.id
         higher = [
             name
@@ -120,7 +120,7 @@ class _Bidder(AgentDecider):
         return len(higher) >= seats
 
     def _hear_of_orders(self, view: View) -> None:
-        """Forget the bids of agents that were seen to go elsewhere since."""
+        """Drop the bids of agents that have since been seen on their way to another task."""
         for name, report in view.agents.items():
             bid = self._bids.get(name)
             if bid is not None and report.hour > bid.hour and report.task != bid.task:

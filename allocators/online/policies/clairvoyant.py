@@ -1,4 +1,4 @@
-"""The policy `clairvoyant`: plans routes knowing all that is to come, as a measure for others."""
+"""The policy `clairvoyant`: routes planned with knowledge of the future, as a reference for other policies."""
 
 from typing import ClassVar
 
@@ -21,21 +21,21 @@ KINDS = {
     EventKind.TASK_CHANGES: CHANGED,
     EventKind.TASK_CANCELLED: CANCELLED,
 }
-"""What each event is in the schedule of a plan."""
+"""Kind of each event in the schedule of a plan."""
 
 
 class Clairvoyant(Routes):
-    """Routes planned by one who is told the whole mission: what could have been reached, not a policy for use.
+    """Routes planned with knowledge of the whole mission: what could have been achieved, not a policy for use.
 
-    Its mission time is no proven bound, as the search may miss better plans; `mission_time_lower_bound` is one. Only
-    what the pace will be it does not know.
+    It knows all of the future but the pace. Its mission time is not a proven bound, as the search may miss better
+    plans; `mission_time_lower_bound` is one.
     """
 
-    info = PolicyInfo(name="clairvoyant", summary="routes, knowing all that is to come", central=True, clairvoyant=True)
+    info = PolicyInfo(name="clairvoyant", summary="routes, planned knowing the future", central=True, clairvoyant=True)
     parameters_type: ClassVar[type] = RoutesParameters
 
     def begin(self, briefing: Briefing) -> FleetDecider:
-        """Return who plans routes knowing the mission."""
+        """Return the planner of all routes."""
         assert briefing.mission is not None
         return _Clairvoyant(self.parameters, briefing, briefing.mission)
 
@@ -51,7 +51,7 @@ class _Clairvoyant(RoutePlanner):
         }
 
     def foresight(self, view: View) -> Foresight:
-        """Return all that is to come after the hour of a view."""
+        """Return everything that happens after the hour of a view."""
         events = [event for event in self._events if event.hour > view.hour]
         kinds = {event.task for event in events if event.kind is EventKind.TASK_APPEARS}
         joining = {event.agent for event in events if event.kind is EventKind.AGENT_JOINS}

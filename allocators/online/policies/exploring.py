@@ -1,4 +1,4 @@
-"""Looking around where an agent knows of nothing to do."""
+"""Exploration by agents that know of no task to do."""
 
 import math
 
@@ -10,10 +10,10 @@ from alloc.problems.missions.simulation.state import STAY, AgentStatus, Order
 from alloc.problems.vocabulary import Knowledge
 
 TRIES = 8
-"""Places that are drawn before an agent stays where it is."""
+"""Number of waypoints that are drawn before an agent stays where it is."""
 
 BATTERY_SHARE = 0.25
-"""Part of its battery that an agent spends on one flight without a task at the most."""
+"""Largest share of its battery that an agent spends on one exploration flight."""
 
 
 class Explorer:
@@ -29,7 +29,7 @@ class Explorer:
         self._is_blind = briefing.knowledge is Knowledge.LOCAL and briefing.sensing < math.inf
 
     def order(self, view: View) -> Order | None:
-        """Return where an agent without a task is to look; None where it is on its way already."""
+        """Return the exploration order of an agent without a task; None if it is already on its way."""
         own = view.own
         if not self._is_blind:
             return STAY

@@ -1,4 +1,4 @@
-"""The policies `gappo` and `ppo`: a network scores what an agent knows of tasks and of its neighbours."""
+"""The policies `gappo` and `ppo`: a network scores each agent's options from what it knows of tasks and neighbours."""
 
 import math
 from dataclasses import dataclass, replace
@@ -25,19 +25,19 @@ from alloc.problems.missions.simulation.state import ACTIVE, STAY, AgentStatus, 
 from alloc.problems.vocabulary import MANHATTAN, Knowledge
 
 REMEMBERED = ("seen", "goal", "decided", "tasks", "periods", "saved", "counted", "news")
-"""What a decider keeps from decision to decision; all else is scratch."""
+"""Fields of `Room` that persist between decisions; the others are scratch."""
 
 NOWHERE = (math.nan, math.nan, math.nan)
 
 
 @dataclass(frozen=True)
 class NetworkParameters(CheckedParameters):
-    """Parameters of a policy that is a network.
+    """Parameters of a network policy.
 
     Attributes
     ----------
     periods : int
-        Radio periods that an agent saves up for each message; one message is kept back for when its order changes.
+        Radio periods per message of an agent: a token bucket, which keeps one message in reserve for a changed order.
     """
 
     periods: int = bounded(12, low=1)
@@ -50,7 +50,7 @@ class NetworkPolicy(Policy):
     ----------
     parameters : NetworkParameters, optional
     policy : Path or str, optional
-        Policy file by ``alloc train gappo --missions``; the shipped one by default.
+        Policy file from ``alloc train gappo --missions``; by default the one that ships with the package.
     **settings
         Single parameters by name.
     """
@@ -75,22 +75,22 @@ class NetworkPolicy(Policy):
         _compile_loops(self._weights)
 
     def begin(self, briefing: Briefing) -> AgentDecider:
-        """Return who decides by the network."""
+        """Return the network decider of an agent."""
         return _NetworkDecider(briefing, self._weights, self.parameters.periods)
 
     def begin_turns(self, briefing: Briefing) -> TurnsDecider:
-        """Return who decides by the network for agents in turn."""
+        """Return the network decider for all agents in turn."""
         return NetworkTurns(briefing, self._weights)
 
 
 class PpoPolicy(NetworkPolicy):
-    """The same network, trained by PPO alone: what `gappo` is to be compared with.
+    """The same network, trained by PPO alone: the baseline for `gappo`.
 
     Parameters
     ----------
     parameters : NetworkParameters, optional
     policy : Path or str, optional
-        Policy file by ``alloc train ppo --missions``; the shipped one by default.
+        Policy file from ``alloc train ppo --missions``; by default the one that ships with the package.
     **settings
         Single parameters by name.
     """
@@ -145,7 +145,7 @@ class _NetworkDecider(AgentDecider):
         return view.message() if is_to_send(room.periods, room.saved, room.counted, room.news, 0, tick) else None
 
     def _with_room(self, n: int, m: int) -> Room:
-        """Return room for what is known now, with what the agent remembers."""
+        """Return arrays for `n` agents and `m` tasks, with what the agent remembers copied over."""
         fresh = room_for(n, m)
         kept = {name: getattr(self._room, name) for name in REMEMBERED}
         self._room = fresh._replace(**kept)
@@ -153,7 +153,7 @@ class _NetworkDecider(AgentDecider):
 
 
 def _compile_loops(weights: MissionWeights) -> None:
-    """Compile all loops that a decision needs, so that the first one is in time as well."""
+    """Compile all loops that a decision needs, so that the first one also meets its deadline."""
     room, area = room_for(1, 2), np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
     room.situation.own[:] = 1.0
     is_due(room, 0, 0.0, 1.0, 1, False)
@@ -165,7 +165,7 @@ def _compile_loops(weights: MissionWeights) -> None:
 
 
 def _fill(view: View, situation: Situation, tasks: list[TaskReport], span: float, memory: float) -> None:
-    """Fill in what an agent knows; tasks are the open ones, behind which one stands for all that are over."""
+    """Fill in what an agent knows; `tasks` are the open ones, and one column after them stands for all closed ones."""
     own = view.own
     index = {task.facts.id: j for j, task in enumerate(tasks)}
     place = own.place.position or NOWHERE
@@ -201,7 +201,7 @@ def _fill(view: View, situation: Situation, tasks: list[TaskReport], span: float
 
 
 def _distance(view: View, task: TaskReport) -> float:
-    """Return how far off a task is, rounded as in the compiled simulation, where others at one place are as near."""
+    """Return the distance to a task, rounded as in the compiled simulation so that ties are the same."""
     here, there = view.own.place.position, task.facts.place.position
     if here is None or there is None or ways_of(view) == OTHER_WAYS:
         return view.distance(view.own, task)
@@ -209,7 +209,7 @@ def _distance(view: View, task: TaskReport) -> float:
 
 
 def _target(view: View, report: AgentReport, index: dict[str, int]) -> int:
-    """Return the number of another's task; that of a task that is over stands behind all others."""
+    """Return the index of another agent's task; closed tasks share one index after all open ones."""
     if report.task is None or report.task not in view.tasks:
         return NOBODY
     return index.get(report.task, len(index))

@@ -1,4 +1,4 @@
-"""The policy `greedy`: each agent goes where most of its time is work."""
+"""The policy `greedy`: each agent goes where the largest fraction of its time would be work."""
 
 from typing import ClassVar
 
@@ -10,17 +10,17 @@ from alloc.problems.missions.simulation.state import Order
 
 
 class GreedyUtility(Policy):
-    """Each agent takes the task of highest utility by what it knows, whenever it decides.
+    """At each decision, an agent takes the task of highest utility by what it knows.
 
-    The utility of a task is its priority times the share of the time until it is done that the agent would work there,
-    rather than fly: so it prefers what is near, large, and not yet well served.
+    The utility of a task is its priority times the fraction of the time until its completion that the agent would work
+    there rather than fly; this favours tasks that are near, large and not yet well served.
     """
 
-    info = PolicyInfo(name="greedy", summary="where most of the agent's time is work, by what it knows")
+    info = PolicyInfo(name="greedy", summary="the task where the largest share of the agent's time is work")
     parameters_type: ClassVar[type] = UtilityParameters
 
     def begin(self, briefing: Briefing) -> AgentDecider:
-        """Return who takes the task of highest utility."""
+        """Return the decider of an agent."""
         return _Greedy(briefing, self.parameters)
 
 

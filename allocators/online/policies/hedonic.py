@@ -1,4 +1,4 @@
-"""The policy `hedonic`: a coalition-formation game on what was heard (GRAPE)."""
+"""The policy `hedonic`: a coalition-formation game on received messages (GRAPE)."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -12,15 +12,15 @@ from alloc.problems.missions.simulation.reports import Message, View
 from alloc.problems.missions.simulation.state import Order, TaskStatus
 
 STAMP = 13
-"""What chances are for, as `alloc.problems.missions.chance` counts."""
+"""First part of the key of random stamps; see `alloc.problems.missions.chance`."""
 
 
 @dataclass(frozen=True)
 class HedonicPolicyParameters(UtilityParameters):
-    """Parameters of the game, those of the utility of a coalition; the defaults are tuned.
+    """Parameters of a coalition's utility; the defaults are tuned.
 
-    A stable partition exists where each member takes away from the utility (`crowding`). `stay` is for the coalition
-    that an agent is in, and `memory` for others that were not heard of.
+    A stable partition exists if each further member lowers the utility (`crowding`). `stay` applies to the coalition
+    that an agent is in, and `memory` to agents that were not heard of.
     """
 
     stay: float = bounded(7.5, low=1)
@@ -32,10 +32,10 @@ class HedonicPolicyParameters(UtilityParameters):
 
 
 class HedonicCoalitions(Policy):
-    """Each agent believes in one partition of the agents into coalitions, and joins the one of highest utility.
+    """Each agent holds one partition of the agents into coalitions, and joins the coalition of highest utility.
 
-    It sends its partition with the number of changes and a random stamp, and adopts the partition with most changes,
-    then the highest stamp, among its own and those that it heard.
+    It sends its partition with the number of changes and a random stamp. Among its own and the received partitions, it
+    adopts the one with the most changes, then the highest stamp.
 
     References
     ----------
@@ -44,13 +44,13 @@ class HedonicCoalitions(Policy):
 
     info = PolicyInfo(
         name="hedonic",
-        summary="coalition-formation game on what was heard (GRAPE)",
+        summary="coalition-formation game on received messages (GRAPE)",
         citation="Jang, Shin and Tsourdos (2018), doi:10.1109/TRO.2018.2858292",
     )
     parameters_type: ClassVar[type] = HedonicPolicyParameters
 
     def begin(self, briefing: Briefing) -> AgentDecider:
-        """Return who joins coalitions."""
+        """Return the decider of an agent."""
         return _Member(briefing, self.parameters)
 
 

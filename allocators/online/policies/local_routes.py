@@ -1,4 +1,4 @@
-"""The policy `local-routes`: routes for agents that hear of each other, planned by one of them for all."""
+"""The policy `local-routes`: among agents in contact, one plans the routes of all."""
 
 import math
 from dataclasses import dataclass, replace
@@ -25,12 +25,12 @@ class LocalRoutesParameters(RoutesParameters):
     Attributes
     ----------
     contact : float
-        Radio periods after which who was not heard of is no longer planned for.
+        Radio periods after which agents that were not heard of are no longer planned for.
     patience : float
-        How much longer than planned others have for their tasks, over the time that they were to take, before these
-        tasks are planned anew.
+        Delay after the planned end of another agent's route, relative to the planned duration, after which its tasks
+        are planned anew.
     fresh : float
-        Radio periods after which a place is to be looked at again, where there is nothing to do.
+        Radio periods after which idle agents explore a place again.
     """
 
     iterations: int = bounded(300, low=0)
@@ -41,15 +41,15 @@ class LocalRoutesParameters(RoutesParameters):
 
 
 class LocalRoutes(Policy):
-    """Of the agents that hear of each other the first plans routes for all; messages tell of them.
+    """Among agents in contact, the one with the smallest id plans routes for all and announces them in messages.
 
     Raises
     ------
     InputError
-        If a setting is out of range.
+        If a parameter is out of range.
     """
 
-    info = PolicyInfo(name="local-routes", summary="sequences of tasks, planned by one agent for all that it hears of")
+    info = PolicyInfo(name="local-routes", summary="sequences of tasks, planned by one agent for all in contact")
     parameters_type: ClassVar[type] = LocalRoutesParameters
 
     def __init__(self, parameters: LocalRoutesParameters | None = None, **settings: object) -> None:
@@ -57,7 +57,7 @@ class LocalRoutes(Policy):
         warm_up()
 
     def begin(self, briefing: Briefing) -> AgentDecider:
-        """Return who plans routes, or follows them."""
+        """Return the decider of an agent: it plans routes or follows them."""
         return _Planner(self.parameters, briefing)
 
 
@@ -74,7 +74,7 @@ class _Planner(AgentDecider):
         self._waits_since = math.inf
 
     def decide(self, view: View) -> Order | None:
-        """Return the first task of the agent's route; a new plan is made where there is news."""
+        """Return the first task of the agent's route, after planning anew if agents or tasks have changed."""
         for message in view.heard:
             self._announced.hear(message.notes)
         self._lookout.note(view)
@@ -88,12 +88,12 @@ class _Planner(AgentDecider):
             task = view.tasks.get(name)
             if task is not None and view.refusal(view.own, task) is None:
                 return Order(name)
-        if self._tasks_open(view, str(view.id)):  # for which its battery no longer lasts: others are to do them
+        if self._tasks_open(view, str(view.id)):  # its battery no longer suffices: leave them to others
             self._announced.plan(str(view.id), Route(view.hour, str(view.id), ()))
         return self._lookout.order(view, [self._end(view, name) for name in group if name != view.id])
 
     def _help(self, view: View, group: list[str]) -> None:
-        """Let an agent without a task take the nearest one of others out of contact who are late, or come later."""
+        """Let an agent without tasks take the nearest task of agents out of contact that are late or would be later."""
         taken = self._announced.taken(set(group), view.hour, self._parameters.patience)
         best, least = None, math.inf
         for task in view.open_tasks(view.own):
@@ -105,11 +105,11 @@ class _Planner(AgentDecider):
             self._announced.plan(str(view.id), Route(view.hour, str(view.id), ((best.facts.id, until),)))
 
     def message(self, view: View) -> Message | None:
-        """Return all that is known, and all routes."""
+        """Return a message with all that the agent knows, and all routes."""
         return view.message(self._announced.notes())
 
     def _has_waited(self, view: View, group: list[str]) -> bool:
-        """Whether there were tasks for longer than a plan takes to come, and none for the agent."""
+        """Whether unplanned tasks were open, and the agent had none, for longer than a plan takes to arrive."""
         if self._tasks_open(view, str(view.id)) or not (self._open(view, set(group)) - self._planned_for(group)):
             self._waits_since = math.inf
         self._waits_since = min(self._waits_since, view.hour)
@@ -127,17 +127,17 @@ class _Planner(AgentDecider):
         return {task for name in group for task in self._tasks_of(name)}
 
     def _open(self, view: View, group: set[str]) -> set[str]:
-        """Return the tasks that are open and not left to others."""
+        """Return the open tasks that are not reserved for agents outside the group."""
         taken = self._announced.taken(group, view.hour, self._parameters.patience)
         return {name for name, task in view.tasks.items() if task.status is TaskStatus.OPEN and name not in taken}
 
     def _end(self, view: View, name: str) -> Place:
-        """Return where an agent will be free."""
+        """Return the place where an agent's route ends."""
         tasks = self._tasks_open(view, name)
         return view.tasks[tasks[-1]].facts.place if tasks else view.agents[name].place
 
     def _renew(self, view: View, group: list[str]) -> None:
-        """Plan routes for some agents, if agents or tasks are not those of the last plan, or it has tasks no more."""
+        """Plan routes for a group, if its agents or tasks have changed since its last plan, or tasks are unplanned."""
         tasks = self._open(view, set(group))
         news = (*group, frozenset(tasks))
         if news == self._planned and tasks - self._planned_for(group) <= self._search.given_up:
@@ -158,7 +158,7 @@ class _Planner(AgentDecider):
 
 
 def _advanced(view: View, report: AgentReport) -> AgentReport:
-    """Return an agent that flies as it is now, if it has gone on as it went when it was heard of."""
+    """Return a report of a flying agent extrapolated to now, assuming that it has kept its course."""
     goal = view.tasks.get(report.task or "")
     age = view.hour - report.hour
     here = report.place.position

@@ -1,4 +1,4 @@
-"""The network of `gappo` decides for agents in turn, where all know all: one compiled loop instead of one view each."""
+"""Decisions of the network for all agents in turn, under full knowledge: one compiled loop instead of a view each."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -18,13 +18,13 @@ from alloc.problems.missions.simulation.state import STAY, AgentStatus, Order, T
 from alloc.problems.vocabulary import GEOGRAPHIC, MANHATTAN
 
 AT_ONCE = 32
-"""Agents for whom the loop decides before it is asked whether there is time for more."""
+"""Number of agents for which the loop decides before the caller may stop it."""
 
 NOWHERE = (math.nan, math.nan, math.nan)
 
 
 class NetworkTurns(TurnsDecider):
-    """Decides by the network, agents in turn.
+    """Network decider for all agents in turn.
 
     Parameters
     ----------
@@ -55,13 +55,13 @@ class NetworkTurns(TurnsDecider):
             for place, (name, choice) in enumerate(zip(some, choices.tolist(), strict=True), 1):
                 try:
                     yield name, orders[choice]
-                except GeneratorExit:  # the orders that nobody asked for are not given: these agents have not decided
+                except GeneratorExit:  # the caller stopped: undo the decisions that it did not take
                     for part, then in zip(remembered, before, strict=True):
                         part[rows[place:]] = then[place:]
                     raise
 
     def _met(self, view: View, tasks: list[TaskReport]) -> Together:
-        """Return what all know, and when they last considered it."""
+        """Fill in and return what all agents know, with the hour of each one's last decision."""
         agents = list(view.agents.values())
         self._make_room(list(view.agents), len(tasks) + 1)
         together, places = self._together, [agent.place for agent in agents]
@@ -79,7 +79,7 @@ class NetworkTurns(TurnsDecider):
         return together
 
     def _make_room(self, names: list[str], m: int) -> None:
-        """Have room for these agents and m tasks; what agents remember is kept."""
+        """Allocate arrays for these agents and `m` tasks; keep what agents remember."""
         before, rows = self._together, {name: i for i, name in enumerate(self._names)}
         if names == self._names and m == before.can.shape[1]:
             return
@@ -92,7 +92,7 @@ class NetworkTurns(TurnsDecider):
 
 
 def _compile_loops(weights: MissionWeights) -> None:
-    """Compile all loops, so that the first decision is in time as well."""
+    """Compile all loops, so that the first decision also meets its deadline."""
     together = together_for(1, 2)
     together.own[:] = 1.0
     meet(together)
@@ -100,14 +100,14 @@ def _compile_loops(weights: MissionWeights) -> None:
 
 
 def ways_of(view: View) -> int:
-    """Return by which metric distances are measured, see `situation`."""
+    """Return the code of the metric; see `alloc.allocators.learned.missions.situation`."""
     if view.has_table or view.metric == GEOGRAPHIC:
         return known.OTHER_WAYS
     return known.MANHATTAN_WAYS if view.metric == MANHATTAN else known.EUCLIDEAN_WAYS
 
 
 def _own(view: View, agent: AgentReport, span: float, index: dict[str, int]) -> tuple[float, ...]:
-    """Return what an agent knows of itself; a task that is over stands behind all open ones."""
+    """Return what an agent knows of itself; closed tasks share one index after all open ones."""
     facts = agent.facts
     return (
         view.hour,
@@ -130,7 +130,7 @@ def _facts(task: TaskReport) -> tuple[float, ...]:
 
 
 def _reach(view: View, agents: list[AgentReport], tasks: list[TaskReport], ways: FloatArray) -> BoolArray:
-    """Return which tasks each agent can take, as `View.refusal` says one by one."""
+    """Return which tasks each agent can take, shape (agents, tasks); the same as `View.refusal` for each pair."""
     is_home_far = view.has_table or any(task.facts.place.position is None for task in tasks)
     if is_home_far and any(agent.facts.returns for agent in agents):
         return np.array([[view.refusal(agent, task) is None for task in tasks] for agent in agents])

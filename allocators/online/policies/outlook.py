@@ -1,4 +1,4 @@
-"""What an agent expects of tasks: who else will work there, and when they will be done."""
+"""Forecasts of tasks by an agent: who else will work there, and when they will be done."""
 
 import math
 from collections.abc import Mapping
@@ -16,17 +16,17 @@ class UtilityParameters(CheckedParameters):
     Attributes
     ----------
     stay : float
-        Factor on the utility of the task that an agent has already.
+        Factor on the utility of an agent's present task.
     memory : float
-        Hours after which what was heard of others no longer counts.
+        Hours after which reports of other agents no longer count.
     missed : float
-        Factor on the utility of a task that will miss its deadline even with the agent.
+        Factor on the utility of a task that will miss its deadline even with the agent's help.
     crowding : float
-        How much each other agent that is at a task, or on its way there, takes away from its utility.
+        Strength of the decrease in utility with the number of other agents at the task or on their way there.
     flight : float
-        How fast utility falls with the hours of the flight.
+        Rate, per hour of flight, at which utility decays.
     age : float
-        How fast utility falls with the age, in hours, of what is known of the task.
+        Rate, per hour, at which utility decays with the age of the information on the task.
     """
 
     stay: float = bounded(4.8, low=0)
@@ -38,22 +38,22 @@ class UtilityParameters(CheckedParameters):
 
 
 Group = list[tuple[float, float]]
-"""Hour of arrival and ability of each."""
+"""Hour of arrival and ability of each member."""
 
 
 @dataclass(frozen=True)
 class Prospect:
-    """A task, as an agent expects it to go on.
+    """An agent's forecast of a task.
 
     Attributes
     ----------
     task : TaskReport
     arrival : float
-        Hour at which the agent would be there.
+        Hour at which the agent would arrive.
     without, with_me : float
-        Hour at which the task is done without the agent, and with it.
+        Expected hour of completion without the agent, and with it.
     group : int
-        Others that are there, or on their way.
+        Number of other agents that are there or on their way.
     """
 
     task: TaskReport
@@ -69,15 +69,15 @@ class Prospect:
 
 
 def prospects(view: View, memory: float, task_of: Mapping[str, str] | None = None) -> list[Prospect]:
-    """Return what an agent expects of the tasks that it knows and can take.
+    """Return an agent's forecasts of the tasks that it knows and can take.
 
     Parameters
     ----------
     view : View
     memory : float
-        Hours after which what was heard of others no longer counts.
+        Hours after which reports of other agents no longer count.
     task_of : mapping of str to str, optional
-        Task of each other agent, where that is agreed; where they were going by the last that was heard by default.
+        Agreed task of each other agent; by default the task in the last report of it.
     """
     own = view.own
     groups = _groups(view, memory, task_of)
@@ -94,7 +94,7 @@ def prospects(view: View, memory: float, task_of: Mapping[str, str] | None = Non
 
 
 def utility(hour: float, prospect: Prospect, parameters: UtilityParameters, *, is_own: bool) -> float:
-    """Return the utility of a task: its priority times the share of the time until it is done that would be work.
+    """Return the utility of a task: its priority times the share of the time until completion that would be work.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def utility(hour: float, prospect: Prospect, parameters: UtilityParameters, *, i
     prospect : Prospect
     parameters : UtilityParameters
     is_own : bool
-        Whether it is the task that the agent has already.
+        Whether it is the agent's present task.
     """
     if not prospect.is_useful:
         return 0.0
@@ -116,7 +116,7 @@ def utility(hour: float, prospect: Prospect, parameters: UtilityParameters, *, i
 
 
 def _groups(view: View, memory: float, task_of: Mapping[str, str] | None) -> dict[str, Group]:
-    """Return who else is at each task, or on its way there, as far as is known."""
+    """Return the other agents that are known to be at each task or on their way there."""
     groups: dict[str, Group] = {}
     for name, report in view.agents.items():
         goal = report.task if task_of is None else task_of.get(name)
@@ -130,7 +130,7 @@ def _groups(view: View, memory: float, task_of: Mapping[str, str] | None) -> dic
 
 
 def done_at(left: float, since: float, group: Group) -> float:
-    """Return the hour at which work is done that is left since an hour, by those who arrive; ``inf`` if nobody does."""
+    """Return the hour at which a group completes the work left at hour `since`; ``inf`` for an empty group."""
     rate = work = 0.0
     hour = math.inf
     for arrival, ability in sorted(group):

@@ -1,4 +1,4 @@
-"""The policy `replan`: an allocator is applied to what is left, whenever something happens."""
+"""The policy `replan`: runs an allocator on a snapshot of the mission at every event."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,21 +18,21 @@ from alloc.problems.missions.simulation.state import STAY, Order
 from alloc.problems.missions.snapshot import snapshot
 
 DEADLINE_SHARE = 0.7
-"""Part of the time for a decision that the method gets: the rest is for the snapshot and the orders."""
+"""Share of the decision's time limit that the method gets; the rest is for the snapshot and the orders."""
 
 
 @dataclass(frozen=True)
 class ReplanParameters(CheckedParameters):
-    """Parameters of re-planning.
+    """Parameters of replanning.
 
     Attributes
     ----------
     method : str
-        The allocator, one of `names`.
+        Name of the allocator, one of `names`.
     iterations : int
-        Of each run, in the method's own unit: the same seed gives the same mission unless the deadline cuts runs off.
+        Limit of each run, in the method's own unit: the same seed gives the same mission unless a deadline ends a run.
     move_price : float
-        Energy that each agent counts for that gets another task than it has, >= 0; energy then counts as well.
+        Penalty, in energy, for each agent whose task changes, >= 0; if positive, energy is minimised as well.
     """
 
     method: str = "local-search"
@@ -41,18 +41,18 @@ class ReplanParameters(CheckedParameters):
 
 
 class Replan(Policy):
-    """An allocator of ours leads all agents: it gets the snapshot of what is left at every event.
+    """Runs an allocator of this package on a snapshot of the mission at every event.
 
-    Agents are where they are, tasks have the work that is left, and the orders in force are its start. What comes later
-    it does not know, nor that an agent can take another task after its first.
+    The snapshot has agents at their present places and tasks with the work left; the orders in force are the warm
+    start. The allocator ignores later events, and that agents can take further tasks after their first.
 
     Raises
     ------
     InputError
-        If the method is unknown, or a setting is out of range.
+        If the method is unknown, or a parameter is out of range.
     """
 
-    info = PolicyInfo(name="replan", summary="any allocator on what is left, at every event", central=True)
+    info = PolicyInfo(name="replan", summary="any allocator on a snapshot of the mission, at every event", central=True)
     parameters_type: ClassVar[type] = ReplanParameters
 
     def __init__(self, parameters: ReplanParameters | None = None, **settings: object) -> None:
@@ -63,11 +63,11 @@ class Replan(Policy):
         )  # compiles loops
 
     def begin(self, briefing: Briefing) -> FleetDecider:
-        """Return who plans anew."""
+        """Return the planner for all agents."""
         return _Replanner(self, briefing)
 
     def plan(self, view: View, seed: int, time_limit_s: float | None) -> dict[str, str | None]:
-        """Return the task of each agent by a new plan; empty where nothing is to be planned."""
+        """Return the task of each agent in a new plan; empty if there is nothing to plan."""
         instance = snapshot(view)
         if instance is None:
             return {}
@@ -95,7 +95,7 @@ class Replan(Policy):
 
 
 def _tiny(method: Allocator) -> Instance:
-    """Return an instance that has all that snapshots have: travel times, batteries, more tasks than agents."""
+    """Return a tiny instance with all features of snapshots: travel times, batteries, more tasks than agents."""
     places = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]
     return Instance(
         ability=[1, 2],

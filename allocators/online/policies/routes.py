@@ -1,4 +1,4 @@
-"""The policy `routes`: looks ahead over sequences of tasks, and improves its plan at every event."""
+"""The policy `routes`: plans sequences of tasks, and improves the plan at every event."""
 
 import time
 from collections.abc import Mapping
@@ -14,21 +14,21 @@ from alloc.problems.missions.simulation.reports import View
 from alloc.problems.missions.simulation.state import ACTIVE, STAY, Order, TaskStatus
 
 DEADLINE_SHARE = 0.6
-"""Part of the time for a decision that the search gets: the rest is for what is around it."""
+"""Share of the decision's time limit that the search gets; the rest is for the view and the orders."""
 
 
 @dataclass(frozen=True)
 class RoutesParameters(CheckedParameters):
-    """Parameters of plans of routes.
+    """Parameters of route planning.
 
     Attributes
     ----------
     iterations : int
-        Changes of the plan that are tried at each event, unless the deadline comes before.
+        Changes of the plan that are tried at each event, unless the deadline ends the search.
     first_iterations : int
-        Those of the first plan.
+        The same for the first plan.
     switch_price : float
-        What each agent counts that leaves its task for another, in units of the hours that all work would take if
+        Penalty for each agent that leaves its task for another, in units of the hours that all work would take if
         flights took no time, >= 0.
     """
 
@@ -38,17 +38,16 @@ class RoutesParameters(CheckedParameters):
 
 
 class Routes(Policy):
-    """Each agent has a sequence of tasks, coalitions meet at tasks, and the plan is improved at every event.
+    """Each agent has a sequence of tasks, coalitions meet at tasks, and local search improves the plan at every event.
 
     Raises
     ------
     InputError
-        If a setting is out of range.
+        If a parameter is out of range.
 
     References
     ----------
-    Christiaens and Vanden Berghe (2020), doi:10.1287/trsc.2019.0914: visits taken out near each other, put back with
-    blinks.
+    Christiaens and Vanden Berghe (2020), doi:10.1287/trsc.2019.0914: removal of adjacent visits, insertion with blinks.
     """
 
     info = PolicyInfo(name="routes", summary="sequences of tasks, improved at every event", central=True)
@@ -59,22 +58,22 @@ class Routes(Policy):
         warm_up()
 
     def begin(self, briefing: Briefing) -> FleetDecider:
-        """Return who plans routes."""
+        """Return the planner of all routes."""
         return RoutePlanner(self.parameters, briefing)
 
 
 class ImprovedRoutes(NamedTuple):
-    """Routes of all agents of a situation.
+    """Result of a search: routes of all agents of a situation.
 
     Attributes
     ----------
     described : Described
     routes, lengths : ndarray of int, shapes (n, c) and (n,)
-        Tasks of each agent by number, and how many there are.
+        Task indices of each agent, and the length of each route.
     names : dict of str to list of str
-        Ids of these tasks, by agent.
+        Task ids of each agent, by agent id.
     tried : set of str
-        Tasks that there was time to try.
+        Tasks whose insertion was tried in time.
     """
 
     described: Described
@@ -85,7 +84,7 @@ class ImprovedRoutes(NamedTuple):
 
 
 class RouteSearch:
-    """Improves routes each time that the situation has changed.
+    """Improves routes whenever the situation has changed.
 
     Parameters
     ----------
@@ -96,7 +95,7 @@ class RouteSearch:
     ----------
     describer : Describer
     given_up : set of str
-        Tasks that are in no route, although they were tried.
+        Tasks in no route although their insertion was tried.
     """
 
     def __init__(self, parameters: RoutesParameters, briefing: Briefing) -> None:
@@ -108,7 +107,7 @@ class RouteSearch:
         self.given_up: set[str] = set()
 
     def improve(self, view: View, foresight: Foresight, before: Mapping[str, list[str]]) -> ImprovedRoutes | None:
-        """Return routes that go on from those before; None where there is nothing to plan."""
+        """Return routes improved from those before; None if there is nothing to plan."""
         began = time.perf_counter()
         described = self.describer.describe(view, foresight)
         if described is None:
@@ -128,7 +127,7 @@ class RouteSearch:
 
 
 class RoutePlanner(FleetDecider):
-    """Leads all agents by routes.
+    """Decides for all agents by planning routes.
 
     Parameters
     ----------
@@ -141,11 +140,11 @@ class RoutePlanner(FleetDecider):
         self._routes: dict[str, list[str]] = {}
 
     def foresight(self, view: View) -> Foresight:
-        """Return what is known to come: nothing."""
+        """Return what is known of the future: nothing."""
         return Foresight()
 
     def decide(self, view: View) -> Mapping[str, Order]:
-        """Return the first task of each route, after it was improved."""
+        """Improve the routes, and return the first task of each as an order."""
         found = self._search.improve(view, self.foresight(view), self._routes)
         if found is None:
             return {}

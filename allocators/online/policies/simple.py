@@ -7,12 +7,12 @@ from alloc.problems.missions.simulation.state import STAY, Order, TaskStatus
 
 
 class Idle(Policy):
-    """Nobody does anything: what happens of itself, beside which other policies are set."""
+    """No agent does anything: the baseline of what happens without any orders."""
 
-    info = PolicyInfo(name="idle", summary="nobody does anything")
+    info = PolicyInfo(name="idle", summary="no agent does anything")
 
     def begin(self, briefing: Briefing) -> AgentDecider:
-        """Return who stays where it is, and sends nothing."""
+        """Return a decider that stays where it is and sends nothing."""
         return _Idle()
 
 
@@ -25,27 +25,27 @@ class _Idle(AgentDecider):
 
 
 class RandomTask(Policy):
-    """Each agent takes any task that it knows and can take, and stays with it until it is over."""
+    """Each agent takes a random task among those that it knows and can take, and stays with it until it is closed."""
 
-    info = PolicyInfo(name="random", summary="any task that the agent knows and can take, until it is over")
+    info = PolicyInfo(name="random", summary="a random task that the agent knows and can take, until it is closed")
 
     def begin(self, briefing: Briefing) -> AgentDecider:
-        """Return who draws tasks."""
+        """Return the decider of an agent."""
         return _RandomTask(briefing)
 
 
 class Nearest(Policy):
-    """Each agent takes the nearest task that it knows and can take, and stays with it until it is over."""
+    """Each agent takes the nearest task that it knows and can take, and stays with it until it is closed."""
 
-    info = PolicyInfo(name="nearest", summary="the nearest task that the agent knows and can take, until it is over")
+    info = PolicyInfo(name="nearest", summary="the nearest task that the agent knows and can take, until it is closed")
 
     def begin(self, briefing: Briefing) -> AgentDecider:
-        """Return who goes to the nearest task."""
+        """Return the decider of an agent."""
         return _Nearest(briefing)
 
 
 class _UntilOver(AgentDecider):
-    """An agent that stays with its task until it is over, and then chooses another."""
+    """A decider that stays with its task until it is closed, and then chooses another."""
 
     def __init__(self, briefing: Briefing) -> None:
         self._explorer, self._rng = Explorer(briefing), briefing.generator()
@@ -71,6 +71,6 @@ class _Nearest(_UntilOver):
 
 
 def has_open_task(view: View) -> bool:
-    """Whether the agent has a task that is open as far as it knows."""
+    """Whether the agent has a task that, as far as it knows, is open."""
     task = view.own.task
     return task is not None and task in view.tasks and view.tasks[task].status is TaskStatus.OPEN

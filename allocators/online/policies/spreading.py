@@ -1,4 +1,4 @@
-"""Looking around together: each where nobody was for long, and else spread out over the area."""
+"""Joint exploration: agents go where none has been for long, and otherwise spread out over the area."""
 
 from collections.abc import Iterable
 
@@ -17,15 +17,16 @@ CELLS = 20
 """Cells along the longer side of the area."""
 
 NEAR = 0.1
-"""Part of the sensing radius within which an agent is where it is to be."""
+"""Share of the sensing radius within which an agent counts as being at its goal."""
 
 
 class Lookout:
-    """Where an agent looks around that has nothing to do.
+    """Exploration orders for an agent that has nothing to do.
 
-    The area is divided in cells, and each belongs to the agent that is nearest to it. An agent goes to that of its
-    cells that was not seen for longest over the hours that it takes to see it; where all were seen lately, to their
-    middle. A cell is seen from where its corners are within the sensing radius too, or its middle within half of it.
+    The area is divided into cells, each of which belongs to the nearest agent. An agent goes to its cell with the
+    largest ratio of hours since it was last seen to hours until the agent can see it; if all its cells were seen
+    recently, to their centroid. A cell counts as seen if all of it is within the sensing radius, or its centre within
+    half of the radius.
 
     Parameters
     ----------
@@ -47,7 +48,7 @@ class Lookout:
         self._goal = -1
 
     def note(self, view: View) -> None:
-        """Take notice of what agents have seen, by what is known of where they were."""
+        """Mark the cells that agents have seen from their known places."""
         if not self._is_blind or is_fixed(view):
             return
         reports = [report for report in view.agents.values() if report.place.position is not None]
@@ -56,7 +57,7 @@ class Lookout:
         self._seen = np.maximum(self._seen, np.where(near, hours[:, None], -np.inf).max(axis=0, initial=-np.inf))
 
     def order(self, view: View, others: Iterable[Place]) -> Order | None:
-        """Return where to look around, when others are at some places; None where the agent is on its way already."""
+        """Return an exploration order, given the places of other agents; None if the agent is already on its way."""
         own = view.own
         here = own.place.position
         if not self._is_blind or here is None or is_fixed(view):
@@ -85,11 +86,11 @@ class Lookout:
         return x, y, z
 
     def _distances(self, view: View, places: list[Place]) -> FloatArray:
-        """Return how far places are from all cells, shape (places, cells)."""
+        """Return the distances of places to all cells, shape (places, cells)."""
         return by_metric(view.metric, positions(places), self._cells)
 
 
 def _middles(low: float, high: float, side: float) -> FloatArray:
-    """Return the middles of cells along an axis."""
+    """Return the centres of cells along an axis."""
     count = max(1, round((high - low) / side))
     return low + (high - low) * (np.arange(count) + 0.5) / count

@@ -1,1 +1,1 @@
-"""Plans that look ahead: each agent has a sequence of tasks, and coalitions meet at tasks."""
+"""Route plans: each agent has a sequence of tasks, and coalitions meet at tasks."""

@@ -1,4 +1,4 @@
-"""Tasks put into routes one by one, always the one that takes least time for its weight."""
+"""Greedy insertion of tasks into routes: next is always the task with the least cost per weight."""
 
 # ruff: noqa: NPY002 - compiled code seeds numba's own generator
 
@@ -10,18 +10,18 @@ from alloc.allocators.online.routes.situation import Floats, Ints, Situation
 from alloc.allocators.runtime.compiled import compiled, inlined
 
 NOISE = 0.3
-"""Share by which costs are blurred, so that no two rebuilt plans are the same."""
+"""Largest relative random noise on costs, which diversifies rebuilt plans."""
 
 
 @compiled
 def insert_cheapest(
     s: Situation, r: Schedule, routes: Ints, lengths: Ints, slack: Floats, waiting: Ints, balance: float
 ) -> None:
-    """Put tasks where one agent can do them in time, while there are such places; -1 in `waiting` for those put."""
+    """Insert tasks that a single agent can do in time, while there are any; set inserted ones to -1 in `waiting`."""
     n, count = len(lengths), len(waiting)
     cost, place, leaves = np.empty((count, n)), np.empty((count, n), np.int64), np.empty((count, n))
     cheapest, blur = np.empty(count, np.int64), 1 + NOISE * np.random.random(count)
-    is_bound = np.zeros((count, n), np.bool_)  # costs only rise as routes fill, so that earlier ones are bounds
+    is_bound = np.zeros((count, n), np.bool_)  # costs only rise as routes fill: old ones are lower bounds
     for k in range(count):
         for i in range(n):
             cost[k, i], place[k, i], leaves[k, i] = _best_of(s, r, routes, lengths, slack, i, waiting[k], balance)
@@ -39,9 +39,9 @@ def insert_cheapest(
         insert(s, r, routes, lengths, slack, i, at, j, leaves[k, i])
         waiting[k] = -1
         for k in range(count):
-            if waiting[k] >= 0 and cost[k, i] < np.inf:  # where there was no place there is none now
+            if waiting[k] >= 0 and cost[k, i] < np.inf:  # infeasible insertions stay infeasible
                 is_bound[k, i] = True
-                for p in range(at, at + 2):  # beside the new visit it may be nearer
+                for p in range(at, at + 2):  # next to the new visit it may be cheaper
                     beside, left = _cost_at(s, r, routes, lengths, slack, i, p, waiting[k], balance)
                     if beside < cost[k, i]:
                         cost[k, i], place[k, i], leaves[k, i], is_bound[k, i] = beside, p, left, False
@@ -51,7 +51,7 @@ def insert_cheapest(
 
 @compiled
 def _least(s: Situation, waiting: Ints, cost: Floats, cheapest: Ints, blur: Floats) -> int:
-    """Return which of those waiting has the least cost for its weight, -1 if none has a place."""
+    """Return the index in `waiting` of the task with the least noisy cost per weight, -1 if none can be inserted."""
     best, best_k = np.inf, -1
     for k in range(len(waiting)):
         if waiting[k] >= 0:
@@ -65,7 +65,7 @@ def _least(s: Situation, waiting: Ints, cost: Floats, cheapest: Ints, blur: Floa
 def _best_of(
     s: Situation, r: Schedule, routes: Ints, lengths: Ints, slack: Floats, i: int, j: int, balance: float
 ) -> tuple[float, int, float]:
-    """Return what a task costs at least in a route, as which visit, and when it is left; ``inf`` if it has no place."""
+    """Return the least cost of a task in a route, its position, and the hour of leaving it; ``inf`` if infeasible."""
     best, place, leaves, count = np.inf, -1, 0.0, lengths[i]
     if not s.allowed[i, j] or count >= routes.shape[1]:
         return best, place, leaves
@@ -85,7 +85,7 @@ def _best_of(
 def _cost_at(
     s: Situation, r: Schedule, routes: Ints, lengths: Ints, slack: Floats, i: int, p: int, j: int, balance: float
 ) -> tuple[float, float]:
-    """Return what a task costs as one visit, and when it is left."""
+    """Return the cost of a task at position `p` of a route, and the hour of leaving it."""
     arrives, latest, detour = place_between(s, r, routes, lengths, slack, i, p, j)
     hours = hours_of_work(s, j, arrives, s.agents[i].ability)
     leaves = arrives + hours

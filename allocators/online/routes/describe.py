@@ -1,4 +1,4 @@
-"""A situation as arrays, from what is known of a mission."""
+"""Conversion of a view of a mission into the arrays of a situation."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -27,21 +27,21 @@ from alloc.problems.missions.simulation.state import ACTIVE, AgentStatus, TaskSt
 from alloc.problems.vocabulary import MANHATTAN as MANHATTAN_METRIC
 
 PRIORITY_OF_NONE = 1e-3
-"""Priority that tasks without any count by, over the greatest, as they have to be done as well."""
+"""Priority assigned to tasks with priority 0, relative to the largest, as they have to be done as well."""
 
 
 @dataclass(frozen=True)
 class Foresight:
-    """What is known to come.
+    """What is known of the future.
 
     Attributes
     ----------
     tasks : mapping of str to TaskReport
-        Those that will appear; their status is that they are to come.
+        Tasks that will appear, with status ``to come``.
     agents : mapping of str to AgentReport
-        Those that will join.
+        Agents that will join.
     events : sequence of (hour, kind, id, amount)
-        In the order of time.
+        Sorted by hour.
     """
 
     tasks: Mapping[str, TaskReport] = field(default_factory=dict)
@@ -51,7 +51,7 @@ class Foresight:
 
 @dataclass(frozen=True)
 class Described:
-    """A situation, and whom and what its rows stand for."""
+    """A situation, with the agents and tasks of its rows, and the nearest tasks of each task."""
 
     situation: Situation
     agents: list[AgentReport]
@@ -60,7 +60,7 @@ class Described:
 
 
 class Describer:
-    """Describes the situations of one mission; it remembers which growing tasks were begun, and their distances.
+    """Describes the situations of one mission; remembers distances and which growing tasks were begun.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class Describer:
     pace : float
         Work of a group per hour over its ability, on average.
     price : float
-        Of a switch, in units of the hours that all work would take without flights.
+        Penalty of a switch, in units of the hours that all work would take without flights.
     """
 
     def __init__(self, end: float, pace: float, price: float) -> None:
@@ -79,7 +79,7 @@ class Describer:
         self._tables = TaskTables()
 
     def describe(self, view: View, foresight: Foresight) -> Described | None:
-        """Return the situation that a view shows; None where nobody can come, or nothing is left."""
+        """Return the situation of a view; None if there are no agents, now or later, or no tasks."""
         coming = {name for _, kind, name, _ in foresight.events if kind == IN}
         known = {**view.agents, **foresight.agents}
         agents = [one for name, one in known.items() if one.status in ACTIVE or name in coming]
@@ -93,7 +93,7 @@ class Describer:
         return Described(self._situation(view, agents, tasks, foresight, distance), agents, tasks, nearest)
 
     def _note_begun(self, hour: float, agents: list[AgentReport], tasks: list[TaskReport]) -> None:
-        """A growing task is begun when somebody works there, or it no longer grows."""
+        """Note the growing tasks that were begun: those where an agent works, or that no longer grow."""
         self._begun.update(str(one.task) for one in agents if one.status is AgentStatus.WORKING)
         for task in tasks:
             if task.facts.growth > 0:
@@ -179,7 +179,7 @@ def _starts(view: View, agents: list[AgentReport], tasks: list[TaskReport]) -> F
 
 
 def _weights(priority: Floats) -> Floats:
-    """Return priorities that sum to 1, with a little for tasks that have none."""
+    """Return priorities normalised to sum 1, small but positive for tasks with priority 0."""
     greatest = float(priority.max())
     weight = np.maximum(priority, PRIORITY_OF_NONE * greatest) if greatest > 0 else np.ones(len(priority))
     return np.asarray(weight / weight.sum(), np.float64)

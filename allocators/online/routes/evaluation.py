@@ -1,4 +1,4 @@
-"""Schedules of changed plans: only those agents are scheduled anew whom a change concerns."""
+"""Incremental evaluation of plans: only agents that a change affects are scheduled anew."""
 
 import numpy as np
 
@@ -11,15 +11,15 @@ from alloc.problems.distances.reach import TOLERANCE
 
 @compiled
 def play(s: Situation, r: Schedule, routes: Ints, lengths: Ints) -> None:
-    """Fill in the whole schedule of a plan.
+    """Compute the whole schedule of a plan.
 
     Parameters
     ----------
     s : Situation
     r : Schedule
-        With room for it.
+        Output, large enough for the plan.
     routes : ndarray of int, shape (n, c)
-        Tasks of each agent, in their order.
+        Tasks of each agent, in order.
     lengths : ndarray of int, shape (n,)
     """
     for i in range(len(s.agents)):
@@ -31,15 +31,15 @@ def play(s: Situation, r: Schedule, routes: Ints, lengths: Ints) -> None:
 
 @compiled
 def replay(s: Situation, r: Schedule, routes: Ints, lengths: Ints, before: Ints, before_lengths: Ints) -> None:
-    """Fill in the schedule of a plan that differs from another one, of which the schedule is there.
+    """Update the schedule of a previous plan to that of a changed one.
 
     Parameters
     ----------
     s : Situation
     r : Schedule
-        Of the plan before, but for those who are touched.
+        Schedule of the previous plan, except for agents and tasks already marked as touched.
     routes, before : ndarray of int, shape (n, c)
-        Tasks of each agent, in their order.
+        Tasks of each agent, in order, in the new and the previous plan.
     lengths, before_lengths : ndarray of int, shape (n,)
     """
     for i in range(len(lengths)):
@@ -82,7 +82,7 @@ def _shares(r: Schedule, routes: Ints, lengths: Ints, i: int) -> bool:
 
 @compiled
 def _schedule(s: Situation, r: Schedule, routes: Ints, lengths: Ints) -> None:
-    """Schedule those who are touched: together, or one by one where nobody meets anybody."""
+    """Schedule all touched agents: jointly, or one by one if no two of them share a task."""
     meets = len(s.events) > 0
     if not meets:
         for j in range(len(s.tasks)):
@@ -106,7 +106,7 @@ def _schedule(s: Situation, r: Schedule, routes: Ints, lengths: Ints) -> None:
 
 @compiled
 def _play_alone(s: Situation, r: Schedule, routes: Ints, lengths: Ints, i: int) -> None:
-    """Fill in the schedule of an agent that meets nobody."""
+    """Compute the schedule of an agent that shares no task with others."""
     hour, node, first, p = max(s.hour, s.agents[i].free), -1, -1, 0
     r.agents[i].fuel, r.agents[i].energy, r.agents[i].hours = s.agents[i].battery, 0.0, 0.0
     r.agents[i].works = 0.0
@@ -149,7 +149,7 @@ def _play_alone(s: Situation, r: Schedule, routes: Ints, lengths: Ints, i: int) 
 
 @compiled
 def _sum_up(s: Situation, r: Schedule) -> None:
-    """Add up what the schedule comes to."""
+    """Compute the totals of the schedule."""
     r.totals[:] = 0.0
     for j in range(len(s.tasks)):
         if r.tasks[j].closed == DONE:
@@ -173,17 +173,17 @@ def copy_touched(
     other_routes: Ints,
     other_lengths: Ints,
 ) -> None:
-    """Copy a plan and its schedule onto another where they differ: at those who are touched, who then no longer are.
+    """Copy the touched agents and tasks of a plan and its schedule onto another plan, and clear the marks.
 
     Parameters
     ----------
     marks : Schedule
-        One of the two, that says who is touched.
+        The one of the two that has the marks.
     r : Schedule
-        To be copied.
+        Source.
     routes, lengths : ndarray of int
     other : Schedule
-        To be overwritten.
+        Target.
     other_routes, other_lengths : ndarray of int
     """
     for i in range(len(lengths)):

@@ -1,4 +1,4 @@
-"""Flights of agents in a schedule: how far, whether they can be flown, and where they end."""
+"""Flights of agents in a schedule: distances, feasibility, departures and landings."""
 
 import numpy as np
 
@@ -12,12 +12,12 @@ IDLE, FLYING, PRESENT, AWAY = 0, 1, 2, 3
 """States of an agent."""
 
 KIND = 1 << 40
-"""Items of the queue are a kind times this, plus an index: completions, deadlines, events, arrivals."""
+"""Queue items are kind * KIND + index; kinds in order: completion, deadline, event, arrival."""
 
 
 @inlined
 def distance_to(s: Situation, r: Schedule, i: int, j: int) -> float:
-    """Return how far an agent is from a task."""
+    """Return the distance from an agent to a task."""
     node = r.agents[i].node
     if node == -1:
         return float(s.start_distance[i, j])
@@ -31,7 +31,7 @@ def distance_to(s: Situation, r: Schedule, i: int, j: int) -> float:
 
 @compiled
 def depart(s: Situation, r: Schedule, routes: Ints, lengths: Ints, i: int, hour: float, size: int) -> int:
-    """Let an agent go to the next task of its route that it can do; return the size of the queue."""
+    """Start an agent's flight to the next task of its route that it can do; return the size of the queue."""
     while r.agents[i].pointer < lengths[i]:
         j = routes[i, r.agents[i].pointer]
         if r.tasks[j].closed == 0 and s.allowed[i, j]:
@@ -55,7 +55,7 @@ def depart(s: Situation, r: Schedule, routes: Ints, lengths: Ints, i: int, hour:
 
 @inlined
 def land(s: Situation, r: Schedule, i: int, hour: float) -> bool:
-    """End a flight where the agent is, if it can be ended there; return whether it is."""
+    """End a flight where the agent is now; return False if the agent cannot be diverted in flight."""
     j = r.agents[i].target
     length = r.agents[i].arrives - r.agents[i].departs
     share = 1.0 if length <= 0 or hour >= r.agents[i].arrives else max(0.0, (hour - r.agents[i].departs) / length)

@@ -1,4 +1,4 @@
-"""Where a task fits best into routes: by one agent, or by a coalition where one is too slow."""
+"""Best insertion of a task into routes: for one agent, or for a coalition where one agent is too slow."""
 
 # ruff: noqa: NPY002 - compiled code seeds numba's own generator
 
@@ -11,7 +11,7 @@ from alloc.allocators.runtime.compiled import compiled, inlined
 
 @compiled
 def tidy(r: Schedule, routes: Ints, lengths: Ints) -> bool:
-    """Take visits off routes that come to nothing; return whether there were any."""
+    """Remove visits that the schedule skips; return whether there were any."""
     is_changed = False
     for i in range(len(lengths)):
         kept = 0
@@ -27,7 +27,7 @@ def tidy(r: Schedule, routes: Ints, lengths: Ints) -> bool:
 
 @compiled
 def find_slack(s: Situation, r: Schedule, routes: Ints, lengths: Ints, slack: Floats, i: int) -> None:
-    """Fill in by how much each visit of an agent may come later before a deadline is missed."""
+    """Compute by how many hours each visit of an agent may be delayed without missing a deadline."""
     least = np.inf
     for p in range(lengths[i] - 1, -1, -1):
         leave = r.leave[i, p]
@@ -39,7 +39,7 @@ def find_slack(s: Situation, r: Schedule, routes: Ints, lengths: Ints, slack: Fl
 
 @inlined
 def hours_of_work(s: Situation, j: int, arrives: float, ability: float) -> float:
-    """Return how long a task takes that is begun at an hour."""
+    """Return the hours that one agent needs for a task that it begins at hour `arrives`."""
     left = s.tasks[j].left
     if s.tasks[j].growth > 0 and not s.tasks[j].begun:
         left += s.tasks[j].growth * (arrives - max(s.hour, s.tasks[j].appears))
@@ -48,7 +48,7 @@ def hours_of_work(s: Situation, j: int, arrives: float, ability: float) -> float
 
 @inlined
 def is_hopeless(s: Situation, r: Schedule, lengths: Ints, slack: Floats, i: int, p: int, hours: float) -> bool:
-    """Return whether work of so many hours does not fit before a visit of an agent, wherever it is to be done."""
+    """Return whether `hours` of work cannot fit before visit `p` of an agent, even without a detour."""
     begins = max(s.hour, s.agents[i].free) if p == 0 else r.leave[i, p - 1]
     return bool(p < lengths[i] and r.arrive[i, p] + slack[i, p] - begins < hours)
 
@@ -57,9 +57,9 @@ def is_hopeless(s: Situation, r: Schedule, lengths: Ints, slack: Floats, i: int,
 def place_between(
     s: Situation, r: Schedule, routes: Ints, lengths: Ints, slack: Floats, i: int, p: int, j: int
 ) -> tuple[float, float, float]:
-    """Return when an agent would be at a task that is its visit `p`, when it must leave, and what the detour adds.
+    """Return the arrival, the latest departure and the added distance if a task is inserted as visit `p`.
 
-    The first is ``inf`` where it cannot.
+    The arrival is ``inf`` if the insertion is infeasible.
     """
     if p == 0:
         begins, there, before = max(s.hour, s.agents[i].free), s.start_distance[i, j], -1
@@ -85,7 +85,7 @@ def place_between(
 def insert(
     s: Situation, r: Schedule, routes: Ints, lengths: Ints, slack: Floats, i: int, p: int, j: int, leaves: float
 ) -> None:
-    """Put a task into a route, which it is left at an hour; what comes later is put off."""
+    """Insert a task into a route, left at hour `leaves`, and delay the later visits."""
     arrives, _, detour = place_between(s, r, routes, lengths, slack, i, p, j)
     r.agents[i].fuel -= s.agents[i].consumption * detour
     delay = 0.0
@@ -103,19 +103,19 @@ def insert(
 def insert_best(
     s: Situation, r: Schedule, routes: Ints, lengths: Ints, slack: Floats, j: int, balance: float, blink: float
 ) -> bool:
-    """Put a task into one route, where the least time is lost.
+    """Insert a task at the position of least cost over all routes.
 
     Parameters
     ----------
     balance : float
-        What the end of a route counts beside the time that the task takes from it.
+        Weight of the end of the route relative to the time that the task adds to it.
     blink : float
-        Share of the places that are passed over.
+        Probability of skipping a position.
 
     Returns
     -------
     bool
-        Whether there was a place.
+        Whether the task was inserted.
     """
     best, best_i, best_p, best_leaves = np.inf, -1, -1, 0.0
     for i in range(len(lengths)):
@@ -148,9 +148,9 @@ def insert_best(
 
 @compiled
 def insert_coalition(s: Situation, r: Schedule, routes: Ints, lengths: Ints, slack: Floats, j: int) -> bool:
-    """Let as few agents as can do it in time meet at a task: those first that have most time for it.
+    """Insert a task into the routes of the fewest agents that can do it in time, those with most work to offer first.
 
-    Return whether there are enough.
+    Return whether there are enough agents.
     """
     n = len(lengths)
     window, place, arrival, limit = np.zeros(n), np.zeros(n, np.int64), np.zeros(n), np.zeros(n)

@@ -1,4 +1,4 @@
-"""Small changes of routes: visits moved, swapped, added and dropped, tails exchanged, parts reversed."""
+"""Neighbourhood moves on routes: move, swap, add or drop visits, exchange tails, reverse segments."""
 
 # ruff: noqa: NPY002 - compiled code seeds numba's own generator
 
@@ -11,18 +11,18 @@ from alloc.allocators.runtime.compiled import compiled
 MOVES = 8
 
 AGAIN = 0.3
-"""Chance of one more change: some plans can be reached only through worse ones."""
+"""Probability of one more move: some plans can be reached only through worse ones."""
 
 
 @compiled
 def change(s: Situation, r: Schedule, nearest: Ints, routes: Ints, lengths: Ints) -> bool:
-    """Make one or a few random small changes; return whether there is one.
+    """Make one or a few random moves; return whether the plan has changed.
 
     Parameters
     ----------
     s : Situation
     r : Schedule
-        Of the routes before the change.
+        Schedule of the routes before the moves.
     nearest : ndarray of int, shape (m, k)
         Tasks near each task, nearest first.
     routes : ndarray of int, shape (n, c)
@@ -44,7 +44,7 @@ def _change_once(s: Situation, r: Schedule, nearest: Ints, routes: Ints, lengths
     kind = np.random.randint(MOVES)
     j = routes[i, p]
     other = np.random.randint(n)
-    if kind <= 1:  # beside a near task
+    if kind <= 1:  # move next to a nearby task
         beside, q = _visit_of(routes, lengths, nearest[j, np.random.randint(nearest.shape[1])])
         if beside < 0:
             return False

@@ -1,4 +1,4 @@
-"""Plans of routes from plans in force: set up, improved until the time is up, read."""
+"""Route plans from the plan in force: set up, improved until the time limit, and read off."""
 
 import math
 import time
@@ -23,13 +23,13 @@ from alloc.allocators.online.routes.situation import (
 )
 
 PORTION, PORTION_S = 8, 0.001
-"""Changes before the first look at the clock, and seconds between two looks that are aimed at."""
+"""Number of changes before the clock is first checked, and target of the seconds between two checks."""
 
 MOST_GROWTH, CAUTION = 4.0, 0.5
-"""By how much more tasks are put in at once than before at the most, and part of what there seems to be time for."""
+"""Largest growth factor of the batch of tasks inserted at once, and safety factor on the estimated batch size."""
 
 TOLERATED = 0.05
-"""By what share a plan may be worse than the best one at first; it shrinks to none."""
+"""Relative amount by which an accepted plan may initially be worse than the best one; it decreases to 0."""
 
 
 def improved(
@@ -40,29 +40,29 @@ def improved(
     until: float | None,
     given_up: Set[str] = frozenset(),
 ) -> tuple[Ints, Ints, Bools]:
-    """Return routes that begin with those in force.
+    """Return improved routes, starting from those in force.
 
-    Where time is limited, new tasks are put in by and by, those near an agent first, so that no more are put in than
-    there is time for; where it is not, all at once, which makes better plans.
+    With a time limit, new tasks are inserted in batches, those near an agent first, and no more than time allows;
+    without one, all at once, which yields better plans.
 
     Parameters
     ----------
     described : Described
     before : mapping of str to sequence of str
-        Tasks of each agent in the plan in force, by their ids.
+        Ids of each agent's tasks in the plan in force.
     iterations : int
-        Changes to be tried.
+        Number of changes to try.
     seed : int
     until : float or None
-        Second of `time.perf_counter` at which to stop; None for no limit.
+        Value of `time.perf_counter` at which to stop; None for no limit.
     given_up : set of str
-        Tasks that were tried before and have no place; they are tried again only as the search comes to them.
+        Tasks that could not be inserted before; only the search's own moves try them again.
 
     Returns
     -------
     routes, lengths, untried : ndarray
-        Tasks of each agent, shape (n, c), how many there are, shape (n,), and which tasks there was no time for, shape
-        (m,).
+        Tasks of each agent, shape (n, c), the length of each route, shape (n,), and which tasks there was no time to
+        insert, shape (m,).
     """
     situation = described.situation
     n, m = situation.start_distance.shape
@@ -104,26 +104,26 @@ def improved(
 
 
 def _next_size(size: int, seconds: float, left: float) -> int:
-    """Return how many tasks to put in next, when some took so many seconds; twice as many take four times as long."""
+    """Return the size of the next batch, given the seconds of the last one; the time grows with the size squared."""
     return max(1, int(size * min(MOST_GROWTH, CAUTION * math.sqrt(left / max(seconds, 1e-9)))))
 
 
 def first_tasks(situation: Situation, routes: Ints, lengths: Ints) -> Ints:
-    """Return the task to which each agent goes first, -1 for none."""
+    """Return the first task of each agent in the schedule, -1 for none."""
     schedule, _ = _new_schedules(situation, routes)
     play(situation, schedule, routes, lengths)
     return schedule.agents["first"]
 
 
 def finish_hours(situation: Situation, routes: Ints, lengths: Ints) -> Floats:
-    """Return when each task is done, ``inf`` where it is not."""
+    """Return the hour at which each task is done, ``inf`` if it is not."""
     schedule, _ = _new_schedules(situation, routes)
     play(situation, schedule, routes, lengths)
     return schedule.tasks["finish"]
 
 
 def warm_up() -> None:
-    """Compile the loops, or read them from their cache."""
+    """Compile the loops, or load them from the cache."""
     table, site = np.zeros((1, 1)), np.zeros((1, 3))
     agents = records(AGENT, 1, ability=1, speed=1, reach=1, battery=1, active=1, at=-1, aim=-1)
     tasks = records(TASK, 1, left=1, weight=1, deadline=9, is_open=1)

@@ -1,4 +1,4 @@
-"""A compiled queue of what comes next: a heap of hours and items."""
+"""A compiled event queue: a binary heap of items by hour."""
 
 import numpy as np
 
@@ -21,7 +21,7 @@ def _copy(queue: Records, to: int, source: int) -> None:
 
 @compiled
 def push(queue: Records, size: int, hour: float, item: int, version: int) -> int:
-    """Put an item into the queue; return its new size. At one hour smaller items come first."""
+    """Push an item; return the new size. At equal hours, smaller items come first."""
     child = size
     while child > 0:
         parent = (child - 1) >> 1
@@ -35,7 +35,7 @@ def push(queue: Records, size: int, hour: float, item: int, version: int) -> int
 
 @compiled
 def drop_first(queue: Records, size: int) -> int:
-    """Take the first item out of the queue; return its new size."""
+    """Remove the first item; return the new size."""
     size -= 1
     hour, item = queue[size].hour, queue[size].item
     parent = 0

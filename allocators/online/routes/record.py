@@ -1,4 +1,4 @@
-"""A schedule of a plan of routes in the making, and what is recorded of it."""
+"""The arrays of a schedule: the state of its simulation, and its results."""
 
 from typing import NamedTuple
 
@@ -25,22 +25,22 @@ TASK = np.dtype(
 
 
 class Schedule(NamedTuple):
-    """A schedule in the making, and what is recorded of it.
+    """State of the simulation of a plan, and its results.
 
     Attributes
     ----------
     agents, tasks : ndarray of `AGENT` and `TASK`, shape (n,) and (m,)
-        Among others ``first``, the task to which each agent goes first, -1 for none, and ``finish``, the hour at which
-        each task is done, ``inf`` if it is not; ``touched``, whether it is to be scheduled anew.
+        Among others ``first``, the first task of each agent, -1 for none; ``finish``, the hour at which each task is
+        done, ``inf`` if it is not; and ``touched``, whether the agent or task is to be scheduled anew.
     point : ndarray, shape (n, 3)
-        Where an agent is that was diverted in flight.
+        Positions of agents that were diverted in flight.
     arrive, leave : ndarray, shape (n, c)
-        Hours of each visit of the routes; NaN where there is none.
+        Hours of each visit of the routes; NaN if the visit does not take place.
     totals : ndarray, shape (6,)
-        Weight of what is not done, hour of the last completion, weighted hours from appearance to completion, energy,
+        Weight of tasks not done, hour of the last completion, weighted hours from appearance to completion, energy,
         hours of flight, hours at tasks.
     queue : ndarray of `ENTRY`
-        What comes next.
+        Future completions, deadlines, events and arrivals.
     """
 
     agents: Records
@@ -53,7 +53,7 @@ class Schedule(NamedTuple):
 
 
 def new_schedule(n: int, m: int, capacity: int, events: int) -> Schedule:
-    """Return room for the schedules of plans of one size."""
+    """Allocate a schedule for plans of a given size."""
     return Schedule(
         np.zeros(n, AGENT),
         np.zeros(m, TASK),

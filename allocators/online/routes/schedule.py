@@ -1,8 +1,8 @@
-"""The exact schedule of a plan of routes: who is where when, and what is done by then.
+"""Exact schedule of a route plan, by discrete-event simulation.
 
-An agent flies to the next task of its route, works there until the task is over, and goes on. Whoever comes to a task
-works with those who are there. A flight to a task that is done meanwhile is broken off. A task is left out of a route
-where it is over, too far, or cannot be reached before its deadline.
+An agent flies to the next task of its route, works there until the task is closed, and goes on to the next. Agents at
+the same task work together. A flight to a task that is closed meanwhile is broken off. An agent skips tasks that are
+closed, out of its reach, or cannot be reached before their deadline.
 """
 
 import numpy as np
@@ -19,15 +19,15 @@ DONE, OVER, GONE = 1, 2, 3
 
 @compiled
 def play_touched(s: Situation, r: Schedule, routes: Ints, lengths: Ints) -> None:
-    """Fill in the schedule of the agents and tasks that are marked as touched; they share no task with others.
+    """Compute the schedule of the agents and tasks marked as touched, which must share no task with other agents.
 
     Parameters
     ----------
     s : Situation
     r : Schedule
-        With room for it.
+        Updated in place.
     routes : ndarray of int, shape (n, c)
-        Tasks of each agent, in their order.
+        Tasks of each agent, in order.
     lengths : ndarray of int, shape (n,)
     """
     size = _begin(s, r, routes, lengths)
@@ -46,7 +46,7 @@ def play_touched(s: Situation, r: Schedule, routes: Ints, lengths: Ints) -> None
 
 @compiled
 def _begin(s: Situation, r: Schedule, routes: Ints, lengths: Ints) -> int:
-    """Begin at the hour of the situation; return the size of the queue."""
+    """Initialise the simulation at the hour of the situation; return the size of the queue."""
     n, size = len(s.agents), 0
     for j in range(len(s.tasks)):
         if r.tasks[j].touched:
@@ -81,7 +81,7 @@ def _begin(s: Situation, r: Schedule, routes: Ints, lengths: Ints) -> int:
 
 @inlined
 def is_at_first(s: Situation, routes: Ints, lengths: Ints, i: int) -> bool:
-    """Return whether an agent works at the first task of its route already."""
+    """Return whether an agent already works at the first task of its route."""
     return bool(s.agents[i].active and lengths[i] > 0 and s.agents[i].at >= 0 and routes[i, 0] == s.agents[i].at)
 
 
@@ -116,7 +116,7 @@ def _join(s: Situation, r: Schedule, i: int, j: int, hour: float, size: int) -> 
 
 @inlined
 def _announce(s: Situation, r: Schedule, j: int, hour: float, size: int) -> int:
-    """Put the end of a task's work into the queue, or its deadline where that comes first."""
+    """Queue the completion of a task, or its deadline if that comes first."""
     r.tasks[j].edition += 1
     end = hour + r.tasks[j].left / r.tasks[j].rate if r.tasks[j].rate > 0 else np.inf
     is_missed = end > s.tasks[j].deadline
@@ -128,7 +128,7 @@ def _announce(s: Situation, r: Schedule, j: int, hour: float, size: int) -> int:
 
 @compiled
 def _close(s: Situation, r: Schedule, routes: Ints, lengths: Ints, j: int, how: int, hour: float, size: int) -> int:
-    """End a task; all who are there or on their way go on."""
+    """Close a task; agents that are there or on their way go on to their next one."""
     r.tasks[j].closed = how
     if how == DONE:
         r.tasks[j].finish = hour
@@ -151,7 +151,7 @@ def _close(s: Situation, r: Schedule, routes: Ints, lengths: Ints, j: int, how: 
 
 @compiled
 def _happen(s: Situation, r: Schedule, routes: Ints, lengths: Ints, k: int, hour: float, size: int) -> int:
-    """Let happen what is known to come."""
+    """Apply a known future event."""
     kind, index = s.events[k].kind, s.events[k].index
     if kind == CHARGED:
         r.agents[index].fuel += s.events[k].amount
@@ -171,7 +171,7 @@ def _happen(s: Situation, r: Schedule, routes: Ints, lengths: Ints, k: int, hour
 
 @compiled
 def _change(s: Situation, r: Schedule, routes: Ints, lengths: Ints, k: int, hour: float, size: int) -> int:
-    """Let a task open, or its work change."""
+    """Open a task, or change its work left."""
     j = s.events[k].index
     _update(s, r, j, hour)
     if s.events[k].kind == OPENS:
@@ -191,9 +191,9 @@ def _change(s: Situation, r: Schedule, routes: Ints, lengths: Ints, k: int, hour
 
 @compiled
 def _leave(s: Situation, r: Schedule, i: int, hour: float, size: int) -> int:
-    """Let an agent leave the mission, for good or for a while."""
+    """Remove an agent from the mission, for good or for a while."""
     j = r.agents[i].target
-    if j >= 0 and r.tasks[j].closed != 0:  # on a way to a task that is over
+    if j >= 0 and r.tasks[j].closed != 0:  # in flight to a closed task
         r.agents[i].version += 1
     elif j >= 0:
         if r.tasks[j].head == i:

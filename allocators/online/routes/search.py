@@ -1,4 +1,4 @@
-"""Local search over routes: small changes, and tasks taken out near each other and put back where they fit best."""
+"""Local search over routes: small moves, and ruin and recreate of adjacent visits."""
 
 # ruff: noqa: NPY002 - compiled code seeds numba's own generator
 
@@ -13,26 +13,26 @@ from alloc.allocators.online.routes.situation import Bools, Floats, Ints, Situat
 from alloc.allocators.runtime.compiled import compiled
 
 UNDONE = 1e4
-"""What all tasks left undone would count, beside the mission time in units of the situation's scale."""
+"""Cost of leaving all tasks undone, relative to mission time in units of the situation's scale."""
 
 HOURS, FLIGHT, MISSED_HOURS, MISSED_BUSY = 0.02, 0.02, 0.02, 0.5
-"""What hours to completion and of flight count where all is done, and hours to completion and of flight and work where
-something is missed: who is done with its tasks earlier has time for more."""
+"""Weights of hours to completion and of flight if all tasks are done; weights of hours to completion, and of flight and
+work, if some are missed: agents that finish earlier have time for more."""
 
 RUIN, BLINK = 0.5, 0.02
-"""Share of the changes that rebuild, and share of the places passed over."""
+"""Probability of a ruin-and-recreate step, and of skipping a position in insertion (blink)."""
 
 Plan = tuple[Ints, Ints]
 """Routes and their lengths."""
 
 MOST_OUT, MOST_NEAR, MOST_WAITING, MOST_MEETINGS, BY_TIME = 7, 10, 4, 2, 0.6
-"""Most tasks of a stretch, unplanned tasks near it and elsewhere that are tried with them, tasks for which a coalition
-is sought, and share of the stretches in time."""
+"""Limits on the visits of a removed segment, on unplanned tasks near it and elsewhere that are inserted with them, and
+on tasks for which a coalition is sought; probability of removing by time rather than by distance."""
 
 
 @compiled
 def value(s: Situation, r: Schedule) -> float:
-    """Return the value of a schedule, less being better: undone weight, then time, then flights and switches."""
+    """Return the cost of a schedule: undone weight, then time, then flights and switches."""
     n, undone = len(s.agents), max(0.0, r.totals[0])
     switches = 0
     for i in range(n):
@@ -48,9 +48,9 @@ def value(s: Situation, r: Schedule) -> float:
 
 @compiled
 def _take_out(r: Schedule, nearest: Ints, routes: Ints, lengths: Ints, near: Ints) -> None:
-    """Take out a stretch of a route and what others do at that time, or tasks near each other in space.
+    """Ruin: remove a segment of a route and other agents' visits at that time, or visits close to each other in space.
 
-    `near` is set to 1 for tasks that are taken out or lie near one of those, for all others it is left as it is.
+    `near` is set to 2 for tasks to be inserted again, and to 1 for tasks near one of them; otherwise it is unchanged.
     """
     i = np.random.randint(len(lengths))
     if lengths[i] == 0:
@@ -82,23 +82,23 @@ def _take_out(r: Schedule, nearest: Ints, routes: Ints, lengths: Ints, near: Int
 def rebuild(
     s: Situation, r: Schedule, nearest: Ints, plan: Plan, before: Plan, slack: Floats, fresh: Bools, is_partial: bool
 ) -> None:
-    """Take some tasks out of all routes, and put them and unplanned tasks where they fit best.
+    """Ruin and recreate: remove some visits, and insert these and unplanned tasks at their best positions.
 
     Parameters
     ----------
     s : Situation
     r : Schedule
-        Of the plan before.
+        Schedule of the previous plan.
     nearest : ndarray of int, shape (m, k)
         Tasks near each task, nearest first.
     plan, before : tuple of ndarray
         Routes and their lengths, to be changed, and as they were.
     slack : ndarray, shape (n, c)
-        Room.
+        Scratch.
     fresh : ndarray of bool, shape (m,)
-        Tasks that are put in where `is_partial` is false.
+        Tasks to insert if `is_partial` is false.
     is_partial : bool
-        Whether tasks are taken out, and put back together with some of those that lie near them.
+        Whether to remove tasks and insert them again, together with some unplanned tasks near them.
     """
     routes, lengths = plan
     m = len(s.tasks)
@@ -133,7 +133,7 @@ def rebuild(
 def _waiting(
     s: Situation, routes: Ints, lengths: Ints, near: Ints, has_deadline: bool, others: int, most_near: int
 ) -> Ints:
-    """Return the tasks without a place that are near, and some others, in a random order or one that suits them."""
+    """Return unplanned tasks that are near, and some others, in a random or a heuristic order of insertion."""
     m = len(s.tasks)
     planned = np.zeros(m, np.bool_)
     for i in range(len(lengths)):
@@ -174,24 +174,24 @@ def improve(
     fresh: Bools,
     tolerated: tuple[float, float],
 ) -> float:
-    """Improve routes in place; return their value.
+    """Improve routes in place; return their cost.
 
     Parameters
     ----------
     s : Situation
     pair : tuple of Schedule
-        Two with room for the routes.
+        Two schedules large enough for the routes.
     nearest : ndarray of int, shape (m, k)
         Tasks near each task, nearest first.
     plan : tuple of ndarray
         Routes, shape (n, c), and their lengths, shape (n,).
     iterations : int
-        Changes that are tried.
+        Number of changes to try.
     seed : int
     fresh : ndarray of bool, shape (m,)
-        Tasks that are to be put into the routes first.
+        Tasks to insert into the routes first.
     tolerated : tuple of float
-        By what share a plan may be worse than the best one, at first and at last.
+        Relative amount by which an accepted plan may be worse than the best one, at the first and the last iteration.
     """
     np.random.seed(seed)
     r, trial_r = pair

@@ -1,4 +1,4 @@
-"""What a plan of routes is made for: agents and tasks at an hour, and what is known to come, as arrays."""
+"""Input of route planning: agents and tasks at an hour, and known future events, as arrays."""
 
 from typing import NamedTuple
 
@@ -11,10 +11,10 @@ Bools = NDArray[np.bool_]
 Records = NDArray[np.void]
 
 EUCLIDEAN, MANHATTAN, FIXED = 0, 1, 2
-"""How agents may be diverted in flight: by a metric, or not before the end of their way."""
+"""How agents are diverted in flight: anywhere along a path in this metric, or (`FIXED`) only at its end."""
 
 OUT, IN, CHARGED, OPENS, CHANGED, CANCELLED = range(6)
-"""Kinds of events that a plan may know of: an agent leaves, comes, gains energy; a task opens, changes, is over."""
+"""Kinds of known future events: an agent leaves, joins, is recharged; a task opens, changes, is cancelled."""
 
 
 AGENT = np.dtype(
@@ -23,8 +23,8 @@ AGENT = np.dtype(
         *((name, np.int64) for name in ("active", "at", "aim")),
     ]
 )
-"""Work and distance per hour, energy per distance, longest flight, energy, and the hour from which an agent can fly;
-whether it is in the mission, the task where it works, and that to which it goes or where it works, -1 for none."""
+"""Ability, speed, energy per distance, range, energy left, and the hour from which the agent can fly; whether it is in
+the mission, the task where it works, and the task to which it flies or where it works, -1 for none."""
 
 TASK = np.dtype(
     [
@@ -37,32 +37,33 @@ EVENT = np.dtype([("hour", np.float64), ("amount", np.float64), ("kind", np.int6
 
 
 class Situation(NamedTuple):
-    """Agents and tasks at an hour; `n` agents, `m` tasks. Records, as compiled code passes on few arrays faster.
+    """`n` agents and `m` tasks at an hour. Records are used because compiled calls with few arrays are faster.
 
     Attributes
     ----------
     hour, end : float
-        Now, and when the mission ends.
+        The present hour, and the end of the mission.
     agents, tasks, events : ndarray of `AGENT`, `TASK` and `EVENT`
-        Events are those that are known to come, in the order of time.
+        Known future events are sorted by hour.
     allowed : ndarray of bool, shape (n, m)
-        Who may work where, skills included.
+        Which agents may work at which tasks, skills included.
     start_distance : ndarray, shape (n, m)
-        From where agents are.
+        Distances from the agents' present places to tasks.
     distance : ndarray, shape (m, m)
+        Distances between tasks.
     home : ndarray, shape (m, n)
-        Way back from each task for agents that return, 0 for others.
+        Distances from each task back home, for agents that return; 0 for others.
     place, site : ndarray, shape (n, 3) and (m, 3)
     metric : int
         `EUCLIDEAN`, `MANHATTAN` or `FIXED`.
     pace : float
         Work of a group per hour over its ability, on average.
     has_missed : bool
-        Whether a deadline was missed already, so that hours count instead of mission time.
+        Whether a deadline was already missed, so that hours to completion count instead of mission time.
     price : float
-        Of each switch, in units of `scale`.
+        Penalty of each switch, in units of `scale`.
     scale : float
-        Hours that all work would take without flights: the unit of time of a plan's value.
+        Hours that all work would take without flights: the unit of time in a plan's cost.
     """
 
     hour: float
@@ -84,7 +85,7 @@ class Situation(NamedTuple):
 
 
 def records(kind: np.dtype[np.void], size: int, **columns: ArrayLike) -> Records:
-    """Return records with these columns, whose other fields are 0."""
+    """Return records with these columns; all other fields are 0."""
     table = np.zeros(size, kind)
     for name, values in columns.items():
         table[name] = values

@@ -1,4 +1,4 @@
-"""What stays as it is from decision to decision: distances between tasks, their deadlines, which are near which."""
+"""Data of tasks that is reused between decisions: distances, nearest tasks, deadlines."""
 
 import numpy as np
 
@@ -10,35 +10,35 @@ from alloc.problems.missions.simulation.reports import TaskReport, View
 from alloc.problems.vocabulary import GEOGRAPHIC, MANHATTAN
 
 NEAR = 24
-"""Tasks that count as near another one."""
+"""Number of nearest tasks kept for each task."""
 
 
 def positions(places: list[Place]) -> Floats:
-    """Return the positions of places, shape (p, 3); NaN where there is none."""
+    """Return the positions of places, shape (p, 3); NaN where unknown."""
     return np.array([place.position or (np.nan,) * 3 for place in places], np.float64)
 
 
 def by_metric(metric: str, sources: Floats, goals: Floats) -> Floats:
-    """Return the distances of positions along straight lines, or along axes."""
+    """Return the Euclidean or Manhattan distances between positions, shape (sources, goals)."""
     table = distance_table(sources, goals, manhattan_distances if metric == MANHATTAN else distances)
     return np.ascontiguousarray(table, np.float64)
 
 
 def is_fixed(view: View) -> bool:
-    """Return whether distances do not come of positions in a plane, so that nobody is diverted in flight."""
+    """Return whether distances do not follow from Cartesian positions, so that agents cannot be diverted in flight."""
     return view.has_table or view.metric == GEOGRAPHIC
 
 
 class TaskTables:
-    """Facts of the tasks of one mission, made anew only when there are new ones.
+    """Cached data of the tasks of one mission, rebuilt only when tasks are added.
 
     Attributes
     ----------
     site : ndarray, shape (k, 3)
-        Positions of all tasks that were there when the tables were made.
+        Positions of all tasks at the time of the last rebuild.
     growth, priority, deadline, appears : ndarray, shape (k,)
     rows : ndarray, shape (m,)
-        The rows of the tasks that are there now.
+        Rows of the present tasks.
     """
 
     def __init__(self) -> None:
@@ -47,7 +47,7 @@ class TaskTables:
         self.rows = np.empty(0, np.int64)
 
     def look_up(self, view: View, tasks: list[TaskReport]) -> None:
-        """Find the rows of tasks."""
+        """Set `rows` to the rows of `tasks`; rebuild the tables if some tasks are new."""
         if not all(task.facts.id in self._row for task in tasks):
             self._row = {task.facts.id: j for j, task in enumerate(tasks)}
             facts = [task.facts for task in tasks]
@@ -63,7 +63,7 @@ class TaskTables:
         self.rows = np.array([self._row[task.facts.id] for task in tasks], np.int64)
 
     def distances(self) -> tuple[Floats, Ints]:
-        """Return distances between the tasks that are there now, and which are nearest to each, nearest first."""
+        """Return the distances between the present tasks, and the nearest tasks of each, nearest first."""
         m = len(self.rows)
         if m == len(self._distance):
             return self._distance, np.ascontiguousarray(self._order[:, : min(NEAR + 1, m)])
@@ -85,7 +85,7 @@ class TaskTables:
 
 @compiled
 def _nearest(order: Ints, rows: Ints, column: Ints, count: int) -> Ints:
-    """Return the first tasks of each row's order that are still there."""
+    """Return the first `count` present tasks in the order of each row."""
     near = np.empty((len(rows), count), np.int64)
     for j in range(len(rows)):
         found, k = 0, 0

@@ -102,7 +102,7 @@ def test_a_grid_finds_who_is_near() -> None:
 
 def test_policies_without_loops_are_refused() -> None:
     """What leads all agents is an error, not a wrong figure."""
-    with pytest.raises(InputError, match="no compiled loops"):
+    with pytest.raises(InputError, match="no compiled version"):
         run_compiled(missions()[0], load_policy("idle"))
 
 

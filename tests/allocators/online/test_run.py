@@ -77,13 +77,13 @@ def test_late_answers_are_not_followed():
 @pytest.mark.parametrize(
     ("policy", "told"),
     [
-        (Answers(lambda view: "t1"), "answered 't1', which is no Order"),
-        (Fleet(lambda view: [STAY]), "answered list, not orders by agent"),
-        (Fleet(lambda view: {"a9": STAY}), "an order for 'a9', who can take none now"),
+        (Answers(lambda view: "t1"), "returned 't1', which is not an Order"),
+        (Fleet(lambda view: [STAY]), "returned list, not a mapping of orders"),
+        (Fleet(lambda view: {"a9": STAY}), "gave an order to 'a9', which cannot take orders now"),
     ],
 )
-def test_answers_that_are_no_orders_are_told(policy, told):
-    """A policy that answers something else is named with what it answered."""
+def test_an_answer_that_is_not_an_order_is_an_error(policy, told):
+    """The error says what the policy returned."""
     with pytest.raises(PolicyError, match=told):
         simulate(TWO, policy)
 
