@@ -1,6 +1,6 @@
-"""Methods that allocate, behind one contract; `solve` runs and scores any of them.
+"""Allocation methods behind a common contract; `solve` runs any of them and scores its answer.
 
-The classes of the methods, `plot`, `train` and the like are imported on first use, as they take large libraries.
+Method classes, `plot`, `train` and the like are imported on first use, as they need large libraries.
 """
 
 import importlib
@@ -160,7 +160,7 @@ _LAZY = {
     "report_html": "alloc.allocators.experiments.report.page.page",
     "simulate": "alloc.allocators.online.run",
 }
-"""Module of each public name that is imported on first use."""
+"""Modules of the public names that are imported on first use."""
 
 
 def __getattr__(name: str) -> object:

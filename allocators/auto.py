@@ -1,11 +1,11 @@
 """The method that `auto` picks for an instance, and why.
 
-Exact methods have local search in them, in turns with their own searches and bounds, so that the pick decides how the
-time is shared. The thresholds were measured on two cores. For the makespan, exact methods pay off as long as the
-solver's model can be built at all, at 60,000 pairs a second. For the energy, they prove a gap of about 1 % up to some
-1,000 pairs for each second, and match local search alone up to 5,000, with a far better bound. Beyond, local search
-alone finds better allocations in the same time where the least makespan is easy: where all agents can do all tasks
-from the start and abilities are whole numbers.
+Exact methods alternate local search with their own searches and bounds, so the choice only decides how the time is
+divided. The thresholds were measured on two cores. For the makespan, exact methods pay off as long as the solver's
+model can be built in time, at 60,000 pairs per second. For the energy, they prove a gap of about 1 % with up to about
+1,000 pairs per second of the time limit, and match pure local search up to 5,000, with a far better bound. With more
+pairs, pure local search finds better allocations in the same time if the least makespan is easy to find: if every
+agent can do every task from the start and abilities are whole numbers.
 """
 
 import numpy as np
@@ -15,19 +15,19 @@ from alloc.problems import Instance, Objective, count_classes
 from alloc.problems.text import counted
 
 PICKED = ("cpsat", "milp", "local-search")
-"""What `choose` returns one of."""
+"""Methods that `choose` picks from."""
 
 MAKESPAN_PAIRS_PER_SECOND = 30_000
 ENERGY_PAIRS_PER_SECOND = 5_000
 MOST_PAIRS_SEARCHED = 4_000_000
-"""Agents times tasks beyond which the exact methods have no search for plans of their own."""
+"""Number of agents times tasks above which the exact methods skip their own searches for plans."""
 
 UNHURRIED_S = 60.0
-"""Longest time limit that counts, also where there is none."""
+"""Time limit in seconds that is assumed if it is longer, or if there is none."""
 
 
 def choose(instance: Instance, objective: Objective, budget: Budget) -> tuple[str, str]:
-    """Return the method for an instance, objective and budget, and the reason."""
+    """Return the name of the method for an instance, objective and budget, and the reason for it."""
     energy = objective is Objective.MAKESPAN_ENERGY
     tasks = int((instance.workload > 0).sum())
     pairs = count_classes(instance, by_place=energy) * tasks
@@ -51,5 +51,5 @@ def choose(instance: Instance, objective: Objective, budget: Budget) -> tuple[st
 
 
 def has_whole_abilities(instance: Instance) -> bool:
-    """Whether abilities are whole numbers."""
+    """Return whether abilities are whole numbers."""
     return bool((instance.ability == np.round(instance.ability)).all())

@@ -1,4 +1,4 @@
-"""Bounds that `solve` proves itself, by linear programmes before and after the method runs."""
+"""Bounds that `solve` itself proves by linear programmes, before and after the method runs."""
 
 import sys
 import time
@@ -17,32 +17,32 @@ from alloc.problems.distances.reach import Reach
 from alloc.problems.matching.clock import GATHERED_PER_SECOND
 
 SHORT_S = 0.1
-"""Time limit up to which no linear programme follows the run: even small ones take some milliseconds."""
+"""Time limit in seconds up to which no linear programme is solved after the run: even small ones take milliseconds."""
 
 UNLIMITED_S = 30.0
-"""Time limit of the linear programme before a run without one; so long that the clock does not decide."""
+"""Seconds for the linear programme before a run without a time limit: enough for it to finish, for reproducibility."""
 
 
 def raise_bound_before(search: Search) -> None:
-    """Raise the bound on the makespan before the run, so that a target gap is measured from it."""
+    """Raise the makespan bound before the run, so that a target gap is measured against it."""
     seconds = UNLIMITED_S if search.budget.time_limit_s is None else seconds_for_bounds(search)
     raise_makespan_bound(search, time.monotonic() + seconds)
 
 
 def raise_makespan_bound(search: Search, end: float) -> None:
-    """Raise the bound on the makespan by linear programmes that end at `end` on the monotonic clock."""
+    """Raise the makespan bound by linear programmes, until `end` on the monotonic clock."""
     seconds = max(0.0, end - time.monotonic())
     prove = _bound_below_plan if search.fastest is not None and search.gap < 1 else _bound_without_plan
     search.raise_bound(_unless_interrupted(search, lambda: prove(search, seconds)) or 0.0)
 
 
 def _bound_without_plan(search: Search, seconds: float) -> float | None:
-    """Return the bound by one linear programme, for where there is no plan yet."""
+    """Return the bound from a single linear programme, for runs that have no plan yet."""
     return lp_makespan_lower_bound(search.instance, seconds)
 
 
 def _bound_below_plan(search: Search, seconds: float) -> float | None:
-    """Return the bound by the linear programmes of exact methods, which know travel times and whole abilities."""
+    """Return the bound from the linear programmes of exact methods, which use travel times and integral abilities."""
     instance = search.instance
     if not (instance.workload > 0).any():
         return None
@@ -66,27 +66,27 @@ def _bound_below_plan(search: Search, seconds: float) -> float | None:
 
 
 def _has_few_neighbours(reach: Reach, seconds: float) -> bool:
-    """Whether reach is short, and the pairs within it can be gathered in so many seconds.
+    """Return whether reach is short enough for the pairs within it to be gathered in `seconds`.
 
-    Pairs that a method has gathered already do not count for it: what is proven must not depend on what ran before.
+    Pairs that a method has gathered already make no difference: the bound must not depend on what ran before.
     """
     return not (reach.has_table or reach.is_complete) and estimated_pairs(reach) <= GATHERED_PER_SECOND * seconds
 
 
 def bounds_after(search: Search, proposal: Proposal) -> float | None:
-    """Close the gap further by linear programmes, within about a tenth of the time limit in all.
+    """Reduce the gap by linear programmes, which take about a tenth of the time limit in total.
 
     Parameters
     ----------
     search : Search
-        A run with a best allocation; its bound on the makespan is raised.
+        A run with a best allocation; its makespan bound is raised.
     proposal : Proposal
-        Of the method, with the bounds that it proved.
+        Returned by the method, with the bounds that it proved.
 
     Returns
     -------
     float or None
-        The bound on the energy; None where energy is no objective, or no bound was found.
+        The bound on the energy; None if energy is not part of the objective, or no bound was found.
     """
     seconds = seconds_for_bounds(search)
     end = time.monotonic() + seconds
@@ -105,7 +105,7 @@ def bounds_after(search: Search, proposal: Proposal) -> float | None:
 
 
 def seconds_for_bounds(search: Search) -> float:
-    """Return the seconds for linear programmes; hardly any after a stop request, and none to load a solver."""
+    """Return the seconds for linear programmes: 0.1 after a stop request, or 0 if the solver is not loaded yet."""
     if search.interrupted:
         return 0.1 if "scipy.optimize" in sys.modules else 0.0
     limit = search.budget.time_limit_s
@@ -113,11 +113,11 @@ def seconds_for_bounds(search: Search) -> float:
 
 
 def bounds_s(limit_s: float) -> float:
-    """Return the seconds for linear programmes after a run of so many seconds: few, or none, after a short one."""
+    """Return the seconds for linear programmes after a run with this time limit; 0 if it is at most `SHORT_S`."""
     return 0.0 if limit_s <= SHORT_S else min(0.2, (limit_s - SHORT_S) / 2) + 0.1 * min(10.0, limit_s)
 
 
 def _unless_interrupted(search: Search, work: Callable[[], float | None]) -> float | None:
-    """Run `work`, but return early on a stop request: a linear programme ends by its time limit alone."""
+    """Run `work`, but return None early on a stop request, which the linear programmes themselves do not check."""
     before = search.interrupted
     return run_native(work, lambda: search.interrupted and not before, lambda: None)

@@ -1,4 +1,4 @@
-"""The end of a run: what is proven of the best allocation, and the result; and the scores of a plan that was stored."""
+"""The end of a run: proofs for the best allocation, and the result; also the scores of a stored plan."""
 
 import json
 import math
@@ -29,13 +29,13 @@ from alloc.problems.instance import IntArray
 from alloc.problems.text import labelled, number
 
 BOUNDS = {"lower_bound": "makespan", "energy_lower_bound": "energy"}
-"""Bounds, and what they are bounds on."""
+"""Score that each bound applies to."""
 
 CLOSE = 1e-9
-"""Relative difference up to which two scores are one."""
+"""Relative difference up to which two scores are equal."""
 
 MOST_NAMES = 10
-"""Ids of competing tasks in a note before it is cut."""
+"""Maximum number of ids of competing tasks in a note."""
 
 
 def conclude(
@@ -55,17 +55,17 @@ def conclude(
     search : Search
         The run on the whole instance, at its end.
     decomposition : Decomposition or None
-        Where not every task can be served.
+        None if every task can be served.
     method : str
         Name of the method that ran.
     proposal : Proposal
         What it returned.
     stop_reason : StopReason or None
-        Why it stopped before its own end.
+        Why the method stopped; None if it finished by itself.
     notes : list of str
         Messages for the user so far.
     pinned : bool
-        Whether there are agents that are pinned.
+        Whether any agent is pinned.
 
     Returns
     -------
@@ -106,24 +106,24 @@ def conclude(
 
 
 def _unmet(search: Search, limit: float) -> list[str]:
-    """Return a note where no plan keeps to the makespan limit that was given."""
+    """Return a note if the best plan exceeds the given makespan limit."""
     assert search.best is not None
     units, makespan = search.instance.units, search.best.evaluation.served_makespan
     if makespan <= last_equal(limit):
         return []
     most, least = (labelled(number(value), units.time) for value in (limit, search.lower_bound))
-    return [f"no plan was found within the makespan limit {most}; any takes {least} at least"]
+    return [f"no plan was found within the makespan limit {most}; every plan takes at least {least}"]
 
 
 def _concluded(decomposition: Decomposition, search: Search) -> list[str]:
-    """Raise the bound on the makespan of the tasks that are served, and return the notes."""
+    """Raise the makespan bound for the tasks that are served, and return the notes."""
     if decomposition.rest is not None and not decomposition.rest.fast_enough:
         raise_makespan_bound(decomposition.rest, time.monotonic() + seconds_for_bounds(search))
     return decomposition.notes()
 
 
 def _is_proven(search: Search, energy_bound: float | None) -> bool:
-    """Whether every stage of the objective is proven."""
+    """Return whether every stage of the objective is proven."""
     if not search.fast_enough or search.objective is Objective.MAKESPAN:
         return search.fast_enough
     if search.best is None or energy_bound is None:
@@ -152,14 +152,14 @@ def _contention(search: Search, decomposition: Decomposition | None) -> str:
 
 
 def scored_result(instance: Instance, allocation: Allocation, method: str = "given") -> Result:
-    """Return the scores of an allocation, wherever it comes from, as a result, with a bound that is cheap to compute.
+    """Score an allocation from any source, and return a result with a makespan bound that is cheap to compute.
 
     Parameters
     ----------
     instance : Instance
     allocation : Allocation
     method : str
-        What the result calls the method.
+        Name of the method in the result.
 
     Raises
     ------
@@ -183,20 +183,20 @@ def scored_result(instance: Instance, allocation: Allocation, method: str = "giv
 
 
 def with_claims(result: Result, claims: Mapping[str, object]) -> tuple[Result, list[str]]:
-    """Return the result with the bounds of a result file, where they hold, and a line for each that does not.
+    """Return the result with the valid bounds of a result file, and a message for each claim that does not hold.
 
     Parameters
     ----------
     result : Result
         The allocation of the file, scored on this instance.
     claims : mapping
-        Fields of the file, which nobody has checked.
+        Fields of the file, unchecked.
 
     Returns
     -------
     result : Result
     lines : list of str
-        What the file states that is not so here. Where a score differs, no bound is taken over: it was proven for
+        Claims of the file that do not hold on this instance. If a score differs, no bound is used, as it was proven for
         another instance.
     """
     wrong = next(_differences(result, claims), None)
@@ -216,14 +216,14 @@ def with_claims(result: Result, claims: Mapping[str, object]) -> tuple[Result, l
     if "lower_bound" in bounds and not claims.get("pins"):
         result = replace(result, lower_bound=max(bounds["lower_bound"], result.lower_bound or 0.0))
     if claims.get("pins"):
-        return result, [*lines, "what it states as proven holds for its pins alone, and is left out"]
+        return result, [*lines, "its bounds hold only with its pins, and are left out"]
     limit = _number(claims.get("makespan_limit"))
     result = replace(result, energy_lower_bound=bounds.get("energy_lower_bound"), makespan_limit=limit)
     return _with_moves(result, claims), lines
 
 
 def _with_moves(result: Result, claims: Mapping[str, object]) -> Result:
-    """Return the result with the moves against a plan in force, and the bound on their cost, if the file has them."""
+    """Return the result with the moves from the plan in force and the bound on their cost, if the file has them."""
     if claims.get("moves") is None:
         return result
     try:
@@ -233,7 +233,7 @@ def _with_moves(result: Result, claims: Mapping[str, object]) -> Result:
 
 
 def _differences(result: Result, claims: Mapping[str, object]) -> Iterator[str]:
-    """Yield how the file and the result differ: in the name of the instance, in the agents, in the scores."""
+    """Yield the differences between the file and the result: instance name, agents, scores and unserved tasks."""
     found = result.to_dict()
     if claims.get("instance") not in (None, found["instance"]):
         yield "it is for another instance"
@@ -244,7 +244,7 @@ def _differences(result: Result, claims: Mapping[str, object]) -> Iterator[str]:
         if not _is_close(claims.get(name), found[name]):
             yield f"its {name} is {_shown(claims.get(name))}, but on this instance it is {_shown(found[name])}"
     if claims.get("unserved_tasks", found["unserved_tasks"]) != found["unserved_tasks"]:
-        yield "other tasks are unserved on this instance than it states"
+        yield "its unserved tasks are not those on this instance"
 
 
 def _is_close(one: object, other: object) -> bool:

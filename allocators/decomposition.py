@@ -1,4 +1,4 @@
-"""Runs on instances in which not every task can be served, decomposed into the competing tasks and the rest."""
+"""Decomposition of an instance in which not every task can be served into the competing tasks and the rest."""
 
 import sys
 
@@ -12,14 +12,14 @@ from alloc.problems.text import labelled
 class Decomposition:
     """A run on an instance in which not every task can be served.
 
-    The competing tasks, which too few agents can do, are allocated by matching: at the least makespan beforehand, and
-    again at the end, at the least energy in the time that the rest takes. The method allocates the rest, where every
+    The competing tasks, for which there are too few agents, are allocated by matching: first for the least makespan,
+    and at the end for the least energy within the makespan of the rest. The method allocates the rest, in which every
     task can be served.
 
     Parameters
     ----------
     whole : Search
-        The run on the whole instance; it gets every allocation, the start of the request first of all.
+        The run on the whole instance. Every allocation is submitted to it, beginning with the start of the request.
     shortage : Shortage
         The competing tasks and the rest.
     request : Request
@@ -28,7 +28,7 @@ class Decomposition:
     ----------
     shortage : Shortage
     rest : Search or None
-        The run of the method on the rest; None where no task is left for it.
+        The run of the method on the rest; None if the rest has no tasks.
     """
 
     def __init__(self, whole: Search, shortage: Shortage, request: Request) -> None:
@@ -60,7 +60,7 @@ class Decomposition:
         self._whole.submit(self.shortage.merged(rest))
 
     def conclude(self) -> None:
-        """Submit the best of the rest together with the cheapest allocation of the competing tasks that is as fast."""
+        """Submit the best allocation of the rest, with the cheapest one of the competing tasks that is as fast."""
         if self.rest is not None and self.rest.best is not None:
             self._whole.submit(self._merged(self.rest.best.allocation, self.rest.makespan_limit))
 
@@ -71,7 +71,7 @@ class Decomposition:
         return shortage.merged(rest)
 
     def notes(self) -> list[str]:
-        """Return the notes on the rest, and what is proven of the makespan of the tasks that are served."""
+        """Return the notes on the rest, and on the makespan bound for the tasks that are served."""
         best, bound = self._whole.best, self.shortage.bound
         notes: list[str] = []
         if self.rest is not None:
@@ -82,5 +82,5 @@ class Decomposition:
         taken, least = labelled(f"{hours:.6g}", unit), labelled(f"{bound:.6g}", unit)
         as_much = "as many tasks" if self.shortage.precedence is None else "as many and as urgent tasks"
         if relative_gap(hours, bound) <= PROVEN:
-            return [*notes, f"no plan that serves {as_much} is done sooner than this one, in {taken}"]
-        return [*notes, f"every plan that serves {as_much} takes {least} or more, this one {taken}"]
+            return [*notes, f"no plan that serves {as_much} has a shorter makespan than this one, {taken}"]
+        return [*notes, f"every plan that serves {as_much} takes at least {least}, this one {taken}"]

@@ -1,4 +1,4 @@
-"""The bottleneck of an allocation: the last task, and what one more agent there would gain."""
+"""The bottleneck of an allocation: its last task, and what one more agent there would gain."""
 
 import sys
 from dataclasses import dataclass
@@ -28,27 +28,28 @@ class Gain:
 
 @dataclass(frozen=True)
 class Bottleneck:
-    """The last task of an allocation that serves all tasks, and what would make it sooner.
+    """The last task of an allocation that serves all tasks, and what would complete it sooner.
 
     Attributes
     ----------
     last : tuple of int
-        The tasks that are done at the makespan, within 1e-9 relative; several if they are last together.
+        The tasks that are completed at the makespan, within 1e-9 relative; usually one.
     makespan : float
         In hours.
     agents : tuple of int
         The agents on the first task of `last`.
     next_task : int or None
-        The latest of the other tasks; None if there is none with workload.
+        The latest of the other tasks; None if no other task has workload.
     next_time : float
-        When that one is done, in hours; 0 if there is none.
+        Completion time of `next_task`, in hours; 0 if there is none.
     use : float
-        Share of all ability, from hour 0 to the makespan, that is at work; the rest is idle, done early, or travels.
+        Share of the total ability that is at work between hour 0 and the makespan; the remainder is of agents that are
+        idle, travel, or have completed their task.
     enough : Gain or None
-        With the least ability of one more agent there for which `next_task` is the last one; more ability gains
-        nothing. None if several tasks are last together, or there is no next one.
+        Gain with one more agent of the least ability for which `next_task` becomes the last; more ability gains
+        nothing. None if several tasks are last, or there is no next one.
     typical : Gain or None
-        With one more agent of the median ability of all agents; None if several tasks are last together.
+        Gain with one more agent of the median ability of all agents; None if several tasks are last.
     """
 
     last: tuple[int, ...]
@@ -64,8 +65,8 @@ class Bottleneck:
 def explain(instance: Instance, allocation: Allocation) -> Bottleneck | None:
     """Return the bottleneck of an allocation: its last task, and what one more agent there would gain.
 
-    The additional agent is on the task from hour 0 on, whatever the speeds of the others; all other agents stay where
-    they are.
+    The additional agent works on the task from hour 0 on, whatever the speeds of the others; all other agents keep
+    their tasks.
 
     Parameters
     ----------
@@ -75,7 +76,7 @@ def explain(instance: Instance, allocation: Allocation) -> Bottleneck | None:
     Returns
     -------
     Bottleneck or None
-        None if a task is unserved, or there is no work at all.
+        None if a task is unserved, or no task has workload.
 
     Raises
     ------
@@ -107,14 +108,14 @@ def explain(instance: Instance, allocation: Allocation) -> Bottleneck | None:
 
 
 def makespan_with_agent(instance: Instance, found: Evaluation, agents: IntArray, task: int, ability: float) -> float:
-    """Return the makespan in hours with one more agent of `ability`, which is on `task` from hour 0 on.
+    """Return the makespan, in hours, if one more agent of `ability` works on `task` from hour 0 on.
 
     Parameters
     ----------
     found : Evaluation
         Scores without that agent.
     agents : ndarray of int, shape (k,)
-        The agents that are on `task` already, and can do it.
+        The agents that work on `task` already.
     task : int
     ability : float
         Work per hour of the additional agent.
@@ -132,13 +133,13 @@ def _arrival(instance: Instance, agents: IntArray, task: int) -> FloatArray:
 
 
 def _working(instance: Instance, allocation: Allocation, task: int) -> IntArray:
-    """Return the agents that are on `task` and can do it."""
+    """Return the agents that are assigned to `task` and can do it."""
     there = np.flatnonzero(allocation.task_of_agent == task)
     return there[instance.reach.allows(there, np.full(len(there), task))]
 
 
 def _enough(instance: Instance, found: Evaluation, agents: IntArray, task: int, next_time: float) -> Gain:
-    """Return the gain with the ability for what the group leaves undone at `next_time`."""
+    """Return the gain with an agent of just the ability to do the work that the group has left at `next_time`."""
     hours = np.maximum(0.0, next_time - _arrival(instance, agents, task))
     left = instance.workload[task] - float((instance.ability[agents] * hours).sum())
     return _gain(instance, found, agents, task, left / next_time)

@@ -1,4 +1,4 @@
-"""The Pareto front of makespan and energy: how much energy saving time costs."""
+"""The Pareto front of makespan and energy: how much energy a shorter makespan costs."""
 
 import math
 import sys
@@ -23,20 +23,20 @@ from alloc.problems.arguments import event, flag, function, listed, of_type, who
 from alloc.problems.formats.allocation_file import FRONT_FORMAT
 
 CLOSE = 1e-3
-"""Relative difference of two makespans up to which there is no run between them."""
+"""Relative difference of two neighbouring makespans up to which no run is made between them."""
 
 
 @dataclass(frozen=True, eq=False)
 class Front:
-    """Allocations that do not dominate each other in makespan and energy, the fastest first.
+    """Allocations none of which dominates another in makespan and energy, fastest first.
 
     Attributes
     ----------
     instance : Instance
     points : tuple of Result
-        Each the least energy found within its `makespan_limit`, with the bound on it; at least one.
+        Allocations with the least energy found within their `makespan_limit`, and the bound on it; at least one.
     complete : bool
-        Whether no run was interrupted.
+        False if a run was interrupted.
     """
 
     instance: Instance
@@ -83,31 +83,31 @@ def pareto(
     parameters: object = None,
     **settings: object,
 ) -> Front:
-    """Trace the front of makespan against energy.
+    """Trace the Pareto front of makespan and energy.
 
-    The fastest allocation comes first, then the one with the least energy of all; then, repeatedly, the least energy
-    at a makespan between the two neighbours that leave the largest area open (the epsilon-constraint method of
-    Haimes, Lasdon and Wismer 1971, doi:10.1109/TSMC.1971.4308298, on an adaptive grid). Every run starts from the best
-    allocation within its limit that an earlier one found.
+    The first run seeks the fastest allocation, the second the one with the least energy at any makespan. Each further
+    run minimises the energy under a makespan limit between the two neighbouring points that leave the largest area
+    open (the epsilon-constraint method of Haimes, Lasdon and Wismer 1971, doi:10.1109/TSMC.1971.4308298, on an adaptive
+    grid). Every run starts from the best allocation within its limit that earlier runs found.
 
     Parameters
     ----------
     instance : Instance
     method : str or Allocator
-        One that makes use of slack for the makespan, or ``auto``.
+        A method that makes use of makespan slack, or ``auto``.
     points : int
-        Number of runs, >= 1, and at least as many as there are `starts`; the front may have fewer points, where several
+        Number of runs, >= 1; raised to the number of `starts` if that is larger. The front has fewer points if several
         limits have the same best allocation.
     time_limit_s, iterations, seed, threads
-        Of each single run, as in `solve`.
+        For each single run, as in `solve`.
     starts : sequence of Allocation or Result
-        Allocations to begin with, such as those of an earlier front: their makespans are the first limits.
+        Known allocations, such as those of an earlier front; their makespans are the first limits.
     on_point : callable, optional
         Called with the result of every run.
     stop : threading.Event, optional
-        Setting it ends the run in progress and returns the front so far.
+        Setting it ends the run in progress; the front so far is returned.
     handle_signals : bool
-        Whether SIGINT and SIGTERM do the same.
+        Whether SIGINT and SIGTERM have the same effect.
     parameters, **settings
         Parameters of the method, as in `solve`.
 
@@ -158,7 +158,7 @@ def _traced(
     on_point: Callable[[Result], None],
     stop: threading.Event,
 ) -> list[Result]:
-    """Return the results of all runs, each with its own limit on the makespan."""
+    """Return the results of all runs, each with its own makespan limit."""
     known = [(start, evaluate(instance, start)) for start in plans]
     wanted = sorted((score.served_makespan, score.energy) for _, score in known if score.makespan)
     points = max(points, len(wanted))
@@ -176,10 +176,10 @@ def _traced(
 
 
 def _next_limit(instance: Instance, results: Sequence[Result], wanted: Sequence[tuple[float, float]]) -> float | None:
-    """Return the limit on the makespan of the next run; 0 for the fastest allocation, None if no run is left.
+    """Return the makespan limit of the next run; 0 for the fastest allocation, None if no run is left.
 
-    After both ends of the front come the makespans of the given allocations, `wanted` with their energies, unless a
-    result is as good already.
+    After both ends of the front come the makespans of the given allocations, each unless a result is as good already;
+    `wanted` has their makespans and energies.
     """
     if not results:
         return 0.0
@@ -196,7 +196,7 @@ def _next_limit(instance: Instance, results: Sequence[Result], wanted: Sequence[
 
 
 def _gaps(results: Sequence[Result]) -> list[tuple[float, float]]:
-    """Return open area and middle of each pair of neighbours; areas with makespans on a logarithmic scale."""
+    """Return the open area between each pair of neighbours, with makespans on a logarithmic scale, and its middle."""
     ends = sorted((_limit(result), result.makespan or 0.0, result.energy or 0.0) for result in results)
     gaps, (left, _, costly) = [], ends[0]
     for limit, right, cheap in ends[1:]:
@@ -207,18 +207,18 @@ def _gaps(results: Sequence[Result]) -> list[tuple[float, float]]:
 
 
 def _is_as_good(result: Result, hours: float, energy: float) -> bool:
-    """Whether `result` is neither slower nor costlier, up to a small tolerance."""
+    """Return whether `result` is neither slower nor costlier, up to a small tolerance."""
     slow, costly = result.makespan or 0.0, result.energy or 0.0
     return slow <= hours * (1 + CLOSE) and costly <= energy * (1 + PROVEN)
 
 
 def _limit(result: Result) -> float:
-    """Return the makespan up to which this run minimised the energy."""
+    """Return the makespan limit under which this run minimised the energy."""
     return max(result.makespan_limit or 0.0, result.makespan or 0.0)
 
 
 def slowest(instance: Instance) -> float:
-    """Return a makespan, in hours, that no allocation exceeds that serves all tasks with any agent each."""
+    """Return an upper bound, in hours, on the makespan of any allocation that serves all tasks."""
     hours = float(instance.workload.max()) / float(instance.ability.min())
     if instance.has_travel_time:
         hours += _farthest(instance) / float(instance.speed.min())
@@ -226,7 +226,7 @@ def slowest(instance: Instance) -> float:
 
 
 def _farthest(instance: Instance) -> float:
-    """Return a distance that no flight exceeds."""
+    """Return an upper bound on the distance of any flight."""
     reach = instance.reach
     if reach.geometry.is_euclidean:
         places = np.vstack([instance.start_position, instance.task_position])
@@ -238,7 +238,7 @@ def _farthest(instance: Instance) -> float:
 
 
 def _best_within(known: Sequence[tuple[Allocation, Evaluation]], limit: float) -> Allocation | None:
-    """Return the allocation with the least energy within `limit` hours, else the fastest, None if none is known."""
+    """Return the allocation with the least energy within `limit` hours, else the fastest one; None if none is known."""
     serving = [(plan, score) for plan, score in known if score.makespan is not None and not score.violations]
     if not serving:
         return None
@@ -249,7 +249,7 @@ def _best_within(known: Sequence[tuple[Allocation, Evaluation]], limit: float) -
 
 
 def _undominated(results: Sequence[Result]) -> tuple[Result, ...]:
-    """Keep each result that has less energy than all faster ones; if none serves all tasks, the first."""
+    """Return the results that have less energy than all faster ones; the first result if none serves all tasks."""
     kept: list[Result] = []
     for result in sorted(results, key=lambda one: (one.makespan or 0.0, one.energy or 0.0)):
         if result.makespan is not None and (not kept or (result.energy or 0.0) < (kept[-1].energy or 0.0)):

@@ -1,4 +1,4 @@
-"""What a method refuses before it runs: what it cannot handle, or not within the budget."""
+"""Refusals before a run: instances that a method cannot handle, or not within the budget."""
 
 from alloc.allocators.contract.base import Allocator
 from alloc.allocators.contract.budget import Budget
@@ -24,7 +24,7 @@ def refuse(
     Raises
     ------
     RefusedError
-        With the reason, and other methods where some can.
+        With the reason, and alternative methods if there are any.
     """
     reason = _beyond(allocator, instance, objective, tolerance) or allocator.refusal(instance, objective, budget)
     if reason is not None:
@@ -32,7 +32,7 @@ def refuse(
 
 
 def _beyond(allocator: Allocator, instance: Instance, objective: Objective, tolerance: MakespanTolerance) -> str | None:
-    """Return which capability the method lacks, None if it has all that is needed."""
+    """Return which required capability the method lacks, or None."""
     method = allocator.method
     if not (instance.reach.is_plain or instance.reach.has_table) and instance.reach.neighbours is None:
         return (
@@ -40,7 +40,7 @@ def _beyond(allocator: Allocator, instance: Instance, objective: Objective, tole
         )
     if instance.has_travel_time and not method.finite_speeds:
         able = [name for name, other in BUILT_IN.items() if other.finite_speeds]
-        return f"finite speeds are beyond it; use {_either(able)}"
+        return f"it does not support finite speeds; use {_either(able)}"
     if objective not in method.objectives:
         return f"it does not optimise {objective}"
     if tolerance != EXACT and not method.makespan_slack:

@@ -1,4 +1,4 @@
-"""Methods by name, imported on first use; third parties add theirs by entry point."""
+"""Methods by name, imported on first use; other packages add theirs by entry points."""
 
 from collections.abc import Mapping
 from importlib.metadata import EntryPoint
@@ -51,13 +51,13 @@ def names() -> list[str]:
     Returns
     -------
     list of str
-        Those built in, then those of installed plugins.
+        Built-in methods, then those of installed plugins.
     """
     return [*BUILT_IN, *_plugins()]
 
 
 def describe(name: str) -> Method:
-    """Return the description of a method; a built-in one is not imported for it, a plugin is.
+    """Return the description of a method; plugins are imported for it, built-in methods are not.
 
     Parameters
     ----------
@@ -78,16 +78,16 @@ def describe(name: str) -> Method:
 
 
 def load(name: str, parameters: object = None, **settings: object) -> Allocator:
-    """Return a method, ready to be used many times and from several threads.
+    """Load a method; the allocator can be used many times, and from several threads.
 
     Parameters
     ----------
     name : str
         One of `names`.
     parameters : object, optional
-        All parameters of the method, of its `Allocator.parameters_type`, or a mapping of some by name.
+        All parameters of the method, as an instance of its `Allocator.parameters_type`, or a mapping of some by name.
     **settings
-        Single ones by name, such as ``population`` of ``ga`` or ``policy`` of ``gappo``; None stands for the default.
+        Single parameters by name, such as ``population`` of ``ga`` or ``policy`` of ``gappo``; None for the default.
 
     Returns
     -------
@@ -96,9 +96,9 @@ def load(name: str, parameters: object = None, **settings: object) -> Allocator:
     Raises
     ------
     InputError
-        If there is no such method, it has no such parameter, or a value is wrong.
+        If the method or a parameter is unknown, or a value is wrong.
     MissingPackageError
-        If what it requires is not installed.
+        If a required package is not installed.
     """
     method = describe(name)
     if isinstance(parameters, Mapping):
@@ -108,7 +108,7 @@ def load(name: str, parameters: object = None, **settings: object) -> Allocator:
     if "policy" in given and "policy" in method.options:
         from alloc.allocators.learned.files.policy_header import read_header
 
-        read_header(cast("str", given["policy"]))  # a wrong file is an error before the seconds that torch takes
+        read_header(cast("str", given["policy"]))  # report a wrong file before torch is loaded, which takes seconds
     with ended_with_process(lambda: None):  # the import of a large library cannot be interrupted
         kind = _class(name)
         for key in given:
@@ -122,7 +122,7 @@ def load(name: str, parameters: object = None, **settings: object) -> Allocator:
 
 
 def method_parameters(name: str) -> dict[str, object]:
-    """Return what can be set of a method, with the defaults; its class is imported for it.
+    """Return the parameters of a method with their defaults; its class is imported.
 
     Parameters
     ----------
@@ -132,20 +132,20 @@ def method_parameters(name: str) -> dict[str, object]:
     Returns
     -------
     dict
-        Default by name of parameter, as `load` and `solve` take them.
+        Default value by parameter name, as `load` and `solve` accept them.
 
     Raises
     ------
     InputError
         If there is no such method.
     MissingPackageError
-        If what it requires is not installed.
+        If a required package is not installed.
     """
     return {parameter.name: parameter.default for parameter in describe_parameters(name)}
 
 
 def describe_parameters(name: str) -> tuple[Parameter, ...]:
-    """Return what can be set of a method, with types, ranges, defaults and meanings; its class is imported for it.
+    """Return the parameters of a method with types, ranges, defaults and meanings; its class is imported.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ def describe_parameters(name: str) -> tuple[Parameter, ...]:
     InputError
         If there is no such method.
     MissingPackageError
-        If what it requires is not installed.
+        If a required package is not installed.
     """
     require_installed(describe(name).missing, f"method {name!r}", "method")
     return described(_class(name))
@@ -180,7 +180,7 @@ def _class(name: str) -> type[Allocator]:
 
 
 def _hint(key: str, method: Method, kind: type[Allocator]) -> str:
-    """Return which of our methods take this option, or which one may be meant and all that there are."""
+    """Return which built-in methods have this option, or else the closest option and all options of this method."""
     takers = [other.name for other in BUILT_IN.values() if key in other.options]
     if takers:
         return f"; {', '.join(takers)} {'do' if len(takers) > 1 else 'does'}"
@@ -194,7 +194,9 @@ def _plugins() -> dict[str, EntryPoint]:
 def _plugin_class(name: str) -> type[Allocator]:
     found = _plugins()
     if name == "auto":
-        raise InputError("'auto' is no method but picks one for an instance; call solve(instance, 'auto')", "method")
+        raise InputError(
+            "'auto' is not a method, but picks one for an instance; call solve(instance, 'auto')", "method"
+        )
     if name not in found:
         raise InputError(f"there is no method {name!r}{nearest(name, [*BUILT_IN, *found, 'auto'])}", "method")
     return plugin_class(found, name, Allocator, "method", "an Allocator with a `method`", "method")  # type: ignore[type-abstract]

@@ -1,4 +1,4 @@
-"""The arguments of `solve`, checked: an error names the parameter, before anything runs."""
+"""Checks of the arguments of `solve` before anything runs; errors name the parameter."""
 
 import threading
 from collections.abc import Callable, Mapping
@@ -18,12 +18,12 @@ LARGEST_SEED = 2**63 - 1
 MOST_THREADS = 1024
 
 Start = Allocation | Result | Mapping[str, str | None]
-"""What a run may start from: an allocation, that of a result, or the task id of each agent id."""
+"""Warm start of a run: an allocation, a result that has one, or a mapping from agent ids to task ids."""
 
 
 @dataclass(frozen=True)
 class Request:
-    """What a run is asked for; every field as `solve` describes it.
+    """The checked arguments of a run, as `solve` describes them.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class Request:
     on_improvement : callable or None
     stop : threading.Event
     pinned : bool
-        Whether agents are pinned.
+        Whether any agent is pinned.
     """
 
     instance: Instance
@@ -66,7 +66,7 @@ def checked_tolerance(slack: float, limit: float | None, objective: Objective) -
     Raises
     ------
     InputError
-        If a number is out of range, or the objective leaves no room for a tolerance.
+        If a number is out of range, or the objective allows no tolerance.
     """
     tolerance = MakespanTolerance(
         real(slack, "makespan_slack"),
@@ -75,7 +75,7 @@ def checked_tolerance(slack: float, limit: float | None, objective: Objective) -
     if objective is Objective.MAKESPAN and tolerance != EXACT:
         name = "makespan_slack" if slack else "makespan_limit"
         goals = f"{Objective.MAKESPAN_ENERGY} or {Objective.MAKESPAN_MOVES}"
-        raise InputError(f"leaves room for less energy or fewer moves; it is for the objective {goals}", name)
+        raise InputError(f"leaves room for less energy or fewer moves; use it with the objective {goals}", name)
     return tolerance
 
 
@@ -90,48 +90,48 @@ def checked_threads(threads: int | None) -> int | None:
 
 
 def default_threads(budget: Budget) -> int:
-    """Return the number of processors; 1 where iterations alone are counted, as the answer may depend on it."""
+    """Return the number of processors, or 1 if only iterations are limited, as the answer may depend on the number."""
     is_counted = budget.iterations is not None and budget.time_limit_s is None
     return 1 if is_counted else available_threads()
 
 
 def checked_objective(objective: Objective | str) -> Objective:
-    """Return an objective for runs without a plan in force.
+    """Return the objective of a run without a plan in force.
 
     Raises
     ------
     InputError
-        If it is none, or counts moves from a plan.
+        If there is no such objective, or it counts moves from a plan.
     """
     goal = choice(Objective, objective, "objective")
     if goal is Objective.MAKESPAN_MOVES:
-        raise InputError(f"must be {' or '.join(OBJECTIVES)}; moves are counted by solve, from a start", "objective")
+        raise InputError(f"must be {' or '.join(OBJECTIVES)}; only solve counts moves, from its start", "objective")
     return goal
 
 
 def checked_pins(pins: object) -> dict[str, str | None]:
-    """Return the task id of each agent id that is pinned, None for idle."""
+    """Return the task id of each pinned agent by agent id; None for agents that must stay idle."""
     found: dict[str, str | None] = {}
     for agent, task in of_type({} if pins is None else pins, Mapping, "pins").items():
         if not isinstance(agent, str) or not isinstance(task, str | None):
-            raise InputError(f"must give the id of a task, or None, for ids of agents, got {agent!r}: {task!r}", "pins")
+            raise InputError(f"must map agent ids to task ids or None, got {agent!r}: {task!r}", "pins")
         found[agent] = task
     return found
 
 
 def as_start(instance: Instance, given: Start) -> tuple[Allocation, CarriedOver]:
-    """Return the plan that a run starts from, and how the instance differs from the one that it was made for.
+    """Return the plan that a run starts from, and how the instance has changed since that plan was made.
 
     Parameters
     ----------
     instance : Instance
     given : Allocation, Result or mapping
-        Agents and tasks of a result or a mapping that have gone are left out.
+        Agents and tasks that the instance no longer has are left out of a result or a mapping.
 
     Raises
     ------
     InputError
-        If it is none of these, or does not fit `instance` at all; its place is ``start``.
+        If it has another type, or does not fit `instance` at all; its `place` is ``start``.
     """
     if isinstance(given, Result) and given.allocation is not None:
         given = given.allocation.to_ids(given.instance)
@@ -144,7 +144,7 @@ def as_start(instance: Instance, given: Start) -> tuple[Allocation, CarriedOver]
 
 
 def as_allocation(instance: Instance, given: Start, name: str) -> Allocation:
-    """Return the allocation of `instance` that the caller gave in one of several forms.
+    """Convert an allocation, a result or a mapping to an allocation of `instance`.
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ def as_allocation(instance: Instance, given: Start, name: str) -> Allocation:
     given : Allocation, Result or mapping
         An allocation, a result that has one, or task ids by agent id.
     name : str
-        The parameter, for errors.
+        Name of the parameter, for errors.
 
     Returns
     -------
@@ -161,7 +161,7 @@ def as_allocation(instance: Instance, given: Start, name: str) -> Allocation:
     Raises
     ------
     InputError
-        If it is none of these, or does not belong to `instance`; its place is `name`.
+        If it has another type, or does not belong to `instance`; its `place` is `name`.
     """
     try:
         if isinstance(given, Mapping):

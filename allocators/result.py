@@ -1,4 +1,4 @@
-"""The answer of `solve`: an allocation with its scores, how good it is proven to be, and why the run stopped."""
+"""The answer of `solve`: an allocation with its scores and proven bounds, and why the run stopped."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
@@ -32,34 +32,34 @@ class Result:
     ----------
     instance : Instance
     method : str
-        Name of the method that ran; the one picked, where the method was ``auto``.
+        Name of the method that ran; with ``auto``, the method that it picked.
     objective : Objective
     seed : int
     allocation : Allocation or None
-        None with status `no_solution` alone.
+        None only with the status `no_solution`.
     evaluation : Evaluation or None
         Scores of `allocation`.
     lower_bound, energy_lower_bound : float or None
-        Best proven lower bounds on the makespan in hours, and on the energy of any allocation with this makespan, or
-        within `makespan_limit`. None while a task is unserved; for the energy also where it is no objective, or no
-        bound was found.
+        Best proven lower bounds on the makespan in hours, and on the energy of any allocation with this makespan or
+        within `makespan_limit`. None if a task is unserved; for the energy also if it is not part of the objective, or
+        no bound was found.
     status : Status
     makespan_limit : float or None
-        Hours up to which only the energy counted, where a slack or a limit was given for the makespan.
+        Makespan in hours up to which only the energy counted; None without a makespan slack or limit.
     stop_reason : StopReason
     runtime_s : float
         Seconds from the instance in memory to the allocation in memory.
     trace : tuple of TracePoint
         Figures of every improvement, in order.
     notes : tuple of str
-        Messages for the user: what ``auto`` picked and why, notes of the method on its run, which tasks too few agents
-        can reach.
+        Messages for the user: the choice of ``auto`` and the reason, notes of the method on its run, and the tasks that
+        too few agents can reach.
     moves : Moves or None
-        How the allocation differs from the plan in force, where there is one.
+        How the allocation differs from the plan in force; None without such a plan.
     pins : mapping
-        Task id of each agent id that had to do one task, None for idle; what is proven holds for them alone.
+        Task id of each pinned agent by agent id, None for idle; bounds and status hold under these pins only.
     tolerance : MakespanTolerance
-        The slack and the limit that were given for the makespan.
+        The makespan slack and limit that were given.
     parameters : mapping
         Parameters of the method that differ from their defaults, by name.
     """
@@ -84,17 +84,17 @@ class Result:
 
     @property
     def label(self) -> str:
-        """The method with the parameters that were set, such as ``ga[population=200]``."""
+        """Name of the method with the parameters that were set, such as ``ga[population=200]``."""
         return labelled_method(self.method, self.parameters)
 
     @property
     def makespan(self) -> float | None:
-        """Hours until the last task is done; None while a task is unserved."""
+        """Completion time of the last task in hours; None if a task is unserved."""
         return None if self.evaluation is None else self.evaluation.makespan
 
     @property
     def unserved(self) -> tuple[Unserved, ...]:
-        """Why tasks are unserved: the ten most urgent ones."""
+        """The ten most urgent unserved tasks, with the reasons."""
         if self.allocation is None or self.evaluation is None or not self.evaluation.unserved_tasks:
             return ()
         pinned = {self.instance.agent_index[name] for name in self.pins}
@@ -102,14 +102,14 @@ class Result:
 
     @property
     def served_makespan(self) -> float | None:
-        """Hours until the last of the tasks that are served is done; None where there is no allocation."""
+        """Completion time of the last served task in hours; None without an allocation."""
         if self.makespan is not None or self.evaluation is None:
             return self.makespan
         return self.evaluation.served_makespan
 
     @property
     def unserved_count(self) -> int:
-        """Number of tasks that are unserved, 0 where there is no allocation."""
+        """Number of unserved tasks; 0 without an allocation."""
         return 0 if self.evaluation is None else len(self.evaluation.unserved_tasks)
 
     @property
@@ -133,7 +133,7 @@ class Result:
 
     @property
     def status(self) -> Status:
-        """Derived from the scores and the bounds alone."""
+        """Status, derived from the scores and the bounds alone."""
         if self.evaluation is None:
             return Status.NO_SOLUTION
         if self.evaluation.unserved_tasks:
@@ -145,14 +145,14 @@ class Result:
 
     @property
     def _is_fast_enough(self) -> bool:
-        """Whether the makespan is proven to be the least, up to the slack or the limit that was given."""
+        """Whether the makespan is proven to be minimal, up to the given slack or limit."""
         if self.makespan is None or self.lower_bound is None:
             return False
         excess = relative_gap(self.makespan, self.tolerance.hours(self.lower_bound))
         return excess <= PROVEN + RELATIVE_TOLERANCE
 
     def __str__(self) -> str:
-        """How good the answer is, its figures, and its bottleneck, a line or two each."""
+        """Return a summary of several lines: status, figures and bottleneck."""
         return summary(self)
 
     def to_dict(self) -> dict[str, object]:
@@ -204,7 +204,7 @@ class Result:
         }
 
     def _reasons(self) -> dict[str, object]:
-        """Return the field on why tasks are unserved; none where all are served."""
+        """Return the field `unserved_reasons`; an empty dict if all tasks are served."""
         agents, found = self.instance.agent_ids, self.unserved
         fields = [
             {
@@ -221,9 +221,9 @@ class Result:
 
     @classmethod
     def from_dict(cls, document: Mapping[str, object], instance: Instance) -> "Result":
-        """Return the result that `to_dict` turned into `document`.
+        """Return the result whose `to_dict` gave `document`.
 
-        Notes, the lower bounds in the trace, and the slack of the makespan are not in the document.
+        The document does not contain notes, the lower bounds in the trace, and the makespan slack.
 
         Parameters
         ----------
@@ -238,8 +238,8 @@ class Result:
         Raises
         ------
         InputError
-            If a field is missing or wrong, an id is unknown, or the scores are not those on `instance`; its place is
-            the field.
+            If a field is missing or wrong, an id is unknown, or the scores do not match `instance`; its `place` is the
+            field.
         """
         fields = result_fields(document, instance)
         result = cls(instance=instance, **fields)
@@ -253,10 +253,10 @@ class Result:
         Returns
         -------
         pandas.DataFrame
-            Its columns are `agent`, `task` (None for idle agents), `ability`, `arrival` (at the task),
-            `completion_time` (of the task), `distance` (back again where the agent returns), `energy`, `battery`,
-            `battery_left` and `violation` (why the agent cannot take its task); NaN where a figure is not known. Empty
-            if there is no allocation.
+            With the columns `agent`, `task` (None for idle agents), `ability`, `arrival` (at the task),
+            `completion_time` (of the task), `distance` (including the return flight, if any), `energy`, `battery`,
+            `battery_left` and `violation` (why the agent cannot take its task). Unknown figures are NaN. Empty if there
+            is no allocation.
 
         Raises
         ------
@@ -277,7 +277,7 @@ def read_result(path: PathLike, instance: Instance) -> Result:
     Parameters
     ----------
     path : str or path
-        A JSON file whatever its suffix, or ``-`` for standard input.
+        A JSON file with any suffix, or ``-`` for standard input.
     instance : Instance
         The instance that was solved.
 

@@ -1,4 +1,4 @@
-"""The document of a result (alloc-result/1), read back: its fields checked against the scores of its allocation."""
+"""Reading of result documents (alloc-result/1): the fields are checked against the scores of the allocation."""
 
 import math
 from collections.abc import Mapping
@@ -16,11 +16,11 @@ from alloc.problems.formats.allocation_file import RESULT_FORMAT
 from alloc.problems.formats.columns import require_format
 
 SCORES = ("makespan", "served_makespan", "energy", "distance", "battery_remaining_percent", "reward")
-"""Fields that must be what `evaluate` says of the allocation."""
+"""Fields that must match what `evaluate` returns for the allocation."""
 
 
 class ResultFields(TypedDict):
-    """Arguments of `Result`, but for the instance and the notes."""
+    """Arguments of `Result` other than the instance and the notes."""
 
     method: str
     objective: Objective
@@ -40,7 +40,7 @@ class ResultFields(TypedDict):
 
 
 def result_fields(document: Mapping[str, object], instance: Instance) -> ResultFields:
-    """Return what a document says of a result on `instance`.
+    """Return the arguments of `Result` from a document of a result on `instance`.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def result_fields(document: Mapping[str, object], instance: Instance) -> ResultF
     Raises
     ------
     InputError
-        If a field is missing or wrong, an id is unknown, or the scores are not those on this instance.
+        If a field is missing or wrong, an id is unknown, or the scores do not match this instance.
     """
     of_type(instance, Instance, "instance")
     fields = dict(of_type(document, Mapping, "document"))
@@ -78,7 +78,7 @@ def result_fields(document: Mapping[str, object], instance: Instance) -> ResultF
             for number, point in enumerate(of_type(fields.get("trace", []), list, "trace"))
         ),
         "makespan_limit": limit,
-        # the slack is not in the document; that there was one matters only where it was needed for the proof
+        # the slack is not in the document; it matters only if the proof needed it
         "tolerance": MakespanTolerance(limit=limit) if limit and status is Status.OPTIMAL else EXACT,
         "pins": _pins(of_type(fields.get("pins", {}), dict, "pins"), instance),
         "moves": None if fields.get("moves") is None else _moves(of_type(fields["moves"], dict, "moves"), instance),
@@ -87,7 +87,7 @@ def result_fields(document: Mapping[str, object], instance: Instance) -> ResultF
 
 
 def _pins(pins: Mapping[str, object], instance: Instance) -> dict[str, str | None]:
-    """Return the task of each agent that is pinned."""
+    """Return the task id of each pinned agent."""
     for agent, task in pins.items():
         if agent not in instance.agent_index or not (task is None or task in instance.task_index):
             raise InputError(f"pins {shown(agent)} to {shown(task)}, but instance {instance.name!r} lacks one", "pins")
@@ -95,7 +95,7 @@ def _pins(pins: Mapping[str, object], instance: Instance) -> dict[str, str | Non
 
 
 def moves_document(moves: Moves, instance: Instance) -> dict[str, object]:
-    """Return how an allocation differs from the plan in force, ready for JSON."""
+    """Return the differences from the plan in force, ready for JSON."""
     return {
         "moved": [instance.agent_ids[i] for i in moves.agents],
         "stayed": moves.stayed,
@@ -108,7 +108,7 @@ def moves_document(moves: Moves, instance: Instance) -> dict[str, object]:
 
 
 def _moves(fields: Mapping[str, object], instance: Instance) -> Moves:
-    """Return what `moves_document` turned into `fields`."""
+    """Return the moves whose `moves_document` gave `fields`."""
     names = {key: of_type(fields.get(key), list, f"moves.{key}") for key in ("moved", "idle")}
     for key, ids in names.items():
         for name in ids:
@@ -125,7 +125,7 @@ def _moves(fields: Mapping[str, object], instance: Instance) -> Moves:
 
 
 def _require_scores(fields: Mapping[str, object], evaluation: Evaluation) -> None:
-    """Raise an error unless the scores of the document are those on this instance."""
+    """Raise an error unless the scores of the document match this instance."""
     for name in SCORES:
         found, expected = _nullable(fields, name, low=-math.inf), getattr(evaluation, name)
         if (found is None) != (expected is None) or (
@@ -148,5 +148,5 @@ def _nullable(fields: Mapping[str, object], name: str, low: float = 0.0) -> floa
 
 
 def _integral(value: object) -> object:
-    """Return a float without a fraction, as JSON readers return whole numbers, as an int."""
+    """Convert a float without a fractional part to int: some JSON readers return whole numbers as floats."""
     return int(value) if isinstance(value, float) and value.is_integer() else value

@@ -1,4 +1,4 @@
-"""The recipe: check the arguments, load the method, run it, score its answer, prove what can be proven."""
+"""`solve`: check the arguments, load the method, run it, score its answer, and prove bounds."""
 
 import importlib
 import math
@@ -41,16 +41,16 @@ from alloc.problems.allocation import CarriedOver
 from alloc.problems.arguments import choice, event, flag, function, of_type, real
 
 REPAIR_S = 0.2
-"""Time to serve more tasks after a run whose own time is up."""
+"""Seconds for serving further tasks after a run whose time is up."""
 
 MATCHED_PAIRS = 1_000_000
-"""Pairs of origin and task beyond which the libraries for matchings are loaded before the run."""
+"""Number of pairs of origin and task above which the libraries for matchings are loaded before the run."""
 
 REPAIR_SHARE = 0.05
-"""Part of the time limit for the repair of a plan in force, after the method's own time is up."""
+"""Share of the time limit for repairing a plan in force after the method has ended."""
 
 SLACK_AGENTS, SLACK_LIMIT_S = 20_000, 0.5
-"""Most agents and least time limit for a look at what slack would save, which must take little of a run."""
+"""Most agents, and least time limit in seconds, for estimating what slack would save; it must take little of a run."""
 
 
 def solve(
@@ -83,36 +83,36 @@ def solve(
         A name, or an allocator with its own parameters, such as ``GeneticAlgorithm(population=200)``.
     objective : Objective or str
         ``makespan``; ``makespan-energy`` for the least energy at the least makespan; or ``makespan-moves`` for the
-        fewest agents that get another task than they have in `start`.
+        fewest agents whose task differs from that in `start`.
     time_limit_s, iterations, target_gap
         The budget; see `Budget`.
     seed : int
         Seed of all random numbers, from 0 to 2^63 - 1.
     start : Allocation, Result or dict, optional
-        A warm start; the answer is never worse. A dict gives the task id of each agent id, None for idle. Agents and
-        tasks that have gone since are left out.
+        A warm start; the answer is never worse. A dict maps agent ids to task ids, or None for idle. Agents and tasks
+        that the instance no longer has are left out.
     threads : int, optional
-        Threads that the method may use. By default as many as there are processors; one, if the budget is a number of
-        iterations without a time limit, so that the answer is the same on every machine.
+        Threads that the method may use. By default the number of processors, or one if the budget limits iterations
+        but not time, so that the answer is the same on every machine.
     makespan_slack, makespan_limit : float
-        Relative excess over the fastest allocation found, and hours, up to which makespans are equally good, so that
-        the energy decides; for the objective ``makespan-energy``. See `MakespanTolerance`.
+        Relative excess over the fastest allocation found, and makespan in hours, up to which makespans are equally
+        good, so that the energy decides; for the objective ``makespan-energy``. See `MakespanTolerance`.
     move_price : float
-        Energy that each agent counts for that gets another task than in `start`, with the objective
+        Energy that is added to the cost for each agent whose task differs from that in `start`; for the objective
         ``makespan-energy``.
     pins : mapping, optional
-        Agents that must do one task: its id, or None for idle, by agent id.
+        Agents that must do a given task: its id, or None for idle, by agent id.
     on_improvement : callable, optional
         Called with every new best; an exception from it ends the run and propagates.
     stop : threading.Event, optional
-        Setting it ends the run as the time limit does.
+        Setting it ends the run, as the time limit does.
     handle_signals : bool
-        Whether SIGINT and SIGTERM end the run as the time limit does, when called from the main thread.
+        Whether SIGINT and SIGTERM end the run, as the time limit does, if `solve` is called from the main thread.
     parameters : object, optional
-        Parameters of a method that is given by name: those that its class describes, or a mapping by name.
+        Parameters of a method given by name: an instance of its `Allocator.parameters_type`, or a mapping by name.
     **settings
-        Single parameters of a method that is given by name, such as ``population`` of ``ga`` or ``policy`` of
-        ``gappo``; see `method_parameters`.
+        Single parameters of a method given by name, such as ``population`` of ``ga`` or ``policy`` of ``gappo``; see
+        `method_parameters`.
 
     Returns
     -------
@@ -121,7 +121,7 @@ def solve(
     Raises
     ------
     InputError
-        If the method or a parameter is unknown, or an argument is wrong; its place is the parameter.
+        If the method or a parameter is unknown, or an argument is wrong; its `place` is the parameter.
     RefusedError
         If the method cannot handle this instance within this budget; the message says why.
     """
@@ -156,15 +156,15 @@ def solve(
 def _prepared(
     method: str | Allocator, request: Request, parameters: object, settings: dict[str, object]
 ) -> tuple[Allocator, list[str], float]:
-    """Choose and load the method, and let it refuse; loading is not part of the run.
+    """Choose and load the method, and check that it does not refuse; loading is not part of the run.
 
     Returns
     -------
     allocator : Allocator
     notes : list of str
-        What ``auto`` picked, and why.
+        The choice of ``auto``, and the reason.
     spent_s : float
-        Seconds that count for the run.
+        Seconds that count as part of the run.
     """
     notes: list[str] = []
     begin = time.monotonic()
@@ -176,12 +176,12 @@ def _prepared(
     spent_s = time.monotonic() - begin
     if isinstance(method, Allocator) and (settings or parameters is not None):
         given = ", ".join(settings) or "parameters"
-        raise InputError(f"is an allocator with its own parameters; set {given} where it is made", "method")
+        raise InputError(f"is an allocator with its own parameters; set {given} when creating it", "method")
     allocator = load(method, parameters, **settings) if isinstance(method, str) else method
     if _is_repaired(request.instance) or _slack_may_save(allocator, request):
         from alloc.allocators.heuristic.local_search.annealing_state import compile_loops
 
-        compile_loops()  # for what local search does in the end; loading is not part of the run
+        compile_loops()  # for the repair and the savings after the run; loading is not part of the run
     begin = time.monotonic()
     refuse(allocator, request.instance, request.objective, request.budget, request.tolerance)
     is_matched = _is_matched(request.instance)
@@ -197,13 +197,13 @@ def _prepared(
 
 
 def _is_repaired(instance: Instance) -> bool:
-    """Whether moves have a price, so that the plan is repaired in the end: pins alone leave nothing to repair."""
+    """Return whether moves have a price, so that the plan is repaired at the end; pins alone need no repair."""
     move = instance.reach.move
     return move is not None and bool(move.price.any())
 
 
 def _slack_may_save(allocator: Allocator, run: Request | Search) -> bool:
-    """Whether the least makespan may take much energy, as sums of abilities can be any numbers."""
+    """Return whether slack may save much energy: with fractional abilities, the least makespan may be costly."""
     if run.objective is not Objective.MAKESPAN_ENERGY or run.tolerance != EXACT or run.instance.reach.move is not None:
         return False
     limit, method = run.budget.time_limit_s, allocator.method
@@ -212,26 +212,26 @@ def _slack_may_save(allocator: Allocator, run: Request | Search) -> bool:
 
 
 def _is_matched(instance: Instance) -> bool:
-    """Whether matchings are sought for sure, or likely, among so many pairs that loading takes little beside that."""
+    """Return whether matchings are certainly needed, or are likely and large enough for loading to be negligible."""
     many = instance.reach.pairs > MATCHED_PAIRS and not instance.reach.is_complete
     return many or instance.n < int(np.count_nonzero(instance.workload))
 
 
 def _is_proven_early(allocator: Allocator, budget: Budget) -> bool:
-    """Whether the method goes on until its time is up, or its plan is proven best; after short runs no proof is due."""
+    """Return whether to prove bounds during the run: for anytime methods without proofs, unless the run is short."""
     is_short = budget.time_limit_s is not None and budget.time_limit_s <= SHORT_S
     return allocator.method.anytime and not allocator.method.proves and not is_short
 
 
 def _require_none(parameters: object, settings: dict[str, object]) -> None:
-    """Raise an error if there are parameters: ``auto`` may pick a method that has no such ones."""
+    """Raise an error if there are parameters: ``auto`` may pick a method that does not have them."""
     given = [name for name, value in {**settings, "parameters": parameters}.items() if value is not None]
     if given:
-        raise InputError("is for a method that you name, such as gappo; auto may pick one without it", given[0])
+        raise InputError("needs a named method, such as gappo; auto may pick one that does not have it", given[0])
 
 
 def _run(allocator: Allocator, request: Request, notes: list[str], spent_s: float) -> Result:
-    """Run the method on the instance, or on the part of it in which every task can be served."""
+    """Run the method on the instance, or on its part in which every task can be served."""
     instance, begin = request.instance, time.monotonic()
     limit = request.budget.time_limit_s
     end = math.inf if limit is None else begin - spent_s + limit
@@ -258,7 +258,7 @@ def _run(allocator: Allocator, request: Request, notes: list[str], spent_s: floa
 
 
 def _propose(allocator: Allocator, search: Search, stop: threading.Event) -> tuple[Proposal, StopReason | None]:
-    """Let the method run, submit its answer, and serve what it left unserved; return also why it stopped."""
+    """Run the method, submit its answer, and serve tasks that it left; return the proposal, and why it stopped."""
     if search.budget.target_gap is not None and not allocator.method.proves:
         raise_bound_before(search)
     proof = EarlyProof(search) if _is_proven_early(allocator, search.budget) else None
@@ -281,7 +281,7 @@ def _propose(allocator: Allocator, search: Search, stop: threading.Event) -> tup
     if _slack_may_save(allocator, search):
         from alloc.allocators.heuristic.slack import note_saving
 
-        with search.improving("looking for what slack saves"):
+        with search.improving("estimating what slack saves"):
             note_saving(search)
     require_wanted(stop)
     return proposal, stop_reason

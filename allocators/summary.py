@@ -1,4 +1,4 @@
-"""The summary of a result as text: how good it is, its figures, and its bottleneck."""
+"""The summary of a result as text: its status, figures and bottleneck."""
 
 import math
 from typing import TYPE_CHECKING
@@ -18,31 +18,31 @@ if TYPE_CHECKING:
 
 STOPS = {
     StopReason.PROVEN: "nothing better exists",
-    StopReason.FINISHED: "the method came to its end",
+    StopReason.FINISHED: "the method finished",
     StopReason.TIME_LIMIT: "the time limit was reached",
-    StopReason.ITERATIONS: "all iterations were done",
+    StopReason.ITERATIONS: "the iteration limit was reached",
     StopReason.TARGET_GAP: "the target gap was reached",
     StopReason.INTERRUPTED: "it was interrupted",
 }
 
 MOST_REASONS = 5
-"""Unserved tasks whose reason is given."""
+"""Maximum number of unserved tasks for which the reason is given."""
 
 MOST_LOOKED_AT = 1000
-"""Unserved tasks up to which it is told how many of them nobody can do."""
+"""Maximum number of unserved tasks for which those are counted that no agent can do."""
 
 LESS = {
     Objective.MAKESPAN: "less energy",
     Objective.MAKESPAN_ENERGY: "less energy",
     Objective.MAKESPAN_MOVES: "fewer moves",
 }
-"""What a better allocation at the same makespan would have."""
+"""How an allocation would be better at the same makespan."""
 
 MOST_NAMES = 8
-"""Ids in a list before it is cut."""
+"""Maximum number of ids in a list."""
 
 CLOSED_GAP = PROVEN + RELATIVE_TOLERANCE
-"""Relative gap up to which no allocation is sooner, as for the status `optimal` without slack."""
+"""Relative gap up to which the makespan counts as optimal, as for the status `optimal` without slack."""
 
 
 def summary(result: "Result") -> str:
@@ -81,7 +81,7 @@ def _status(result: "Result") -> str:
 
 
 def _shortage(result: "Result") -> str:
-    """Return how many tasks are left, and how many of them nobody can do."""
+    """Return how many tasks are unserved, and how many of them no agent can do."""
     instance, tasks = result.instance, () if result.evaluation is None else result.evaluation.unserved_tasks
     unserved = f"{len(tasks)} of {counted(instance.m, 'task')}"
     lost = sum(not len(instance.reach.agents_of(task)) for task in tasks) if len(tasks) <= MOST_LOOKED_AT else 0
@@ -92,7 +92,7 @@ def _shortage(result: "Result") -> str:
 
 
 def figures(result: "Result") -> list[str]:
-    """Return the makespan, the energy and the battery, a line each.
+    """Return one line each for makespan, energy, moves and battery.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def figures(result: "Result") -> list[str]:
 
 
 def moves_line(moves: "Moves", instance: Instance) -> str:
-    """Return how many agents get another task than they had, and which.
+    """Return how many agents change their task, and which.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def _ending(result: "Result") -> str:
 
 
 def bottleneck_lines(result: "Result") -> list[str]:
-    """Return which task is the last and what one more agent there would gain, or which tasks are unserved.
+    """Return lines on the last task and what one more agent there would gain, or on the unserved tasks.
 
     Parameters
     ----------
@@ -175,7 +175,7 @@ def bottleneck_lines(result: "Result") -> list[str]:
 
 
 def _reasons(result: "Result") -> list[str]:
-    """Return why the most urgent of the unserved tasks are, a line each."""
+    """Return one line each for the most urgent unserved tasks, with the reason."""
     weights = result.instance.priority
     return [
         f"  {result.instance.task_ids[one.task]}"
@@ -203,7 +203,7 @@ def _last_tasks(instance: Instance, found: Bottleneck) -> str:
 
 def _gain(instance: Instance, found: Bottleneck) -> str:
     if len(found.last) > 1:
-        return "One more agent on one of them gains nothing, as the others stay."
+        return "One more agent on one of them gains nothing, as the others are still last."
     at_once = " that is there at once" if instance.has_travel_time else ""
     if found.enough is None or found.next_task is None:
         assert found.typical is not None
@@ -232,7 +232,7 @@ def _while_pinned(result: "Result") -> str:
 
 
 def rounded_up(ability: float, *, whole: bool) -> str:
-    """Return `ability` rounded up, so that it is enough: to three digits, or to a whole number of at most six."""
+    """Return `ability` rounded up to three significant digits, or to a whole number if `whole` and below 999,999."""
     if whole and ability < 999_999:
         return f"{math.ceil(ability * (1 - 1e-12))}"
     unit = 10.0 ** (math.floor(math.log10(ability)) - 2)
@@ -240,7 +240,7 @@ def rounded_up(ability: float, *, whole: bool) -> str:
 
 
 def _time(instance: Instance, value: float | None) -> str:
-    """Return a time in the unit of the instance, if it names one."""
+    """Return a time as text, with the unit of the instance if it has one."""
     return labelled(number(value), instance.units.time)
 
 

@@ -1,1 +1,1 @@
-"""The contract of an allocator: what a method is told, what it answers, and within which budget."""
+"""The contract of an allocator: what a method receives, what it returns, and its budget."""

@@ -18,13 +18,13 @@ class Proposal:
     Attributes
     ----------
     allocation : Allocation or None
-        The answer; None means the best allocation passed to `Search.submit`, if any.
+        The answer; None stands for the best allocation passed to `Search.submit`, if any.
     makespan_lower_bound : float or None
         Proven lower bound on the makespan, in hours, of every allocation that serves all tasks.
     energy_lower_bound : float or None
         Proven lower bound on the energy of every allocation whose makespan is at most that of the answer.
     notes : tuple of str
-        Messages for the user; they end up in `Result.notes`.
+        Messages for the user; they are added to `Result.notes`.
     """
 
     allocation: Allocation | None = None
@@ -34,14 +34,14 @@ class Proposal:
 
 
 class Allocator(Parameterised):
-    """A method, loaded and ready; one object serves many instances and threads at once.
+    """A method that is loaded and ready; one object can be used for many instances, from several threads at once.
 
-    Subclasses set `method`, and `parameters_type` if they have parameters; `allocate` changes no attribute.
+    Subclasses set `method`, and `parameters_type` if they have parameters; `allocate` must not change attributes.
 
     Parameters
     ----------
     parameters : parameters_type, optional
-        Its parameters; the defaults if None.
+        All parameters; the defaults if None.
     **settings
         Single parameters by name, such as ``population=200``.
 
@@ -52,12 +52,12 @@ class Allocator(Parameterised):
     parameters_type : type or None
         Frozen dataclass of the parameters, with a default for each; None for a method without parameters.
     parameters : parameters_type
-        What is set; only where `parameters_type` is given.
+        The parameters in use; only if `parameters_type` is not None.
 
     Raises
     ------
     InputError
-        If there is no such parameter, or its value is wrong; its place is the name of the parameter.
+        If there is no such parameter, or its value is wrong; its `place` is the name of the parameter.
     """
 
     method: ClassVar[Method]
@@ -83,14 +83,14 @@ class Allocator(Parameterised):
         return None
 
     def prepare(self, instance: Instance) -> None:
-        """Load what a run on the instance needs beyond the method itself, such as compiled loops.
+        """Load what a run on the instance needs besides the method itself, such as compiled loops.
 
-        Called after `refusal` and before the clock starts: loading is no part of the run, as importing is none.
+        Called after `refusal` and before the clock starts: loading is not part of the run, and neither is importing.
 
         Parameters
         ----------
         instance : Instance
-            Nothing may be computed from it here.
+            Must not be used for computations here.
         """
 
     @abstractmethod

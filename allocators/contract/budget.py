@@ -1,4 +1,4 @@
-"""The budget of a run: how long it may take, and why it ended."""
+"""The budget of a run, and the reasons why a run ends."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -8,14 +8,14 @@ from alloc.problems.arguments import real, whole
 
 @dataclass(frozen=True)
 class Budget:
-    """How long a run may take; every limit that is not None holds.
+    """Limits of a run; every limit that is not None applies.
 
     Attributes
     ----------
     time_limit_s : float or None
         Seconds on the wall clock, >= 0.
     iterations : int or None
-        Iterations in the method's own unit, >= 0; with this limit alone, runs are reproducible.
+        Iterations in the method's own unit, >= 0; runs with only this limit are reproducible.
     target_gap : float or None
         Relative gap of the makespan, >= 0, at which the run may stop.
     """

@@ -5,19 +5,19 @@ import math
 from alloc.allocators.contract.search import Search
 
 LONG_S, LONG_ITERATIONS = 5.0, 1000
-"""Seconds and iterations above which a budget is long."""
+"""Seconds and iterations above which a budget counts as long."""
 
 
 class Clock:
-    """A part of a search's budget that begins now, in time and in iterations; whichever ends first counts.
+    """A part of a search's budget that begins now, in time and iterations; it ends when either is used up.
 
     Parameters
     ----------
     search : Search
     until_s : float
-        Where the part ends, on `Search.elapsed_s`.
+        Value of `Search.elapsed_s` at which the part ends.
     until_iteration : float
-        Where the part ends, on `Search.iteration`.
+        Value of `Search.iteration` at which the part ends.
     """
 
     def __init__(self, search: Search, until_s: float = math.inf, until_iteration: float = math.inf) -> None:
@@ -28,7 +28,7 @@ class Clock:
         self.begin_s, self.begin_iteration = search.elapsed_s, search.iteration
 
     def part(self, share: float) -> "Clock":
-        """Return a clock for the first `share` of what is left."""
+        """Return a clock for the first `share` of the remaining budget."""
         search = self.search
         seconds = search.elapsed_s + share * (self.until_s - search.elapsed_s)
         iterations = (
@@ -40,7 +40,7 @@ class Clock:
 
     @property
     def is_endless(self) -> bool:
-        """Whether only a stop request ends it."""
+        """Whether only a stop request ends this part."""
         return min(self.until_s, self.until_iteration) == math.inf
 
     @property
@@ -59,14 +59,14 @@ class Clock:
 
     @property
     def iterations_left(self) -> float:
-        """Iterations that are left, at the pace so far."""
+        """Number of iterations left, at the pace so far."""
         search = self.search
         pace_s = (search.elapsed_s - self.begin_s) / max(1, search.iteration - self.begin_iteration)
         in_time = (self.until_s - search.elapsed_s) / max(pace_s, 1e-9) if self.until_s < math.inf else math.inf
         return max(0.0, min(in_time, self.until_iteration - search.iteration))
 
     def iterations_of(self, number: int, count: int) -> float:
-        """Return how many of the iterations until the end are those of one of `count` threads."""
+        """Return the remaining iterations of thread `number` out of `count`; ``inf`` if they are not limited."""
         left = self.until_iteration - self.search.iteration
         return left if left == math.inf else (left + count - 1 - number) // count
 

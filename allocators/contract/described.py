@@ -1,4 +1,4 @@
-"""What is known of each parameter of a method: its type, range and default, and what it means."""
+"""Descriptions of the parameters of a method: type, range, default and meaning."""
 
 import inspect
 import math
@@ -12,7 +12,7 @@ from typing import Any, get_args, get_origin, get_type_hints
 from alloc.allocators.contract.base import Allocator
 
 NAMES = {int: "whole number", float: "number", bool: "true or false", str: "text", Path: "file"}
-"""How types of values are called."""
+"""Names of the types of values."""
 
 
 @dataclass(frozen=True)
@@ -22,9 +22,9 @@ class Parameter:
     Attributes
     ----------
     name : str
-        As in ``--set NAME=VALUE``, and as keyword of the class of the method.
+        As in ``--set NAME=VALUE``, and as keyword argument of the method's class.
     kind : str
-        What its values are, with their range, such as ``whole number >= 4, or none``.
+        Type and range of its values, such as ``whole number >= 4, or none``.
     default : object
     meaning : str
         From the docstring.
@@ -37,7 +37,7 @@ class Parameter:
 
 
 def described(kind: type[Allocator]) -> tuple[Parameter, ...]:
-    """Return the parameters of a method, given its class.
+    """Return descriptions of the parameters of a method, given its class.
 
     Parameters
     ----------
@@ -65,13 +65,13 @@ def _arguments(kind: type[Allocator]) -> Mapping[str, inspect.Parameter]:
 
 
 def _option(kind: type[Allocator], name: str) -> Parameter:
-    """Return an option that is an argument of the constructor itself."""
+    """Return the description of an option that is an argument of the constructor itself."""
     hint = get_type_hints(kind.__init__)[name]
     return Parameter(name, _kind(hint, {}), _arguments(kind)[name].default, _meanings(kind).get(name, ""))
 
 
 def _kind(hint: Any, limits: Mapping[str, Any]) -> str:
-    """Return in words what values there are."""
+    """Return the type and range of the values in words."""
     kinds = get_args(hint) if get_origin(hint) is types.UnionType else (hint,)
     none = " or none" if types.NoneType in kinds else ""
     first = next(kind for kind in kinds if kind is not types.NoneType)
@@ -97,7 +97,7 @@ def _meanings(kind: type) -> dict[str, str]:
 
 
 def _entries(docstring: str) -> Iterator[tuple[str, str]]:
-    """Yield each name of the sections Parameters and Attributes with its explanation, as numpydoc has them."""
+    """Yield each name in the numpydoc sections Parameters and Attributes, with its explanation."""
     for section in re.split(r"\n\n(?=\w[\w ]*\n---)", docstring):
         title, _, body = section.partition("\n")
         if title not in ("Parameters", "Attributes"):

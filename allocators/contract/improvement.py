@@ -1,4 +1,4 @@
-"""A new best allocation of a run, and the figures that remain of it in the trace."""
+"""A new best allocation of a run, and its figures, which are kept in the trace."""
 
 from dataclasses import dataclass
 
@@ -14,11 +14,11 @@ class TracePoint:
     time_s : float
         Seconds since the run began.
     makespan : float or None
-        In hours; None while a task is unserved.
+        In hours; None if a task is unserved.
     energy : float
     lower_bound : float or None
-        Best lower bound on the makespan at that moment, in hours; None where it is not known, as in a result that was
-        read from a file.
+        Best lower bound on the makespan at that time, in hours; None if it is unknown, as in a result that was read
+        from a file.
     """
 
     time_s: float
@@ -38,7 +38,7 @@ class Improvement:
     allocation : Allocation
     evaluation : Evaluation
     lower_bound : float
-        Best lower bound on the makespan at that moment, in hours.
+        Best lower bound on the makespan at that time, in hours.
     """
 
     time_s: float
@@ -48,5 +48,5 @@ class Improvement:
 
     @property
     def figures(self) -> TracePoint:
-        """The figures alone, which take little memory."""
+        """The figures without the allocation, which take little memory."""
         return TracePoint(self.time_s, self.evaluation.makespan, self.evaluation.energy, self.lower_bound)

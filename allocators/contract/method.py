@@ -1,4 +1,4 @@
-"""What is known of a method before it is loaded."""
+"""Descriptions of methods, available before they are loaded."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -17,34 +17,34 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class Method:
-    """Name, needs and capabilities of a method.
+    """Name, requirements and capabilities of a method.
 
     Attributes
     ----------
     name : str
         As in ``--method``; lower-case letters, digits and hyphens.
     summary : str
-        One line.
+        One-line description.
     kind : Kind
     requires : tuple of str
         Modules that must be installed.
     objectives : tuple of Objective
-        What it optimises; with any other objective `solve` refuses it.
+        Objectives that it supports; `solve` refuses it for any other.
     finite_speeds : bool
-        Whether it handles agents that need time to travel; `solve` refuses it where it cannot.
+        Whether it supports travel times; if not, `solve` refuses it for instances with finite speeds.
     makespan_slack : bool
-        Whether it spends the slack that `MakespanTolerance` leaves to the makespan on less energy; `solve` refuses it
-        where it does not.
+        Whether it uses the makespan slack of `MakespanTolerance` to reduce the energy; if not, `solve` refuses runs
+        with slack or a makespan limit.
     proves : bool
         Whether it proves bounds of its own.
     warm_start : bool
-        Whether it builds on a start allocation.
+        Whether it makes use of a start allocation.
     anytime : bool
-        Whether a longer budget gives better answers.
+        Whether a larger budget gives better answers.
     options : tuple of str
-        Options that its constructor takes.
+        Options of its constructor.
     citation : str
-        Where it comes from.
+        Source of the method.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Parameters of methods: frozen dataclasses whose fields are also keywords of the method's constructor."""
+"""Parameters of methods: frozen dataclasses whose fields are also keyword arguments of the method's constructor."""
 
 import dataclasses
 import math
@@ -19,7 +19,7 @@ Value = TypeVar("Value")
 
 
 def with_settings(parameters_type: type[P], parameters: P | None, settings: Mapping[str, object]) -> P:
-    """Return parameters with some fields replaced, all of them checked.
+    """Return checked parameters with some fields replaced.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ def with_settings(parameters_type: type[P], parameters: P | None, settings: Mapp
         A frozen dataclass whose fields have defaults and are annotated with int, float, bool, str, a tuple of one of
         these (``tuple[float, ...]``), or one of these and None.
     parameters : P or None
-        What to start from; None for the defaults.
+        Values of the other fields; None for the defaults.
     settings : mapping of str to object
         Values by field name; numpy scalars are converted to Python's own types.
 
@@ -42,7 +42,7 @@ def with_settings(parameters_type: type[P], parameters: P | None, settings: Mapp
     for name in settings:
         if name not in names:
             raise InputError(f"is not a parameter of this method{of_these(name, names)}", name)
-    if not issubclass(parameters_type, CheckedParameters):  # which check themselves, and know their ranges
+    if not issubclass(parameters_type, CheckedParameters):  # those check themselves, including ranges
         settings = {name: _converted(value, hints[name], name, infinite=True) for name, value in settings.items()}
     return dataclasses.replace(start, **settings)
 
@@ -50,7 +50,7 @@ def with_settings(parameters_type: type[P], parameters: P | None, settings: Mapp
 def bounded(
     default: Value, low: float = -math.inf, high: float = math.inf, *, above: bool = False, infinite: bool = False
 ) -> Value:
-    """Return a field of a `CheckedParameters` with its default and range.
+    """Return a dataclass field for `CheckedParameters` with a default and a range.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def bounded(
     above : bool
         Whether `low` itself is excluded.
     infinite : bool
-        Whether infinity is a value.
+        Whether infinity is allowed.
     """
     limits = {"low": low, "high": high, "above": above, "infinite": infinite}
     field: Any = dataclasses.field(default=default, metadata=limits)
@@ -69,7 +69,7 @@ def bounded(
 
 @dataclasses.dataclass(frozen=True)
 class CheckedParameters:
-    """Base of parameters that check their types and ranges, as `bounded` declares them, however they are made."""
+    """Base class of parameters that check their types, and the ranges declared by `bounded`, on creation."""
 
     def __post_init__(self) -> None:
         hints = get_type_hints(type(self))
@@ -79,7 +79,7 @@ class CheckedParameters:
 
 
 def plain_values(parameters: Mapping[str, object]) -> dict[str, object]:
-    """Return parameters as JSON has them: tuples as lists, paths and infinity as text."""
+    """Return parameters as JSON values: tuples as lists, paths and infinity as text."""
     return {name: _plain(value) for name, value in parameters.items()}
 
 
@@ -92,20 +92,20 @@ def _plain(value: object) -> object:
 
 
 def labelled_method(name: str, parameters: Mapping[str, object]) -> str:
-    """Return a method with parameters as ``alloc compare`` takes it, such as ``ga[population=200]``."""
+    """Return a method with parameters in the syntax of ``alloc compare``, such as ``ga[population=200]``."""
     settings = ",".join(f"{key}={written(value)}" for key, value in parameters.items())
     return f"{name}[{settings}]" if settings else name
 
 
 def written(value: object) -> str:
-    """Return the value of a parameter as ``--set`` takes it."""
+    """Return the value of a parameter in the syntax of ``--set``."""
     if isinstance(value, tuple | list):
         return ",".join(map(written, value)) + ("," if len(value) == 1 else "")
     return str(value).lower() if value is None or isinstance(value, bool) else str(value)
 
 
 class Parameterised(ABC):
-    """A class whose parameters are a frozen dataclass, or none; see `Allocator` and `Policy`."""
+    """Base class of `Allocator` and `Policy`: its parameters, if any, are a frozen dataclass."""
 
     parameters_type: ClassVar[type[Any] | None] = None
 
@@ -117,7 +117,7 @@ class Parameterised(ABC):
 
     @classmethod
     def default_parameters(cls) -> dict[str, object]:
-        """Return the default of each parameter, by name; nothing where there are none."""
+        """Return the default of each parameter by name; empty if there are no parameters."""
         if cls.parameters_type is None:
             return {}
         defaults = cls.parameters_type()
@@ -135,7 +135,7 @@ class Parameterised(ABC):
     @classmethod
     @abstractmethod
     def _title(cls) -> str:
-        """Return what messages call it, such as ``method 'greedy'``."""
+        """Return how messages refer to it, such as ``method 'greedy'``."""
 
 
 def _converted(
@@ -147,7 +147,7 @@ def _converted(
     above: bool = False,
     infinite: bool = False,
 ) -> object:
-    """Return a value as Python's own of the type `hint`, checked to be of that type and in that range."""
+    """Convert a value to the built-in type `hint`, and check its type and range."""
     kinds = get_args(hint) if get_origin(hint) is types.UnionType else (hint,)
     if value is None and types.NoneType in kinds:
         return None

@@ -1,4 +1,4 @@
-"""Classes by name: built-in ones by module and attribute, those of other packages by entry points."""
+"""Loading of classes: built-in ones by module and attribute, those of other packages by entry points."""
 
 import importlib
 from collections.abc import Collection, Mapping
@@ -11,14 +11,14 @@ Kind = TypeVar("Kind")
 
 
 def imported(target: str) -> object:
-    """Return what is called ``package.module:attribute``."""
+    """Import and return ``package.module:attribute``."""
     module, _, attribute = target.partition(":")
     found: object = getattr(importlib.import_module(module), attribute)
     return found
 
 
 def plugins(group: str, built_in: Collection[str]) -> dict[str, EntryPoint]:
-    """Return the entry points of other packages; the name of a built-in class cannot be taken."""
+    """Return the entry points of other packages by name, without those that have the name of a built-in class."""
     return {entry.name: entry for entry in entry_points(group=group) if entry.name not in built_in}
 
 
@@ -32,20 +32,20 @@ def plugin_class(
     found : mapping
         Entry points by name.
     name : str
-        One of them.
+        Name of the plugin.
     base : type
-        What the class must be derived from.
+        Required base class.
     attribute : str
-        What it must have.
+        Required attribute.
     expected : str
-        Both in words.
+        Both requirements in words.
     place : str
-        That of an error: ``method`` or ``policy``.
+        `InputError.place` of an error: ``method`` or ``policy``.
 
     Raises
     ------
     InputError
-        If it cannot be imported, or is no such class.
+        If it cannot be imported, or does not meet the requirements.
     """
     plugin = f"plugin {name!r} ({found[name].value})"
     try:
@@ -58,7 +58,7 @@ def plugin_class(
 
 
 def require_installed(missing: Collection[str], title: str, place: str) -> None:
-    """Raise a `MissingPackageError` if modules are missing that something called `title` needs."""
+    """Raise a `MissingPackageError` if there are `missing` modules, which `title` needs."""
     if missing:
         modules = " ".join(missing)
         raise MissingPackageError(f"{title} needs {modules}; install with: pip install {modules}", place)

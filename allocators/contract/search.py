@@ -1,4 +1,4 @@
-"""One run of one method on one instance: clock, budget, best allocation so far, stop requests."""
+"""One run of a method on an instance: clock, budget, best allocation so far, and stop requests."""
 
 import logging
 import math
@@ -23,24 +23,24 @@ from alloc.problems import (
 from alloc.problems.evaluation import RELATIVE_TOLERANCE, last_equal
 
 STANDS = "the best plan up to then stands"
-"""End of the note on a stage that failed after a plan had been found."""
+"""End of the note on a stage that failed after a plan was found."""
 
 _log = logging.getLogger("alloc")
 
 
 class Search:
-    """The run as a method sees it; made by `solve`.
+    """A run as a method sees it; created by `solve`.
 
     Parameters
     ----------
     instance, objective, budget, seed, start, threads, tolerance
-        As the attributes below.
+        See the attributes below.
     on_improvement : callable, optional
-        Called with every new best.
+        Called with every new best allocation.
     stop : threading.Event, optional
         Setting it ends the run.
     spent_s : float
-        Seconds that count for the run although they have passed already.
+        Seconds of the run that have passed already.
 
     Attributes
     ----------
@@ -49,20 +49,20 @@ class Search:
     budget : Budget
     seed : int
     start : Allocation or None
-        A warm start, already submitted; agents assigned to tasks that they cannot do are idle in it.
+        A warm start, already submitted; agents whose task in it was one that they cannot do are idle.
     threads : int
         Threads that the method may use.
     lower_bound : float
-        Best lower bound known on the makespan of allocations that serve all tasks, in hours.
+        Best known lower bound on the makespan of allocations that serve all tasks, in hours.
     best : Improvement or None
-        The best submitted so far.
+        The best allocation submitted so far.
     fastest : Improvement or None
-        The one with the least makespan among those that leave the fewest and least urgent tasks unserved; differs from
-        `best` only where energy counts.
+        The allocation with the least makespan among those that leave the fewest and least urgent tasks unserved;
+        differs from `best` only if energy counts.
     tolerance : MakespanTolerance
-        How much slower than the fastest the best may be.
+        How much slower than `fastest` `best` may be.
     iteration : int
-        Iterations done, counted by the method in its own unit.
+        Number of iterations so far, counted by the method in its own unit.
     trace : list of TracePoint
         Figures of every improvement, in order.
     notes : list of str
@@ -92,7 +92,7 @@ class Search:
         self.iteration = 0
         self.best: Improvement | None = None
         self.fastest: Improvement | None = None
-        self._front: list[Improvement] = []  # candidates for `best` once the fastest becomes faster
+        self._front: list[Improvement] = []  # candidates for `best` when `fastest` changes
         self.trace: list[TracePoint] = []
         self.notes: list[str] = []
         self._callback_failed = False  # whether `on_improvement` raised an exception
@@ -112,7 +112,7 @@ class Search:
 
     @property
     def remaining_s(self) -> float:
-        """Seconds until the time limit, never negative; ``inf`` without one."""
+        """Seconds until the time limit, at least 0; ``inf`` without a limit."""
         limit = self.budget.time_limit_s
         return float("inf") if limit is None else max(0.0, limit - self.elapsed_s)
 
@@ -123,7 +123,7 @@ class Search:
 
     @property
     def makespan_limit(self) -> float:
-        """Hours up to which allocations count as equally fast, so that energy decides; ``inf`` before the first one."""
+        """Makespan up to which allocations count as equally fast, so that energy decides; ``inf`` before the first."""
         return math.inf if self.fastest is None else self.tolerance.hours(self.fastest.evaluation.served_makespan)
 
     def part(
@@ -133,16 +133,16 @@ class Search:
         on_improvement: Callable[[Improvement], None] | None = None,
         budget: Budget | None = None,
     ) -> "Search":
-        """Return a run of its own on the same instance, with the same clock, stop event and best plans.
+        """Return a separate run on the same instance, with the same clock, stop event and best plans.
 
-        For another method within this run, possibly in another thread.
+        For running another method within this run, possibly in another thread.
 
         Parameters
         ----------
         objective, tolerance, on_improvement
-            As those of a search; improvements are not submitted to this one.
+            Those of the part; improvements are not submitted to this run.
         budget : Budget, optional
-            Its time limit is on the clock of this run; by default the time limit of this run, and no other limit.
+            Its time limit is measured on the clock of this run; by default the time limit of this run and no other.
         """
         part = Search(
             self.instance,
@@ -161,16 +161,16 @@ class Search:
         return part
 
     def end(self) -> None:
-        """End this run, from any thread, but not the one that it is a part of."""
+        """End this run, but not the run that it is a part of; may be called from any thread."""
         self._is_ended = True
 
     def end_when(self, is_met: Callable[["Search"], bool]) -> None:
-        """End this run as soon as its best plan is proven best: `is_met` is asked now, and of every new best."""
+        """End this run as soon as `is_met` returns true; it is called now, and after every new best."""
         self._is_met = is_met
         self._is_proven = is_met(self)
 
     def submit(self, allocation: Allocation) -> Evaluation:
-        """Score `allocation`, and keep and report it if it is the best so far.
+        """Score `allocation`, and record and report it if it is the best so far.
 
         Parameters
         ----------
@@ -205,15 +205,15 @@ class Search:
 
     @contextmanager
     def improving(self, stage: str) -> Iterator[None]:
-        """Let an exception in the block end only the block: it is logged, and a note tells the user.
+        """Catch and log exceptions of the block, and add a note for the user.
 
-        For optional stages after a plan has been found; without a plan the exception propagates, as does any that
-        `on_improvement` raises.
+        For optional stages after a plan has been found. If there is no plan, or `on_improvement` raised the exception,
+        it propagates.
 
         Parameters
         ----------
         stage : str
-            What the note and the log call the block.
+            Name of the block in the note and the log.
         """
         try:
             yield
@@ -224,7 +224,7 @@ class Search:
             self.notes.append(f"{stage} failed ({type(error).__name__}: {error}); {STANDS}")
 
     def _is_better(self, one: Evaluation, other: Evaluation) -> bool:
-        """Whether `one` is better, where makespans up to the limit are equal if energy counts."""
+        """Return whether `one` is better; if energy counts, makespans up to the limit are equal."""
         if self.objective is Objective.MAKESPAN or one.unserved_rank != other.unserved_rank:
             return one.is_better_than(other, self.objective)
         limit = last_equal(self.makespan_limit)
@@ -239,20 +239,20 @@ class Search:
 
     @property
     def gap(self) -> float:
-        """Relative gap (T - bound) / T of the fastest so far; 1 if nothing serves all tasks yet."""
+        """Relative gap (T - bound) / T of `fastest`; 1 while no allocation serves all tasks."""
         makespan = None if self.fastest is None else self.fastest.evaluation.makespan
         return 1.0 if makespan is None else relative_gap(makespan, self.lower_bound)
 
     @property
     def fast_enough(self) -> bool:
-        """Whether the fastest so far is proven to be fastest, or keeps to the makespan limit that was given."""
+        """Whether the makespan of `fastest` is proven to be minimal, or within the given makespan limit."""
         if self.fastest is None or self.fastest.evaluation.makespan is None:
             return False
         given = self.tolerance.limit
         return self.gap <= PROVEN or (given is not None and self.fastest.evaluation.makespan <= given)
 
     def stop_reason(self) -> StopReason | None:
-        """Return why the run should end now, or None if it should go on."""
+        """Return why the run should end now, or None if it should continue."""
         if self.interrupted:
             return StopReason.INTERRUPTED
         if self.remaining_s <= 0:
@@ -270,12 +270,12 @@ class Search:
         return None
 
     def should_stop(self) -> bool:
-        """Whether the run should end now."""
+        """Return whether the run should end now."""
         return self.stop_reason() is not None
 
 
 def _undominated(found: list[Improvement], limit: float) -> list[Improvement]:
-    """Keep those within `limit` hours that have less energy than all faster ones, the fastest first."""
+    """Return those within `limit` hours that have less energy than all faster ones, fastest first."""
     kept: list[Improvement] = []
     fewest = min(one.evaluation.unserved_rank for one in found)
     for one in sorted(found, key=lambda one: (one.evaluation.served_makespan, one.evaluation.cost)):

@@ -1,13 +1,14 @@
-"""How good the answer of a run is proven to be."""
+"""The status of a run's answer: whether it is proven to be optimal, feasible or neither."""
 
 from enum import StrEnum
 
 
 class Status(StrEnum):
-    """How good an answer is proven to be.
+    """Status of an answer.
 
-    `optimal`: every stage of the objective is proven to 1e-6 relative; `feasible`: every task is served; `infeasible`:
-    no allocation serves every task, the answer as many as possible; `no_solution`: there is no allocation.
+    `optimal`: every stage of the objective is proven to a relative gap of 1e-6; `feasible`: every task is served;
+    `infeasible`: no allocation serves every task, and the answer serves as many as possible; `no_solution`: no
+    allocation was found.
     """
 
     OPTIMAL = "optimal"

@@ -1,4 +1,4 @@
-"""What counts as equally fast, and as proven."""
+"""Tolerances: which makespans count as equal, and which gaps as closed."""
 
 import sys
 from dataclasses import dataclass
@@ -11,14 +11,14 @@ PROVEN = 1e-6
 
 @dataclass(frozen=True)
 class MakespanTolerance:
-    """How slow an allocation may be before its makespan counts against it; for the objective with energy.
+    """Range of makespans that count as equally good; for objectives with energy.
 
     Attributes
     ----------
     slack : float
-        Relative excess over the fastest allocation found, >= 0; 0.02 takes any that is at most 2 % slower.
+        Relative excess over the fastest allocation found, >= 0; with 0.02, allocations may be up to 2 % slower.
     limit : float or None
-        Hours, > 0; allocations that are no slower are equally fast.
+        Makespan in hours, > 0, up to which all allocations count as equally fast.
     """
 
     slack: float = 0.0
@@ -30,14 +30,14 @@ class MakespanTolerance:
             object.__setattr__(self, "limit", real(self.limit, "limit", above=True))
 
     def hours(self, fastest: float) -> float:
-        """Return the makespan up to which allocations are equally fast, where the fastest takes `fastest` hours."""
+        """Return the makespan up to which allocations count as equally fast, given the least makespan in hours."""
         return min(max((1 + self.slack) * fastest, self.limit or 0.0), sys.float_info.max)
 
 
 EXACT = MakespanTolerance()
-"""No slack: the least makespan, whatever energy it takes."""
+"""No slack: the least makespan, regardless of energy."""
 
 
 def relative_gap(value: float, bound: float) -> float:
-    """Return (value - bound) / value, 0 where the two agree or value is 0."""
+    """Return (value - bound) / value, or 0 if that is negative or `value` is 0."""
     return 0.0 if value <= 0 else max(0.0, (value - bound) / value)

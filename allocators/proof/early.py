@@ -57,7 +57,7 @@ class EarlyProof:
         return 0.0
 
     def _is_met(self, search: Search) -> bool:
-        """Whether the best plan of the run is proven to be the best there is."""
+        """Return whether the best plan of the run is proven to be the best there is."""
         best, fastest = search.best, search.fastest
         if best is None or fastest is None or fastest.evaluation.makespan is None:
             return False
@@ -85,13 +85,13 @@ class EarlyProof:
 
 
 def needs_solver(instance: Instance, objective: Objective) -> bool:
-    """Whether a linear programme may be solved during the run, so that its solver is to be loaded beforehand."""
+    """Return whether a linear programme may be solved during the run, so that its solver is to be loaded beforehand."""
     energy = objective is Objective.MAKESPAN_ENERGY and _has_few_pairs(instance)
     return not is_tiny(instance) and (energy or _is_restricted(instance))
 
 
 def _is_restricted(instance: Instance) -> bool:
-    """Whether agents are few, travel takes no time, and not every agent can take every task."""
+    """Return whether agents are few, travel takes no time, and not every agent can take every task."""
     return instance.n <= MOST_AGENTS and not instance.has_travel_time and not instance.reach.is_complete
 
 

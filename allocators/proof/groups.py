@@ -35,7 +35,7 @@ class Optimum(NamedTuple):
 
 
 def is_tiny(instance: Instance) -> bool:
-    """Whether all groups of agents can be tried within milliseconds."""
+    """Return whether all groups of agents can be tried within milliseconds."""
     return instance.n <= MOST_AGENTS and 3**instance.n * instance.m <= MOST_PAIRS
 
 

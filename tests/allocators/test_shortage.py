@@ -48,7 +48,7 @@ def test_the_least_work_is_served_where_all_reach_everything(method):
         assert result.evaluation.served_makespan == pytest.approx(best)
         assert len(result.evaluation.unserved_tasks) == m - n
         assert (result.makespan, result.lower_bound, result.gap) == (None, None, None)
-        assert "no plan that serves as many tasks is done sooner" in result.notes[-1]
+        assert "no plan that serves as many tasks has a shorter makespan" in result.notes[-1]
 
 
 @pytest.mark.parametrize("objective", ["makespan", "makespan-energy"])

@@ -177,7 +177,7 @@ def test_callbacks_may_end_a_run(instance: Instance) -> None:
 
 def test_options_need_a_name(instance: Instance) -> None:
     """An allocator has its parameters already: more of them are an error, not lost."""
-    with pytest.raises(InputError, match="with its own parameters; set policy where it is made"):
+    with pytest.raises(InputError, match="with its own parameters; set policy when creating it"):
         solve(instance, load("greedy"), policy="x.safetensors")
     with pytest.raises(InputError, match="takes no option 'policy'"):
         solve(instance, "greedy", policy="x.safetensors")
@@ -185,7 +185,7 @@ def test_options_need_a_name(instance: Instance) -> None:
 
 def test_auto_takes_no_options(instance: Instance) -> None:
     """What it picks depends on the size: an option that one method takes needs that method's name."""
-    with pytest.raises(InputError, match="for a method that you name"):
+    with pytest.raises(InputError, match="needs a named method"):
         solve(instance, "auto", policy="x.safetensors")
     assert solve(instance, "auto", policy=None).makespan == 1.0
 

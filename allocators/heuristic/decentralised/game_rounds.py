@@ -140,7 +140,7 @@ def communicate(game: GameData, beliefs: Beliefs) -> IntArray:
 
 @compiled
 def is_newer(one: int, other: int, n_changes: IntArray, stamp: FloatArray) -> bool:
-    """Whether the version of agent `one` takes precedence over that of `other`."""
+    """Return whether the version of agent `one` takes precedence over that of `other`."""
     if n_changes[one] == n_changes[other]:
         return bool(stamp[one] > stamp[other])
     return bool(n_changes[one] > n_changes[other])

@@ -91,7 +91,7 @@ def _added_cost(givers: IntArray, takers: IntArray, columns: TwoColumns, encodin
 
 
 def _is_possible(givers: IntArray, takers: IntArray, columns: TwoColumns, encoding: Encoding) -> BoolArray:
-    """Whether both coalitions exist, can reach their tasks, and are not both empty."""
+    """Return whether both coalitions exist, can reach their tasks, and are not both empty."""
     going = np.all(encoding.allows(givers, columns.target[:, None, None]) & (givers >= 0), axis=2)
     coming = np.all(encoding.allows(takers, columns.source[:, None, None]) & (takers >= 0), axis=2)
     possible: BoolArray = going[:, :, None] & coming[:, None, :]

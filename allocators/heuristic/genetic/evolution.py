@@ -185,7 +185,7 @@ class Evolution:
         return individuals
 
     def _may_improve(self, individual: Individual) -> bool:
-        """Whether `Search.submit` may accept it as the best."""
+        """Return whether `Search.submit` may accept it as the best."""
         assert self.search.best is not None
         known = self.search.best.evaluation
         energy = known.energy * self.energy_counts

@@ -97,7 +97,7 @@ def build_tree(position: Floats, tasks: Indices) -> Tree:
 
 @compiled
 def is_worse(one: int, other: int, coverage: Floats, rank: Indices) -> bool:
-    """Whether task `one` is served worse than `other`, or equally and comes first."""
+    """Return whether task `one` is served worse than `other`, or equally and comes first."""
     if coverage[one] == coverage[other]:
         return bool(rank[one] < rank[other])
     return bool(coverage[one] < coverage[other])

@@ -249,7 +249,7 @@ def _worst_in_tree(agent: int, tree: Tree, tasks: Tasks, agents: Agents, stack: 
 
 @compiled
 def is_reachable(distance: float, longest: float, battery: float, energy_per_distance: float, horizon: float) -> bool:
-    """Whether a task at that distance is within range, battery and horizon of an agent."""
+    """Return whether a task at that distance is within range, battery and horizon of an agent."""
     return bool(distance <= longest and energy_per_distance * distance <= battery and distance < horizon)
 
 
@@ -263,7 +263,7 @@ def straight_distance(one: Floats, other: Floats) -> float:
 
 @compiled
 def _is_beyond(position: Floats, low: Floats, high: Floats, limit: float) -> bool:
-    """Whether the box is farther away than `limit`."""
+    """Return whether the box is farther away than `limit`."""
     total = 0.0
     for axis in range(3):
         step = max(0.0, low[axis] - position[axis], position[axis] - high[axis])

@@ -7,5 +7,5 @@ LEAST_AGENTS = 5_000
 
 
 def are_prices_used(instance: Instance) -> bool:
-    """Whether there are many agents, for whom tasks differ by more than their workloads."""
+    """Return whether there are many agents, for whom tasks differ by more than their workloads."""
     return instance.n >= LEAST_AGENTS and (instance.has_travel_time or not instance.reach.is_complete)

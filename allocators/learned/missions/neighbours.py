@@ -58,7 +58,7 @@ def swap_for(n: int, m: int) -> Swap:
 
 @compiled_in_place
 def precedes(one: FloatArray, i: int, other: FloatArray, k: int) -> bool:
-    """Whether an agent decides before another: the stronger, then that of more battery, then by place.
+    """Return whether an agent decides before another: the stronger, then that of more battery, then by place.
 
     So all agree on the order without a message; of two that are equal in all of that, each takes itself for the first.
     """

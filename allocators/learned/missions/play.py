@@ -152,7 +152,7 @@ def open_tasks(state: MissionArrays, number: int) -> int:
 
 @inlined
 def is_busy(state: MissionArrays, number: int) -> bool:
-    """Whether an agent has a task that is open as far as it knows, or is on its way to look around."""
+    """Return whether an agent has a task that is open as far as it knows, or is on its way to look around."""
     agent = state.agents[number]
     if agent.order == TO_TASK:
         return bool(state.task_left[agent.known, agent.order_task] >= 0)
@@ -193,7 +193,7 @@ def act(state: MissionArrays, room: Room, number: int, choice: int) -> None:
 
 @inlined
 def wants(state: MissionArrays, room: Room, number: int) -> bool:
-    """Whether an agent is to consider its options now; what it sees is noticed."""
+    """Return whether an agent is to consider its options now; what it sees is noticed."""
     head, agent = state.head[0], state.agents[number]
     tasks = open_tasks(state, agent.known)
     is_considered = is_due(room, number, head.hour, head.period, tasks, is_busy(state, number))

@@ -9,7 +9,7 @@ MOST_SAVED = 3
 
 @compiled_in_place
 def is_to_send(periods: int, saved: IntArray, counted: IntArray, news: IntArray, row: int, tick: int) -> bool:
-    """Whether an agent sends now; what is remembered of that is brought up to date.
+    """Return whether an agent sends now; what is remembered of that is brought up to date.
 
     Parameters
     ----------

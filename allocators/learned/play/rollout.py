@@ -52,7 +52,7 @@ class Best:
     distance: Tensor
 
     def better_than(self, other: "Best") -> Tensor:
-        """Whether each position is better than the other one, shape (B,)."""
+        """Return whether each position is better than the other one, shape (B,)."""
         same = (self.shortfall - other.shortfall).abs() <= TIE
         less = (self.shortfall < other.shortfall) & ~same
         nearer = self.distance < other.distance * (1 - TIE)

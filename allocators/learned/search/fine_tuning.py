@@ -102,7 +102,7 @@ class FineTuning:
         self._stats: list[TrainingStats] = []
 
     def is_due(self) -> bool:
-        """Whether it is time to learn; runs without a time limit never learn, so that they repeat."""
+        """Return whether it is time to learn; runs without a time limit never learn, so that they repeat."""
         since = self.search.elapsed_s - self.parameters.after_s
         limit = self.search.budget.time_limit_s
         return limit is not None and since > 0 and self.spent_s < self.parameters.share * since

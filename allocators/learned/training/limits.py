@@ -47,7 +47,7 @@ class Limits:
         return 0.0
 
     def reached(self, history: Sequence[Report]) -> bool:
-        """Whether a limit is reached."""
+        """Return whether a limit is reached."""
         decisions, seconds = _spent(history)
         return (
             (self.steps is not None and decisions >= self.steps)

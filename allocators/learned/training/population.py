@@ -59,7 +59,7 @@ class PopulationTraining(ABC):
         return limits.progress(self.history)
 
     def is_over(self, limits: Limits) -> bool:
-        """Whether a limit is reached."""
+        """Return whether a limit is reached."""
         return limits.reached(self.history)
 
     @abstractmethod

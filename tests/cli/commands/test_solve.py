@@ -162,7 +162,7 @@ def test_slack_buys_energy(alloc, small):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--makespan-slack", "0.1"], "it is for the objective makespan-energy"),
+        (["--makespan-slack", "0.1"], "use it with the objective makespan-energy"),
         (["--makespan-slack", "inf", "--objective", "makespan-energy"], "must be a finite number"),
         (["--makespan-limit", "0", "--objective", "makespan-energy"], "must be a finite number > 0"),
         (
