@@ -9,7 +9,7 @@ from alloc.allocators.contract.built_in import BUILT_IN
 from alloc.allocators.contract.described import Parameter, described
 from alloc.allocators.contract.method import Method
 from alloc.allocators.contract.plugins import imported, plugin_class, plugins, require_installed
-from alloc.allocators.runtime.interrupts import ended_with_process
+from alloc.allocators.runtime.interrupts import stopped_at_exit
 from alloc.problems import InputError
 from alloc.problems.arguments import text
 from alloc.problems.errors import nearest, of_these
@@ -109,7 +109,7 @@ def load(name: str, parameters: object = None, **settings: object) -> Allocator:
         from alloc.allocators.learned.files.policy_header import read_header
 
         read_header(cast("str", given["policy"]))  # report a wrong file before torch is loaded, which takes seconds
-    with ended_with_process(lambda: None):  # the import of a large library cannot be interrupted
+    with stopped_at_exit(lambda: None):  # the import of a large library cannot be interrupted
         kind = _class(name)
         for key in given:
             if key not in method.options and key not in kind.default_parameters():

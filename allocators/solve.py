@@ -35,7 +35,7 @@ from alloc.allocators.request import (
     default_threads,
 )
 from alloc.allocators.result import Result
-from alloc.allocators.runtime.interrupts import ended_with_process, require_wanted, signals_set
+from alloc.allocators.runtime.interrupts import raise_if_cancelled, signals_set, stopped_at_exit
 from alloc.problems import InputError, Instance, Objective, find_shortage, serve_all
 from alloc.problems.allocation import CarriedOver
 from alloc.problems.arguments import choice, event, flag, function, of_type, real
@@ -141,14 +141,14 @@ def solve(
         seed=checked_seed(seed),
         start=None if plan is None else plan_in_force.completed(plan),
         threads=checked_threads(threads) or default_threads(budget),
-        on_improvement=None if tell is None else lambda improvement: tell(plan_in_force.told(improvement)),
+        on_improvement=None if tell is None else lambda improvement: tell(plan_in_force.on_instance(improvement)),
         stop=event(stop, "stop") or threading.Event(),
         pinned=bool(plan_in_force.pinned.any()),
     )
     handle_signals = flag(handle_signals, "handle_signals")
     carried_notes = [f"since the plan was made, {carried}"] if str(carried) else []
     allocator, notes, spent_s = _prepared(method, request, parameters, settings)
-    with ended_with_process(request.stop.set), signals_set(request.stop) if handle_signals else nullcontext():
+    with stopped_at_exit(request.stop.set), signals_set(request.stop) if handle_signals else nullcontext():
         result = _run(allocator, request, [*notes, *carried_notes], spent_s)
     return concluded(replace(result, parameters=allocator.changed_parameters()), plan_in_force)
 
@@ -248,7 +248,7 @@ def _run(allocator: Allocator, request: Request, notes: list[str], spent_s: floa
         stop=request.stop,
         spent_s=spent_s + time.monotonic() - begin,
     )
-    require_wanted(request.stop)
+    raise_if_cancelled(request.stop)
     decomposition = None if shortage is None else Decomposition(search, shortage, request)
     part = search if decomposition is None else decomposition.rest
     proposal, stop_reason = (Proposal(), None) if part is None else _propose(allocator, part, request.stop)
@@ -263,7 +263,7 @@ def _propose(allocator: Allocator, search: Search, stop: threading.Event) -> tup
         raise_bound_before(search)
     proof = EarlyProof(search) if _is_proven_early(allocator, search.budget) else None
     proposal = allocator.allocate(search)
-    require_wanted(stop)
+    raise_if_cancelled(stop)
     stop_reason = search.stop_reason()
     if proposal.allocation is not None:
         search.submit(proposal.allocation)
@@ -283,5 +283,5 @@ def _propose(allocator: Allocator, search: Search, stop: threading.Event) -> tup
 
         with search.improving("estimating what slack saves"):
             note_saving(search)
-    require_wanted(stop)
+    raise_if_cancelled(stop)
     return proposal, stop_reason

@@ -1,8 +1,8 @@
-"""The protocol of engines: one function applied to many items, wherever the work is done.
+"""The protocol of engines, which apply a function to many items, in this process or elsewhere.
 
 The function is pure and importable by name (a top-level function, or a `functools.partial` of one), so that an item
-whose process or machine dies is simply run again, and every engine returns the same results. Engines know nothing of
-what the function computes; one that depends on the number of threads of a library sets it itself.
+whose process or machine dies can be run again, and every engine returns the same results. Engines do not depend on what
+the function computes; a function that needs a certain number of threads in a library must set it itself.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,11 +18,11 @@ POLL_S = 0.05
 
 
 class EngineError(AllocError, RuntimeError):
-    """An item was given up, as every process that worked on it died."""
+    """An item was given up because every process that worked on it died."""
 
 
 def never_stop() -> bool:
-    """Return False: there is no stop request."""
+    """Return False, as there is no stop request."""
     return False
 
 
@@ -45,26 +45,26 @@ class Engine(Protocol):
         Parameters
         ----------
         function : callable
-            Pure and picklable; its exceptions are raised here.
+            Pure and picklable; its exceptions are re-raised here.
         items : sequence
-            Picklable values. A tensor is sent with the whole storage that it is a view of.
+            Picklable values. A tensor is sent with the whole storage of which it is a view.
         should_stop : callable
-            Whether to stop; called every `POLL_S` seconds, by the serial engine between two items only.
+            Returns whether to stop; called every `POLL_S` seconds, or between items by the serial engine.
 
         Returns
         -------
         list or None
-            None if `should_stop` returned True before every item was done; unfinished items are dropped.
+            None if `should_stop` returned True before all items were done; unfinished items are dropped.
 
         Raises
         ------
         EngineError
-            If the process that works on an item dies again and again.
+            If processes that work on an item die repeatedly.
         """
         ...
 
     def close(self) -> None:
-        """End the processes and connections; a second call does nothing."""
+        """End processes and connections; further calls do nothing."""
         ...
 
     def __enter__(self) -> Self:

@@ -1,4 +1,4 @@
-"""Engines by name, as options of commands and parameters of functions name them."""
+"""Engines by name, for options of commands and parameters of functions."""
 
 from importlib.util import find_spec
 
@@ -13,7 +13,7 @@ ENGINES = ("serial", "processes", "ray")
 
 
 def check_engine(name: str, workers: int | None = None, address: str | None = None) -> None:
-    """Raise the `InputError` of `make_engine` for its options, as far as that needs no connection."""
+    """Raise the errors of `make_engine` that can be found without a connection."""
     if name not in ENGINES:
         raise InputError(f"no such engine: {name!r}{nearest(name, ENGINES)}", "engine")
     if workers is not None and name != "processes":
@@ -27,14 +27,14 @@ def check_engine(name: str, workers: int | None = None, address: str | None = No
 def make_engine(
     name: str = "serial", workers: int | None = None, address: str | None = None, threads: int = 1
 ) -> Engine:
-    """Return an engine.
+    """Return a new engine.
 
     Parameters
     ----------
     name : str
         One of `ENGINES`.
     workers : int, optional
-        Number of processes, for ``processes`` only; all available processors by default.
+        Number of processes, for ``processes`` only; by default the number of available processors.
     address : str, optional
         Head of the cluster, for ``ray`` only; see `RayEngine`.
     threads : int

@@ -1,4 +1,4 @@
-"""A thread pool for parts of a run that proceed concurrently."""
+"""A thread pool for concurrent parts of a run."""
 
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -11,19 +11,19 @@ T = TypeVar("T")
 
 
 class RunAll(Protocol):
-    """Makes one call for each item, and gives the results in their order, as `map` does."""
+    """Calls a function for each item and returns the results in the order of the items, as `map` does."""
 
     def __call__(self, function: Callable[[T], R], items: Iterable[T], /) -> Iterable[R]:
         """Call `function` with each of `items`."""
 
 
 @contextmanager
-def side_by_side(threads: int) -> Iterator[RunAll]:
-    """Give what makes calls in so many threads, or in the calling thread where there is one.
+def thread_map(threads: int) -> Iterator[RunAll]:
+    """Yield a `map` that makes its calls in `threads` threads, or in the calling thread if `threads` is 1.
 
-    A method divides a count of iterations into calls, which let go of the interpreter's lock for most of their time,
-    and goes on once all have ended: it exchanges plans between them and submits what they found in its own thread.
-    Thus the answer depends on the number of threads, but not on which of them is faster.
+    A method divides a number of iterations into calls that mostly release the global interpreter lock, and waits for
+    all of them; it then exchanges plans between them and submits what they found in its own thread. Thus the answer
+    depends on the number of threads, but not on their speeds.
     """
     if threads == 1:
         yield map
@@ -33,9 +33,9 @@ def side_by_side(threads: int) -> Iterator[RunAll]:
 
 
 class Pool(ThreadPoolExecutor):
-    """A thread pool that runs calls in the calling thread once the interpreter shuts down and starts no threads.
+    """A thread pool that runs calls in the calling thread when the interpreter shuts down and starts no new threads.
 
-    A run in a non-daemon thread, which the program waits for at its end, has its whole time limit even then.
+    A run in a non-daemon thread, for which the program waits at its end, thus has its full time limit even then.
     """
 
     def submit(self, fn: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> Future[R]:

@@ -1,4 +1,4 @@
-"""The process engine: items in processes of this machine; the item of a process that dies is run again in another."""
+"""The process engine: runs items in local processes; if a process dies, its item is run again in another."""
 
 import contextlib
 import multiprocessing
@@ -14,19 +14,19 @@ from alloc.allocators.parallel.processors import available_threads
 from alloc.allocators.parallel.remote_call import RemoteCall, run_call
 
 MAX_ATTEMPTS = 3
-"""Attempts at an item; a process that dies at it three times will die again."""
+"""Attempts at an item; after three deaths, a further attempt would most likely fail as well."""
 
 
 class ProcessEngine(Engine):
-    """Items in processes of this machine, each with a pipe of its own.
+    """Runs items in processes on this machine, each with its own pipe.
 
-    The executors of the standard library lose all workers with one, and cannot drop a running item. Here a killed
-    worker costs only the time spent on its own item. Not for use by several threads at once.
+    The executors of the standard library lose all workers if one dies, and cannot drop a running item. Here a killed
+    worker costs only the time spent on its own item. Not thread-safe.
 
     Parameters
     ----------
     workers : int, optional
-        Number of processes; all available processors by default.
+        Number of processes; by default the number of available processors.
     threads : int
         Threads that each item may use.
     max_attempts : int
@@ -64,7 +64,7 @@ class ProcessEngine(Engine):
         return [results[index] for index in range(len(items))]
 
     def _assign(self, call: RemoteCall[T, R], items: Sequence[T], waiting: deque[int], attempts: list[int]) -> None:
-        """Give every idle worker an item; start workers in place of dead ones, and as far as there are items."""
+        """Assign waiting items to idle workers; replace dead workers, and start more if there are items for them."""
         self._dismiss([worker for worker in self._workers if worker.item is None and not worker.alive])
         busy = sum(worker.item is not None for worker in self._workers)
         while len(self._workers) < min(self.size, busy + len(waiting)):
@@ -76,7 +76,7 @@ class ProcessEngine(Engine):
                 worker.start(index, call.request(items[index]))
 
     def _finished(self) -> list["_Worker"]:
-        """Wait up to `POLL_S` for workers that reply or die."""
+        """Return the workers that have replied or died, after waiting up to `POLL_S` seconds for one."""
         busy = [worker for worker in self._workers if worker.item is not None]
         ready = connection.wait([handle for worker in busy for handle in worker.handles], POLL_S)
         return [worker for worker in busy if any(handle in ready for handle in worker.handles)]
@@ -92,7 +92,7 @@ class ProcessEngine(Engine):
 
 
 class _Worker:
-    """A process, the parent's end of its pipe, and the index of the item that it works on."""
+    """A process, the parent's end of its pipe, and the index of its current item."""
 
     def __init__(self) -> None:
         context = multiprocessing.get_context("spawn")  # a forked process would inherit the locks of other threads
@@ -100,7 +100,7 @@ class _Worker:
         self._process = context.Process(target=_serve, args=(child_end,), daemon=True)
         with _interrupts_blocked():
             self._process.start()
-        child_end.close()  # the worker's death then closes the last copy, and the parent reads the end of file
+        child_end.close()  # so that the pipe is closed when the worker dies, and the parent reads end of file
         self.item: int | None = None
         self.exit_code: int | None = None
 
@@ -110,21 +110,21 @@ class _Worker:
 
     @property
     def handles(self) -> tuple["connection.Connection[bytes, bytes]", int]:
-        """What becomes readable when there is a reply, or when the process is dead."""
+        """Objects that become readable when there is a reply, or when the process dies."""
         return self._pipe, self._process.sentinel
 
     def start(self, item: int, request: bytes) -> None:
         self.item = item
-        with contextlib.suppress(OSError):  # the process is dead, which `take_reply` finds
+        with contextlib.suppress(OSError):  # the process is dead; `take_reply` detects that
             self._pipe.send_bytes(request)
 
     def take_reply(self) -> tuple[int, bytes | None]:
-        """Return the item, and the reply or None if the process died."""
+        """Return the item, and its reply, or None if the process died."""
         assert self.item is not None
         item, self.item = self.item, None
         try:
             return item, self._pipe.recv_bytes() if self._pipe.poll() else None
-        except (EOFError, OSError):  # it died before or while it wrote
+        except (EOFError, OSError):  # the process died before or during writing
             return item, None
 
     def kill(self) -> None:
@@ -136,7 +136,7 @@ class _Worker:
 
 
 def _serve(pipe: "connection.Connection[bytes, bytes]") -> None:
-    """Run calls until the pipe is closed or the parent is gone."""
+    """Run calls until the pipe is closed or the parent process ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole process group; the parent decides
     threading.Thread(target=_die_with_parent, daemon=True).start()
     with contextlib.suppress(EOFError, OSError):
@@ -160,8 +160,8 @@ def _given_up(attempts: int, exit_code: int | None) -> str:
 
 @contextlib.contextmanager
 def _interrupts_blocked() -> Iterator[None]:
-    """Block SIGINT while processes start: they inherit the mask, as they cannot ignore the signal from the first."""
-    resource_tracker.ensure_running()  # otherwise it starts with the first process, and unblocks the signal
+    """Block SIGINT while processes start: they inherit the mask until they can ignore the signal."""
+    resource_tracker.ensure_running()  # otherwise it is started with the first process, and unblocks the signal
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield

@@ -1,4 +1,4 @@
-"""How many processors there are to compute on."""
+"""The number of available processors."""
 
 import os
 

@@ -1,4 +1,4 @@
-"""The Ray engine: items on the machines of a Ray cluster; the item of a machine that dies is run again on another."""
+"""The Ray engine: runs items on a Ray cluster; if a machine dies, its item is run again on another."""
 
 import contextlib
 import os
@@ -13,32 +13,32 @@ from alloc.allocators.parallel.remote_call import RemoteCall, run_call
 from alloc.problems import InputError, MissingPackageError
 
 MAX_ATTEMPTS = 5
-"""Attempts at an item; more than in processes, as whole machines join and leave."""
+"""Attempts at an item; more than for processes, as whole machines join and leave."""
 
 CONNECT_S = 5.0
-"""Seconds that the head of the cluster may take to answer."""
+"""Seconds that the head of the cluster may take to respond."""
 
 RAY_MISSING = "Ray is not installed: pip install 'alloc-mrta[cluster]'"
 
 
 class RayEngine(Engine):
-    """Items as tasks of a Ray cluster, on whose machines this package must be installed in the same version.
+    """Runs items as tasks of a Ray cluster, whose machines must have the same version of this package installed.
 
     Parameters
     ----------
     address : str, optional
-        Head of the cluster, as ``host:port``; ``local`` starts one on this machine alone. By default the environment
-        variable ``RAY_ADDRESS``, or the cluster that runs on this machine. A connection that this process already has
-        is used, and left open by `close`.
+        Head of the cluster, as ``host:port``; ``local`` starts a cluster on this machine only. By default the
+        environment variable ``RAY_ADDRESS``, or the cluster that runs on this machine. An existing connection of this
+        process is used, and left open by `close`.
     threads : int
-        Threads that each item may use: the processors that Ray reserves for it.
+        Threads that each item may use, which is the number of processors that Ray reserves for it.
     max_attempts : int
         Attempts at an item before it is given up.
 
     Raises
     ------
     InputError
-        If Ray is not installed, there is no cluster at `address`, or none of its machines has so many processors.
+        If Ray is not installed, there is no cluster at `address`, or none of its machines has `threads` processors.
     """
 
     def __init__(self, address: str | None = None, threads: int = 1, max_attempts: int = MAX_ATTEMPTS) -> None:
@@ -67,9 +67,9 @@ class RayEngine(Engine):
             raise InputError(f"no Ray cluster at {address!r}: {_reason(error)}", "address") from error
 
     def _check_processors(self, threads: int) -> None:
-        """Raise an `InputError` where Ray would wait forever, silently, for a machine that is large enough."""
+        """Raise an `InputError` if no machine is large enough, as Ray would silently wait for one forever."""
         most = max((int(node["Resources"].get("CPU", 0)) for node in self._ray.nodes() if node["Alive"]), default=0)
-        if 0 < most < threads:  # a cluster without any may grow with the work
+        if 0 < most < threads:  # a cluster without processors may be scaled up on demand
             raise InputError(f"no machine of the cluster has {threads} processors; the largest has {most}", "threads")
 
     def map(
@@ -83,8 +83,8 @@ class RayEngine(Engine):
             while pending:
                 if should_stop():
                     return None
-                with self._failures_told():
-                    # fetched at once, so that results are not lost with the machine that holds them
+                with self._ray_errors_converted():
+                    # fetched immediately, so that results are not lost with the machine that holds them
                     done, pending = self._ray.wait(pending, timeout=POLL_S)
                     replies = [self._ray.get(task) for task in done]
                 for task, reply in zip(done, replies, strict=True):
@@ -95,8 +95,8 @@ class RayEngine(Engine):
         return [results[index] for index in range(len(items))]
 
     @contextlib.contextmanager
-    def _failures_told(self) -> Iterator[None]:
-        """Raise an `EngineError` for an error of Ray, or of the connection to it, which some versions raise as such."""
+    def _ray_errors_converted(self) -> Iterator[None]:
+        """Convert errors of Ray, and connection errors, which some versions raise directly, to an `EngineError`."""
         try:
             yield
         except (self._ray.exceptions.RayError, OSError) as error:
@@ -118,7 +118,7 @@ def _reason(error: Exception) -> str:
 
 
 def _check_reachable(address: str) -> None:
-    """Raise an `InputError` if nothing listens there, which takes Ray minutes to find before it aborts the process."""
+    """Raise an `InputError` if nothing listens at `address`; Ray would take minutes and then abort the process."""
     host, colon, port = address.removeprefix("ray://").rpartition(":")
     if not colon or not port.isdigit():
         return
@@ -130,7 +130,7 @@ def _check_reachable(address: str) -> None:
 
 @contextlib.contextmanager
 def _sigterm_handler_kept() -> Iterator[None]:
-    """Restore the handler of SIGTERM: Ray replaces it by one that exits at once."""
+    """Restore the SIGTERM handler after the block: Ray installs one that exits immediately."""
     before = signal.getsignal(signal.SIGTERM)
     try:
         yield

@@ -1,4 +1,4 @@
-"""Calls as bytes: how a function and its item reach another process, and how the result comes back."""
+"""Serialisation of calls: how a function and its item reach another process, and how the result returns."""
 
 import pickle
 import traceback
@@ -9,10 +9,10 @@ from alloc.allocators.parallel.engine import R, T
 
 
 class RemoteCall(Generic[T, R]):
-    """A function whose calls are run by `run_call` in another process.
+    """A function whose calls `run_call` runs in another process.
 
-    Plain pickle, not that of `Connection.send`, for which torch registers handles of shared memory: they die with
-    their sender.
+    Uses plain pickle in place of `Connection.send`, for which torch registers shared-memory handles that become invalid
+    when the sender dies.
 
     Parameters
     ----------
@@ -24,11 +24,11 @@ class RemoteCall(Generic[T, R]):
         self.function = function
 
     def request(self, item: T) -> bytes:
-        """Return the call of the function with `item`, for `run_call`."""
+        """Return the serialised call of the function with `item`, for `run_call`."""
         return pickle.dumps((self.function, item))
 
     def result(self, reply: bytes) -> R:
-        """Return the result in a reply of `run_call`, or raise its exception with a note of the remote traceback."""
+        """Return the result in a reply of `run_call`, or raise its exception with the remote traceback as a note."""
         value, trace = pickle.loads(reply)
         if trace is not None:
             value.add_note(f"In a worker process:\n{trace}")
@@ -38,7 +38,7 @@ class RemoteCall(Generic[T, R]):
 
 
 def run_call(request: bytes) -> bytes:
-    """Run a call; return its pickled result and None, or its pickled exception and the traceback."""
+    """Run a call; return a pickle of its result and None, or of its exception and traceback."""
     try:
         function, item = pickle.loads(request)
         return pickle.dumps((function(item), None))

@@ -1,4 +1,4 @@
-"""The serial engine: one item after the other, in the calling thread."""
+"""The serial engine: runs items one after another in the calling thread."""
 
 from collections.abc import Callable, Sequence
 
@@ -6,7 +6,7 @@ from alloc.allocators.parallel.engine import Engine, R, T, never_stop
 
 
 class SerialEngine(Engine):
-    """One item after the other, in this process.
+    """Runs items one after another in the calling thread.
 
     Parameters
     ----------
@@ -29,4 +29,4 @@ class SerialEngine(Engine):
         return results
 
     def close(self) -> None:
-        """See `Engine.close`; there is nothing to end."""
+        """See `Engine.close`; does nothing."""

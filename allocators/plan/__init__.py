@@ -1,1 +1,1 @@
-"""A plan as tables, files and maps for people: who does what, when, and with how much battery left."""
+"""Plans as tables, files and maps: who does what, when, and how much battery is left."""

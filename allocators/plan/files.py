@@ -1,4 +1,4 @@
-"""A result as a file: JSON, a table, a workbook, GeoJSON, or a map; the suffix decides."""
+"""Result files: JSON, a table, a workbook, GeoJSON or a map, depending on the suffix."""
 
 import json
 from collections.abc import Callable
@@ -23,7 +23,7 @@ JSON = ".json"
 
 
 def to_json(result: "Result") -> str:
-    """Return the document of a result."""
+    """Return the JSON document of a result."""
     return json.dumps(result.to_dict(), indent=2, allow_nan=False) + "\n"
 
 
@@ -34,44 +34,44 @@ WRITERS: dict[str, Callable[["Result"], str | bytes]] = {
     ".geojson": to_geojson,
     ".html": to_html,
 }
-"""What each suffix holds."""
+"""Functions that return the content of a file, by suffix."""
 
 
 def write_result(result: "Result", path: PathLike) -> None:
-    """Write a result to a file, whole or not at all; the suffix of its name decides what is written.
+    """Write a result to a file atomically; the suffix of the file name determines the format.
 
     Parameters
     ----------
     result : Result
     path : str or path
         ``.json`` for the document that `read_result` reads; ``.csv`` for a row per agent; ``.xlsx`` for a workbook with
-        the summary, the tasks and the agents, which needs openpyxl; ``.geojson`` for tasks, agents and moves, where
-        places are longitudes and latitudes; ``.html`` for a map that a browser opens from disk.
+        the summary, the tasks and the agents, which needs openpyxl; ``.geojson`` for tasks, agents and moves, if
+        positions are longitudes and latitudes; ``.html`` for a map that a browser opens from disk.
 
     Raises
     ------
     InputError
-        If the name has another suffix, the instance has no such places, or the file cannot be written.
+        If the suffix is another one, the positions are unknown or of another kind, or the file cannot be written.
     MissingPackageError
-        If openpyxl is needed and not installed.
+        If openpyxl is needed but not installed.
     """
     check_result_file(path, result.instance)
     write_bytes_atomically(path, content(result, suffix_of(path)))
 
 
 def content(result: "Result", suffix: str) -> bytes:
-    """Return what the file with this suffix holds."""
+    """Return the content of the file with this suffix."""
     text = WRITERS[suffix](result)
     return text.encode("utf-8", "replace") if isinstance(text, str) else text
 
 
 def suffix_of(path: PathLike) -> str:
-    """Return the suffix that decides what is written: that of the name, and JSON for streams and devices.
+    """Return the suffix that determines the format: that of the name, or ``.json`` for streams and devices.
 
     Raises
     ------
     InputError
-        If it is none of those that are known.
+        If the suffix is unknown.
     """
     target = Path(path)
     if is_stream(path) or (target.exists() and not target.is_file() and not target.is_dir()):
@@ -84,14 +84,14 @@ def suffix_of(path: PathLike) -> str:
 
 
 def check_result_file(path: PathLike, instance: Instance) -> None:
-    """Raise an error where no result on this instance could be written to a file of this name.
+    """Raise an error if results on this instance cannot be written to a file of this name.
 
     Raises
     ------
     InputError
-        If the suffix is unknown, or the instance has not the places for it, or too many agents.
+        If the suffix is unknown, or the instance lacks the positions for it, or is too large.
     MissingPackageError
-        If a package is needed that is not installed.
+        If a required package is not installed.
     """
     suffix = suffix_of(path)
     problem = ""
@@ -99,12 +99,12 @@ def check_result_file(path: PathLike, instance: Instance) -> None:
         if find_spec("openpyxl") is None:
             raise MissingPackageError(f"{named(path)} needs openpyxl; install with: pip install 'alloc-mrta[tables]'")
         if max(instance.n, instance.m) >= MOST_ROWS:
-            problem = f"a sheet holds {MOST_ROWS} rows, and there are more agents or tasks; write .csv"
+            problem = f"a sheet holds at most {MOST_ROWS} rows, but there are more agents or tasks; write .csv"
     elif suffix == ".geojson" and instance.metric != GEOGRAPHIC:
-        problem = f"needs the metric 'geographic', and that of the instance is {instance.metric!r}; write .html"
+        problem = f"needs the metric 'geographic', but the instance has {instance.metric!r}; write .html"
     elif suffix == ".html" and np.isnan(instance.task_position).all():
-        problem = "needs positions, and no task of the instance has one; write .csv or .xlsx"
+        problem = "needs positions, but no task of the instance has one; write .csv or .xlsx"
     elif suffix == ".html" and instance.n > MOST_AGENTS:
-        problem = f"is for at most {MOST_AGENTS} agents, and there are {instance.n}; write .csv"
+        problem = f"is for at most {MOST_AGENTS} agents, but there are {instance.n}; write .csv"
     if problem:
         raise InputError(problem, source=named(path))

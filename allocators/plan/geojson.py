@@ -1,4 +1,4 @@
-"""A plan as GeoJSON (RFC 7946): points of tasks, agents and bases, and a line for each move and each way to a base."""
+"""A plan as GeoJSON (RFC 7946): points for tasks, agents and bases, and lines for moves and returns to bases."""
 
 from dataclasses import asdict
 from typing import TYPE_CHECKING
@@ -17,7 +17,7 @@ Properties = AgentRow | TaskRow | dict[str, str]
 
 
 def to_geojson(result: "Result") -> str:
-    """Return a collection of features; the property `kind` is task, agent, base, move or return."""
+    """Return a plan as a GeoJSON feature collection; the property `kind` is task, agent, base, move or return."""
     instance = result.instance
     tasks = dict(zip(instance.task_ids, instance.task_position.tolist(), strict=True))
     starts = dict(zip(instance.agent_ids, instance.start_position.tolist(), strict=True))
@@ -43,14 +43,14 @@ def to_geojson(result: "Result") -> str:
 
 
 def _point(kind: str, row: Properties, place: Position) -> list[Feature]:
-    """Return a point; none where the place is unknown."""
+    """Return a point feature, or no feature if the position is unknown."""
     if np.isnan(place[0]):
         return []
     return [_feature(kind, row, {"type": "Point", "coordinates": _position(place)})]
 
 
 def _line(kind: str, row: AgentRow, start: Position, goal: Position) -> list[Feature]:
-    """Return a line, in two parts where it crosses the date line; none where nothing is known, or nobody moves."""
+    """Return a line feature, in two parts if it crosses the date line; none if an end is unknown or both are equal."""
     if np.isnan(start[0]) or np.isnan(goal[0]) or start == goal:
         return []
     first, second = _position(start), _position(goal)

@@ -1,4 +1,4 @@
-"""A plan as one page with a map that a browser opens from disk, without a network."""
+"""A plan as a self-contained page with a map, which a browser opens from disk without a network."""
 
 import json
 import re
@@ -26,16 +26,16 @@ if TYPE_CHECKING:
     from alloc.problems.instance import FloatArray
 
 MOST_AGENTS = 20_000
-"""Agents beyond which a browser is slow to draw the page."""
+"""Maximum number of agents; with more, browsers draw the page slowly."""
 
 SIZE = 1000.0
-"""Width or height of the drawing in its own units."""
+"""Larger of width and height of the drawing, in its own units."""
 
 Entry = dict[str, object]
 
 
 def to_html(result: "Result") -> str:
-    """Return the page: its parts lie beside this module, and the plan goes in as JSON."""
+    """Return the page, made from the templates beside this module with the plan as JSON."""
     data = json.dumps(document(result), allow_nan=False, ensure_ascii=False).replace("<", "\\u003c")
     parts = {"TITLE": escape(one_line(result.instance.name)), "PLAN": data}
     parts |= {"STYLE": _text_of("map.css"), "SCRIPT": _text_of("map.js")}
@@ -47,7 +47,7 @@ def _text_of(name: str) -> str:
 
 
 def document(result: "Result") -> Entry:
-    """Return what the page shows: names, places from 0 to `SIZE`, and the figures as text."""
+    """Return the content of the page: names, positions from 0 to `SIZE`, and figures as text."""
     instance = result.instance
     where = places(instance)
     low, scale = _frame(where)
@@ -70,7 +70,7 @@ def document(result: "Result") -> Entry:
 
 
 def _frame(where: Places) -> "tuple[FloatArray, FloatArray]":
-    """Return the lower left corner of all places, and how much of each axis one unit of the drawing is."""
+    """Return the lower left corner of all positions, and the length of one drawing unit on each axis."""
     known = where.known
     low, high = known.min(axis=0), known.max(axis=0)
     unit = max(float(high[0] - low[0]), float(high[1] - low[1]) * where.aspect) / SIZE or 1.0
@@ -119,7 +119,7 @@ def _agents(instance: Instance, rows: list[AgentRow], begin: list[Base], where: 
 
 
 def _place(place: "FloatArray") -> list[float] | None:
-    """Return a place on the drawing, whose second axis points down; None where it is unknown."""
+    """Return a position on the drawing, whose second axis points down; None if it is unknown."""
     return None if np.isnan(place[0]) else [round(float(place[0]), 3), round(SIZE - float(place[1]), 3)]
 
 

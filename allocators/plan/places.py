@@ -1,4 +1,4 @@
-"""Where tasks and agents are on a map, and the bases at which agents begin together or to which they return."""
+"""Positions of tasks and agents on a map, and the bases where agents start or to which they return."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -12,26 +12,26 @@ from alloc.problems.units import labels
 from alloc.problems.vocabulary import GEOGRAPHIC
 
 STEEPEST = 0.05
-"""Least cosine of a latitude by which a map is stretched."""
+"""Least cosine of the latitude by which a map is stretched."""
 
 MOST_BASES = 20_000
-"""Places beyond which a sample is shown: more would only overlap."""
+"""Maximum number of starting places that are shown; of more, which would overlap, a sample is shown."""
 
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """The places of an instance on a map.
+    """The positions of an instance on a map.
 
     Attributes
     ----------
     tasks, starts : ndarray, shapes (m, 2) and (n, 2)
-        NaN rows where unknown.
+        Unknown positions are rows of NaN.
     aspect : float
-        How long a unit of the vertical axis is drawn, over one of the horizontal axis.
+        Drawn length of a unit of the vertical axis over that of a unit of the horizontal axis.
     axes : (str, str)
         Names of the axes, with units.
     homes : ndarray, shape (bases, 2)
-        Of the bases to which agents return; NaN rows where unknown.
+        Positions of the bases to which agents return; unknown ones are rows of NaN.
     """
 
     tasks: FloatArray
@@ -42,17 +42,17 @@ class Places:
 
     @property
     def known(self) -> FloatArray:
-        """All places that are known, shape (k, 2)."""
+        """All known positions, shape (k, 2)."""
         every = np.vstack([self.tasks, self.starts, self.homes])
         return every[~np.isnan(every[:, 0])]
 
     def home_of(self, instance: Instance, agents: IntArray) -> FloatArray:
-        """Return where each of these agents returns to, shape (k, 2); NaN where it is its start, or nowhere."""
+        """Return the base of each of these agents, shape (k, 2); NaN if it returns to its start or does not return."""
         return np.vstack([self.homes, [[np.nan, np.nan]]])[instance.return_base[agents]]
 
 
 def places(instance: Instance) -> Places:
-    """Return the places on a map: longitudes and latitudes, or the two axes along which the places spread the most."""
+    """Return the positions on a map: longitudes and latitudes, or the coordinates on the two axes of largest spread."""
     if instance.metric != GEOGRAPHIC:
         plane = two_axes(instance)
         unit = labels(instance).distance
@@ -62,7 +62,7 @@ def places(instance: Instance) -> Places:
     tasks, starts, homes = (every[:, :2].copy() for every in _positions(instance))
     both = np.vstack([tasks, starts, homes])
     known = both[~np.isnan(both[:, 0])]
-    if len(known) and np.ptp(known[:, 0] % 360) < np.ptp(known[:, 0]):  # around the date line
+    if len(known) and np.ptp(known[:, 0] % 360) < np.ptp(known[:, 0]):  # on both sides of the date line
         for every in (tasks, starts, homes):
             every[:, 0] %= 360
     middle = (known[:, 1].min() + known[:, 1].max()) / 2 if len(known) else 0.0
@@ -85,20 +85,20 @@ def two_axes(instance: Instance) -> tuple[int, int]:
 
 @dataclass(frozen=True, eq=False)
 class Base:
-    """A place where agents begin, or to which they return.
+    """A place where agents start, or to which they return.
 
     Attributes
     ----------
     name : str
-        Of the base or the task that is there, of the only agent, or what the ids of the agents begin with.
+        Id of the base or of the task at this place, id of the only agent, or common prefix of the agents' ids.
     place : ndarray, shape (2,)
-        On the map.
+        Position on the map.
     agents : ndarray of int
-        Those who begin there.
+        Agents that start there.
     task : int or None
-        The task that is there.
+        Task at the same position.
     is_named : bool
-        Whether the name says more than a number.
+        Whether the name is more than a number.
     """
 
     name: str
@@ -109,9 +109,9 @@ class Base:
 
 
 def bases(instance: Instance, where: Places, most: int = MOST_BASES) -> list[Base]:
-    """Return where the agents begin, evenly spaced ones beyond `most`, and then where else they return to.
+    """Return the places where agents start, at most `most` evenly sampled ones, and the other bases to return to.
 
-    Agents whose place is unknown are left out.
+    Agents whose position is unknown are left out.
     """
     known = np.flatnonzero(~np.isnan(where.starts[:, 0]))
     begin = _starts(instance, where, known, most) if len(known) else []
@@ -143,18 +143,18 @@ def _starts(instance: Instance, where: Places, known: IntArray, most: int) -> li
 
 
 def _names(instance: Instance, members: list[IntArray], tasks: list[int | None]) -> list[str]:
-    """Return the name of each base, empty where the ids of its agents say nothing."""
-    everybody = _beginning(list(instance.agent_ids))
+    """Return the name of each base; empty if none can be derived from the ids of its agents."""
+    everybody = _common_prefix(list(instance.agent_ids))
     names = []
     for agents, task in zip(members, tasks, strict=True):
         ids = [instance.agent_ids[i] for i in agents.tolist()]
-        shared = "" if len(members) > 1 and _beginning(ids) == everybody else _beginning(ids)
+        shared = "" if len(members) > 1 and _common_prefix(ids) == everybody else _common_prefix(ids)
         names.append(instance.task_ids[task] if task is not None else ids[0] if len(ids) == 1 else shared)
     return names
 
 
-def _beginning(ids: list[str]) -> str:
-    """Return what all ids begin with, at least two characters, without numbers and separators at its end."""
+def _common_prefix(ids: list[str]) -> str:
+    """Return the common prefix of all ids without trailing digits and separators; empty if shorter than two."""
     first, last = min(ids), max(ids)
     length = next((k for k, pair in enumerate(zip(first, last, strict=False)) if pair[0] != pair[1]), len(first))
     shared = first[:length].rstrip("0123456789-_ .:/#")

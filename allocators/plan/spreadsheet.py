@@ -1,4 +1,4 @@
-"""A plan as CSV, for programs, and as a workbook, for people."""
+"""A plan as CSV for programs, and as a workbook for people."""
 
 import csv
 import io
@@ -23,14 +23,14 @@ if TYPE_CHECKING:
     from alloc.allocators.result import Result
 
 MOST_ROWS = 1_048_576
-"""Rows of a sheet."""
+"""Maximum number of rows of a sheet."""
 
 LONGEST_CELL = 32_767
-"""Characters of a cell."""
+"""Maximum number of characters of a cell."""
 
 
 def to_csv(result: "Result") -> str:
-    """Return a header with the fields of `AgentRow`, and a line per agent; None is empty."""
+    """Return a header with the fields of `AgentRow`, and a line per agent; None becomes an empty field."""
     text = io.StringIO()
     writer = csv.DictWriter(text, [field.name for field in fields(AgentRow)], lineterminator="\n")
     writer.writeheader()
@@ -39,7 +39,7 @@ def to_csv(result: "Result") -> str:
 
 
 def to_workbook(result: "Result") -> bytes:
-    """Return a workbook with the sheets summary, tasks and agents, their headings with the units."""
+    """Return a workbook with the sheets summary, tasks and agents; headings include units."""
     from openpyxl import Workbook
 
     book = Workbook(write_only=True)
@@ -47,7 +47,7 @@ def to_workbook(result: "Result") -> bytes:
     summary.column_dimensions["A"].width = 120
     for line in [*str(result).splitlines(), *result.notes]:
         summary.append([_cell(summary, line)])
-    extra = [Column[AgentRow]("cannot go, as", lambda row: row.violation)] if _has_violations(result) else []
+    extra = [Column[AgentRow]("cannot go because", lambda row: row.violation)] if _has_violations(result) else []
     _fill(book.create_sheet("tasks"), task_columns(result.instance), task_rows(result))
     _fill(book.create_sheet("agents"), [*agent_columns(result.instance), *extra], agent_rows(result))
     book.properties.title = one_line(result.instance.name)
@@ -61,7 +61,7 @@ def _has_violations(result: "Result") -> bool:
 
 
 def _fill(sheet: "WriteOnlyWorksheet", columns: list[Column[Row]], rows: list[Row]) -> None:
-    """Write a heading that stays in sight, with filters, and the rows below it."""
+    """Write a frozen heading with filters, and the rows below it."""
     from openpyxl.cell import WriteOnlyCell
     from openpyxl.styles import Font
     from openpyxl.utils import get_column_letter
@@ -81,7 +81,7 @@ def _fill(sheet: "WriteOnlyWorksheet", columns: list[Column[Row]], rows: list[Ro
 
 
 def _cell(sheet: "WriteOnlyWorksheet", value: Value) -> object:
-    """Return what a sheet takes as a cell; a text that begins with = stays a text, and is no formula."""
+    """Return a value as a cell; text that begins with = remains text and is not a formula."""
     if value is None or isinstance(value, float):
         return value
     from openpyxl.cell import WriteOnlyCell

@@ -1,4 +1,4 @@
-"""Who does what, as rows: the figures that text, spreadsheets, maps and data frames show of a plan."""
+"""A plan as rows per agent and task: the figures that text, spreadsheets, maps and data frames show."""
 
 import sys
 from collections.abc import Callable
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from alloc.allocators.result import Result
 
 START = "start"
-"""What is said of an agent that returns to where it starts."""
+"""Value of `AgentRow.returns_to` for an agent that returns to its start."""
 
 Value = str | float | tuple[str, ...] | None
 
@@ -33,17 +33,17 @@ class AgentRow:
         None for an idle agent.
     ability : float
     arrival : float or None
-        When it is at its task; None for an idle agent, and for one that cannot take its task.
+        Arrival time at its task; None for an idle agent, and for one that cannot take its task.
     completion_time : float or None
-        When its task is done; None likewise.
+        Completion time of its task; None in the same cases.
     returns_to : str or None
-        The id of its base, or ``start`` where it returns there; None where it does not return.
+        Id of its base, or ``start`` if it returns to its start; None if it does not return.
     distance, energy : float
-        Flown, back again where the agent returns, and the energy for it; 0 where `arrival` is None.
+        Distance of its flight, including the return if any, and the energy for it; 0 if `arrival` is None.
     battery, battery_left : float or None
-        Energy that it has at first and in the end; None where there is no limit.
+        Energy available at the start and left at the end; None if unlimited.
     violation : str
-        Why the agent cannot take its task; empty where it can.
+        Why the agent cannot take its task; empty if it can.
     """
 
     agent: str
@@ -68,7 +68,7 @@ class TaskRow:
     task : str
     workload, priority : float
     completion_time : float or None
-        None where the task is unserved.
+        None if the task is unserved.
     ability : float
         Sum over the group.
     agents : tuple of str
@@ -88,14 +88,14 @@ Row = TypeVar("Row", AgentRow, TaskRow)
 
 @dataclass(frozen=True)
 class Column(Generic[Row]):
-    """A column for people: its heading, with the unit, and its value in a row."""
+    """A column of a table for people: its heading, with the unit, and a function that gives its value in a row."""
 
     heading: str
     value: Callable[[Row], Value]
 
 
 def agent_rows(result: "Result", agents: IntArray | None = None) -> list[AgentRow]:
-    """Return a row for each agent, or for each of `agents`; none where there is no allocation.
+    """Return a row for each agent, or for each of `agents`; empty without an allocation.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ def _returns_to(instance: Instance, agent: int) -> str | None:
 
 
 def _flights(instance: Instance, agents: IntArray, tasks: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the arrival of each agent at the task beside it, and the distance and the energy of its whole flight."""
+    """Return each agent's arrival time at the task of the same index, and distance and energy of its whole flight."""
     reach, most = instance.reach, sys.float_info.max
     origin, away = reach.origin[agents], reach.distance_of(agents, tasks)
     with np.errstate(over="ignore"):
@@ -142,7 +142,7 @@ def _flights(instance: Instance, agents: IntArray, tasks: IntArray) -> tuple[Flo
 
 
 def task_rows(result: "Result", tasks: IntArray | None = None) -> list[TaskRow]:
-    """Return a row for each task, or for each of `tasks`; none where there is no allocation.
+    """Return a row for each task, or for each of `tasks`; empty without an allocation.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ def task_rows(result: "Result", tasks: IntArray | None = None) -> list[TaskRow]:
 
 
 def agent_columns(instance: Instance) -> list[Column[AgentRow]]:
-    """Return the columns of agents, without those that say nothing on this instance."""
+    """Return the columns of the table of agents, without those that are uninformative for this instance."""
     units = labels(instance)
     columns: list[Column[AgentRow]] = [
         Column("agent", lambda row: row.agent),
@@ -193,7 +193,7 @@ def agent_columns(instance: Instance) -> list[Column[AgentRow]]:
 
 
 def task_columns(instance: Instance) -> list[Column[TaskRow]]:
-    """Return the columns of tasks, without those that say nothing on this instance."""
+    """Return the columns of the table of tasks, without those that are uninformative for this instance."""
     units = labels(instance)
     columns: list[Column[TaskRow]] = [
         Column("task", lambda row: row.task),
@@ -214,5 +214,5 @@ def _finish(row: TaskRow) -> Value:
 
 
 def _known(values: FloatArray) -> list[float | None]:
-    """Return the values, None in the place of those that are not finite."""
+    """Return the values, with None in place of those that are not finite."""
     return [value if np.isfinite(value) else None for value in values.tolist()]

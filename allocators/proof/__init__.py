@@ -1,1 +1,1 @@
-"""What is proven while a method runs, at little cost, so that the run ends with the plan that is proven best."""
+"""Cheap proofs during a run, so that it ends as soon as its plan is proven to be optimal."""

@@ -1,4 +1,4 @@
-"""Bounds before and during a run, where they cost little beside it; the run ends as soon as its plan meets them."""
+"""Bounds before and during a run, if they are cheap relative to it; the run ends as soon as its plan meets them."""
 
 from dataclasses import replace
 
@@ -10,30 +10,31 @@ from alloc.problems import Instance, Objective, energy_lower_bound, lp_makespan_
 from alloc.problems.evaluation import last_equal
 
 SHARE, MOST_S = 0.02, 0.1
-"""Part of the time limit, and seconds, that a linear programme may take before or during the run."""
+"""Share of the time limit, and seconds, that a linear programme may take at most before or during the run."""
 
 MOST_AGENTS = 5000
-"""Agents up to which a linear programme bounds the makespan before the run."""
+"""Maximum number of agents for bounding the makespan by a linear programme before the run."""
 
 MOST_PAIRS = 500
-"""Pairs of agent and task up to which one bounds the energy: where there are more, plans hardly ever meet it."""
+"""Maximum number of agent-task pairs for bounding the energy by one; with more, plans hardly ever meet the bound."""
 
 
 class EarlyProof:
-    """What is known of the least makespan and cost of a run before its end; the run asks whether its plan meets it.
+    """Bounds on the least makespan and cost of a run, which ends as soon as its plan meets them.
 
-    Of tiny instances both are known, as all groups of agents are tried. Of others, the best fractional makespan, where
-    not every agent can take every task, and a bound on the energy, which plans meet where each task needs one agent.
+    For tiny instances, both optima are computed by enumerating groups of agents. For others, the makespan bound is that
+    of a linear programme, if not every agent can take every task, and the energy bound is one that plans often meet if
+    each task needs one agent.
 
     Parameters
     ----------
     search : Search
-        At its begin. Where iterations are counted its bound is not raised, as methods go another way with another one.
+        The run, at its beginning. Its bound is not raised if iterations are limited, as it influences the methods.
 
     Attributes
     ----------
     hours : float
-        Bound on the makespan.
+        Lower bound on the makespan.
     """
 
     def __init__(self, search: Search) -> None:
@@ -57,7 +58,7 @@ class EarlyProof:
         return 0.0
 
     def _is_met(self, search: Search) -> bool:
-        """Return whether the best plan of the run is proven to be the best there is."""
+        """Return whether the best plan of the run is proven to be optimal."""
         best, fastest = search.best, search.fastest
         if best is None or fastest is None or fastest.evaluation.makespan is None:
             return False
@@ -72,11 +73,11 @@ class EarlyProof:
         return relative_gap(best.evaluation.cost, self._bound(search)) <= PROVEN
 
     def _bound(self, search: Search) -> float:
-        """Return what plans within the makespan limit of the run are known to cost at least."""
+        """Return the lower bound on the cost of plans within the makespan limit of the run."""
         return self._cost if search.makespan_limit <= self._within else 0.0
 
     def added_to(self, proposal: Proposal, search: Search) -> Proposal:
-        """Return what a method proposes at the end of a run, with these bounds where they are better."""
+        """Return the proposal of a method with these bounds where they are tighter."""
         return replace(
             proposal,
             makespan_lower_bound=max(proposal.makespan_lower_bound or 0.0, self.hours),
@@ -85,13 +86,13 @@ class EarlyProof:
 
 
 def needs_solver(instance: Instance, objective: Objective) -> bool:
-    """Return whether a linear programme may be solved during the run, so that its solver is to be loaded beforehand."""
+    """Return whether a linear programme may be solved during the run, so that its solver should be loaded before."""
     energy = objective is Objective.MAKESPAN_ENERGY and _has_few_pairs(instance)
     return not is_tiny(instance) and (energy or _is_restricted(instance))
 
 
 def _is_restricted(instance: Instance) -> bool:
-    """Return whether agents are few, travel takes no time, and not every agent can take every task."""
+    """Return whether there are few agents, no travel times, and not every agent can take every task."""
     return instance.n <= MOST_AGENTS and not instance.has_travel_time and not instance.reach.is_complete
 
 

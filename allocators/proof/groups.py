@@ -1,4 +1,4 @@
-"""The least makespan, and the least cost within it, of instances with a handful of agents: all groups are tried."""
+"""The least makespan, and the least cost within it, of instances with few agents, by enumeration of all groups."""
 
 import sys
 from functools import lru_cache
@@ -13,11 +13,11 @@ from alloc.problems.evaluation import last_equal
 from alloc.problems.instance import FloatArray, IntArray
 
 MOST_AGENTS, MOST_PAIRS = 12, 600_000
-"""Agents, and pairs of disjoint groups over all tasks, up to which all are tried; so many take some milliseconds."""
+"""Maximum numbers of agents, and of pairs of disjoint groups over all tasks, which take a few milliseconds."""
 
 
 class Optimum(NamedTuple):
-    """What no plan that serves all tasks falls below.
+    """The optimum over all plans that serve all tasks.
 
     Attributes
     ----------
@@ -26,7 +26,7 @@ class Optimum(NamedTuple):
     within : float
         Makespan up to which plans count as equally fast, in hours.
     cost : float
-        The least energy and price of moves of a plan within that.
+        The least energy, including prices of moves, of a plan within that makespan.
     """
 
     hours: float
@@ -35,20 +35,20 @@ class Optimum(NamedTuple):
 
 
 def is_tiny(instance: Instance) -> bool:
-    """Return whether all groups of agents can be tried within milliseconds."""
+    """Return whether all groups of agents can be enumerated within milliseconds."""
     return instance.n <= MOST_AGENTS and 3**instance.n * instance.m <= MOST_PAIRS
 
 
 def optimum(instance: Instance, tolerance: MakespanTolerance) -> Optimum | None:
-    """Return what is least, None where no plan serves all tasks.
+    """Return the optimum, or None if no plan serves all tasks.
 
-    By dynamic programming over the tasks: of the agents in U, a group S does the next task, and the others of U do the
-    tasks before; 3^n such pairs for each task.
+    By dynamic programming over the tasks: of a set U of agents, a group S does the next task, and the rest of U does
+    the tasks before it; there are 3^n such pairs for each task.
 
     Parameters
     ----------
     instance : Instance
-        A tiny one.
+        One for which `is_tiny` holds.
     tolerance : MakespanTolerance
         How much slower than the fastest plan the cheapest may be.
     """
@@ -64,10 +64,11 @@ def optimum(instance: Instance, tolerance: MakespanTolerance) -> Optimum | None:
 
 
 def _groups(instance: Instance) -> tuple[FloatArray, FloatArray]:
-    """Return hours and cost of each task with work by each group of agents, ``inf`` where one cannot take it.
+    """Return completion time in hours and cost of each task that has workload, for each group of agents.
 
-    Both of shape (tasks, 2^n); bit i of a group stands for agent i. With the arrivals a of a group, its rate w and the
-    workload h, the task takes the least of (h + sum w a) / sum w over its members that have arrived, in any order.
+    Both have the shape (tasks, 2^n); bit i of a group stands for agent i. They are ``inf`` if a member cannot take the
+    task. With arrival times a, abilities w and the workload h, the completion time is the minimum of
+    (h + sum w a) / sum w over subsets of the group.
     """
     n, reach = instance.n, instance.reach
     tasks = np.flatnonzero(instance.workload > 0)
@@ -83,12 +84,12 @@ def _groups(instance: Instance) -> tuple[FloatArray, FloatArray]:
         hours[:, with_it] = np.minimum(hours[:, with_it], hours[:, with_it - (1 << i)])
     astray = (member @ np.logical_not(able)).T > 0
     hours[astray], cost[astray] = np.inf, np.inf
-    cost[:, 0] = np.inf  # nobody serves no task
+    cost[:, 0] = np.inf  # the empty group serves no task
     return hours, cost
 
 
 def _least(value: FloatArray, joined: np.ufunc) -> float:
-    """Return the least of all values of disjoint groups, one for each task, joined by `joined`; ``inf`` for none."""
+    """Return the least value over all choices of disjoint groups, one per task, combined by `joined`; or ``inf``."""
     group, rest, first = _disjoint(value.shape[1].bit_length() - 1)
     least = np.full(value.shape[1], np.inf)
     least[0] = 0.0
@@ -99,7 +100,7 @@ def _least(value: FloatArray, joined: np.ufunc) -> float:
 
 @lru_cache(MOST_AGENTS)
 def _disjoint(n: int) -> tuple[IntArray, IntArray, IntArray]:
-    """Return all pairs of disjoint groups of `n` agents by their union, and where each union begins."""
+    """Return all pairs of disjoint groups of `n` agents, sorted by union, and the index where each union begins."""
     group, rest = np.zeros(1, dtype=np.intp), np.zeros(1, dtype=np.intp)
     for i in range(n):
         bit = 1 << i

@@ -1,1 +1,1 @@
-"""Re-planning: a plan is in force, moves have a price, and some agents keep their tasks."""
+"""Re-planning with a plan in force: moves may have a price, and agents may be pinned to tasks."""

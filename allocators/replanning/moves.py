@@ -1,4 +1,4 @@
-"""How an allocation differs from the plan in force."""
+"""The differences between an allocation and the plan in force."""
 
 from dataclasses import dataclass
 
@@ -7,21 +7,21 @@ from alloc.allocators.contract.tolerance import relative_gap
 
 @dataclass(frozen=True)
 class Moves:
-    """How an allocation differs from the plan in force.
+    """Differences between an allocation and the plan in force.
 
     Attributes
     ----------
     agents : tuple of int
-        Agents that get another task than they had, those that were idle included.
+        Agents that get a different task, including those that were idle.
     stayed : int
-        Agents that keep their task.
+        Number of agents that keep their task.
     idle : tuple of int
-        Agents that had a task and get none.
+        Agents that had a task and are idle now.
     price : float
-        Energy that each move counts for.
+        Energy that is added to the cost for each move.
     cost, cost_lower_bound : float or None
-        What was minimised at this makespan: energy and price of all moves, or the number of moves where that is the
-        objective; and a proven bound on it. None where moves had no price.
+        The cost that was minimised at this makespan, which is energy plus prices of moves, or the number of moves if
+        that is the objective; and a proven bound on it. None if moves have no price.
     """
 
     agents: tuple[int, ...]

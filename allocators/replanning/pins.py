@@ -1,4 +1,4 @@
-"""Agents that must do one task: as ``AGENT=TASK``, and as a file; each is checked on the instance."""
+"""Agents pinned to tasks, given as ``AGENT=TASK`` or in a file, and checked against the instance."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -16,7 +16,7 @@ SIGN = "="
 
 
 def pinned(instance: Instance, agent: str, task: str | None) -> tuple[int, int]:
-    """Return the index of an agent and that of the task it is pinned to, -1 for idle.
+    """Return the indices of an agent and of the task that it is pinned to, -1 for idle.
 
     Raises
     ------
@@ -39,15 +39,15 @@ def pinned(instance: Instance, agent: str, task: str | None) -> tuple[int, int]:
 
 
 def parse_pin(instance: Instance, pair: str) -> tuple[str, str | None]:
-    """Return the agent and the task in ``AGENT=TASK``, None for the task in ``AGENT=``.
+    """Return the agent and the task in ``AGENT=TASK``; the task is None in ``AGENT=``.
 
-    An id may contain ``=``: the text is split where both sides are ids of the instance. Where no split does, the
-    longest known agent is taken, so that the error is about its task.
+    Ids may contain ``=``: the text is split such that both sides are ids of the instance. If there is no such split,
+    the longest known agent is taken, so that the error is about the task.
 
     Raises
     ------
     InputError
-        If there is no ``=`` after an agent, or several splits are possible.
+        If there is no ``=``, or several splits are possible.
     """
     splits = [(pair[:at], pair[at + 1 :] or None) for at, sign in enumerate(pair) if sign == SIGN and at]
     if not splits:
@@ -65,12 +65,12 @@ def _named(task: str | None) -> str:
 
 
 def parse_pins(instance: Instance, pairs: Iterable[str]) -> dict[str, str | None]:
-    """Return the task id of each agent id in several ``AGENT=TASK``.
+    """Return the task id of each agent id from several texts ``AGENT=TASK``.
 
     Raises
     ------
     InputError
-        As `parse_pin` does, and if an agent is pinned to two tasks.
+        As for `parse_pin`, and if an agent is pinned to two tasks.
     """
     found: dict[str, str | None] = {}
     for agent, task in (parse_pin(instance, pair) for pair in pairs):
@@ -80,19 +80,19 @@ def parse_pins(instance: Instance, pairs: Iterable[str]) -> dict[str, str | None
 
 
 def read_pins(instance: Instance, path: PathLike) -> tuple[dict[str, str | None], str | None]:
-    """Return the task id of each agent id in a file with a plan, all of whose agents are pinned.
+    """Return the task id of each agent id in a plan file, all of whose agents are pinned.
 
     Parameters
     ----------
     instance : Instance
     path : str or path
-        As for `read_plan`. Agents that the instance does not have, or whose task it does not have, are left out.
+        As for `read_plan`. Agents that are not in the instance, or whose tasks are not, are left out.
 
     Returns
     -------
     pins : dict
     note : str or None
-        One line, where something is left out.
+        One line on what is left out, if anything is.
 
     Raises
     ------
@@ -114,7 +114,7 @@ def read_pins(instance: Instance, path: PathLike) -> tuple[dict[str, str | None]
 
 
 def _require(instance: Instance, agent: str, task: str | None) -> None:
-    """Raise an error whose place is that in the file."""
+    """Check a pin; the `place` of an error is the position in the file."""
     try:
         pinned(instance, agent, task)
     except InputError as error:

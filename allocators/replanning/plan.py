@@ -1,8 +1,7 @@
-"""Re-planning: a plan is in force, moves have a price, and some agents keep their tasks.
+"""Re-planning with a plan in force: moves may have a price, and agents may be pinned to tasks.
 
-The price of an agent's move is one more cost of its flight, so that methods minimise it, and prove bounds on it, as
-they do for energy: they get an instance whose `Reach` has these costs. An agent that is pinned can do nothing but its
-task, and costs nothing there.
+The price of a move is added to the cost of the agent's flight, so that methods minimise it, and prove bounds on it, as
+they do for energy: they get an instance whose `Reach` has these costs. A pinned agent can do only its task, at no cost.
 """
 
 import sys
@@ -29,22 +28,23 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Replanning:
-    """What a run is told of the plan in force.
+    """The plan in force, prices of moves and pins of a run.
 
     Attributes
     ----------
     instance : Instance
-        As it is.
+        The instance as given, without prices and pins.
     objective : Objective
-        As it was asked for.
+        The objective as given.
     plan, target : ndarray of int, shape (n,)
-        The task that each agent has, -1 where it is idle; and the same, but for agents that are pinned to another one.
+        The task of each agent in the plan in force, -1 for idle; and the same with the tasks of pinned agents.
     has_plan : bool
         Whether there is a plan in force.
-    has_place : ndarray of bool, shape (n,)
-        Whether the agent was in the plan, and its task is still there; else it moves at no price.
+    is_planned : ndarray of bool, shape (n,)
+        Whether the agent is in the plan and its task still exists; other agents move at no price.
     pinned : ndarray of bool, shape (n,)
     price : float
+        Energy that is added to the cost for each move.
     """
 
     instance: Instance
@@ -52,22 +52,22 @@ class Replanning:
     plan: IntArray
     target: IntArray
     has_plan: bool
-    has_place: Flags
+    is_planned: Flags
     pinned: Flags
     price: float
 
     @property
     def changes_costs(self) -> bool:
-        """Whether methods get other costs than those of the instance."""
+        """Whether the costs or tasks that methods see differ from those of the instance."""
         return self.price > 0 or bool(self.pinned.any()) or self.objective is Objective.MAKESPAN_MOVES
 
     @property
     def priced_instance(self) -> Instance:
-        """The instance that methods get."""
+        """The instance with prices and pins, on which methods run."""
         if not self.changes_costs:
             return self.instance
         only_moves = self.objective is Objective.MAKESPAN_MOVES
-        price: FloatArray = np.where(self.has_place, 1.0 if only_moves else self.price, 0.0)
+        price: FloatArray = np.where(self.is_planned, 1.0 if only_moves else self.price, 0.0)
         priced = replace(self.instance)
         priced.__dict__["reach"] = replanned(
             self.instance.reach,
@@ -81,15 +81,15 @@ class Replanning:
 
     @property
     def method_objective(self) -> Objective:
-        """What methods are asked to optimise."""
+        """The objective that methods optimise."""
         return Objective.MAKESPAN_ENERGY if self.objective is Objective.MAKESPAN_MOVES else self.objective
 
     def completed(self, allocation: Allocation) -> Allocation:
-        """Return an allocation in which all pinned agents are at their tasks."""
+        """Return the allocation with all pinned agents on their tasks."""
         return Allocation(np.where(self.pinned, self.target, allocation.task_of_agent))
 
-    def told(self, improvement: Improvement) -> Improvement:
-        """Return an improvement on `priced_instance` as one on the instance itself."""
+    def on_instance(self, improvement: Improvement) -> Improvement:
+        """Convert an improvement on `priced_instance` to one on the instance itself."""
         if not self.changes_costs:
             return improvement
         allocation = self.completed(improvement.allocation)
@@ -102,18 +102,18 @@ class Replanning:
         return {self.instance.agent_ids[i]: tasks[self.target[i]] for i in np.flatnonzero(self.pinned).tolist()}
 
     def moves(self, allocation: Allocation, bound: float | None) -> Moves:
-        """Return how an allocation differs from the plan, and what that costs.
+        """Return the differences between an allocation and the plan, and their cost.
 
         Parameters
         ----------
         allocation : Allocation
         bound : float or None
-            On the cost that methods minimise, for `priced_instance`.
+            Lower bound on the cost that methods minimise on `priced_instance`.
         """
         task, had = allocation.task_of_agent, self.plan
-        moved = self.has_place & (task != had) & (task != IDLE)
-        idle = self.has_place & (task == IDLE) & (had != IDLE)
-        cost, unseen = None, 0.0  # methods do not see what pinned agents cost
+        moved = self.is_planned & (task != had) & (task != IDLE)
+        idle = self.is_planned & (task == IDLE) & (had != IDLE)
+        cost, unseen = None, 0.0  # methods do not see the cost of pinned agents
         pinned = float((moved & self.pinned).sum())
         if self.objective is Objective.MAKESPAN_MOVES:
             cost, unseen = float(moved.sum()), pinned
@@ -122,7 +122,7 @@ class Replanning:
             unseen = self.energy_of_pinned + self.price * pinned
         return Moves(
             agents=tuple(np.flatnonzero(moved).tolist()),
-            stayed=int((self.has_place & (task == had) & (had != IDLE)).sum()),
+            stayed=int((self.is_planned & (task == had) & (had != IDLE)).sum()),
             idle=tuple(np.flatnonzero(idle).tolist()),
             price=self.price,
             cost=cost,
@@ -139,7 +139,7 @@ class Replanning:
 
 
 def concluded(result: "Result", plan: Replanning) -> "Result":
-    """Return the result of a run on `Replanning.priced_instance` as that on the instance itself.
+    """Convert the result of a run on `Replanning.priced_instance` to one on the instance itself.
 
     Parameters
     ----------
@@ -178,20 +178,20 @@ def replanning(
     price: float,
     pins: Mapping[str, str | None],
 ) -> Replanning:
-    """Return what a run is told of the plan in force.
+    """Check and combine the plan in force, the price of moves and the pins of a run.
 
     Parameters
     ----------
     instance : Instance
     objective : Objective
     plan : Allocation or None
-        None where there is none; then nothing can have a price.
+        The plan in force; if None, moves cannot have a price.
     carried : CarriedOver or None
-        How the instance differs from that of the plan.
+        How the instance has changed since the plan was made.
     price : float
-        Energy that each move counts for.
+        Energy that is added to the cost for each move.
     pins : mapping
-        Task id of each agent id that is pinned, None for idle.
+        Task id of each pinned agent by agent id, None for idle.
 
     Raises
     ------
@@ -206,12 +206,12 @@ def replanning(
             f"is weighed against energy; use it with the objective {Objective.MAKESPAN_ENERGY}", "move_price"
         )
     task = np.full(instance.n, IDLE, dtype=np.intp) if plan is None else plan.task_of_agent.copy()
-    has_place = np.full(instance.n, plan is not None)
+    is_planned = np.full(instance.n, plan is not None)
     if carried is not None:
         unknown = [instance.agent_index[name] for name in (*carried.new_agents, *carried.agents_without_task)]
-        has_place[unknown] = False
+        is_planned[unknown] = False
     target, is_pinned = task.copy(), np.zeros(instance.n, dtype=np.bool_)
     for name, goal in pins.items():
         agent, target_task = pinned(instance, name, goal)
         is_pinned[agent], target[agent] = True, target_task
-    return Replanning(instance, objective, task, target, plan is not None, has_place, is_pinned, price)
+    return Replanning(instance, objective, task, target, plan is not None, is_planned, is_pinned, price)

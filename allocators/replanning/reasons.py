@@ -1,4 +1,4 @@
-"""Why each agent moves: what its new task would be without it."""
+"""Reasons for moves: when the new task of each agent would be done without it."""
 
 from typing import TYPE_CHECKING
 
@@ -13,12 +13,12 @@ if TYPE_CHECKING:
 
 
 def reasons_of_moves(result: "Result") -> list[str]:
-    """Return one line for each agent that gets another task than it had: when that task would be done without it.
+    """Return a line for each agent that gets a different task: when that task would be done without it.
 
     Parameters
     ----------
     result : Result
-        Of a run with the plan in force as its start.
+        Result of a run that started from the plan in force.
 
     Returns
     -------
@@ -38,7 +38,7 @@ def reasons_of_moves(result: "Result") -> list[str]:
 
 
 def _time_without(instance: Instance, allocation: Allocation, agent: int, task: int) -> float | None:
-    """Return when a task is done without one of its agents, None where it has no other."""
+    """Return the completion time of a task without one of its agents; None if it has no other."""
     others = np.flatnonzero(allocation.task_of_agent == task)
     others = others[others != agent]
     if not len(others):

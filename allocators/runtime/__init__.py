@@ -1,1 +1,1 @@
-"""Compilation, random numbers in compiled code, stop requests and native solvers."""
+"""Runtime support: compilation, random numbers in compiled code, stop requests and native solvers."""

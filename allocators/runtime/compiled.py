@@ -1,4 +1,4 @@
-"""Decorators for functions that numba compiles to machine code, at their first call or from its cache."""
+"""Decorators for functions that numba compiles at the first call, or loads from its cache."""
 
 import contextlib
 from collections.abc import Callable, Mapping, Sequence
@@ -8,34 +8,34 @@ from typing import TypeVar, cast
 import numba
 
 Function = TypeVar("Function", bound=Callable[..., object])
-Type = object  # those of numba have no stubs
+Type = object  # numba has no type stubs
 
-RESOLVED = ["args", "kws"]
-"""Parameters of what numba asks a function for, when another one that is compiled calls it."""
+CALL_TEMPLATE_PARAMETERS = ["args", "kws"]
+"""Parameters that numba's `get_call_template` must have for `_compiled_once` to replace it."""
 
-_LOOSELY = {"error_model": "numpy", "fastmath": {"contract", "reassoc", "arcp", "nsz", "afn"}}
+_FAST_MATH = {"error_model": "numpy", "fastmath": {"contract", "reassoc", "arcp", "nsz", "afn"}}
 
 _IN_PLACE = {"_nrt": False}
-"""Not among the options that numba documents: no references are counted, and no arrays can be made."""
+"""An undocumented option of numba: references are not counted, and no arrays can be allocated."""
 
 
 def _cached(function: Function, **options: object) -> Function:
     njit = cast(Callable[..., Callable[[Function], Function]], numba.njit)
     try:
         return njit(cache=True, nogil=True, **options)(function)
-    except RuntimeError:  # no folder for the cache
+    except RuntimeError:  # no writable folder for the cache
         return njit(nogil=True, **options)(function)
 
 
 def _compiled_once(loop: Function) -> Function:
-    """Let compiled callers share one compilation of `loop`, whatever constants and integers they call it with.
+    """Let compiled callers share one specialisation of `loop`, whatever constants and integer types they pass.
 
-    Numba compiles a function anew for each constant that is an argument, also for the value that a variable has at
-    first, and for integers of 32 and of 64 bits: a tenth of the time that all loops took. `get_call_template` is not
-    among what numba documents: where it is not as it was, loops are compiled for each caller, and do the same.
+    Numba specialises a function for each constant argument, including initial values of variables, and for 32-bit and
+    64-bit integers, which took a tenth of the total compilation time. `get_call_template` is undocumented: if its
+    parameters have changed, loops are specialised for each caller, with the same behaviour.
     """
-    resolve = getattr(loop, "get_call_template", None)  # not where numba is told to compile nothing
-    if resolve is None or list(signature(resolve).parameters) != RESOLVED:
+    resolve = getattr(loop, "get_call_template", None)  # missing if numba's compiler is disabled
+    if resolve is None or list(signature(resolve).parameters) != CALL_TEMPLATE_PARAMETERS:
         return loop
 
     def resolve_alike(args: Sequence[Type], kws: Mapping[str, Type]) -> object:
@@ -47,42 +47,42 @@ def _compiled_once(loop: Function) -> Function:
 
 
 def _whole_type(argument: Type) -> Type:
-    """Return the type of a constant, and 64 bits for integers of 32."""
+    """Return the type of a constant in place of its literal type, and int64 in place of int32."""
     whole = cast(Callable[[Type], Type], numba.types.unliteral)(argument)
     return numba.types.int64 if whole == numba.types.int32 else whole
 
 
 def compiled(function: Function) -> Function:
-    """Compile `function` at its first call, to run without the interpreter's lock.
+    """Compile `function` at its first call, to run without the global interpreter lock.
 
-    The machine code is cached beside the source, else in the user's cache folder; where neither is writable, every
-    process compiles anew.
+    The machine code is cached beside the source, or else in the user's cache folder; if neither is writable, every
+    process compiles it again.
     """
     return _compiled_once(_cached(function))
 
 
 def compiled_in_place(function: Function) -> Function:
-    """Compile `function` as `compiled` does, where it makes no arrays, but works on those that it is given.
+    """Compile `function` as `compiled` does, without reference counting; it must not allocate arrays.
 
-    Who uses an array is then not counted. That matters where many small functions pass on many arrays: in missions,
-    counting took more than half of the time.
+    This matters if many small functions pass many arrays: in missions, reference counting took more than half of the
+    time.
     """
     return _compiled_once(_cached(function, **_IN_PLACE))
 
 
-def compiled_loosely(function: Function) -> Function:
-    """Compile `function` as `compiled` does, with fast math: sums in any order, and unchecked divisions by 0.
+def compiled_fast_math(function: Function) -> Function:
+    """Compile `function` as `compiled` does, with fast math: reassociated sums, and unchecked division by zero.
 
-    For neural networks. Infinities and NaN keep their meaning.
+    For neural networks. Infinities and NaN are still handled correctly.
     """
-    return _cached(function, **_LOOSELY)
+    return _cached(function, **_FAST_MATH)
 
 
-def compiled_loosely_in_place(function: Function) -> Function:
-    """Compile `function` as both `compiled_loosely` and `compiled_in_place` do."""
-    return _cached(function, **_IN_PLACE, **_LOOSELY)
+def compiled_fast_math_in_place(function: Function) -> Function:
+    """Compile `function` as both `compiled_fast_math` and `compiled_in_place` do."""
+    return _cached(function, **_IN_PLACE, **_FAST_MATH)
 
 
 def inlined(function: Function) -> Function:
-    """Inline `function` into each compiled function that calls it, where a call would cost more than its work."""
+    """Inline `function` into the compiled functions that call it; for functions cheaper than a call."""
     return cast(Function, numba.njit(inline="always", nogil=True)(function))

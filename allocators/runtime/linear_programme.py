@@ -1,6 +1,6 @@
 """Linear programmes by HiGHS that can be stopped: the solver of `scipy.optimize.linprog`, with the same answers.
 
-scipy gives no way to stop it, so that a cancelled run would have to wait, or to leave a thread behind.
+scipy cannot stop it, so that a cancelled run would have to wait, or to abandon a thread.
 """
 
 from collections.abc import Callable
@@ -25,7 +25,7 @@ class Optimum:
     Attributes
     ----------
     value : float
-        Of the objective.
+        Objective value.
     x : ndarray, shape (v,)
     multiplier : ndarray, shape (r,)
         Dual value >= 0 of each constraint.
@@ -45,7 +45,7 @@ def minimise(
     upper: FloatArray | None = None,
     seconds: float = np.inf,
 ) -> Optimum | None:
-    """Minimise ``cost @ x`` subject to ``matrix @ x <= limits`` and ``0 <= x <= upper``, in a thread of its own.
+    """Minimise ``cost @ x`` subject to ``matrix @ x <= limits`` and ``0 <= x <= upper``, in a separate thread.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def minimise(
     matrix : sparse array, shape (r, v)
     limits : ndarray, shape (r,)
     should_stop : callable
-        Asked every 10 ms, in the calling thread.
+        Called every 10 ms in the calling thread.
     upper : ndarray, shape (v,), optional
         ``inf`` by default.
     seconds : float
@@ -62,7 +62,7 @@ def minimise(
     Returns
     -------
     Optimum or None
-        None if it was stopped, there was no time, or there is none.
+        None if the solver was stopped or ran out of time, or there is no optimum.
     """
     highs = highspy.Highs()
     highs.HandleUserInterrupt = True

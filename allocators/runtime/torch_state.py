@@ -1,4 +1,4 @@
-"""How torch computes in this thread for a while, whatever its caller and other threads have set."""
+"""Temporary torch settings for the current thread, independent of those of its caller and of other threads."""
 
 import ctypes
 from collections.abc import Iterator
@@ -8,15 +8,15 @@ from functools import cache
 
 @contextmanager
 def torch_threads(threads: int) -> Iterator[None]:
-    """Let torch compute with so many threads where this thread calls it, and then with those that it had before.
+    """Set the number of threads that torch uses when called from this thread; restored after the block.
 
-    `torch.set_num_threads` sets that for the whole process, so that two runs at once, each of which puts back what it
-    met, leave the number of the other behind. The libraries below keep a number per thread, which is set here; a
-    build of torch without them is left as it is.
+    `torch.set_num_threads` applies to the whole process, so that two concurrent runs that each restore the previous
+    number could leave behind that of the other. The underlying libraries keep a number per thread, which is set here;
+    builds of torch without these libraries are left unchanged.
     """
-    import torch  # here, so that options are checked before the seconds that it takes
+    import torch  # imported late, as it takes seconds and options are checked before
 
-    before = torch.get_num_threads()  # the first call in a thread sets it; later ones only ask
+    before = torch.get_num_threads()  # the first call in a thread sets the number
     library = _library()
     set_openmp = getattr(library, "omp_set_num_threads", None)
     set_mkl = getattr(library, "MKL_Set_Num_Threads_Local", None)
@@ -37,7 +37,7 @@ def torch_threads(threads: int) -> Iterator[None]:
 
 @cache
 def _library() -> ctypes.CDLL:
-    """Return torch's library, through which those that it was linked with are reached."""
+    """Return torch's library, through which the libraries that it links to are accessible."""
     import torch
 
     return ctypes.CDLL(torch._C.__file__)
@@ -45,10 +45,10 @@ def _library() -> ctypes.CDLL:
 
 @contextmanager
 def plain_torch() -> Iterator[None]:
-    """Compute with gradients, on the CPU unless another device is named, and in the precision of the tensors.
+    """Enable gradients, and disable inference mode, autocast and default devices other than the CPU, in the block.
 
-    A caller may be within `torch.no_grad`, `torch.inference_mode`, `torch.autocast` or another default device: all of
-    these belong to a thread, so that nobody else sees them changed.
+    The caller may be within `torch.no_grad`, `torch.inference_mode`, `torch.autocast` or another default device. All of
+    these are per thread, so other threads are not affected.
     """
     import torch
 
@@ -58,7 +58,7 @@ def plain_torch() -> Iterator[None]:
         for kind in ("cpu", "cuda"):
             if torch.is_autocast_enabled(kind):
                 stack.enter_context(torch.autocast(kind, enabled=False))
-        # a context makes every call a little slower; up to torch 2.7, `get_default_device` knows none of the caller's
+        # only if needed, as it slows down every call; up to torch 2.7, `get_default_device` ignores contexts
         if torch.empty(0).device.type != "cpu":
             stack.enter_context(torch.device("cpu"))
         yield

@@ -24,7 +24,7 @@ from alloc.allocators.online.registry import load_policy
 from alloc.allocators.online.run import simulate
 from alloc.allocators.registry import load
 from alloc.allocators.result import Result
-from alloc.allocators.runtime.interrupts import left_behind
+from alloc.allocators.runtime.interrupts import abandoned_threads
 from alloc.allocators.solve import solve
 from alloc.problems import Family, Instance, MissingPackageError, Mission, Objective, RefusedError, random_instance
 
@@ -77,7 +77,7 @@ def serve(channel: int) -> None:
             figures["cpu_s"] = time.process_time() - begin
         except BaseException as error:  # any exception, also SystemExit, is the ending of the run
             figures = failure(error)
-        figures["reusable"] = not left_behind()
+        figures["reusable"] = not abandoned_threads()
         connection.send_bytes(json.dumps(figures).encode())
         del order, problem
         gc.collect()

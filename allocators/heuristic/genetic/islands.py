@@ -8,7 +8,7 @@ import numpy as np
 from alloc.allocators.contract.search import Search
 from alloc.allocators.heuristic.genetic.encoding import Encoding
 from alloc.allocators.heuristic.genetic.evolution import Evolution, GeneticParameters
-from alloc.allocators.parallel.pool import side_by_side
+from alloc.allocators.parallel.pool import thread_map
 from alloc.problems import Allocation
 
 TARGETS = (0.0, 0.5, 0.8, 0.95)
@@ -79,7 +79,7 @@ def evolve_islands(search: Search, encoding: Encoding, parameters: GeneticParame
         Island(part, encoding, parameters, np.random.default_rng([search.seed, number]), number)
         for number, part in enumerate(parts)
     ]
-    with side_by_side(len(islands)) as run_all:
+    with thread_map(len(islands)) as run_all:
         while not search.should_stop():
             left = math.inf if search.budget.iterations is None else search.budget.iterations - search.iteration
             shares = [min(GENERATIONS, (left + number) // len(islands)) for number in range(len(islands))]

@@ -9,7 +9,7 @@ from alloc.allocators.contract.base import Allocator, Proposal
 from alloc.allocators.contract.built_in import BUILT_IN
 from alloc.allocators.contract.search import Search
 from alloc.allocators.heuristic.greedy.swaps import reduce_distance
-from alloc.allocators.parallel.pool import side_by_side
+from alloc.allocators.parallel.pool import thread_map
 from alloc.problems import IDLE, Allocation, Instance, Objective, makespan_lower_bound
 
 CHECK_EVERY = 256
@@ -95,7 +95,7 @@ def _by_tree(instance: Instance, search: Search | None) -> NDArray[np.intp]:
 
     if shared:
         twins = [tree.twin() for _ in range(threads)]
-        with side_by_side(threads) as run_all:  # every thread serves all tasks, by agents of all sizes
+        with thread_map(threads) as run_all:  # every thread serves all tasks, by agents of all sizes
             list(
                 run_all(
                     lambda part: assign(twins[part], np.ascontiguousarray(order[part:shared:threads])), range(threads)

@@ -11,7 +11,7 @@ from alloc.allocators.heuristic.local_search.annealing_state import AnnealingSta
 from alloc.allocators.heuristic.local_search.parameters import LocalSearchParameters
 from alloc.allocators.heuristic.local_search.parts import MOST_STATES, Attempt, Parts, Team, tighten
 from alloc.allocators.heuristic.task_prices.start import PricedPlan
-from alloc.allocators.parallel.pool import side_by_side
+from alloc.allocators.parallel.pool import thread_map
 from alloc.problems import IDLE, Allocation, Objective, only_allowed
 from alloc.problems.evaluation import RELATIVE_TOLERANCE
 from alloc.problems.instance import IntArray
@@ -75,7 +75,7 @@ def improve(
     if clock.is_over:
         return
     parameters = parameters or LocalSearchParameters()
-    with side_by_side(min(search.threads, MOST_STATES)) as run_all:
+    with thread_map(min(search.threads, MOST_STATES)) as run_all:
         _improve(search, Team.of(search, parameters.neighbours, run_all), parameters, clock, priced)
 
 

@@ -7,7 +7,7 @@ from alloc.allocators.contract.search import Search
 from alloc.allocators.heuristic.task_prices.prices import TaskPrices
 from alloc.allocators.heuristic.task_prices.rounding import rounded
 from alloc.allocators.heuristic.task_prices.use import are_prices_used
-from alloc.allocators.parallel.pool import side_by_side
+from alloc.allocators.parallel.pool import thread_map
 from alloc.problems import Allocation, Instance, serve_all
 from alloc.problems.instance import FloatArray
 
@@ -44,7 +44,7 @@ def plan_by_prices(search: Search) -> PricedPlan | None:
         return None
     end = time.monotonic() + TIME_SHARE * search.remaining_s
     threads = min(search.threads, MOST_THREADS)
-    with side_by_side(threads) as run_all:
+    with thread_map(threads) as run_all:
         prices = TaskPrices(instance, search.lower_bound, run_all, threads)
         helped = prices.improve(end, lambda: search.interrupted)
     search.raise_bound(prices.bound)

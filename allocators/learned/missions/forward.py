@@ -4,13 +4,13 @@ import numpy as np
 
 from alloc.allocators.learned.missions.feature_names import FEATURES
 from alloc.allocators.learned.missions.network_arrays import HIDDEN, MissionWeights, Singles
-from alloc.allocators.runtime.compiled import compiled_loosely_in_place
+from alloc.allocators.runtime.compiled import compiled_fast_math_in_place
 
 F = np.float32
 SLOPE = F(0.1)
 
 
-@compiled_loosely_in_place
+@compiled_fast_math_in_place
 def score(
     options: Singles, count: int, weights: MissionWeights, token: Singles, pooled: Singles, scores: Singles
 ) -> None:
@@ -53,7 +53,7 @@ def score(
         scores[row] = score
 
 
-@compiled_loosely_in_place
+@compiled_fast_math_in_place
 def add_context(
     token: Singles, count: int, largest: np.float32, weights: MissionWeights, pooled: Singles, attention: Singles
 ) -> None:

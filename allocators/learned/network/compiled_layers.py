@@ -6,7 +6,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from alloc.allocators.runtime.compiled import compiled_loosely, inlined
+from alloc.allocators.runtime.compiled import compiled_fast_math, inlined
 from alloc.problems.game.features import FEATURE_LIMIT
 
 Floats = NDArray[np.float32]
@@ -34,7 +34,7 @@ def positive(x: float) -> float:
     return max(x, F(0.0))
 
 
-@compiled_loosely
+@compiled_fast_math
 def linear(x: Floats, weights: Floats, out: Floats, rectify: bool) -> None:
     """Fill `out` with the product of the inputs and the weights, plus the bias; rectified if wanted.
 

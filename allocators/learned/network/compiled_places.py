@@ -9,7 +9,7 @@ import numpy as np
 from alloc.allocators.learned.network.compiled_layers import F, Floats, Ints, clip, clip_to_one, linear, positive
 from alloc.allocators.learned.network.game_arrays import GameArrays
 from alloc.allocators.learned.network.weights import Weights
-from alloc.allocators.runtime.compiled import compiled_loosely, inlined
+from alloc.allocators.runtime.compiled import compiled_fast_math, inlined
 from alloc.problems.game.board import SMALLEST
 from alloc.problems.game.features import (
     AGENT_FEATURES,
@@ -22,7 +22,7 @@ from alloc.problems.game.features import (
 )
 
 
-@compiled_loosely
+@compiled_fast_math
 def encode_tasks(
     game: GameArrays,
     slot: Ints,
@@ -69,7 +69,7 @@ def encode_tasks(
     return score
 
 
-@compiled_loosely
+@compiled_fast_math
 def mix_and_normalise(weights: Weights, token: Floats) -> None:
     """Apply the residual network and the layer normalisation to each place, shape (m + 1, width), in place."""
     places, width = token.shape
@@ -91,7 +91,7 @@ def mix_and_normalise(weights: Weights, token: Floats) -> None:
             token[j, k] = (token[j, k] - mean) * factor
 
 
-@compiled_loosely
+@compiled_fast_math
 def embed_tasks(
     game: GameArrays, task: Ints, group: Floats, shortfall: Floats, weights: Weights, token: Floats
 ) -> None:
@@ -116,7 +116,7 @@ def embed_tasks(
         linear(x, weights.embed, token[j], True)
 
 
-@compiled_loosely
+@compiled_fast_math
 def fill_shared_features(game: GameArrays, group: Floats, shortfall: Floats, x: Floats) -> None:
     """Fill the features that all places share: of all tasks together."""
     total, short, surplus, lowest = F(0), F(0), F(0), F(np.inf)
@@ -133,7 +133,7 @@ def fill_shared_features(game: GameArrays, group: Floats, shortfall: Floats, x: 
     x[TaskFeature.ENERGY_WEIGHT.value] = clip(F(game.energy_weight) - F(1))
 
 
-@compiled_loosely
+@compiled_fast_math
 def attend_to_members(
     game: GameArrays, slot: Ints, task: Ints, shortfall: Floats, weights: Weights, token: Floats
 ) -> None:
@@ -165,7 +165,7 @@ def attend_to_members(
             token[j, k] += out[k]
 
 
-@compiled_loosely
+@compiled_fast_math
 def fill_agent_features(game: GameArrays, shortfall: Floats, agent: int, own: int, x: Floats) -> None:
     """Fill the features of an agent at its candidate `own` (`observe_agents`), shape (AGENT_FEATURES,)."""
     place, contribution, distance = (
@@ -185,7 +185,7 @@ def fill_agent_features(game: GameArrays, shortfall: Floats, agent: int, own: in
     x[AgentFeature.SHORTFALL_PER_NEED.value] = clip(own_shortfall / own_need)
 
 
-@compiled_loosely
+@compiled_fast_math
 def attend_to_neighbours(game: GameArrays, weights: Weights, token: Floats) -> None:
     """Let places attend to each other (`ActorCritic._neighbours`), and add the outcome to `token`."""
     places, width = token.shape

@@ -13,7 +13,7 @@ import numpy as np
 from alloc.allocators.learned.network.compiled_layers import F, Flags, Floats, clip, clip_to_one, positive
 from alloc.allocators.learned.network.game_arrays import GameArrays
 from alloc.allocators.learned.network.weights import Weights
-from alloc.allocators.runtime.compiled import compiled_loosely, inlined
+from alloc.allocators.runtime.compiled import compiled_fast_math, inlined
 from alloc.problems.game.board import SMALLEST
 from alloc.problems.game.features import IDLE_SURPLUS, LOG_NEED_OFFSET, PAIR_FEATURES, SHORTFALL_DIVISOR, PairFeature
 
@@ -26,7 +26,7 @@ class PairBuffers(NamedTuple):
     hidden2: Floats
 
 
-@compiled_loosely
+@compiled_fast_math
 def pair_buffers(game: GameArrays, weights: Weights) -> PairBuffers:
     """Return room for `score_agent`."""
     return PairBuffers(
@@ -36,7 +36,7 @@ def pair_buffers(game: GameArrays, weights: Weights) -> PairBuffers:
     )
 
 
-@compiled_loosely
+@compiled_fast_math
 def score_agent(
     game: GameArrays,
     weights: Weights,

@@ -5,14 +5,14 @@ import numpy as np
 from alloc.allocators.learned.network.compiled_layers import F, Flags, Floats, Ints
 from alloc.allocators.learned.network.game_arrays import GameArrays
 from alloc.allocators.learned.network.weights import Weights
-from alloc.allocators.runtime.compiled import compiled_loosely
+from alloc.allocators.runtime.compiled import compiled_fast_math
 from alloc.allocators.runtime.random import RandomState, draw
 
 MASKED = F(-np.inf)
 """Score of a bid that is not made."""
 
 
-@compiled_loosely
+@compiled_fast_math
 def gumbel(random: RandomState) -> float:
     """Draw from the standard Gumbel distribution."""
     uniform = (F(draw(random, 1 << 24)) + F(0.5)) * F(2.0**-24)
@@ -20,7 +20,7 @@ def gumbel(random: RandomState) -> float:
     return drawn
 
 
-@compiled_loosely
+@compiled_fast_math
 def fill_query(game: GameArrays, weights: Weights, token: Floats, task: int, agent: int, query: Floats) -> None:
     """Fill `query`, shape (width,), with that of the agent's group (`ActorCritic.pointer`)."""
     width = len(query)
@@ -34,7 +34,7 @@ def fill_query(game: GameArrays, weights: Weights, token: Floats, task: int, age
             query[k] += factor * weights.query[j, k]
 
 
-@compiled_loosely
+@compiled_fast_math
 def fill_likeness(query: Floats, key: Floats, likeness: Floats) -> None:
     """Fill `likeness`, shape (places,), with `query`, shape (width,), times `key`, shape (width, places)."""
     likeness[:] = 0
@@ -44,7 +44,7 @@ def fill_likeness(query: Floats, key: Floats, likeness: Floats) -> None:
             likeness[j] += factor * key[d, j]
 
 
-@compiled_loosely
+@compiled_fast_math
 def make_bids(
     game: GameArrays,
     weights: Weights,
@@ -89,7 +89,7 @@ def make_bids(
             bids[agent, k] = bid + gumbel(random) if noisy else bid
 
 
-@compiled_loosely
+@compiled_fast_math
 def grant_bids(
     game: GameArrays, bids: Floats, reserve: float, task: Ints, slot: Ints, used: Flags, changed: Flags
 ) -> int:
@@ -136,7 +136,7 @@ def grant_bids(
         slot[winner] = best[winner]
 
 
-@compiled_loosely
+@compiled_fast_math
 def find_next_best(game: GameArrays, bids: Floats, agent: int, used: Flags, idle: int, best: Ints) -> bool:
     """Put the agent's best bid for a place that is not used into `best`; return whether there is any."""
     n, c = bids.shape

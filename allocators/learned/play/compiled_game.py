@@ -12,7 +12,7 @@ from alloc.allocators.learned.network.game_arrays import GameArrays
 from alloc.allocators.learned.network.weights import Weights
 from alloc.allocators.learned.play.compiled_bids import grant_bids, gumbel, make_bids
 from alloc.allocators.learned.play.rollout import TIE
-from alloc.allocators.runtime.compiled import compiled_loosely
+from alloc.allocators.runtime.compiled import compiled_fast_math
 from alloc.allocators.runtime.random import RandomState
 from alloc.problems.game.features import IDLE_SURPLUS
 
@@ -65,7 +65,7 @@ def new_game(game: GameArrays, best: Ints, figures: NDArray[np.float64], random:
     )
 
 
-@compiled_loosely
+@compiled_fast_math
 def reset_game(game: GameArrays, weights: Weights, state: GameState, total: bool) -> None:
     """Score all pairs, and rate the first position; `slot`, `random` and `visited` are filled already."""
     buffers = pair_buffers(game, weights)
@@ -77,7 +77,7 @@ def reset_game(game: GameArrays, weights: Weights, state: GameState, total: bool
     keep_if_best(game, state, total)
 
 
-@compiled_loosely
+@compiled_fast_math
 def play_rounds(
     game: GameArrays, weights: Weights, state: GameState, rounds: int, temperature: float, total: bool
 ) -> None:
@@ -114,7 +114,7 @@ def play_rounds(
         keep_if_best(game, state, total)
 
 
-@compiled_loosely
+@compiled_fast_math
 def update_groups(game: GameArrays, state: GameState) -> Floats:
     """Add the contributions up by place; return the shortfall of each place, shape (places,)."""
     state.group[:] = 0
@@ -126,7 +126,7 @@ def update_groups(game: GameArrays, state: GameState) -> Floats:
     return shortfall
 
 
-@compiled_loosely
+@compiled_fast_math
 def score_changes(
     game: GameArrays,
     weights: Weights,
@@ -163,7 +163,7 @@ def score_changes(
             score_agent(game, weights, shortfall, agent, own, wanted, buffers, state.local[agent])
 
 
-@compiled_loosely
+@compiled_fast_math
 def keep_if_best(game: GameArrays, state: GameState, total: bool) -> None:
     """Keep the position if it is the best up to now: fewer unserved, then less shortfall, then nearer.
 
@@ -187,7 +187,7 @@ def keep_if_best(game: GameArrays, state: GameState, total: bool) -> None:
         state.best[:] = state.slot
 
 
-@compiled_loosely
+@compiled_fast_math
 def unserved_and_shortfall(game: GameArrays, state: GameState, total: bool) -> tuple[float, float]:
     """Return the number of tasks without anyone, and the relative shortfall in total or of the worst task."""
     need, group = game.need, state.group

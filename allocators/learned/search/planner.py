@@ -19,7 +19,7 @@ from alloc.allocators.learned.play.rollout import Best, position
 from alloc.allocators.learned.search.fine_tuning import FineTuning
 from alloc.allocators.learned.search.regions import partition, reach_graph
 from alloc.allocators.learned.search.target_makespan import TargetMakespan
-from alloc.allocators.parallel.pool import RunAll, side_by_side
+from alloc.allocators.parallel.pool import RunAll, thread_map
 from alloc.problems import IDLE, Allocation, Objective, serve_all
 from alloc.problems.game import Board, at_slot, make_board, reset
 from alloc.problems.game.candidates import Candidates, candidate_tasks
@@ -135,7 +135,7 @@ class Planner:
         if self.search.objective is Objective.MAKESPAN_ENERGY and self.target.spent < SECOND_GAME:
             self.play_whole(self.parameters.second_energy_weight)
         threads = min(self.search.threads, STREAMS)
-        with self.search.improving("playing on regions"), side_by_side(threads) as self.run_all:
+        with self.search.improving("playing on regions"), thread_map(threads) as self.run_all:
             while not self.search.should_stop():
                 self._sweep()
                 self.search.iteration += 1

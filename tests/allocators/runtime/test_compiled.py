@@ -66,7 +66,7 @@ def test_another_numba_is_left_as_it_is(function):
 
 def test_loops_that_share_nothing_do_the_same(monkeypatch):
     """Without that place each caller has loops compiled for it, with the same sums."""
-    monkeypatch.setattr(module, "RESOLVED", ["of another numba"])
+    monkeypatch.setattr(module, "CALL_TEMPLATE_PARAMETERS", ["of another numba"])
     added = module._compiled_once(numba.njit(add))
     total = summed(added)
     assert total(np.array([1, 2], dtype=np.int32)) == 13

@@ -9,7 +9,7 @@ import time
 
 import pytest
 
-from alloc.allocators.runtime.interrupts import left_behind, run_native, signals_set
+from alloc.allocators.runtime.interrupts import abandoned_threads, run_native, signals_set
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -78,10 +78,10 @@ def test_native_work_that_does_not_stop_is_abandoned() -> None:
     release, begin = threading.Event(), time.monotonic()
     assert run_native(lambda: release.wait(10), lambda: True, lambda: None) is None
     assert time.monotonic() - begin < 2
-    (thread,) = left_behind()
+    (thread,) = abandoned_threads()
     release.set()
     thread.join(5)
-    assert not left_behind()
+    assert not abandoned_threads()
 
 
 def test_native_work_is_halted_by_an_exception_of_a_handler() -> None:
@@ -94,7 +94,7 @@ def test_native_work_is_halted_by_an_exception_of_a_handler() -> None:
     with pytest.raises(KeyboardInterrupt):
         run_native(lambda: halted.wait(10), interrupted, halted.set)
     assert halted.is_set()
-    assert not left_behind()
+    assert not abandoned_threads()
 
 
 PROGRAM = """

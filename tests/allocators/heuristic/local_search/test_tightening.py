@@ -11,7 +11,7 @@ from alloc.allocators.heuristic.local_search import allocator
 from alloc.allocators.heuristic.local_search.allocator import LocalSearch
 from alloc.allocators.heuristic.local_search.parts import Team, tighten
 from alloc.allocators.heuristic.task_prices.start import plan_by_prices
-from alloc.allocators.parallel.pool import side_by_side
+from alloc.allocators.parallel.pool import thread_map
 from alloc.problems import Instance, Objective
 
 
@@ -35,7 +35,7 @@ def test_a_plan_from_prices_is_tightened(threads: int) -> None:
     priced = plan_by_prices(search)
     assert priced is not None
     before = search.gap
-    with side_by_side(threads) as run_all:
+    with thread_map(threads) as run_all:
         tighten(search, Team.of(search, 10, run_all), priced, Clock(search), 1000)
     assert search.gap < 0.5 * before
     assert 0 < search.iteration <= 60
