@@ -105,7 +105,7 @@ SEPARATORS_AND_ENCODINGS = [
     Case(
         "open quote",
         'id,ability\n"d1,4\nd2,3\n',
-        error="agents.csv: line 2: has a cell that cannot be read: unexpected end of data; are its quotes in pairs?",
+        error="agents.csv: line 2: has a cell that cannot be read: unexpected end of data; are its quotes balanced?",
     ),
     Case("no text", b"\x89PNG\x00\x1a\n" + b"abcdef" * 5, error="agents.csv: is not text; save it as .csv or .xlsx"),
     Case("empty file", "", error="agents.csv: is empty; it needs a row with the names of its columns, and rows below"),

@@ -1,4 +1,4 @@
-"""Plans in files: allocations (alloc-allocation/1), results (alloc-result/1), tables and solutions of solvers."""
+"""Plans in files: allocations (alloc-allocation/1), results (alloc-result/1), tables, and solver solutions."""
 
 import json
 from dataclasses import dataclass
@@ -24,22 +24,22 @@ FRONT_FORMAT = "alloc-pareto/1"
 ALLOCATION_FIELDS = ("format", "instance", "assignment")
 
 LARGEST_EXACT = 2**53
-"""Beyond it, floats skip whole numbers."""
+"""Limit beyond which floats cannot represent all integers."""
 
 TABLE_COLUMNS = ("agent", "task")
-"""Columns of a table that make a plan, as `write_result` writes it."""
+"""Required columns of a table with a plan, as `write_result` writes it."""
 
 
 @dataclass(frozen=True)
 class PlanFile:
-    """A plan as a file has it, whatever its format, before it is held against an instance.
+    """A plan as read from a file of any format, not yet checked against an instance.
 
     Attributes
     ----------
     source : str
-        What messages call the file.
+        Name of the file in messages.
     document : dict
-        An allocation or a result; what a table or a solver's solution says, as an allocation.
+        An allocation or a result; tables and solver solutions are converted to an allocation.
     """
 
     source: str
@@ -47,11 +47,11 @@ class PlanFile:
 
     @property
     def result(self) -> dict[str, object]:
-        """All fields of a result, which nobody has checked; empty for a plan alone."""
+        """Unverified fields of a result; empty for a plan alone."""
         return self.document if self.document.get("format") == RESULT_FORMAT else {}
 
     def assignment(self) -> dict[str, str | None]:
-        """Return the task id of each agent id, None for idle, whatever instance they belong to.
+        """Return the task id of each agent id, None for idle, without reference to an instance.
 
         Raises
         ------
@@ -64,12 +64,12 @@ class PlanFile:
             raise told(error, self.source) from error.__cause__
 
     def allocation(self, instance: Instance) -> tuple[Allocation, str | None]:
-        """Return the plan as an allocation of `instance`, and one line where the file names another instance.
+        """Return the plan as an allocation of `instance`, and a one-line warning if the file names another instance.
 
         Raises
         ------
         InputError
-            As `assignment` does, and if an agent or task is unknown.
+            As for `assignment`, or if an agent or task is unknown.
         """
         try:
             allocation, name = allocation_from_document(self.document, instance)
@@ -79,21 +79,21 @@ class PlanFile:
 
 
 def read_plan(path: PathLike, instance: Instance) -> PlanFile:
-    """Read a file of any of the formats that hold a plan.
+    """Read a plan from a file of any supported format.
 
     Parameters
     ----------
     path : str or path
-        JSON with an allocation or a result, whatever the suffix; a ``.csv`` table with the columns agent and task; or a
-        solution file of HiGHS, CBC, Gurobi or SCIP, of a model by `write_model`. ``-`` is standard input, where the
-        first line tells them apart.
+        JSON with an allocation or a result, with any suffix; a ``.csv`` table with the columns agent and task; or a
+        solution file of HiGHS, CBC, Gurobi or SCIP for a model of `write_model`. ``-`` is standard input, where the
+        first line determines the format.
     instance : Instance
-        What the names in a solution file belong to; ids in other files may be any.
+        Instance of the names in a solution file; ids in other files are not checked.
 
     Raises
     ------
     InputError
-        If it cannot be read, or is none of these.
+        If the file cannot be read or has none of these formats.
     """
     source = named(path)
     of_type(instance, Instance, "instance")
@@ -113,13 +113,13 @@ def _document(text: str, source: str, instance: Instance) -> dict[str, object]:
 
 
 def _has_table_header(text: str) -> bool:
-    """Return whether the first line names the columns of a plan."""
+    """Return whether the first line has the column names of a plan."""
     header = text.lstrip().partition("\n")[0].split(",")
     return set(TABLE_COLUMNS) <= {name.strip().strip('"') for name in header}
 
 
 def _table_assignment(text: str) -> dict[str, str | None]:
-    """Return the task id of each agent id in a table, None where the cell is empty; other columns may be any."""
+    """Return the task id of each agent id in a table, None for empty cells; other columns are ignored."""
     table = parse_table(text, TABLE_COLUMNS)
     found: dict[str, str | None] = {}
     for row, (agent, task) in enumerate(zip(*map(table.cells.__getitem__, TABLE_COLUMNS), strict=True)):
@@ -131,12 +131,12 @@ def _table_assignment(text: str) -> dict[str, str | None]:
 
 
 def parse_result(text: str) -> dict[str, object]:
-    """Return the object in a JSON text; a seed stays exact, where other whole numbers become floats.
+    """Return the object in a JSON text; unlike other integers, which become floats, the seed stays exact.
 
     Raises
     ------
     InputError
-        If it is no JSON object.
+        If it is not a JSON object.
     """
     document = json_text.require_object(json_text.parse(text))
     seed = document.get("seed")
@@ -146,20 +146,20 @@ def parse_result(text: str) -> dict[str, object]:
 
 
 def read_allocation(path: PathLike, instance: Instance) -> tuple[Allocation, str | None]:
-    """Read an allocation: from JSON, a result, a ``.csv`` table, or a solver's solution of a model by `write_model`.
+    """Read an allocation from JSON, a result, a ``.csv`` table, or a solver's solution of a model of `write_model`.
 
     Parameters
     ----------
     path : str or path
-        A JSON file whatever its suffix; a table with the columns agent and task; or a solution file of HiGHS, CBC,
-        Gurobi or SCIP; ``-`` for standard input.
+        A JSON file with any suffix, a table with the columns agent and task, or a solution file of HiGHS, CBC, Gurobi
+        or SCIP; ``-`` for standard input.
     instance : Instance
-        What the ids belong to.
+        Instance of the ids.
 
     Returns
     -------
     allocation : Allocation
-        Agents that the file leaves out are idle.
+        Agents that are not in the file are idle.
     warning : str or None
         One line, where the file names another instance.
 
@@ -172,7 +172,7 @@ def read_allocation(path: PathLike, instance: Instance) -> tuple[Allocation, str
 
 
 def read_allocations(path: PathLike, instance: Instance) -> tuple[list[Allocation], str | None]:
-    """Read all allocations of a front (alloc-pareto/1), or the one of a file that `read_allocation` takes.
+    """Read all allocations of a front (alloc-pareto/1), or a single one as `read_allocation` does.
 
     Returns
     -------
@@ -183,7 +183,7 @@ def read_allocations(path: PathLike, instance: Instance) -> tuple[list[Allocatio
     Raises
     ------
     InputError
-        As `read_allocation` does.
+        As for `read_allocation`.
     """
     plan = read_plan(path, instance)
     if plan.document.get("format") != FRONT_FORMAT:
@@ -242,13 +242,13 @@ def write_allocation(allocation: Allocation, instance: Instance, path: PathLike)
 
 
 def allocation_to_document(allocation: Allocation, instance: Instance) -> dict[str, object]:
-    """Return `allocation` as plain objects; every agent appears, idle ones with None."""
+    """Return `allocation` as plain objects; all agents are included, idle ones with None."""
     check_names(instance, "instance")
     return {"format": ALLOCATION_FORMAT, "instance": instance.name, "assignment": allocation.to_ids(instance)}
 
 
 def allocation_from_document(document: object, instance: Instance) -> tuple[Allocation, str | None]:
-    """Return the allocation in plain objects, and the name of the instance that it was made for, if given.
+    """Return the allocation in plain objects, and the name of its instance, if given.
 
     Raises
     ------
@@ -265,7 +265,7 @@ def _assignment(fields: dict[str, object]) -> dict[str, str | None]:
     if fields["format"] == ALLOCATION_FORMAT:
         require_known(fields, ALLOCATION_FIELDS, "")
     elif fields.get("status") == "no_solution":
-        raise InputError("this result holds no allocation; give one with another status", "status")
+        raise InputError("this result contains no allocation; give one with another status", "status")
     _instance_name(fields)
     if fields.get("assignment") is None:
         raise InputError("is missing; it must give the task of each agent", "assignment")

@@ -1,4 +1,4 @@
-"""An instance as files hold it: by columns, tasks by their ids, NaN and None for null."""
+"""Columnar intermediate representation of instances in files, with task ids, and NaN or None for null."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -49,7 +49,7 @@ class DistanceColumns:
         Ids of agents, tasks and bases.
     distance : ndarray, shape (k,)
     missing : str
-        What holds for pairs that are left out.
+        Treatment of other pairs.
     """
 
     source: Sequence[str]
@@ -60,24 +60,24 @@ class DistanceColumns:
 
 @dataclass(frozen=True, kw_only=True)
 class Columns:
-    """What a reader gathered; `build` checks references and makes the instance.
+    """Data collected by a reader; `build` checks references and makes the instance.
 
     Attributes
     ----------
     agent_ids, task_ids : sequence of str
     ability, battery, communication_range, speed : ndarray, shape (n,)
     workload, priority : ndarray, shape (m,)
-        NaN where the file says null.
+        NaN for null.
     agent_position, task_position : ndarray, shape (n, 3) and (m, 3), or None
-        NaN rows where the file says null; two columns are 2-D positions.
+        NaN rows for null; two columns are 2-D positions.
     start_task : sequence of (str or None), or None
-        Task id of each agent.
+        Id of the start task of each agent.
     tasks : sequence of (sequence of str, or None), or None
         Task ids that each agent may do.
     metric : str
     units : Units
     speed_unit : str
-        Of `speed`, where it is not that of `units`.
+        Unit of `speed`, if it differs from `units`.
     agent_energy_per_distance : ndarray, shape (n,), or None
     returns : sequence of (bool or str), or None
         The id of a base, or whether the agent returns to its start.
@@ -119,7 +119,7 @@ class Columns:
         Raises
         ------
         InputError
-            If a value breaks a rule or a reference leads nowhere; its place is in the terms of the JSON format.
+            If a value or reference is invalid; `place` is in terms of the JSON format.
         """
         check_names(self)
         _require_all(self.ability, "agents[{}].ability", "> 0")
@@ -153,7 +153,7 @@ class Columns:
         )
 
     def _converted_speed(self) -> FloatArray | None:
-        """Return speeds as distance per time, converted once and for all where they are given in another unit."""
+        """Return speeds as distance per time in the instance's units."""
         factor = speed_factor(self.speed_unit, self.units) if self.speed_unit else 1.0
         speed = _unlimited(self.speed, "speed")
         return speed if speed is None or factor == 1 else speed * factor
@@ -174,7 +174,7 @@ class Columns:
 
 
 def check_names(named: "Columns | Instance", name_field: str = "name") -> None:
-    """Raise `InputError` if the name or an id holds what not every format can keep: NUL, or half a surrogate pair."""
+    """Raise `InputError` if the name or an id contains NUL or a lone surrogate, which not all formats can store."""
     _check_texts([named.name], name_field)
     _check_texts(named.agent_ids, "agents[{}].id")
     _check_texts(named.task_ids, "tasks[{}].id")
@@ -201,12 +201,12 @@ def require_format(found: object, expected: Sequence[str] = (INSTANCE_FORMAT,)) 
 
 
 def unknown_field(name: str, known: Sequence[str], kind: str = "field") -> str:
-    """Return what to say of a field that no format knows."""
+    """Return the error message for an unknown field."""
     return f"unknown {kind} {quoted(name)}{nearest(name, known)}"
 
 
 def plain_numbers(values: FloatArray) -> list[float | int | None]:
-    """Return numbers as written to text: whole ones without a fraction, None for NaN and inf."""
+    """Return numbers as written to text: integers without a fraction, None for NaN and inf."""
     numbers: list[float | int | None] = values.tolist()
     whole = (values == np.floor(values)) & (np.abs(values) < 2**53) & ~((values == 0) & np.signbit(values))
     for row in np.flatnonzero(whole | ~np.isfinite(values)).tolist():
@@ -229,7 +229,7 @@ def _require_all(values: FloatArray, place: str, rule: str) -> None:
 
 
 def _unlimited(values: FloatArray | None, field: str) -> FloatArray | None:
-    """Turn null into ``inf``, which is how an instance says that there is no limit."""
+    """Replace null by ``inf``, which means no limit in an instance."""
     if values is None:
         return None
     wrong = np.isinf(values)
@@ -270,7 +270,7 @@ def _allowed(lists: Sequence[Sequence[str] | None] | None, index: dict[str, int]
     for row, names in enumerate(lists):
         try:
             tasks = None if names is None else [index[name] for name in names]
-            # what is named twice counts once; as long a list with repetitions would pass for a row of a matrix
+            # remove duplicates, as a list with repetitions could be mistaken for a row of a matrix
             allowed.append(sorted(set(tasks)) if tasks is not None and len(tasks) == len(index) else tasks)
         except KeyError as error:
             raise _unknown_task(error.args[0], index, f"agents[{row}].tasks") from error

@@ -35,7 +35,7 @@ AGENT_COLUMNS = ("id", "ability", *AXES, "start_task", "battery", "range", "spee
 TASK_COLUMNS = ("id", "workload", *AXES, "priority")
 MORE_AGENT_COLUMNS = ("energy_per_distance", "returns", "skills")
 MORE_TASK_COLUMNS = ("needs",)
-"""Columns that are written where the instance makes use of them."""
+"""Optional columns that are written only if the instance uses them."""
 
 DISTANCE_COLUMNS = ("from", "to", "distance")
 AGENTS, TASKS, BASES = "agents.csv", "tasks.csv", "bases.csv"
@@ -45,7 +45,7 @@ BASE_COLUMNS = ("id", *AXES)
 
 
 class Header(NamedTuple):
-    """What instance.json says; the missing rule is None where it does not speak of distances."""
+    """Content of instance.json; the rule for missing pairs is None if it does not mention distances."""
 
     values: HeaderValues
     missing: str | None
@@ -57,7 +57,7 @@ def read_folder(folder: Path, default_name: str) -> Instance:
     Raises
     ------
     InputError
-        If a file is absent or breaks the rules of the format; places name the file, its line and the column.
+        If a file is missing or breaks the rules of the format; `place` names the file, its line and the column.
     """
     header = _read_header(folder / HEADER, default_name)
     axes = GEOGRAPHIC_AXES if header.values["metric"] == GEOGRAPHIC else AXES
@@ -99,9 +99,9 @@ def read_folder(folder: Path, default_name: str) -> Instance:
 
 
 def write_folder(instance: Instance, folder: Path) -> None:
-    """Write `instance` into `folder`, which is made where it does not exist; files of other names stay.
+    """Write `instance` into `folder`, which is created if it does not exist; files with other names are kept.
 
-    Tables of distances and of bases of the instance that was there do not stay.
+    Tables of distances and bases of a previous instance are removed.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def write_folder(instance: Instance, folder: Path) -> None:
             write_text_atomically(folder / name, text)
         for name in (BASES, DISTANCES):
             if name not in texts:
-                _remove(folder / name)  # of the instance that was there; it would be read as part of this one
+                _remove(folder / name)  # from a previous instance; it would be read as part of this one
         return
     beside = folder.parent / f".alloc-{secrets.token_hex(8)}.tmp"
     try:
@@ -152,14 +152,14 @@ def _texts(instance: Instance) -> dict[str, str]:
 def _columns(
     rows: Sequence[Row], columns: Sequence[str], more: Sequence[str], axes: Sequence[str]
 ) -> dict[str, Sequence[object]]:
-    """Return the columns of a table, those of positions under the names `axes`."""
+    """Return the columns of a table, with positions under the names `axes`."""
     table: dict[str, Sequence[object]] = {}
     places = [row["position"] for row in rows]
     for column in (*columns, *(name for name in more if name in rows[0])):
         if column in AXES:
             axis = AXES.index(column)
             table[axes[axis]] = [place[axis] if isinstance(place, list) else None for place in places]
-        elif column in ("skills", "needs"):  # no list and an empty one are the same
+        elif column in ("skills", "needs"):  # no list and an empty list are equivalent
             table[column] = [row[column] or None for row in rows]
         else:
             table[column] = [row[column] for row in rows]
@@ -191,13 +191,13 @@ def _missing(given: object) -> str | None:
         return None
     table = json_text.require_object(given, "distances")
     if "rows" in table:
-        raise InputError(f"must stand in {DISTANCES}, with columns {','.join(DISTANCE_COLUMNS)}", "distances.rows")
+        raise InputError(f"must be in {DISTANCES}, with columns {','.join(DISTANCE_COLUMNS)}", "distances.rows")
     require_known(table, ("missing",), "distances")
     return missing_rule(table)
 
 
 def _read_placed(path: Path, columns: Sequence[str], required: Sequence[str], axes: Sequence[str]) -> Table:
-    """Return a table with positions; a column of the other kind of positions is an error that tells what to do."""
+    """Return a table with positions; raise an error with a hint for a column of the other kind of positions."""
     names = dict(zip(AXES, axes, strict=True))
     table = read_table(path, (*(names.get(column, column) for column in columns), *_others(axes)), required)
     for other, axis in zip(_others(axes), axes, strict=True):
@@ -228,7 +228,7 @@ def _distances(table: Table, missing: str | None) -> DistanceColumns:
 
 
 def _translated(place: str, tables: Mapping[str, Table | None], distances: Table | None, axes: Sequence[str]) -> str:
-    """Turn ``agents[3].ability`` into ``agents.csv line 5, column ability``."""
+    """Convert a place such as ``agents[3].ability`` to ``agents.csv line 5, column ability``."""
     match = re.fullmatch(r"distances\.rows\[(\d+)\](?:\[(\d)\])?", place)
     if match is not None and distances is not None:
         row, column = int(match[1]), match[2]

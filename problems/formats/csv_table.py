@@ -1,4 +1,4 @@
-"""CSV tables: their cells by column, with the line of each, and their text."""
+"""Reading and writing of CSV tables, by column and with line numbers."""
 
 import csv
 import io
@@ -18,7 +18,7 @@ from alloc.problems.instance import FloatArray
 from alloc.problems.text import counted
 
 LONGEST_CELL = 131_072
-"""What Python's csv module reads; spreadsheets stop earlier."""
+"""Longest cell that Python's csv module reads; spreadsheets have lower limits."""
 
 
 @dataclass(frozen=True)
@@ -30,11 +30,11 @@ class Table:
     lines: list[int]
 
     def place(self, row: int, column: str) -> str:
-        """Return the place of a cell, in words."""
+        """Return the place of a cell as text."""
         return f"{_line(self.file, self.lines[row])}, column {column}"
 
     def numbers(self, column: str) -> FloatArray | None:
-        """Return a column of numbers, NaN where empty; None if the table does not have it."""
+        """Return a column of numbers, NaN for empty cells; None if the table lacks it."""
         if column not in self.cells:
             return None
         cells = self.cells[column]
@@ -49,14 +49,14 @@ class Table:
         values = np.full(len(cells), np.nan)
         text = "".join(cells)
         if not text.isascii() or "_" in text:
-            raise ValueError("Python's float takes more than numbers are written in")
+            raise ValueError("not a number in the usual notation, although Python's float accepts it")
         values[given] = list(map(float, compress(cells, given)))
         if not np.isfinite(values[given]).all():
             raise ValueError("not finite")
         return values
 
     def positions(self, axes: Sequence[str]) -> FloatArray:
-        """Return three columns of coordinates, with 0 for the last where only two are given, NaN where none is."""
+        """Return three columns of coordinates; the last is 0 if only two are given; NaN if none are."""
         unknown = np.full(len(self.lines), np.nan)
         x, y, z = (unknown if column is None else column for column in map(self.numbers, axes))
         half = (np.isnan(x) != np.isnan(y)) | (np.isnan(x) & ~np.isnan(z))
@@ -67,15 +67,15 @@ class Table:
         return np.column_stack([x, y, np.where(np.isnan(z) & ~np.isnan(x), 0.0, z)])
 
     def texts(self, column: str) -> list[str | None] | None:
-        """Return a column of strings, None where empty; None if the table does not have it."""
+        """Return a column of strings, None for empty cells; None if the table lacks it."""
         return [cell or None for cell in self.cells[column]] if column in self.cells else None
 
     def lists(self, column: str) -> list[list[str] | None] | None:
-        """Return a column of lists of strings, None where empty; None if the table does not have it."""
+        """Return a column of lists of strings, None for empty cells; None if the table lacks it."""
         return list(map(split_ids, self.cells[column])) if column in self.cells else None
 
     def returns(self, column: str) -> list[bool | str] | None:
-        """Return a column of true, false and ids of bases, false where empty; None if the table does not have it."""
+        """Return a column of true, false and ids of bases, false for empty cells; None if the table lacks it."""
         if column not in self.cells:
             return None
         words = {"true": True, "false": False, "": False}
@@ -88,7 +88,7 @@ def read_table(path: Path, known: Sequence[str], required: Sequence[str]) -> Tab
     Raises
     ------
     InputError
-        If it cannot be read, is no CSV, has a column that is not `known`, or does not have one that is `required`.
+        If it cannot be read, is not CSV, has a column that is not in `known`, or lacks a `required` one.
     """
     try:
         text = read_text(path)
@@ -104,16 +104,16 @@ def parse_table(text: str, required: Sequence[str], known: Sequence[str] | None 
     ----------
     text : str
     required : sequence of str
-        Columns that must be there.
+        Required columns.
     known : sequence of str, optional
-        Columns that may be there; any by default.
+        Allowed columns; by default all.
     file : str
-        The file within a folder, for errors.
+        Name of the file in a folder, for errors.
 
     Raises
     ------
     InputError
-        If it is no CSV, has a column that is not `known`, or does not have one that is `required`.
+        If it is not CSV, has a column that is not in `known`, or lacks a `required` one.
     """
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
     rows: list[list[str]] = []
@@ -163,19 +163,19 @@ def _is_number(cell: str) -> bool:
 
 
 def table_text(columns: Mapping[str, Sequence[object]]) -> str:
-    """Return a table, given by columns, as CSV."""
+    """Return columns as CSV text."""
     cells = [_cells(values) for values in columns.values()]
     return "\n".join([",".join(columns), *map(",".join, zip(*cells, strict=True)), ""])
 
 
 def _cells(values: Sequence[object]) -> list[str]:
-    """Return values as cells, quoted where they need it."""
+    """Return values as cells, quoted if needed."""
     cells = ["" if value is None else _cell(value) for value in values]
     if re.search(r'[",\r\n]', "".join(cells)):
         cells = ['"' + cell.replace('"', '""') + '"' if re.search(r'[",\r\n]', cell) else cell for cell in cells]
     longest = max(map(len, cells), default=0)
     if longest > LONGEST_CELL:
-        raise InputError(f"a cell would have {longest} characters, more than CSV readers take; use .json or .npz")
+        raise InputError(f"a cell would have {longest} characters, more than CSV readers accept; use .json or .npz")
     return cells
 
 
@@ -188,12 +188,12 @@ def _cell(value: object) -> str:
 
 
 def join_ids(ids: Iterable[str]) -> str:
-    r"""Return ids in one cell, separated by ``;``; ``;`` and ``\`` in an id get a ``\`` before them."""
+    r"""Return ids in one cell, separated by ``;``; ``;`` and ``\`` in an id are escaped by ``\``."""
     return ";".join(re.sub(r"([;\\])", r"\\\1", name) for name in ids) or ";"
 
 
 def split_ids(cell: str) -> list[str] | None:
-    """Return the ids in a cell, None if it is empty; empty ids are left out, so that ``;`` is the empty list."""
+    """Return the ids in a cell, None if it is empty; empty ids are dropped, so that ``;`` is the empty list."""
     if not cell:
         return None
     if "\\" not in cell:

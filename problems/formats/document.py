@@ -1,4 +1,4 @@
-"""Instances as plain objects, as JSON holds them (alloc-instance/1)."""
+"""Conversion of instances to and from plain objects for JSON (alloc-instance/1)."""
 
 from collections.abc import Sequence
 from typing import TypedDict
@@ -36,7 +36,7 @@ INSTANCE_FIELDS = (*HEADER_FIELDS, "bases", "agents", "tasks")
 
 
 class HeaderValues(TypedDict):
-    """The fields of `Columns` that concern neither a single agent nor a single task."""
+    """The fields of `Columns` that do not belong to single agents or tasks."""
 
     name: str
     tau: float
@@ -47,14 +47,14 @@ class HeaderValues(TypedDict):
 
 
 def from_document(document: object, *, default_name: str = DEFAULT_NAME) -> Instance:
-    """Return the instance that a document of plain objects describes.
+    """Return the instance in a document of plain objects.
 
     Parameters
     ----------
     document : dict
-        As `json.load` gives it; see docs/data/formats.md.
+        As returned by `json.load`; see docs/data/formats.md.
     default_name : str
-        The name of the instance where the document gives none.
+        Name of the instance if the document has none.
 
     Raises
     ------
@@ -97,7 +97,7 @@ def to_document(instance: Instance) -> Row:
     Raises
     ------
     InputError
-        If an id holds what no file can keep.
+        If an id cannot be stored in files.
     """
     check_names(instance)
     document = {**header_document(instance), "agents": agent_rows(instance), "tasks": task_rows(instance)}
@@ -112,7 +112,7 @@ def to_document(instance: Instance) -> Row:
 
 
 def agent_rows(instance: Instance) -> list[Row]:
-    """Return the agents of an instance as plain objects; fields that no agent makes use of are left out."""
+    """Return the agents of an instance as plain objects, without fields that no agent uses."""
     columns: dict[str, Sequence[object]] = {
         "id": instance.agent_ids,
         "ability": plain_numbers(instance.ability),
@@ -134,7 +134,7 @@ def agent_rows(instance: Instance) -> list[Row]:
 
 
 def task_rows(instance: Instance) -> list[Row]:
-    """Return the tasks of an instance as plain objects; fields that no task makes use of are left out."""
+    """Return the tasks of an instance as plain objects, without fields that no task uses."""
     columns: dict[str, Sequence[object]] = {
         "id": instance.task_ids,
         "workload": plain_numbers(instance.workload),
@@ -153,19 +153,19 @@ def base_rows(instance: Instance) -> list[Row]:
 
 
 def returns_of(instance: Instance) -> list[bool | str]:
-    """Return the base to which each agent returns, or whether it returns to where it starts."""
+    """Return the base of each agent, or whether it returns to its start."""
     base, names = instance.return_base.tolist(), instance.bases.ids
     return [names[b] if b >= 0 else flag for flag, b in zip(instance.returns.tolist(), base, strict=True)]
 
 
 def own_rates(instance: Instance) -> FloatArray | None:
-    """Return the energy per distance of each agent, NaN where it is that of the instance; None if it is for all."""
+    """Return the energy per distance of each agent, NaN if equal to the instance's; None if equal for all."""
     rates, usual = instance.agent_energy_per_distance, instance.energy_per_distance
     return None if (rates == usual).all() else np.where(rates == usual, np.nan, rates)
 
 
 def distance_rows(instance: Instance) -> list[tuple[str, str, float | int | None]]:
-    """Return the table of distances by ids: from, to and distance of each row."""
+    """Return the rows of the table of distances: ids of both nodes, and distance."""
     table = instance.distances
     if table is None:
         return []
@@ -175,7 +175,7 @@ def distance_rows(instance: Instance) -> list[tuple[str, str, float | int | None
 
 
 def header_document(instance: Instance) -> Row:
-    """Return what concerns neither a single agent nor a single task, but for the distances."""
+    """Return the fields that do not belong to single agents or tasks, without distances."""
     tau, energy = plain_numbers(np.array([instance.tau, instance.energy_per_distance]))
     header: Row = {"format": INSTANCE_FORMAT, "name": instance.name, "tau": tau, "energy_per_distance": energy}
     if instance.metric != EUCLIDEAN:
@@ -185,12 +185,12 @@ def header_document(instance: Instance) -> Row:
 
 
 def unit_labels(instance: Instance) -> dict[str, str]:
-    """Return the units that are known, by quantity."""
+    """Return the given labels of units, by quantity."""
     return {name: label for name, label in vars(instance.units).items() if label}
 
 
 def header_values(header: Row, default_name: str) -> HeaderValues:
-    """Return what concerns neither a single agent nor a single task, defaults where it is absent."""
+    """Return the fields that do not belong to single agents or tasks, with defaults."""
     units, speed_unit = _units(header.get("units"))
     return {
         "name": _text(header, "name", "name", default_name),
@@ -203,12 +203,12 @@ def header_values(header: Row, default_name: str) -> HeaderValues:
 
 
 def missing_rule(table: Row) -> str:
-    """Return what holds for pairs that a table of distances leaves out."""
+    """Return the treatment of pairs that are not in a table of distances."""
     return _text(table, "missing", "distances.missing", DEFAULT_MISSING)
 
 
 def _units(given: object) -> tuple[Units, str]:
-    """Return the labels of units, and the unit of speeds where that is another."""
+    """Return the labels of units, and the unit of speeds if it differs."""
     if given is None:
         return Units(), ""
     fields = require_object(given, "units")
@@ -253,7 +253,7 @@ def _number(header: Row, field: str, default: float) -> float:
 
 
 def start_task_ids(instance: Instance) -> list[str | None]:
-    """Return the id of the task where each agent begins, None for none."""
+    """Return the id of the start task of each agent, None for none."""
     names: list[str | None] = [*instance.task_ids, None]
     return [names[task] for task in instance.start_task.tolist()]
 

@@ -1,4 +1,4 @@
-"""Bytes and text from files and standard input, and to files and standard output."""
+"""Reading and writing of bytes and text, with files and standard streams."""
 
 import errno
 import os
@@ -16,7 +16,7 @@ STANDARD_STREAM = "-"
 PathLike = str | os.PathLike[str]
 
 _MOST_LINKS = 40
-"""Links that are followed one after the other, as the kernel does."""
+"""Maximum length of a chain of symbolic links, as in the kernel."""
 
 _NO_MOVE = {
     errno.EACCES,
@@ -27,11 +27,11 @@ _NO_MOVE = {
     errno.EROFS,
     errno.EXDEV,
 }
-"""Why nothing can be made beside a file, or moved there: its folder is read-only, or it is mounted by itself."""
+"""Errors if no file can be created in or moved to a folder, as it is read-only or the file is a mount point."""
 
 
 def named(path: PathLike, *, output: bool = False) -> str:
-    """Return what messages call `path`."""
+    """Return the name of `path` in messages."""
     of_type(path, (str, os.PathLike), "path")
     text = os.fspath(path)
     if text == STANDARD_STREAM:
@@ -40,12 +40,12 @@ def named(path: PathLike, *, output: bool = False) -> str:
 
 
 def is_stream(path: PathLike) -> bool:
-    """Whether `path` is open already: ``-``, ``/dev/stdin``, or what a shell makes of ``<(command)``."""
+    """Return whether `path` is already open: ``-``, ``/dev/stdin``, or a shell's process substitution."""
     return os.fspath(path) == STANDARD_STREAM or open_descriptor(path) is not None
 
 
 def open_descriptor(path: PathLike) -> int | None:
-    """Return N of ``/dev/fd/N`` or ``/proc/self/fd/N``, or of a link to one, as ``/dev/stdout`` is; else None."""
+    """Return N for ``/dev/fd/N``, ``/proc/self/fd/N`` or a link to one, such as ``/dev/stdout``; else None."""
     text = os.fspath(path)
     own = {os.path.realpath(folder) for folder in ("/dev/fd", "/proc/self/fd", "/proc/thread-self/fd")}
     try:
@@ -62,17 +62,17 @@ def open_descriptor(path: PathLike) -> int | None:
 
 
 def is_standard_output(path: PathLike) -> bool:
-    """Whether `path` is ``-``, or names the descriptor of standard output."""
+    """Return whether `path` is ``-`` or the descriptor of standard output."""
     return os.fspath(path) == STANDARD_STREAM or open_descriptor(path) == 1
 
 
 def read_bytes(path: PathLike) -> bytes:
-    """Return all of a file, or of standard input where `path` is ``-``.
+    """Return the content of a file, or of standard input if `path` is ``-``.
 
     Raises
     ------
     InputError
-        If there is no such file, it is no regular file, or it cannot be read.
+        If the file does not exist, is not a regular file, or cannot be read.
     """
     source = named(path)
     try:
@@ -84,7 +84,7 @@ def read_bytes(path: PathLike) -> bytes:
     except FileNotFoundError as error:
         raise InputError("there is no such file; check the path", source=source) from error
     except PermissionError as error:
-        raise InputError("may not be read; change its permissions", source=source) from error
+        raise InputError("cannot be read: permission denied; change its permissions", source=source) from error
     except (OSError, ValueError) as error:
         if isinstance(error, InputError):
             raise
@@ -99,7 +99,7 @@ def read_text(path: PathLike) -> str:
     Raises
     ------
     InputError
-        As `read_bytes`, and if the file is not UTF-8.
+        As for `read_bytes`, or if the file is not UTF-8.
     """
     data = read_bytes(path)
     try:
@@ -111,21 +111,22 @@ def read_text(path: PathLike) -> str:
 
 
 def write_text_atomically(path: PathLike, text: str) -> None:
-    """Write a UTF-8 file whole or not at all; see `write_bytes_atomically`."""
+    """Write a UTF-8 file atomically; see `write_bytes_atomically`."""
     try:
         data = text.encode("utf-8")
     except UnicodeEncodeError as error:
-        message = f"cannot be written: {text[error.start]!r} is half a character, and no UTF-8"
+        message = f"cannot be written: {text[error.start]!r} is a lone surrogate, which UTF-8 cannot encode"
         raise InputError(message, source=named(path, output=True)) from error
     write_bytes_atomically(path, data)
 
 
 def write_bytes_atomically(path: PathLike, data: bytes) -> None:
-    """Write a file whole or not at all; ``-`` is standard output.
+    """Write a file atomically; ``-`` is standard output.
 
-    The file is written beside its place and then moved there, so that an existing file is either replaced or left as
-    it was. It keeps the permissions of the file that it replaces. Where its folder does not allow that, it is written
-    in place, once there is room for all of it. Devices, pipes and open descriptors are written to directly.
+    The data are written to a temporary file in the same folder, which is then renamed, so that an existing file is
+    either replaced or unchanged. The permissions of a replaced file are kept. If the folder does not allow this, the
+    file is overwritten in place, after making sure of enough space. Devices, pipes and open descriptors are written
+    directly.
 
     Raises
     ------
@@ -143,14 +144,14 @@ def write_bytes_atomically(path: PathLike, data: bytes) -> None:
             _write_file(Path(os.path.realpath(path)), data)
     except (OSError, ValueError) as error:
         if isinstance(error, BrokenPipeError) and is_standard_output(path):
-            raise  # whoever read has left: no fault of the input
+            raise  # the reader of a pipe has closed it, which is not an input error
         raise unwritable(error, path, source) from error
 
 
 def check_writable(path: PathLike) -> None:
-    """Raise an `InputError` where `write_bytes_atomically` could not write, found by the same steps but for the data.
+    """Raise an `InputError` if `write_bytes_atomically` would fail, by the same steps but without data.
 
-    A file that is there is not touched; one that is not is made and removed again.
+    An existing file is not changed; a missing one is created and removed again.
     """
     source = named(path, output=True)
     try:
@@ -201,30 +202,30 @@ def _write_standard_output(data: bytes) -> None:
 
 
 def _flush(stream: object) -> None:
-    flush = getattr(stream, "flush", None)  # which not all that is put in the place of a stream has
+    flush = getattr(stream, "flush", None)  # replacements of streams may lack it
     if flush is not None:
         flush()
 
 
 def _write_descriptor(descriptor: int, data: bytes) -> None:
-    """Write where the descriptor stands, or at the end if it appends: what it is of belongs to whoever opened it."""
+    """Write at the current position of the descriptor, or at the end if it appends, without truncation."""
     _check_descriptor(descriptor)
     for stream in (sys.stdout, sys.stderr):
-        _flush(stream)  # what was said before stands before
+        _flush(stream)  # keep the order of earlier output
     left = memoryview(data)
     while left:
         left = left[os.write(descriptor, left) :]
 
 
 def _check_descriptor(descriptor: int) -> None:
-    import fcntl  # where descriptors have names, there is fcntl
+    import fcntl  # exists on all systems with /dev/fd
 
     if fcntl.fcntl(descriptor, fcntl.F_GETFL) & os.O_ACCMODE == os.O_RDONLY:
-        raise OSError(errno.EBADF, "it is open for reading alone")
+        raise OSError(errno.EBADF, "it is open for reading only")
 
 
 def _mode(target: Path) -> int | None:
-    """Return the mode of what is to be written, None if it is not there; raise an error if it may not be written."""
+    """Return the mode of the target, None if it does not exist; raise an error if it is not writable."""
     try:
         mode = target.stat().st_mode
     except FileNotFoundError:
@@ -250,7 +251,7 @@ def _write_file(target: Path, data: bytes) -> None:
 
 
 def _replace(target: Path, data: bytes, mode: int | None) -> None:
-    """Write beside `target` and move; 0666 less the umask is what open() would give a new file."""
+    """Write a temporary file and rename it to `target`; new files get mode 0666 minus the umask, as by open()."""
     beside = target.parent / f".alloc-{secrets.token_hex(8)}.tmp"
     try:
         with os.fdopen(os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666), "wb") as file:
@@ -264,7 +265,7 @@ def _replace(target: Path, data: bytes, mode: int | None) -> None:
 
 
 def _overwrite(target: Path, data: bytes) -> None:
-    """Write into the file that is there; a full disk is met before the old content is touched."""
+    """Overwrite an existing file; space is reserved first, so that a full disk leaves the old content intact."""
     with os.fdopen(os.open(target, os.O_WRONLY), "wb") as file:
         size = os.fstat(file.fileno()).st_size
         if data and hasattr(os, "posix_fallocate"):

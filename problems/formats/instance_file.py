@@ -1,4 +1,4 @@
-"""Reading and writing instances; the suffix of the path decides on the format."""
+"""Reading and writing of instances; the suffix of the path determines the format."""
 
 import os
 from pathlib import Path
@@ -38,7 +38,7 @@ def read_instance(path: PathLike) -> Instance:
     Raises
     ------
     InputError
-        If it cannot be read or breaks the rules of its format: one line with source, place and mend.
+        If it cannot be read or breaks the rules of its format; the message names source, place and correction.
     """
     source = named(path)
     try:
@@ -59,22 +59,22 @@ def read_instance(path: PathLike) -> Instance:
 
 
 def name_of(path: PathLike) -> str:
-    """Return the name of an instance that has none in its file, as Unicode; other bytes become U+FFFD."""
+    """Return the default name of an instance from its path; undecodable bytes become U+FFFD."""
     file = Path(path)
     stem = file.stem if file.suffix.lower() in (".json", ".npz") else Path(os.path.abspath(file)).name
     return os.fsencode(stem).decode("utf-8", "replace")
 
 
 def write_instance(instance: Instance, path: PathLike) -> None:
-    """Write an instance, such that `read_instance` gives back the same.
+    """Write an instance, which `read_instance` restores exactly.
 
     Parameters
     ----------
     instance : Instance
     path : str or path
-        ``*.json``, ``*.npz``, a folder (a path without suffix, or one that exists) for CSV files, or ``-`` for JSON to
-        standard output; JSON too to pipes, devices and names of open descriptors such as ``/dev/stdout``. A file that
-        exists is replaced whole or not at all.
+        ``*.json``, ``*.npz``, a folder (a path without suffix, or an existing folder) for CSV files, or ``-`` for JSON
+        to standard output; pipes, devices and open descriptors such as ``/dev/stdout`` get JSON, too. An existing file
+        is replaced atomically.
 
     Raises
     ------
@@ -109,7 +109,7 @@ def _write(instance: Instance, path: PathLike) -> None:
 
 
 def _is_device(path: PathLike) -> bool:
-    """Whether it is there and neither a file nor a folder, but a pipe or a device, which has no suffix to go by."""
+    """Return whether the path exists and is a pipe or a device, whose suffix does not matter."""
     try:
         return os.path.exists(path) and not os.path.isfile(path) and not os.path.isdir(path)
     except ValueError:  # a NUL in the path
@@ -129,7 +129,7 @@ def _require_folder(path: PathLike) -> None:
     suffix = Path(path).suffix
     if suffix == ".csv":
         raise InputError(
-            "is a single table; give the folder of agents.csv and tasks.csv, or join two tables by `alloc import`"
+            "is a single table; give a folder with agents.csv and tasks.csv, or combine two tables with `alloc import`"
         )
     try:
         exists = os.path.lexists(path)

@@ -1,4 +1,4 @@
-"""Columns of the objects in a JSON document: one field of all agents or tasks, checked, with its place in errors."""
+"""Extraction and validation of one field of all agents or tasks in a JSON document."""
 
 from collections.abc import Callable, Sequence
 from typing import TypeGuard, TypeVar, cast
@@ -16,14 +16,14 @@ Value = TypeVar("Value")
 
 
 def require_known(row: Row, known: Sequence[str], place: str) -> None:
-    """Raise `InputError` if an object has a field that the format does not know."""
+    """Raise `InputError` if an object has an unknown field."""
     for field in row:
         if field not in known:
             raise InputError(unknown_field(str(field), known), place)
 
 
 def rows(document: Row, kind: str, known: Sequence[str]) -> list[Row]:
-    """Return the agents or the tasks of a document, with known fields alone."""
+    """Return the agents or the tasks of a document, after checking that their fields are known."""
     rows = document.get(kind)
     if rows is None:
         raise InputError(f"is missing; list at least one of the {kind}", kind)
@@ -41,7 +41,7 @@ def rows(document: Row, kind: str, known: Sequence[str]) -> list[Row]:
 def _column(
     rows: list[Row], kind: str, field: str, types: set[type], fits: Callable[[object], TypeGuard[Value]], rule: str
 ) -> list[Value]:
-    """One field of all rows, None where absent; `types` settles at once what `fits` decides one by one."""
+    """Return one field of all rows, None if absent; `types` is a fast check before `fits` per value."""
     column = [row.get(field) for row in rows]
     if not set(map(type, column)) <= types:
         for index, value in enumerate(column):
@@ -71,7 +71,7 @@ def numbers(rows: list[Row], kind: str, field: str) -> FloatArray:
 
 
 def required_numbers(values: Sequence[object], place: str) -> FloatArray:
-    """Return numbers of which none may be null; `place` has the index of a wrong one put in."""
+    """Return numbers, none of which may be null; the index of an invalid one is inserted into `place`."""
     if not set(map(type, values)) <= {float, int}:
         for index, value in enumerate(values):
             if value is None or not _is_number_or_null(value):
@@ -94,12 +94,12 @@ def _float(value: float | None) -> float:
 
 
 def texts(rows: list[Row], kind: str, field: str) -> list[str]:
-    """Return the strings of a field, of which none may be null."""
+    """Return the strings of a field, none of which may be null."""
     return _column(rows, kind, field, {str}, _is_text, "a non-empty string")
 
 
 def nullable_texts(rows: list[Row], kind: str, field: str) -> list[str | None] | None:
-    """Return the ids of tasks of a field; None if all are null."""
+    """Return the task ids of a field; None if all are null."""
     column = _column(rows, kind, field, {str, type(None)}, _is_text_or_null, "the id of a task, or null")
     return _unless_all_null(column)
 
@@ -125,7 +125,7 @@ def name_lists(rows: list[Row], kind: str, field: str) -> list[Sequence[str] | N
 
 
 def returns(rows: list[Row], kind: str, field: str) -> list[bool | str] | None:
-    """Return the true, the false and the ids of bases of a field, false for null; None if all are null."""
+    """Return the booleans and base ids of a field, False for null; None if all are null."""
     rule = "true, false or the id of a base"
     column = _column(rows, kind, field, {bool, str, type(None)}, _is_return_or_null, rule)
     return None if column.count(None) == len(column) else [False if value is None else value for value in column]

@@ -1,4 +1,4 @@
-"""JSON text to plain objects, with every fault told by its line or its place."""
+"""Parsing of JSON text, with the line or place of errors, and formatting."""
 
 import json
 from collections.abc import Iterable
@@ -11,23 +11,23 @@ encode = json.JSONEncoder(ensure_ascii=False, allow_nan=False).encode
 
 
 class RepeatedKey(dict[str, object]):
-    """An object in which a key occurs twice; found when the object's place is known."""
+    """An object with a repeated key; the error is raised later, when its place is known."""
 
     repeated = ""
 
 
 def parse(text: str) -> object:
-    """Return the value of a JSON text; numbers are floats, and those out of range infinite.
+    """Parse a JSON text; all numbers become floats, infinite if out of range.
 
     Raises
     ------
     InputError
-        If it is no JSON.
+        If it is not valid JSON.
     """
     if not text.strip():
         raise InputError("is empty; expected a JSON object")
     try:
-        # float takes whole numbers of any length, int does not
+        # unlike int, float accepts integers of any length
         value: object = json.loads(text, object_pairs_hook=_object, parse_int=float)
     except JSONDecodeError as error:
         end = " (the file ends here; is it cut off?)" if not text[error.pos :].strip() else ""
@@ -39,7 +39,7 @@ def parse(text: str) -> object:
 
 
 def require_object(value: object, place: str = "") -> dict[str, object]:
-    """Return `value` if it is an object whose keys all differ.
+    """Return `value` if it is an object without repeated keys.
 
     Raises
     ------
@@ -54,7 +54,7 @@ def require_object(value: object, place: str = "") -> dict[str, object]:
 
 
 def lines(document: dict[str, object]) -> str:
-    """Return a document as JSON text; its lists and objects take one line per entry, and so does a table in one."""
+    """Return a document as JSON text with one line per entry of its lists and objects, and of tables in them."""
     return "{\n" + ",\n".join(f"{encode(key)}: {_block(value)}" for key, value in document.items()) + "\n}\n"
 
 
@@ -67,7 +67,7 @@ def _block(value: object) -> str:
 
 
 def _table(value: object) -> str:
-    """Return a list of lists with one line for each, and any other value in one line."""
+    """Return a list of lists with one line per list, and any other value in one line."""
     if isinstance(value, list) and value and isinstance(value[0], list):
         return "[\n" + ",\n".join(f"    {encode(row)}" for row in value) + "\n  ]"
     return encode(value)

@@ -1,4 +1,4 @@
-"""Values, names and errors in words that fit on one line."""
+"""Formatting of values, names and errors for one-line messages."""
 
 import os
 from pathlib import Path
@@ -10,7 +10,7 @@ LONGEST_MESSAGE = 300
 
 
 def described(value: object) -> str:
-    """Return what a JSON value is, in at most about 50 characters."""
+    """Return a description of a JSON value in at most about 50 characters."""
     if value is None:
         return "null"
     if isinstance(value, bool):
@@ -26,39 +26,39 @@ def described(value: object) -> str:
 
 
 def quoted(text: str) -> str:
-    """Return `text` in quotes, with control characters escaped and a long end cut off."""
+    """Return `text` in quotes, with control characters escaped, and cut if it is long."""
     return repr(text if len(text) <= LONGEST_NAME else text[: LONGEST_NAME - 3] + "...")
 
 
 def one_line(text: str, longest: int = LONGEST_MESSAGE) -> str:
-    """Return `text` without line breaks and other control characters, a long middle cut out."""
+    """Return `text` without line breaks and other control characters, with its middle cut out if it is long."""
     if len(text) > longest:
         text = f"{text[: longest - 100]} ... {text[-90:]}"
     return text if text.isprintable() else "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
 
 
 def told(error: InputError, source: str) -> InputError:
-    """Return the same error with its source, fit for one line."""
+    """Return the error with its source, as a one-line message."""
     place = one_line(error.place, 100 + LONGEST_NAME)
     return InputError(one_line(error.message), place, one_line(error.source or source, 4096))
 
 
 def reason(error: Exception) -> str:
-    """Return the words of a system error, to stand after a colon."""
+    """Return the text of a system error, for use after a colon."""
     words = getattr(error, "strerror", None) or str(error) or type(error).__name__
     return one_line(words[0].lower() + words[1:])
 
 
 def unwritable(error: OSError | ValueError, path: str | os.PathLike[str], source: str = "") -> InputError:
-    """Return the error that says why a file or folder cannot be written, and what to do.
+    """Return an error that says why a file or folder cannot be written, and how to correct it.
 
     Parameters
     ----------
     error : OSError or ValueError
     path : str or path
-        What was to be written.
+        The target.
     source : str
-        What messages call it.
+        Name of the target in messages.
     """
     if isinstance(error, InputError):
         return error
@@ -68,7 +68,7 @@ def unwritable(error: OSError | ValueError, path: str | os.PathLike[str], source
         file = next((parent for parent in (folder, *folder.parents) if parent.is_file()), folder)
         problem = f"{quoted(str(file))} is a file, not a folder; name another place"
     elif isinstance(error, FileNotFoundError) and folder.is_dir():
-        problem = f"no files can be made in {quoted(str(folder))}; name another folder"
+        problem = f"no files can be created in {quoted(str(folder))}; name another folder"
     elif isinstance(error, FileNotFoundError):
         problem = f"there is no folder {one_line(str(folder))!r}; create it first"
     return InputError(f"cannot be written: {problem}", source=source)

@@ -1,4 +1,4 @@
-"""Integer programmes as LP and MPS files, which every solver reads."""
+"""Export of integer programmes as LP and MPS files."""
 
 import re
 import tempfile
@@ -19,16 +19,16 @@ if TYPE_CHECKING:
     import highspy
 
 COMMENT = {ModelFormat.LP: "\\", ModelFormat.MPS: "*"}
-"""What a line of comment begins with."""
+"""Prefix of comment lines."""
 
 SMALLEST_COEFFICIENT = 1e-12
-"""Coefficients below this are left out: the least value that HiGHS takes for this option."""
+"""Coefficients below this are dropped; the least value that HiGHS allows for this option."""
 
 SECTION = re.compile(r"^(bin|gen|semi)\n(?! )|^(bin|gen)(?=\n)", re.MULTILINE)
-"""What HiGHS calls sections of an LP file, those without an entry included; CBC takes these words for variables."""
+"""HiGHS's names of sections in LP files, even if empty; CBC mistakes them for variables."""
 
 SPELT_OUT = {"bin": "binaries", "gen": "generals"}
-"""What all solvers call sections; those without an entry are left out."""
+"""Names of sections that all solvers accept; empty sections are left out."""
 
 
 def write_model(
@@ -48,19 +48,19 @@ def write_model(
     path : str or path
         A file, or ``-`` for standard output.
     format : ModelFormat or str, optional
-        ``lp`` or ``mps``; by the suffix of `path` by default.
+        ``lp`` or ``mps``; by default, determined by the suffix of `path`.
     model : ModelKind or str
-        ``class`` counts the agents that are alike, which is smaller; ``plain`` has a binary variable for each agent and
-        task, e_ij of (5).
+        ``class`` counts interchangeable agents, which gives a smaller model; ``plain`` has a binary variable for each
+        agent and task, e_ij of (5).
     objective : Objective or str
-        The least makespan, or with ``makespan-energy`` the least energy at `makespan`.
+        Minimise the makespan, or with ``makespan-energy`` the energy at `makespan`.
     makespan : float, optional
-        Time by which every task must be done, > 0: needed for the energy, and with speeds.
+        Deadline of all tasks, > 0; required for the energy, and with speeds.
 
     Raises
     ------
     InputError
-        If an argument is wrong, or the file cannot be written; its place is the parameter.
+        If an argument is invalid (`place` names the parameter), or the file cannot be written.
     RefusedError
         If the model has no solution, or would be too large.
     """
@@ -82,7 +82,7 @@ def write_model(
 
 
 def _written(programme: Programme, kind: ModelFormat) -> str:
-    """Return what HiGHS writes of the programme."""
+    """Return the programme in the format written by HiGHS."""
     import highspy
 
     highs = highspy.Highs()

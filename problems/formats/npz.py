@@ -1,4 +1,4 @@
-"""An instance as a columnar .npz file: one array per field, for up to millions of agents."""
+"""Instances as columnar .npz files, with one array per field, for up to millions of agents."""
 
 from collections.abc import Mapping, Sequence
 from itertools import accumulate
@@ -28,12 +28,12 @@ Arrays = Mapping[str, NDArray[np.generic]]
 
 
 def from_npz(data: bytes, default_name: str) -> Instance:
-    """Return the instance in the bytes of an .npz file; nothing in it is ever unpickled.
+    """Return the instance in the bytes of an .npz file, without unpickling anything.
 
     Raises
     ------
     InputError
-        If it is no such file or breaks the rules of the format; places are ``agent_ability[3]`` or the like.
+        If it is not such a file or breaks the rules of the format; places are such as ``agent_ability[3]``.
     """
     arrays = load(data)
     require_format(str(arrays["format"][()]) if "format" in arrays else None)
@@ -78,12 +78,12 @@ def from_npz(data: bytes, default_name: str) -> Instance:
 
 
 def to_npz(instance: Instance) -> bytes:
-    """Return `instance` as the bytes of an .npz file, the same for the same instance; null columns are left out.
+    """Return `instance` as the bytes of an .npz file, deterministically; null columns are left out.
 
     Raises
     ------
     InputError
-        If an id holds what the format cannot keep, or ids are so long that the file would be.
+        If an id cannot be stored in the format, or ids are too long.
     """
     check_names(instance)
     return packed(_arrays(instance))
@@ -117,7 +117,7 @@ def _arrays(instance: Instance) -> dict[str, NDArray[np.generic]]:
 
 
 def _optional_arrays(instance: Instance) -> dict[str, NDArray[np.generic]]:
-    """Return the arrays that are there only where an instance makes use of them."""
+    """Return the arrays that are written only if the instance uses them."""
     arrays: dict[str, NDArray[np.generic]] = {}
     if instance.metric != EUCLIDEAN:
         arrays["metric"] = np.array(instance.metric)
@@ -153,7 +153,7 @@ def _list_arrays(name: str, lists: Sequence[Sequence[str] | None]) -> dict[str, 
 def _texts(texts: tuple[str, ...] | list[str]) -> NDArray[np.generic]:
     width = max(map(len, texts), default=1)
     if 4 * width * len(texts) > LARGEST:
-        raise InputError(f"ids of up to {width} characters need too much room in .npz; use .json")
+        raise InputError(f"ids of up to {width} characters need too much space in .npz; use .json")
     return np.array(texts, dtype=f"U{max(1, width)}")
 
 
@@ -199,7 +199,7 @@ def _start_tasks(arrays: Arrays) -> list[str | None] | None:
 
 
 def _returns(arrays: Arrays) -> list[bool | str] | None:
-    """Return the base to which each agent returns, or whether it returns to where it starts."""
+    """Return the base of each agent, or whether it returns to its start."""
     if "agent_return_base" not in arrays:
         return arrays["agent_returns"].tolist() if "agent_returns" in arrays else None
     names = arrays["agent_return_base"].tolist()
@@ -227,7 +227,7 @@ def _distances(arrays: Arrays) -> DistanceColumns | None:
 
 
 def _lists(arrays: Arrays, name: str) -> list[list[str] | None] | None:
-    """Cut an array into one list for each agent or task; a count of -1 is None."""
+    """Split an array into one list per agent or task; a count of -1 stands for None."""
     if (name in arrays) != (f"{name}_count" in arrays):
         raise InputError(f"the arrays '{name}' and '{name}_count' need each other; one is missing")
     if name not in arrays:
@@ -245,7 +245,7 @@ def _lists(arrays: Arrays, name: str) -> list[list[str] | None] | None:
 
 
 def _translated(place: str) -> str:
-    """Turn ``agents[3].ability`` into ``agent_ability[3]``, and likewise for the other fields."""
+    """Convert a place such as ``agents[3].ability`` to ``agent_ability[3]``."""
     owner, bracket, rest = place.partition("[")
     row, _, field = rest.partition("]")
     if owner == "distances.rows":

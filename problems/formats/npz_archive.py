@@ -1,4 +1,4 @@
-"""The arrays in an .npz file: read without unpickling anything, and written alike for the same arrays."""
+"""Arrays in .npz files: read without unpickling, and written deterministically."""
 
 import io
 import math
@@ -14,7 +14,7 @@ from alloc.problems.formats.columns import UNIT_FIELDS, unknown_field
 from alloc.problems.formats.messages import one_line, quoted
 
 LARGEST = 4 << 30
-"""Bytes that the arrays of a file may take unpacked."""
+"""Maximum number of bytes of the uncompressed arrays of a file."""
 
 TEXTS, NUMBERS, COUNTS, FLAGS = "strings", "numbers", "whole numbers", "booleans"
 KINDS = {TEXTS: "U", NUMBERS: "fiu", COUNTS: "iu", FLAGS: "b"}
@@ -53,18 +53,18 @@ FIELDS: dict[str, tuple[str, str]] = {
     "distance": (NUMBERS, "d"),
     "distance_missing": (TEXTS, ""),
 }
-"""Kind and shape of each array; those of distances have length ``d``, of bases ``b``; ``k`` is free."""
+"""Kind and shape of each array; length ``d`` is for distances, ``b`` for bases; ``k`` is free."""
 
 REQUIRED = ("format", "agent_id", "agent_ability", "task_id", "task_workload")
 
 
 def load(data: bytes) -> dict[str, NDArray[np.generic]]:
-    """Return the arrays in the bytes of a file, each of the kind and the dimensions that `FIELDS` says.
+    """Return the arrays in the bytes of a file, after checking their kinds and dimensions against `FIELDS`.
 
     Raises
     ------
     InputError
-        If it is no such file, or holds other arrays.
+        If it is not such a file, or contains other arrays.
     """
     if not data:
         raise InputError("is empty; expected an .npz file")
@@ -77,8 +77,8 @@ def load(data: bytes) -> dict[str, NDArray[np.generic]]:
         raise
     except MemoryError as error:
         raise InputError("does not fit into memory") from error
-    except Exception as error:  # zipfile raises half a dozen kinds for damaged archives
-        raise InputError(f"is no .npz file, or damaged: {_words(error)}") from error
+    except Exception as error:  # zipfile raises many kinds of errors for damaged archives
+        raise InputError(f"is not an .npz file, or is damaged: {_words(error)}") from error
 
 
 def _check_members(members: list[zipfile.ZipInfo]) -> None:
@@ -90,7 +90,7 @@ def _check_members(members: list[zipfile.ZipInfo]) -> None:
             raise InputError(f"the array {name!r} occurs twice; remove one")
     size = sum(member.file_size for member in members)
     if size > LARGEST:
-        raise InputError(f"its arrays take {size / 2**30:.1f} GiB unpacked; at most {LARGEST >> 30} are read")
+        raise InputError(f"its arrays take {size / 2**30:.1f} GiB uncompressed; at most {LARGEST >> 30} are read")
 
 
 def _field(member: str) -> str:
@@ -98,7 +98,7 @@ def _field(member: str) -> str:
 
 
 def _read(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> NDArray[np.generic]:
-    """Read one array, after its header: what the header promises must be what the archive holds."""
+    """Read one array, after checking that its header matches the size of its data."""
     name = _field(member.filename)
     kind, shape = FIELDS[name]
     with archive.open(member) as file:
@@ -110,7 +110,7 @@ def _read(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> NDArray[np.gener
         array: NDArray[np.generic] = npy.read_array(io.BytesIO(content), allow_pickle=False)
     except (InputError, MemoryError):
         raise
-    except Exception as error:  # numpy parses the header as Python text, and passes on what that raises
+    except Exception as error:  # numpy evaluates the header as Python text, which may raise any error
         raise InputError(f"cannot be read: {_words(error)}", f"array {name}") from error
     if array.dtype.kind not in KINDS[kind]:
         raise InputError(f"must hold {kind}, got dtype {array.dtype.name}", f"array {name}")
@@ -121,14 +121,14 @@ def _read(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> NDArray[np.gener
 
 
 def _check_promise(content: bytes, name: str) -> None:
-    """Raise an `InputError` where a header promises more than there is: room for it is not even asked for."""
+    """Raise an `InputError` if a header declares more data than exist, before memory is allocated for them."""
     file = io.BytesIO(content)
     headers = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
     read_header = headers.get(npy.read_magic(file))
     if read_header is not None:
         shape, _, dtype = read_header(file)
         if math.prod(shape) * dtype.itemsize > len(content):
-            raise InputError("cannot be read: its header promises more than there is", f"array {name}")
+            raise InputError("cannot be read: its header declares more data than there are", f"array {name}")
 
 
 def _words(error: Exception) -> str:
@@ -136,7 +136,7 @@ def _words(error: Exception) -> str:
 
 
 def packed(arrays: Mapping[str, NDArray[np.generic]]) -> bytes:
-    """Return arrays as the bytes of a file, the same for the same arrays."""
+    """Return arrays as the bytes of a file, deterministically."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
         for name, array in arrays.items():

@@ -1,11 +1,11 @@
 """The Markov game of the paper (section 2.2), batched in torch.
 
-States, not observations, are kept in trajectories: observations are a pure function of `Board` and `State`.
+Trajectories store states instead of observations, which are a pure function of `Board` and `State`.
 
 References
 ----------
-Fang et al. (2025), section 2.2 and equations (1)-(8), doi:10.20944/preprints202502.0192.v1. That agents bid in turn,
-instead of all choosing at once, is ours.
+Fang et al. (2025), section 2.2 and equations (1)-(8), doi:10.20944/preprints202502.0192.v1. Bidding, as an
+alternative to simultaneous choices, is ours.
 """
 
 from alloc.problems.game.board import Board

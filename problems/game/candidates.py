@@ -1,4 +1,4 @@
-"""The candidates of each agent: all tasks, or the nearest ones where there are many."""
+"""Candidates of each agent: all tasks, or the nearest ones if there are many."""
 
 from typing import NamedTuple
 
@@ -9,26 +9,26 @@ from alloc.problems.instance import Instance
 from alloc.problems.vocabulary import IDLE
 
 SCARCE_SHARE = 4
-"""One in so many candidates of each agent is kept for tasks that few agents have near."""
+"""One in this many candidates of each agent is reserved for tasks that are near few agents."""
 
 AMPLE = 3.0
-"""Ability over need from the nearest agents up to which a task is added to their candidates."""
+"""Ratio of ability to need up to which a scarce task is added to the candidates of its nearest agents."""
 
 CHUNK = 2_000_000
-"""Pairs of agent and task handled at once, to bound the memory."""
+"""Number of pairs of agent and task processed together, to limit memory."""
 
 Ints = NDArray[np.int64]
 
 
 class Candidates(NamedTuple):
-    """Candidates of n agents, the last of which is being idle.
+    """Candidates of n agents, the last of which is idle.
 
     Attributes
     ----------
     place : ndarray of int, shape (n, c)
-        Task, or m for idle and where there are fewer tasks in reach than candidates.
+        Task, or m for idle and for padding if fewer tasks are in reach.
     distance, cost : ndarray, shape (n, c)
-        Distance, and cost of the flight, see `Reach.costs`.
+        Distance and cost of the flight, see `Reach.costs`.
     legal : ndarray of bool, shape (n, c)
     """
 
@@ -44,9 +44,9 @@ def candidate_tasks(instance: Instance, near: int | None, plan: Ints | None) -> 
     Parameters
     ----------
     near : int or None
-        Candidates besides being idle, at least 1; None, or as many as there are tasks, for all tasks.
+        Number of candidates besides idle, at least 1; None, or the number of tasks or more, for all tasks.
     plan : ndarray of int, shape (n,), or None
-        Places that must be among the candidates.
+        Place of each agent that must be among its candidates.
     """
     n, m = instance.n, instance.m
     if near is None or near >= m:
@@ -71,7 +71,7 @@ def candidate_tasks(instance: Instance, near: int | None, plan: Ints | None) -> 
 def _with_idle(
     task: Ints, distance: NDArray[np.float64], cost: NDArray[np.float64], legal: NDArray[np.bool_], idle: int
 ) -> Candidates:
-    """Append being idle to the candidates, all of shape (n, c - 1)."""
+    """Append idle to the candidates, which have shape (n, c - 1)."""
     n = len(task)
     away = np.column_stack([distance, np.zeros(n)])
     return Candidates(
@@ -83,7 +83,7 @@ def _with_idle(
 
 
 def _nearest(instance: Instance, near: int) -> Ints:
-    """Return the nearest tasks in reach, then scarce ones (`_add_scarce`); -1 for none; shape (n, near)."""
+    """Return the nearest tasks in reach, followed by scarce ones (`_add_scarce`); -1 for none; shape (n, near)."""
     reach, m = instance.reach, instance.m
     own = near - near // SCARCE_SHARE
     origins = len(reach.place)
@@ -104,7 +104,7 @@ def _nearest(instance: Instance, near: int) -> Ints:
 
 
 def _add_scarce(instance: Instance, chosen: Ints, own: int) -> None:
-    """Put tasks that too little ability has near in the last columns of the agents nearest to them."""
+    """Put tasks with too little ability nearby into the last columns of the agents nearest to them."""
     n, m = instance.n, instance.m
     kept = chosen[:, :own]
     ability = np.repeat(instance.ability[:, None], own, axis=1)[kept >= 0]
@@ -120,12 +120,12 @@ def _add_scarce(instance: Instance, chosen: Ints, own: int) -> None:
         chosen[able[:enough], used[able[:enough]]] = task
         used[able[:enough]] += 1
     spare = np.arange(chosen.shape[1])[None] >= used[:, None]
-    for column in range(own, chosen.shape[1]):  # near tasks that were kept may have been added as scarce ones
+    for column in range(own, chosen.shape[1]):  # scarce tasks may already be among the near ones
         twice = (chosen[:, :column] == chosen[:, column : column + 1]).any(axis=1) & spare[:, column]
         chosen[twice, column] = -1
 
 
 def _include(chosen: Ints, wanted: Ints, column: Ints) -> None:
-    """Put each agent's wanted task in its column where it is not among the candidates."""
+    """Put the wanted task of each agent into its column, unless it is already a candidate."""
     absent = np.flatnonzero((wanted != IDLE) & ~(chosen == wanted[:, None]).any(axis=1))
     chosen[absent, column[absent]] = wanted[absent]

@@ -1,32 +1,32 @@
-"""The features that policies observe: name, position and scaling of each, for torch and for compiled loops alike.
+"""Features of policies: names, indices and scaling, shared by torch and compiled code.
 
-Of an agent's move from its *own* place to a *candidate*: the shortfall of a place is its need less the ability there,
-negative for a surplus; the contribution is the ability that the agent has there. "After" means after the move.
+Features of a move are about the agent's *own* place and a *candidate*. The shortfall of a place is its need minus the
+ability there, negative for a surplus; the contribution is the agent's ability there; "after" means after the move.
 """
 
 from enum import IntEnum
 
 FEATURE_SET = "bidding-3"
-"""Name of these features; policies trained on another set do not load."""
+"""Name of this feature set; policies trained with another one are rejected."""
 
 FEATURE_LIMIT = 2.0
-"""Features are clipped to this, on either side of 0."""
+"""Features are clipped to [-FEATURE_LIMIT, FEATURE_LIMIT]."""
 
 IDLE_SURPLUS = 1e6
-"""Surplus of ability at the place of the idle: leaving it costs nobody anything."""
+"""Surplus of ability at idle, so that leaving it costs nothing."""
 
 LOG_NEED_OFFSET = 1.5
-"""Subtracted from logarithms of needs, and of numbers of members, to centre them."""
+"""Offset that centres logarithms of needs and of group sizes."""
 
 SHORTFALL_DIVISOR = 3.0
-"""Divides shortfalls in units of ability."""
+"""Divisor of shortfalls in units of ability."""
 
 FINE_FACTOR = 5.0
-"""Multiplies relative shortfalls where small ones matter."""
+"""Factor on relative shortfalls, to resolve small ones."""
 
 
 class PairFeature(IntEnum):
-    """Of an agent and a candidate."""
+    """Features of an agent and a candidate."""
 
     SHORTFALL_PER_CONTRIBUTION = 0
     SHORTFALL_AFTER_PER_CONTRIBUTION = 1
@@ -53,7 +53,7 @@ class PairFeature(IntEnum):
 
 
 class AgentFeature(IntEnum):
-    """Of an agent where it is."""
+    """Features of an agent at its own place."""
 
     ABILITY = 0
     SHORTFALL_PER_CONTRIBUTION = 1
@@ -66,7 +66,7 @@ class AgentFeature(IntEnum):
 
 
 class TaskFeature(IntEnum):
-    """Of a place, and from `LOWEST_COVERAGE` to `ENERGY_WEIGHT` of all together."""
+    """Features of a place; those from `LOWEST_COVERAGE` to `ENERGY_WEIGHT` are global."""
 
     SHORTFALL_PER_NEED = 0
     SHORTFALL = 1

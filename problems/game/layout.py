@@ -1,4 +1,4 @@
-"""From instances to a board: the one place where games are scaled and made dimensionless."""
+"""Conversion of instances to a board; the only place where games are made dimensionless."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from alloc.problems.instance import Instance
 from alloc.problems.vocabulary import IDLE
 
 MEAN_DISTANCE = 0.66
-"""Distances are scaled to this mean, that of two points in the unit cube."""
+"""Mean to which distances are scaled; the mean distance of two points in the unit cube."""
 
 LARGEST = 1e9
-"""Needs, distances and the like are cut off here, so that nothing overflows in single precision."""
+"""Cap on needs, distances and similar values, so that nothing overflows in single precision."""
 
 SHORTEST_HOURS = 1e-300
-"""Least reference makespan that is divided by."""
+"""Lower limit on the reference makespan in divisions."""
 
 TIE_BREAK = 1e-9
-"""Most that is added to distances to choose among equally near tasks at random."""
+"""Maximum random perturbation of distances to break ties between equally near tasks."""
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -43,17 +43,17 @@ class UnscaledGames:
     Attributes
     ----------
     ability, speed, endurance : ndarray, shape (B, n)
-        Ability 0 marks agents that only fill a game up; endurance is the distance for which the battery lasts.
+        Ability 0 marks padding agents; endurance is the maximum distance on the battery.
     workload, priority : ndarray, shape (B, m)
     candidates : ndarray of int, shape (B, n, c)
         Place of each candidate, the last one m for idle.
     reachable : ndarray of bool, shape (B, n, c)
         Whether the candidate is in C(i).
     distance, cost : ndarray, shape (B, n, c)
-        From the agents' starts, and what the flight costs, see `Reach.costs`; 0 for the place of the idle.
+        Distance from the agents' starts, and cost of the flight, see `Reach.costs`; 0 for idle.
     task_distance : ndarray, shape (B, m, m)
     hours, log_tau : ndarray, shape (B,)
-        Reference makespan, and logarithm of the discount factor of (3).
+        Reference makespan, and logarithm of tau of (3).
     """
 
     ability: Floats
@@ -71,7 +71,7 @@ class UnscaledGames:
 
     @cached_property
     def unit(self) -> Floats:
-        """Mean ability of the agents of each game, 1 where there are none; shape (B,)."""
+        """Mean ability of the agents of each game, 1 without agents; shape (B,)."""
         unit = self.ability.sum(1) / np.maximum((self.ability > 0).sum(1), 1)
         return np.where(unit > 0, unit, 1.0)
 
@@ -82,13 +82,13 @@ class UnscaledGames:
 
     @cached_property
     def contribution(self) -> Floats:
-        """Ability that each agent brings to its candidates, in mean abilities, shape (B, n, c)."""
+        """Ability that each agent contributes to its candidates, in mean abilities, shape (B, n, c)."""
         share = working_share(self.speed[..., None], self.distance, self.hours[:, None, None])
         return self.relative_ability[..., None] * share
 
     @cached_property
     def legal(self) -> Flags:
-        """Whether an agent can go to a candidate and contribute there; always for being idle; shape (B, n, c)."""
+        """Whether an agent can go to a candidate and contribute there; always True for idle; shape (B, n, c)."""
         useful = _with_idle(self.workload > 0)
         games = np.arange(len(useful))[:, None, None]
         legal: Flags = self.reachable & useful[games, self.candidates] & (self.contribution > 0)
@@ -97,30 +97,30 @@ class UnscaledGames:
 
     @property
     def nearest(self) -> Ints:
-        """Slot of the nearest task that each agent can go to, that of being idle without; shape (B, n)."""
+        """Slot of the nearest legal task of each agent, or idle if there is none; shape (B, n)."""
         return self.nearest_by(self.cost[..., :-1])
 
     def nearest_by(self, cost: Floats) -> Ints:
-        """Return `nearest` by other costs of the flights to the tasks, shape (B, n, c - 1)."""
+        """Return `nearest` with respect to the given costs of flights to tasks, shape (B, n, c - 1)."""
         legal = self.legal[..., :-1]
         slot: Ints = np.where(legal.any(2), np.where(legal, cost, np.inf).argmin(2), legal.shape[2])
         return slot
 
     def slots_at(self, chosen: Flags, otherwise: Ints | int) -> Ints:
-        """Return the first legal slot that is chosen, shape (B, n), from flags of shape (B, n, c) or (B, n, c - 1)."""
+        """Return the first legal slot with a flag, shape (B, n); flags have shape (B, n, c) or (B, n, c - 1)."""
         found = chosen & self.legal[..., : chosen.shape[2]]
         slot: Ints = np.where(found.any(2), found.argmax(2), otherwise)
         return slot
 
     def board(self, scale: Floats, start: Ints, energy_weight: Sequence[float] | Floats) -> Board:
-        """Return the games without units.
+        """Return the dimensionless games.
 
         Parameters
         ----------
         scale : ndarray, shape (B,)
-            What distances are multiplied by.
+            Factor on distances.
         start : ndarray of int, shape (B, n)
-            Slot where each agent begins.
+            Initial slot of each agent.
         energy_weight : sequence of float
             Weight of energy in the reward, by game.
         """
@@ -166,23 +166,23 @@ def make_board(
     near: int | None = None,
     plan: Ints | None = None,
 ) -> Board:
-    """Lay out games on `instances`, which must agree in numbers of agents and tasks.
+    """Return a board of games on `instances`, which must have equal numbers of agents and tasks.
 
-    Agents begin at their start task, or else at the nearest task in their reach, or idle where there is none.
+    Agents start at their start task, or else at the nearest task in their reach, or else idle.
 
     Parameters
     ----------
     instances : sequence of Instance
     reference_makespan : sequence of float
-        Hours at which the needs are set, such as a lower bound on the makespan.
+        Makespan in hours for which needs are computed, such as a lower bound.
     energy_weight : sequence of float
         Weight of energy in each game.
     rng : numpy Generator
         Breaks ties between equally near tasks.
     near : int, optional
-        Candidates per agent besides being idle; all tasks by default.
+        Number of candidates per agent besides idle; by default all tasks.
     plan : ndarray of int, shape (n,), optional
-        Where the agents of all games begin instead; `IDLE` for idle.
+        Initial task of the agents of all games instead; `IDLE` for idle.
     """
     games = _unscaled(instances, reference_makespan, near, plan)
     cost, legal = games.cost[..., :-1], games.legal[..., :-1]
@@ -214,17 +214,17 @@ def _unscaled(
 
 
 def _stack(arrays: Sequence[NDArray[Number]]) -> NDArray[Number]:
-    """Stack arrays along a first axis, without a copy where there is only one."""
+    """Stack arrays along a new first axis, without a copy if there is only one."""
     return arrays[0][None] if len(arrays) == 1 else np.stack(arrays)
 
 
 def _with_idle(array: NDArray[Number], axes: int = 1) -> NDArray[Number]:
-    """Append the place of the idle, with 0, to each of the last axes."""
+    """Append idle, with value 0, to each of the last `axes` axes."""
     return np.pad(array, [(0, 0)] * (array.ndim - axes) + [(0, 1)] * axes)
 
 
 def working_share(speed: Floats, distance: Floats, hours: float | Floats) -> Floats:
-    """Return the share of the reference makespan that is left to work after the flight, in the common shape."""
+    """Return the share of the reference makespan left for work after the flight; arguments broadcast."""
     if not np.isfinite(speed).any():
         return np.ones_like(distance)
     with np.errstate(over="ignore"):
@@ -232,7 +232,7 @@ def working_share(speed: Floats, distance: Floats, hours: float | Floats) -> Flo
 
 
 def _scale(distance: Floats) -> float:
-    """Return what these distances are multiplied by, so that their mean is `MEAN_DISTANCE`."""
+    """Return the factor that scales the mean of these distances to `MEAN_DISTANCE`."""
     farthest = float(distance.max(initial=0.0))
     if farthest == 0:
         return 1.0
@@ -247,7 +247,7 @@ def _scaled(distance: Floats, scale: Floats) -> NDArray[np.float32]:
 
 
 def _endurance(instance: Instance) -> Floats:
-    """Distance for which each battery lasts, shape (n,); not a number where an empty one is not used."""
+    """Return the maximum distance on each battery, shape (n,); NaN for an empty battery that is not used."""
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         return instance.battery / instance.reach.energy_per_distance
 
@@ -259,7 +259,7 @@ def _scaled_endurance(endurance: Floats, scale: Floats) -> Floats:
 
 
 def _weights(priority: Floats, useful: Flags) -> Floats:
-    """Priority over its mean among the tasks with workload, by game; 1 where none of these has any; shape (B, m)."""
+    """Return priorities divided by their mean over tasks with workload, per game; 1 if all are 0; shape (B, m)."""
     priority = np.where(useful, priority, 0.0)
     highest = priority.max(1, keepdims=True)
     priority = np.where(highest > 0, priority / np.where(highest > 0, highest, 1.0), useful)

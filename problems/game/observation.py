@@ -1,4 +1,4 @@
-"""Observations: dimensionless features of `Board` and `State`, for instances of any scale and number of agents."""
+"""Observations: dimensionless features of `Board` and `State`, independent of scale and number of agents."""
 
 from collections.abc import Mapping
 from enum import IntEnum
@@ -22,14 +22,14 @@ from alloc.problems.game.rules import State, at_slot, current_tasks
 
 
 class AgentAtPlace(NamedTuple):
-    """A place, and what an agent has there; tensors that broadcast.
+    """A place and an agent's values there, as tensors that broadcast.
 
     Attributes
     ----------
     shortfall, need, supply_ratio : Tensor
-        Of the place.
+        Values of the place.
     contribution, distance : Tensor
-        Of the agent at this place.
+        Values of the agent at this place.
     """
 
     shortfall: Tensor
@@ -40,7 +40,7 @@ class AgentAtPlace(NamedTuple):
 
 
 def shortfalls(board: Board, state: State) -> Tensor:
-    """Return the ability that each place is short of, negative for a surplus, shape (B, m + 1)."""
+    """Return the shortfall of ability at each place, negative for a surplus, shape (B, m + 1)."""
     shortfall = board.need - state.group
     shortfall[:, -1] = -IDLE_SURPLUS
     return shortfall
@@ -55,9 +55,9 @@ def pair_features(
     ----------
     energy_weight : Tensor
     ability, reachable_share : Tensor
-        Of the agent.
+        Values of the agent.
     own, other : AgentAtPlace
-        The agent where it is, and at the candidate that it bids for.
+        The agent at its own place, and at the candidate that it bids for.
     """
     per_own, per_other = own.contribution.clamp(min=SMALLEST), other.contribution.clamp(min=SMALLEST)
     own_after, after = own.shortfall + own.contribution, other.shortfall - other.contribution
@@ -113,7 +113,7 @@ def observe_pairs(board: Board, state: State) -> Tensor:
 
 
 def observe_agents(board: Board, state: State) -> Tensor:
-    """Return the `AgentFeature` values of each agent where it is, shape (B, n, AGENT_FEATURES)."""
+    """Return the `AgentFeature` values of each agent at its own place, shape (B, n, AGENT_FEATURES)."""
     shortfall, need, task = shortfalls(board, state), board.need.clamp(min=SMALLEST), current_tasks(board, state)
     own_shortfall, own_need = shortfall.gather(1, task), need.gather(1, task)
     contribution, distance = at_slot(board.contribution, state.slot), at_slot(board.distance, state.slot)
@@ -163,6 +163,6 @@ def observe_tasks(board: Board, state: State) -> Tensor:
 
 
 def _stacked(values: Mapping[IntEnum, Tensor]) -> Tensor:
-    """Put features, which broadcast to (...), at their positions along a last axis, clipped to `FEATURE_LIMIT`."""
+    """Stack features, which broadcast to (...), by index along a last axis, clipped to `FEATURE_LIMIT`."""
     columns = torch.broadcast_tensors(*(values[feature] for feature in sorted(values)))
     return torch.stack(columns, -1).clamp(-FEATURE_LIMIT, FEATURE_LIMIT)

@@ -1,4 +1,4 @@
-"""Regions of an instance as games of their own: a few tasks, and the agents that work there."""
+"""Games on regions of an instance: small groups of tasks with the agents that work there."""
 
 import math
 from collections.abc import Sequence
@@ -24,10 +24,9 @@ class Regions:
     Attributes
     ----------
     board : Board
-        One game a region; where a region has fewer agents than others, the rest are agents without ability that
-        cannot go anywhere.
+        One game per region; regions with fewer agents are padded with agents that have no ability and cannot move.
     agents : ndarray of int, shape (G, k)
-        Agents of each region, -1 for none.
+        Agents of each region, -1 for padding.
     tasks : ndarray of int, shape (G, j)
     nearest : Tensor of int, shape (G, k)
         The nearest candidate of each agent.
@@ -39,7 +38,7 @@ class Regions:
     nearest: torch.Tensor
 
     def merge(self, plan: Ints, slots: Ints, accepted: NDArray[np.bool_]) -> Ints:
-        """Return `plan` with the outcome of the accepted games; `IDLE` or the task of each agent, shape (n,).
+        """Return `plan` with the outcomes of the accepted games applied, shape (n,).
 
         Parameters
         ----------
@@ -59,18 +58,18 @@ class Regions:
 def lay_out_regions(
     instance: Instance, hours: float, plan: Ints, tasks: Ints, agents: Sequence[Ints], energy_weight: float = 1.0
 ) -> Regions:
-    """Lay out games in which the agents of a region distribute themselves over its tasks anew.
+    """Return games in which the agents of each region are reallocated to its tasks.
 
     Parameters
     ----------
     hours : float
-        Makespan at which the needs are set.
+        Makespan for which needs are computed.
     plan : ndarray of int, shape (n,)
-        Task of each agent, `IDLE` for none: where the games begin.
+        Initial task of each agent, `IDLE` for none.
     tasks : ndarray of int, shape (G, j)
         Tasks of each region.
     agents : sequence of G ndarrays of int
-        Agents of each region; each is at one of its tasks or idle.
+        Agents of each region, each at one of its tasks or idle.
     energy_weight : float
         Weight of energy in the reward.
     """
@@ -83,7 +82,7 @@ def lay_out_regions(
 
 
 def _members(agents: Sequence[Ints]) -> Ints:
-    """Agents of each region in one array, shape (G, k), filled up with -1."""
+    """Return the agents of each region in one array, shape (G, k), padded with -1."""
     members = np.full((len(agents), max(1, max(len(some) for some in agents))), -1, dtype=np.int64)
     for region, some in enumerate(agents):
         members[region, : len(some)] = some
@@ -120,7 +119,7 @@ def _unscaled(instance: Instance, hours: float, tasks: Ints, members: Ints) -> U
 
 
 def _scale(games: UnscaledGames) -> NDArray[np.float64]:
-    """Return what distances are multiplied by, so that their mean over legal pairs is `MEAN_DISTANCE`; shape (G,)."""
+    """Return the factor that scales the mean distance of legal pairs to `MEAN_DISTANCE`; shape (G,)."""
     legal = games.legal[..., :-1]
     mean = (games.cost[..., :-1] * legal).sum((1, 2)) / np.maximum(legal.sum((1, 2)), 1)
     return np.where(mean > 0, MEAN_DISTANCE / np.where(mean > 0, mean, 1.0), 1.0)

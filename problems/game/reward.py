@@ -1,4 +1,4 @@
-"""Rewards: the utility of a state, and the rise of it that an action causes, its marginal contribution."""
+"""Rewards: the utility of a state, and the marginal contributions of actions to it."""
 
 from collections.abc import Callable
 
@@ -10,16 +10,16 @@ from alloc.problems.game.rules import PLANNING, Rules, State, at_slot, group_abi
 from alloc.problems.vocabulary import Reward
 
 LARGEST_EXPONENT = 20.0
-"""Exponent of e in (3) beyond which the reward follows its tangent: it overflows for large shortfalls."""
+"""Exponent in (3) beyond which the reward is extended linearly, as it overflows for large shortfalls."""
 
 DIVISOR = 1e-9
 
 
 def potential(board: Board, group: Tensor) -> Tensor:
-    """Return a potential of the groups, at most 0, where all needs are met.
+    """Return a potential of the groups, which is at most 0, its value if all needs are met.
 
-    The sum of the relative shortfall of ability in total, on average (both weighed by priority), and at the worst
-    task, which is 1 - T_ref / T and so the makespan.
+    Minus the relative shortfall of ability in total (times 4), on average (times 2, both weighted by priority), and of
+    the worst task, which is 1 - T_ref / T and thus measures the makespan.
 
     Parameters
     ----------
@@ -37,10 +37,10 @@ def potential(board: Board, group: Tensor) -> Tensor:
 
 
 def coverage(board: Board, group: Tensor) -> Tensor:
-    """Return the sum of (3), - tau^(W_j - h_j), over the tasks, weighed by priority and over their number.
+    """Return the mean of (3), -tau^(W_j - h_j), over the tasks, weighted by priority.
 
-    Where the exponent exceeds `LARGEST_EXPONENT` times e, -tau^x is continued along its tangent: finite, and still
-    falling with the shortfall.
+    Beyond the exponent `LARGEST_EXPONENT`, the exponential is extended by its tangent: finite, and still decreasing
+    with the shortfall.
     """
     need, weight = board.need[:, :-1], board.weight[:, :-1]
     exponent = (group[..., :-1] - need) * board.log_tau[:, None]
@@ -50,24 +50,24 @@ def coverage(board: Board, group: Tensor) -> Tensor:
 
 
 def utility(board: Board, state: State, rules: Rules = PLANNING) -> Tensor:
-    """Return the utility of each state, shape (B,): potential or coverage, less the weighted energy."""
+    """Return the utility of each state, shape (B,): potential or coverage, minus the weighted energy."""
     return _group_value(rules)(board, state.group) - board.energy_weight * mean_distance(board, state, rules)
 
 
 def marginal_contributions(board: Board, state: State, granted: Tensor, rules: Rules = PLANNING) -> Tensor:
-    """Return the marginal contribution of each granted bid, given those before it; 0 for what is no bid.
+    """Return the marginal contribution of each granted bid, given the bids before it; 0 for invalid bids.
 
     Parameters
     ----------
     state : State
-        Before the step.
+        State before the step.
     granted : Tensor of int, shape (B, k)
-        Bids, ``agent * c + slot``; anything else is none.
+        Bids, ``agent * c + slot``; other values are ignored.
 
     Returns
     -------
     Tensor, shape (B, k)
-        They add up to the rise of `utility`.
+        Contributions, which sum to the increase of `utility`.
     """
     _, n, c = board.shape
     value, agent_count = _group_value(rules), board.agent_count
@@ -89,14 +89,14 @@ def marginal_contributions(board: Board, state: State, granted: Tensor, rules: R
 
 
 def difference_rewards(board: Board, state: State, slot: Tensor, rules: Rules = PLANNING) -> Tensor:
-    """Return what the utility would lose had one agent alone stayed, for agents that choose at once.
+    """Return the loss of utility if each agent alone had stayed, for simultaneous choices.
 
     Parameters
     ----------
     state : State
-        Before the step.
+        State before the step.
     slot : Tensor of int, shape (B, n)
-        Candidate that each agent goes to.
+        Candidate to which each agent goes.
 
     Returns
     -------
@@ -129,7 +129,7 @@ def _group_value(rules: Rules) -> Callable[[Board, Tensor], Tensor]:
 def _extra_distance(
     board: Board, state: State, agent: Tensor, slot: Tensor, rules: Rules, rows: Tensor | None = None
 ) -> Tensor:
-    """Return how much more agents fly by going to a slot; all arguments of one shape, games in `rows`."""
+    """Return the additional distance of agents that go to a slot; arguments have one shape, games in `rows`."""
     rows = torch.arange(len(agent), device=agent.device) if rows is None else rows
     if rules.flying:
         place, now = board.candidates[rows, agent, slot], state.location[rows, agent]
@@ -139,7 +139,7 @@ def _extra_distance(
 
 
 def relative_makespan(board: Board, group: Tensor) -> tuple[Tensor, Tensor]:
-    """Return the makespan of the served tasks over the reference makespan, and the number unserved, both of shape (B,).
+    """Return the makespan of the served tasks relative to the reference, and the number of unserved tasks, shape (B,).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The rules of the game: states, legal moves, transitions, and the distance flown."""
+"""Rules of the game: states, legal moves, transitions, and distances flown."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from alloc.problems.game.board import Board
 from alloc.problems.vocabulary import Reward, TurnRule
 
 TOLERANCE = 1e-5
-"""Distance by which a battery may be overdrawn, for rounding in single precision."""
+"""Tolerance on the distance that a battery allows, for rounding errors in single precision."""
 
 
 @dataclass(frozen=True)
@@ -21,17 +21,17 @@ class Rules:
     Attributes
     ----------
     turn : TurnRule or str
-        ``bidding``: all agents bid for all their candidates, and bids are granted in descending order, but for those
-        that share a task with one granted before. ``simultaneous``, the paper's: all agents choose at once.
+        ``bidding``: all agents bid for all their candidates, and bids are granted in descending order, except those
+        that share a task with a bid already granted. ``simultaneous``, as in the paper: all agents choose at once.
     reward : Reward or str
         ``makespan``: see `potential`; ``coverage``: (3).
     flying : bool
-        Whether agents fly in each step, so that energy adds up over the hops (19) and the battery left limits the
-        reach. If not, they decide first and fly to their last place only: energy is that of the plan.
+        Whether agents fly in each step, so that energy accumulates over the hops (19) and the remaining battery limits
+        the reach. If not, they fly only to their final place, and energy is that of the plan.
     returning : bool
         Whether an agent may return to a place that it left in the same episode.
     most_moves : int or None
-        Bids granted at most in a step; 1 is one move at a time.
+        Maximum number of bids granted in a step; 1 for one move at a time.
     """
 
     turn: TurnRule | str = TurnRule.BIDDING
@@ -42,7 +42,7 @@ class Rules:
 
 
 PLANNING = Rules()
-"""The game that the shipped policies play: agents bid, and fly once all is decided."""
+"""The game of the built-in policies: agents bid, and fly after all decisions."""
 
 PAPER = Rules(TurnRule.SIMULTANEOUS, Reward.COVERAGE, flying=True, returning=True)
 """The game of the paper, section 2.2."""
@@ -63,9 +63,9 @@ class State:
     done : Tensor of bool, shape (B,)
         Whether the game has ended.
     location : Tensor of int, shape (B, n)
-        Task that each agent has flown to, at first where it begins; it stays there while idle. m for its start.
+        Task to which each agent has flown, initially its start, m if that is not a task; idle agents stay there.
     flown : Tensor, shape (B, n)
-        Distance that each agent has flown hop by hop.
+        Distance that each agent has flown, hop by hop.
     """
 
     slot: Tensor
@@ -76,16 +76,16 @@ class State:
     flown: Tensor
 
     def __getitem__(self, rows: Tensor | tuple[Tensor, ...]) -> State:
-        """Return the states with these numbers."""
+        """Return the states with the given indices."""
         return State(*(getattr(self, field.name)[rows] for field in fields(self)))
 
     def of_agents(self, some: slice) -> State:
-        """Return the same states with some of the agents, for the features of these alone."""
+        """Return the states with a slice of the agents, to compute features for these only."""
         return replace(self, slot=self.slot[:, some], location=self.location[:, some], flown=self.flown[:, some])
 
 
 def reset(board: Board) -> State:
-    """Return the initial states: agents have flown to where they begin."""
+    """Return the initial states, in which agents have flown to their initial slots."""
     return State(
         slot=board.start,
         group=group_ability(board, board.start),
@@ -97,7 +97,7 @@ def reset(board: Board) -> State:
 
 
 def at_slot(values: Tensor, slot: Tensor) -> Tensor:
-    """Return each agent's value at its slot: (B, n, c) and (B, n) to (B, n)."""
+    """Return each agent's value at its slot: shapes (B, n, c) and (B, n) give (B, n)."""
     return values.gather(2, slot[..., None])[..., 0]
 
 
@@ -114,9 +114,9 @@ def group_ability(board: Board, slot: Tensor) -> Tensor:
 
 
 def sum_by_place(values: Tensor, place: Tensor, places: int) -> Tensor:
-    """Sum values of agents by their place: (B, n, k) and (B, n) to (B, places, k).
+    """Sum values of agents by place: shapes (B, n, k) and (B, n) give (B, places, k).
 
-    Always the same to the last bit: on a GPU, `scatter_add` adds in any order, and a product of matrices does not.
+    A matrix product is bitwise deterministic, unlike `scatter_add` on a GPU, which adds in arbitrary order.
     """
     if values.device.type == "cpu":
         empty = values.new_zeros(len(values), places, values.shape[2])
@@ -126,7 +126,7 @@ def sum_by_place(values: Tensor, place: Tensor, places: int) -> Tensor:
 
 
 def action_mask(board: Board, state: State, rules: Rules = PLANNING) -> Tensor:
-    """Return which candidates each agent may move to, shape (B, n, c): legal, not where it is, not visited."""
+    """Return which candidates each agent may move to, shape (B, n, c): legal, not its own, not visited."""
     allowed = board.legal & ~state.done[:, None, None]
     if not rules.returning:
         allowed = allowed & ~state.visited
@@ -138,7 +138,7 @@ def action_mask(board: Board, state: State, rules: Rules = PLANNING) -> Tensor:
 
 
 def hop_distance(board: Board, state: State) -> Tensor:
-    """Return the distance from where each agent is to its candidates, shape (B, n, c); 0 for being idle."""
+    """Return the distance from each agent's location to its candidates, shape (B, n, c); 0 for idle."""
     rows = board.task_distance.gather(1, state.location[..., None].expand(-1, -1, board.places)).gather(
         2, board.candidates
     )
@@ -147,22 +147,22 @@ def hop_distance(board: Board, state: State) -> Tensor:
 
 
 def grant_bids(board: Board, state: State, bids: Tensor, reserve: Tensor, most_moves: int | None = None) -> Tensor:
-    """Grant bids above the reserve in descending order, but for those that share a task with one granted before.
+    """Grant bids above the reserve in descending order, except those that share a task with a granted one.
 
     Parameters
     ----------
     bids : Tensor, shape (B, n, c)
-        ``-inf`` where an agent may not bid.
+        Bids; ``-inf`` where an agent may not bid.
     reserve : Tensor, shape (B,)
-        Bids below it are not granted; a game without a granted bid ends.
+        Reserve price, below which bids are not granted; a game without a granted bid ends.
     most_moves : int, optional
-        Bids granted at most.
+        Maximum number of granted bids.
 
     Returns
     -------
     Tensor of int, shape (B, k)
-        The granted bids, ``agent * c + slot``, in their order; then once ``n * c`` where the reserve came next, or
-        nobody else could bid; then -1. Where `most_moves` were granted, no reserve follows.
+        The granted bids, ``agent * c + slot``, in order; then ``n * c`` once if the reserve came next or no other agent
+        could bid; then -1. After `most_moves` granted bids, no reserve follows.
     """
     batch, n, c = board.shape
     task, idle = current_tasks(board, state), board.places - 1
@@ -195,22 +195,22 @@ def apply_moves(board: Board, state: State, granted: Tensor) -> Tensor:
     Parameters
     ----------
     granted : Tensor of int, shape (B, k)
-        Bids, ``agent * c + slot``; anything else is none.
+        Bids, ``agent * c + slot``; other values are ignored.
     """
     batch, n, c = board.shape
-    slot = torch.cat([state.slot, state.slot.new_zeros(batch, 1)], 1)  # a last column for what is no bid
+    slot = torch.cat([state.slot, state.slot.new_zeros(batch, 1)], 1)  # the last column absorbs other values
     real = (granted >= 0) & (granted < n * c)
     agent = torch.where(real, torch.div(granted, c, rounding_mode="floor"), n)
     return slot.scatter(1, agent, granted.clamp(min=0) % c)[:, :-1]
 
 
 def step(board: Board, state: State, slot: Tensor) -> State:
-    """Move every agent to a candidate; a game in which nobody moves ends.
+    """Move every agent to a candidate; a game in which no agent moves ends.
 
     Parameters
     ----------
     slot : Tensor of int, shape (B, n)
-        Candidate that each agent goes to, or its slot now to stay; ignored in games that are done.
+        Candidate to which each agent goes, or its current slot to stay; ignored in finished games.
     """
     slot = torch.where(state.done[:, None], state.slot, slot)
     goes = slot != state.slot
@@ -238,14 +238,14 @@ def _flight(board: Board, state: State, slot: Tensor, place: Tensor) -> Tensor:
 
 
 def mean_distance(board: Board, state: State, rules: Rules = PLANNING) -> Tensor:
-    """Return the mean distance flown per agent, shape (B,): directly to the last place (19), or hop by hop."""
+    """Return the mean distance flown per agent, shape (B,): directly to the final place (19), or hop by hop."""
     return (state.flown if rules.flying else at_slot(board.distance, state.slot)).sum(1) / board.agent_count
 
 
 def battery_left(board: Board, state: State) -> Tensor:
     """Return the share of the battery left after the hops of the episode, shape (B,).
 
-    The mean over the agents that have a battery; 1 where nobody has one.
+    This is the mean over agents with a battery; 1 if no agent has one.
     """
     limited = board.endurance < torch.inf
     spent = (state.flown / board.endurance.clamp(min=TOLERANCE)).clamp(max=1.0) * limited

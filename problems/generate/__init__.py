@@ -1,4 +1,4 @@
-"""Seeded instances: the paper's scenarios, a general family, and machine covering."""
+"""Random instances: the paper's scenarios, a general family, and machine covering."""
 
 from alloc.problems.generate.covering import machine_covering
 from alloc.problems.generate.family import Family, Spread

@@ -1,4 +1,4 @@
-"""Seeded instances of machine covering, P||Cmin and Q||Cmin: few agents per task, abilities over a wide range."""
+"""Random instances of machine covering, P||Cmin and Q||Cmin, with few agents per task and a wide range of abilities."""
 
 import numpy as np
 
@@ -7,10 +7,10 @@ from alloc.problems.fields import IntArray
 from alloc.problems.instance import Instance
 
 EQUAL_WORKLOAD = 1000
-"""Workload of every task where all are equal."""
+"""Workload of every task if all are equal."""
 
 WORKLOADS = (200, 2000)
-"""Smallest and largest workload where they differ."""
+"""Smallest and largest workload if they differ."""
 
 
 def machine_covering(
@@ -24,27 +24,27 @@ def machine_covering(
     whole: bool = True,
     choices: int | None = None,
 ) -> Instance:
-    """Return an instance without places: abilities U[low, high], and workloads all 1000, or U[200, 2000].
+    """Return an instance without places, with abilities U[low, high] and workloads of 1000 or U[200, 2000].
 
-    ``numpy.random.default_rng([agents, tasks, low, high, seed])`` draws first the abilities, by ``integers``, ends
-    included, or by ``uniform``, and then the workloads, by ``integers``. So an instance with equal workloads and one
-    with unequal ones have the same abilities.
+    ``numpy.random.default_rng([agents, tasks, low, high, seed])`` draws first the abilities, by ``integers`` (ends
+    included) or ``uniform``, and then the workloads, by ``integers``, so that instances with equal and unequal
+    workloads have the same abilities.
 
     Parameters
     ----------
     agents, tasks : int
-        Numbers of both, >= 1.
+        Numbers of agents and tasks, >= 1.
     low, high : int
         Range of the abilities, 1 <= low <= high.
     seed : int
-        Source of all randomness, >= 0.
+        Random seed, >= 0.
     equal : bool
         Whether all workloads are 1000.
     whole : bool
         Whether abilities are whole numbers.
     choices : int, optional
-        How many tasks each agent may take, all by default: agent i takes task i modulo m, and others that
-        ``numpy.random.default_rng([agents, tasks, seed])`` draws, among which that one may be again.
+        Number of tasks that each agent may take, by default all: agent i may take task i modulo m, and others drawn by
+        ``numpy.random.default_rng([agents, tasks, seed])``, possibly including that task again.
 
     Raises
     ------

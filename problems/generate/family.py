@@ -1,4 +1,4 @@
-"""A general family of random instances, and what its parameters may be."""
+"""Parameters of a general family of random instances."""
 
 from dataclasses import dataclass
 
@@ -7,23 +7,23 @@ from alloc.problems.errors import InputError
 from alloc.problems.vocabulary import Distribution, Sites, Starts
 
 LARGEST = 1e12
-"""Largest number that a parameter takes."""
+"""Largest value of a parameter."""
 
 MOST = 10_000_000
-"""Agents or tasks beyond which no instance is generated."""
+"""Maximum number of agents, and of tasks, of a generated instance."""
 
 Spread = float | tuple[float, float] | None
-"""One value for all, the ends of a uniform distribution, or None: no limit."""
+"""A single value, the ends of a uniform distribution, or None for no limit."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Family:
-    """What random instances look like.
+    """Parameters of random instances.
 
     Parameters
     ----------
     agents, tasks : int
-        How many of each.
+        Numbers of agents and tasks.
     ability : Distribution or str
         ``equal``: all `ability_max`; ``uniform`` from `ability_min` to `ability_max`; ``lognormal``: 95 % of the agents
         between the two; ``pareto``: at least `ability_min`, shape 1.5, mean three times that, no upper end.
@@ -33,7 +33,7 @@ class Family:
         Shares of the total: ``equal``, ``uniform`` (from a tenth to one, before scaling), ``dirichlet`` (with all
         parameters 2), ``lognormal`` (sigma 1) or ``pareto`` (shape 1.5).
     load : float
-        Total workload over total ability, > 0; with `integer` as near as whole numbers come, and each at least 1.
+        Total workload divided by total ability, > 0; with `integer`, rounded, with workloads of at least 1.
     integer : bool
         Whether abilities and workloads are whole numbers.
     sites : Sites or str
@@ -44,21 +44,21 @@ class Family:
     world_size : float
         Side of the square or cube, in units of distance, > 0.
     starts : Starts or str
-        Each agent begins at a random task (``tasks``), at a place of its ``own`` that lies like the sites, at one of
-        `depots` random ``depots``, or nowhere known (``unknown``).
+        Each agent starts at a random task (``tasks``), at a place of its ``own`` distributed like the sites, at one of
+        `depots` random ``depots``, or at an unknown place (``unknown``).
     depots : int
     communication_range, battery, speed : float, (float, float) or None
-        In units of distance, of energy, and in distance per hour; None for no limit.
+        In units of distance, energy, and distance per hour; None for no limit.
     priority : float or (float, float)
     allowed_fraction : float
-        Share of the tasks that each agent may do, > 0; each gets a random set of this share, one task at the least.
+        Share of the tasks that each agent may do, > 0; each gets a random subset of this size, at least one task.
     energy_per_distance, tau : float
         As in `Instance`.
 
     Raises
     ------
     InputError
-        If a value is out of its range; the error's place is the field.
+        If a value is out of its range; `place` names the field.
     """
 
     agents: int = 100
@@ -104,7 +104,7 @@ class Family:
         for name, kind in choices.items():
             self._set(name, choice(kind, getattr(self, name), name))
         if self.ability is Distribution.DIRICHLET:
-            raise InputError("dirichlet shares a total out, and is for workloads alone", "ability")
+            raise InputError("must not be dirichlet, which divides a total and is for workloads only", "ability")
 
     def _set(self, name: str, value: object) -> None:
         object.__setattr__(self, name, value)
@@ -116,8 +116,8 @@ def _spread(spread: Spread, name: str) -> Spread:
     pair = tuple(spread) if isinstance(spread, list | tuple) else None
     ends = (spread, spread) if pair is None else pair
     if len(ends) != 2:
-        raise InputError(f"must be one number, or the two ends of a range, got {spread!r}", name)
+        raise InputError(f"must be a number or the two ends of a range, got {spread!r}", name)
     low, high = (real(end, name, 0, LARGEST, above=name == "speed") for end in ends)
     if low > high:
-        raise InputError(f"must not end ({high:g}) below its beginning ({low:g})", name)
+        raise InputError(f"must be an ascending range, got {low:g} to {high:g}", name)
     return low if pair is None else (low, high)

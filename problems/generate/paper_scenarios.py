@@ -1,4 +1,4 @@
-"""Seeded instances of the paper: its four scenarios, and others like them."""
+"""Random instances of the paper's four scenarios, and similar ones of other sizes."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from alloc.problems.instance import Instance, IntArray
 
 @dataclass(frozen=True)
 class Scenario:
-    """One scenario of the paper: sizes, total of all abilities and of all workloads, and battery (ours)."""
+    """A scenario of the paper: sizes, total of abilities and of workloads, and battery (ours)."""
 
     agents: int
     tasks: int
@@ -35,7 +35,7 @@ def paper(scenario: int, seed: int) -> Instance:
     scenario : int
         1 to 4.
     seed : int
-        Source of all randomness, >= 0.
+        Random seed, >= 0.
 
     Raises
     ------
@@ -45,7 +45,7 @@ def paper(scenario: int, seed: int) -> Instance:
     References
     ----------
     Fang et al. (2025), section 5, doi:10.20944/preprints202502.0192.v1. Sizes and totals are the paper's; the unit
-    cube, the spread of the workloads, 6 units of energy per unit of distance, the batteries and tau are ours.
+    cube, the distribution of workloads, 6 units of energy per unit of distance, the batteries and tau are ours.
     """
     if isinstance(scenario, bool) or not isinstance(scenario, int | np.integer) or scenario not in SCENARIOS:
         raise InputError(f"must be 1, 2, 3 or 4, got {shown(scenario)}", "scenario")
@@ -58,16 +58,16 @@ def paper(scenario: int, seed: int) -> Instance:
 def paper_like(
     agents: int, tasks: int, total: int, seed: int, *, battery: float = 20.0, name: str | None = None
 ) -> Instance:
-    """Return an instance like those of the paper, of any size.
+    """Return a random instance like those of the paper, of any size.
 
     Parameters
     ----------
     agents, tasks : int
     total : int
-        Sum of all abilities (whole numbers from 1 to 10), and of all workloads (distinct positive whole numbers).
+        Sum of all abilities (integers from 1 to 10), and of all workloads (distinct positive integers).
     seed : int
     battery : float
-        Energy of each agent; a unit of distance costs 6.
+        Battery of each agent; a unit of distance costs 6.
     name : str, optional
 
     Raises
@@ -78,7 +78,7 @@ def paper_like(
     agents, tasks, total = whole(agents, "agents", 1), whole(tasks, "tasks", 1), whole(total, "total")
     real(battery, "battery")
     if not agents <= total <= 10 * agents:
-        raise InputError(f"must lie from 1 to 10 per agent, got {total} for {agents} agents", "total")
+        raise InputError(f"must be from 1 to 10 per agent, got {total} for {agents} agents", "total")
     if tasks * (tasks + 1) // 2 > total:
         raise InputError(f"must be at least {tasks * (tasks + 1) // 2} for {tasks} distinct workloads", "total")
     rng = np.random.default_rng(whole(seed, "seed"))
@@ -95,7 +95,7 @@ def paper_like(
 
 
 def _abilities_summing_to(total: int, agents: int, rng: np.random.Generator) -> IntArray:
-    """Whole numbers from 1 to 10: uniform at first, then moved by 1 at random agents until the sum is right."""
+    """Return integers from 1 to 10: uniform, then changed by 1 at random agents until the sum is right."""
     ability = rng.integers(1, 11, agents)
     while (gap := total - int(ability.sum())) != 0:
         moves = np.bincount(rng.integers(0, agents, abs(gap)), minlength=agents)
@@ -104,7 +104,7 @@ def _abilities_summing_to(total: int, agents: int, rng: np.random.Generator) -> 
 
 
 def _distinct_workloads(total: int, tasks: int, rng: np.random.Generator) -> IntArray:
-    """Distinct positive whole numbers: a Dirichlet(2) spread over the staircase 1, 2, ..., m."""
+    """Return distinct positive integers: 1, 2, ..., m plus Dirichlet(2) shares of the remainder."""
     spare = total - tasks * (tasks + 1) // 2
     spread = np.sort(np.floor(rng.dirichlet(np.full(tasks, 2.0)) * spare).astype(np.int64))
     spread += np.arange(1, tasks + 1)

@@ -1,4 +1,4 @@
-"""Seeded random instances of a general family."""
+"""Random instances of a general family."""
 
 import numpy as np
 
@@ -15,7 +15,7 @@ def random_instance(family: Family, seed: int, *, name: str | None = None) -> In
     ----------
     family : Family
     seed : int
-        Seed of all random numbers, >= 0.
+        Random seed, >= 0.
     name : str, optional
         Name of the instance.
     """
@@ -73,7 +73,7 @@ def _workloads(family: Family, ability: float, rng: np.random.Generator) -> Floa
     elif family.workload is Distribution.UNIFORM:
         weight = rng.uniform(0.1, 1.0, m)
     elif family.workload is Distribution.DIRICHLET:
-        weight = rng.gamma(2.0, 1.0, m)  # in proportion, that is Dirichlet(2)
+        weight = rng.gamma(2.0, 1.0, m)  # normalised, this is Dirichlet(2)
     elif family.workload is Distribution.LOGNORMAL:
         weight = rng.lognormal(0.0, 1.0, m)
     else:
@@ -83,7 +83,7 @@ def _workloads(family: Family, ability: float, rng: np.random.Generator) -> Floa
 
 
 def _whole(share: FloatArray, total: int) -> FloatArray:
-    """Round `total` times `share` to whole numbers >= 1 of this total, by the largest remainder."""
+    """Round `total` times `share` to integers >= 1 with this total, by largest remainders."""
     exact = share * (total - len(share))
     whole = np.floor(exact)
     left = int(total - len(share) - whole.sum())
@@ -105,7 +105,7 @@ def _draw(spread: Spread, count: int, rng: np.random.Generator) -> FloatArray | 
 
 
 def _allowed(family: Family, rng: np.random.Generator) -> list[IntArray]:
-    """One random set of tasks per agent, drawn in blocks to bound the memory."""
+    """Return a random set of tasks per agent, drawn in blocks to limit memory."""
     n, m = family.agents, family.tasks
     size, block = max(1, round(family.allowed_fraction * m)), max(1, 1_000_000 // m)
     lists: list[IntArray] = []

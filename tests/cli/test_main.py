@@ -181,7 +181,7 @@ def test_bad_usage_is_one_line(alloc, small, arguments):
         (("solve", "small.json", "--method", "greedy", "--policy", "x"), "--policy: method 'greedy' takes no option"),
         (("pareto", "small.json", "--time-limit", "inf"), "--time-limit: must be a finite number"),
         (("compare", "small.json", "--methods", "gredy"), "--methods: there is no method 'gredy'"),
-        (("generate", "random", "--range", "5:3"), "--range: must not end"),
+        (("generate", "random", "--range", "5:3"), "--range: must be an ascending range"),
         (("generate", "covering", "--ability-min", "0"), "--ability-min: must be a whole number >= 1"),
         (("generate", "random", "--tau", "2"), "--tau: must lie strictly between 0 and 1"),
         (("train", "ga", "--output", "p"), "METHOD: 'ga' learns nothing"),

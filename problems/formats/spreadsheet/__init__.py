@@ -1,4 +1,4 @@
-"""Spreadsheets as people keep them: text with any separator and encoding, and workbooks of Excel."""
+"""Reading of spreadsheets: text with any common separator and encoding, and Excel workbooks."""
 
 from alloc.problems.formats.spreadsheet.file import read_grid
 

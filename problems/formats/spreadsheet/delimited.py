@@ -1,4 +1,4 @@
-"""Text with separators, in the encodings and with the separators that spreadsheets write."""
+"""Delimited text, in the encodings and with the separators that spreadsheets write."""
 
 import codecs
 import csv
@@ -10,7 +10,7 @@ from alloc.problems.errors import InputError
 from alloc.problems.tables.grid import Grid, clean
 
 SEPARATORS = ("\t", ";", ",", "|")
-"""In the order in which they are preferred where several would do."""
+"""Separators, in order of preference if several fit."""
 
 MARKS = (
     (codecs.BOM_UTF8, "utf-8"),
@@ -22,16 +22,16 @@ MARKS = (
 DECLARED = re.compile(r"^\"?sep=(.)\"?\r?\n", re.IGNORECASE)
 FORMULA_TEXT = re.compile(r'^="([^"]*)"$')
 SAMPLE = 200
-"""Rows by which the separator is chosen."""
+"""Number of rows from which the separator is determined."""
 
 
 def grid_of_text(data: bytes, source: str) -> Grid:
-    """Return the cells of a text file, whatever its encoding and separator.
+    """Return the cells of a text file, detecting its encoding and separator.
 
     Raises
     ------
     InputError
-        If it is no text, or its quotes do not fit.
+        If it is not text, or its quotes are unbalanced.
     """
     text, encoding = decoded(data)
     if text.lstrip().startswith(("<", "{")):
@@ -53,18 +53,18 @@ def grid_of_text(data: bytes, source: str) -> Grid:
             line = reader.line_num + 1
     except csv.Error as error:
         raise InputError(
-            f"has a cell that cannot be read: {error}; are its quotes in pairs?", f"line {line}"
+            f"has a cell that cannot be read: {error}; are its quotes balanced?", f"line {line}"
         ) from error
     return Grid(source, rows, places, decimal_point=separator == ",", notes=tuple(notes))
 
 
 def _unescaped(cell: str) -> str:
-    """Return the text of a cell that is written as a formula, so that no spreadsheet takes it for a number."""
+    """Return the text of a cell written as a formula, which prevents spreadsheets from converting it to a number."""
     return FORMULA_TEXT.sub(r"\1", cell) if cell.startswith('="') else cell
 
 
 def decoded(data: bytes) -> tuple[str, str]:
-    """Return a text and its encoding: by its byte order mark, else UTF-16 by its zeros, UTF-8, or Windows-1252."""
+    """Return a text and its encoding: by byte order mark, UTF-16 by its zero bytes, UTF-8, or else Windows-1252."""
     for mark, encoding in MARKS:
         if data.startswith(mark):
             return _decode(data[len(mark) :], encoding), encoding
@@ -86,11 +86,11 @@ def _decode(data: bytes, encoding: str) -> str:
     try:
         return data.decode(encoding)
     except UnicodeDecodeError as error:
-        raise InputError(f"begins like {encoding.upper()}, but is none; save it as UTF-8") from error
+        raise InputError(f"begins like {encoding.upper()}, but is not valid; save it as UTF-8") from error
 
 
 def separator_of(text: str) -> str:
-    """Return the separator that gives most rows the same number of cells, two or more; a comma for a single column."""
+    """Return the separator that gives most rows the same number of cells, at least 2; a comma for a single column."""
     best, score = ",", (0, 0)
     for separator in SEPARATORS:
         try:

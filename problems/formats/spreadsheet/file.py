@@ -1,4 +1,4 @@
-"""Cells of a file; its suffix decides between text and a workbook."""
+"""Reading of the cells of a file; its suffix determines whether it is text or a workbook."""
 
 import os
 import re
@@ -21,8 +21,8 @@ def read_grid(path: PathLike) -> Grid:
     Parameters
     ----------
     path : str or path
-        ``*.xlsx`` or ``*.xlsm``, the first sheet or ``file.xlsx:Sheet``; else text with separators, ``-`` for that from
-        standard input.
+        ``*.xlsx`` or ``*.xlsm``, the first sheet or ``file.xlsx:Sheet``; otherwise delimited text, ``-`` for text
+        from standard input.
 
     Raises
     ------
@@ -36,7 +36,7 @@ def read_grid(path: PathLike) -> Grid:
         if not is_stream(path):
             suffix = Path(file).suffix.lower()
             if suffix in OTHERS:
-                raise InputError(f"no table is read from {suffix}; save it as .xlsx or .csv")
+                raise InputError(f"tables cannot be read from {suffix}; save it as .xlsx or .csv")
             if suffix in WORKBOOKS:
                 from alloc.problems.formats.spreadsheet.workbook import grid_of_workbook
 

@@ -1,4 +1,4 @@
-"""Workbooks of Excel, read by openpyxl."""
+"""Reading of Excel workbooks by openpyxl."""
 
 import io
 import zipfile
@@ -14,14 +14,14 @@ OPENPYXL_MISSING = "needs openpyxl; install it with: pip install 'alloc-mrta[tab
 
 
 def grid_of_workbook(data: bytes, source: str, sheet: str | None) -> Grid:
-    """Return the cells of a sheet, the first where none is named; merged cells have their value in each row.
+    """Return the cells of a sheet, by default the first; merged cells have their value in each row.
 
     Raises
     ------
     MissingPackageError
         If openpyxl is not installed.
     InputError
-        If it is no workbook, or has no such sheet.
+        If it is not a workbook, or has no such sheet.
     """
     try:
         import openpyxl
@@ -31,9 +31,7 @@ def grid_of_workbook(data: bytes, source: str, sheet: str | None) -> Grid:
     try:
         book = openpyxl.load_workbook(io.BytesIO(data), data_only=True)
     except (InvalidFileException, zipfile.BadZipFile, KeyError, ValueError) as error:
-        raise InputError(
-            "is no workbook that can be read (protected by a password?); save it anew, or as .csv"
-        ) from error
+        raise InputError("is not a readable workbook (protected by a password?); save it again, or as .csv") from error
     names = [one.title for one in book.worksheets]
     if not names:
         raise InputError("has no sheet with cells")

@@ -45,7 +45,7 @@ def test_a_table_alone_leads_to_this_command(alloc):
     """Whoever has a table and solves it at once is told what makes an instance of two."""
     ran = alloc("solve", "tasks.csv")
     assert (ran.code, len(ran.err.splitlines())) == (2, 1)
-    assert "join two tables by `alloc import`" in ran.err
+    assert "combine two tables with `alloc import`" in ran.err
 
 
 @pytest.mark.usefixtures("tables")
@@ -101,7 +101,7 @@ def test_other_formats_say_what_to_save(alloc):
     """A spreadsheet of another program is refused with the formats that are read."""
     Path("fleet.ods").write_bytes(b"PK")
     ran = alloc("import", "--agents", "fleet.ods", "--tasks", "tasks.csv", "--output", "fleet.json")
-    assert (ran.code, ran.err) == (2, "alloc: fleet.ods: no table is read from .ods; save it as .xlsx or .csv\n")
+    assert (ran.code, ran.err) == (2, "alloc: fleet.ods: tables cannot be read from .ods; save it as .xlsx or .csv\n")
 
 
 @pytest.mark.usefixtures("tables")

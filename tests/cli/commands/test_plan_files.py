@@ -111,4 +111,4 @@ def test_a_result_without_a_plan_is_still_drawn(alloc, small):
     assert alloc("plot", "small.json", "none.txt", "--output", "none.svg").code == 0
     assert "no allocation found" in Path("none.svg").read_text()
     ran = alloc("solve", "small.json", "--start", "none.txt")
-    assert ran.err == "alloc: none.txt: status: this result holds no allocation; give one with another status\n"
+    assert ran.err == "alloc: none.txt: status: this result contains no allocation; give one with another status\n"

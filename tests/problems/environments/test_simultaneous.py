@@ -167,7 +167,7 @@ def test_wrong_use_is_refused() -> None:
         small(rules=PLANNING)
     with pytest.raises(InputError, match="none"):
         SimultaneousEnv([])
-    with pytest.raises(InputError, match="one size"):
+    with pytest.raises(InputError, match="equal size"):
         SimultaneousEnv([paper_like(8, 3, 30, 0), paper_like(9, 3, 30, 0)])
     env = SimultaneousEnv(lambda rng: paper_like(int(rng.integers(3, 30)), 3, 30, 0))
     with pytest.raises(InputError, match="agents and 3 tasks"):

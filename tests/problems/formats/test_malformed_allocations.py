@@ -26,7 +26,7 @@ ALLOCATIONS = [
     ({"format": "alloc-allocation/1", "assignment": {"a1": 1}}, "assignment.a1", "the id of a task, or null, got 1"),
     ({"format": "alloc-allocation/1", "assignment": {"a1": ["t1"]}}, "assignment.a1", "got a list"),
     ({"format": "alloc-allocation/1", "assignment": {"a1": False}}, "assignment.a1", "got false"),
-    ({"format": "alloc-result/1", "status": "no_solution", "assignment": {}}, "status", "holds no allocation"),
+    ({"format": "alloc-result/1", "status": "no_solution", "assignment": {}}, "status", "contains no allocation"),
     ({"format": "alloc-result/1", "status": "optimal"}, "assignment", "is missing"),
     ('{"format": "alloc-allocation/1", "assignment": {"a1": "t1", "a1": "t2"}}', "assignment", "'a1' occurs twice"),
     ({"format": "alloc-allocation/1", "assignment": {"x\n" * 999: "t1"}}, "assignment", "no agent"),

@@ -74,7 +74,7 @@ TABLES: list[tuple[dict[str, str | bytes], str, str]] = [
     ({"instance.json": header(metric="geo")}, "instance.json, metric", "must be one of euclidean"),
     ({"instance.json": header(units={"speed": "m/s"})}, "instance.json, units.distance", "is missing"),
     ({"instance.json": header(distances={})}, "distances.csv", "is missing, but instance.json has the field"),
-    ({"instance.json": header(distances={"rows": []})}, "instance.json, distances.rows", "must stand in distances.csv"),
+    ({"instance.json": header(distances={"rows": []})}, "instance.json, distances.rows", "must be in distances.csv"),
     ({"instance.json": header(distances={"mising": ""})}, "instance.json, distances", "did you mean 'missing'?"),
     (
         {"instance.json": header(distances={"missing": "x"}), "distances.csv": "from,to,distance\n"},

@@ -118,10 +118,10 @@ def bomb() -> bytes:
 
 BYTES = {
     "empty": (b"", "is empty"),
-    "text": (b"id,ability\n", "is no .npz file"),
-    "npy": (npy("{'descr': '<f8', 'fortran_order': False, 'shape': (0,), }"), "is no .npz file"),
+    "text": (b"id,ability\n", "is not an .npz file"),
+    "npy": (npy("{'descr': '<f8', 'fortran_order': False, 'shape': (0,), }"), "is not an .npz file"),
     "no arrays": (archive(), "is missing"),
-    "cut off": (archive(agent_id__npy=npy("{}"))[:-30], "is no .npz file, or damaged"),
+    "cut off": (archive(agent_id__npy=npy("{}"))[:-30], "is not an .npz file, or is damaged"),
     "other files": (archive(virus__exe=b"x"), "unknown array 'virus.exe'"),
     "no suffix": (archive(format=b"x"), "unknown array 'format'"),
     "no array": (archive(agent_id__npy=b"hello"), "cannot be read"),
@@ -168,7 +168,7 @@ def test_a_zip_bomb_is_not_unpacked(tmp_path: Path) -> None:
         data[position + 24 : position + 28] = struct.pack("<I", 0xFFFFFFF0)
         position += 4
     (tmp_path / "x.npz").write_bytes(data)
-    assert "take 8.0 GiB unpacked; at most 4 are read" in the_error(tmp_path / "x.npz").message
+    assert "take 8.0 GiB uncompressed; at most 4 are read" in the_error(tmp_path / "x.npz").message
 
 
 def test_the_same_array_twice(tmp_path: Path) -> None:

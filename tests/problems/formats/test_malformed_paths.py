@@ -74,7 +74,7 @@ def test_unreadable_files(bound: Path, file: str, full: Instance) -> None:
     locked = path / "agents.csv" if path.is_dir() else path
     locked.chmod(0)
     try:
-        assert "may not be read; change its permissions" in the_error(path).message
+        assert "cannot be read: permission denied; change its permissions" in the_error(path).message
     finally:
         locked.chmod(stat.S_IRUSR | stat.S_IWUSR)
 
@@ -83,7 +83,7 @@ def test_unreadable_files_as_the_system_tells(tmp_path: Path, monkeypatch: pytes
     """Whatever the system says against reading becomes one line; so does what does not fit into memory."""
     (tmp_path / "x.json").write_text("{}")
     for fault, words in (
-        (PermissionError(13, "Permission denied"), "may not be read; change its permissions"),
+        (PermissionError(13, "Permission denied"), "cannot be read: permission denied; change its permissions"),
         (OSError(5, "Input/output error"), "cannot be read: input/output error"),
         (MemoryError(), "does not fit into memory"),
     ):

@@ -195,5 +195,5 @@ def test_hidden_rows_are_told(tmp_path: Path) -> None:
     book.save(path)
     assert read_grid(path).notes == ("1 hidden rows were read too",)
     path.write_bytes(b"PK nothing")
-    with pytest.raises(InputError, match="is no workbook that can be read"):
+    with pytest.raises(InputError, match="is not a readable workbook"):
         read_grid(path)
