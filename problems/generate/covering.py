@@ -1,4 +1,4 @@
-"""Random instances of machine covering, P||Cmin and Q||Cmin, with few agents per task and a wide range of abilities."""
+"""Random instances of machine covering, P||Cmin and Q||Cmin: few agents per task, and a wide range of abilities."""
 
 import numpy as np
 

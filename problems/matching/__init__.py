@@ -1,1 +1,1 @@
-"""Which tasks can be served together: matchings of tasks with agents, and what to do where agents are too few."""
+"""Bipartite matchings of tasks with agents, to decide which tasks can be served together if agents are scarce."""

@@ -1,4 +1,4 @@
-"""More tasks than agents: agents get a task each, by a sample of the pairs first and by augmenting paths then."""
+"""Matchings for more tasks than agents, first by a sample of the pairs, then by augmenting paths."""
 
 from collections import deque
 
@@ -12,28 +12,28 @@ from alloc.problems.matching.pairs import bound_by_size, sampled_pairs
 from alloc.problems.vocabulary import IDLE
 
 SAMPLE_SHARE, LONGEST_S = 0.2, 2.0
-"""Share of the time for the sample, and the longest that it takes."""
+"""Share of the time for the sample, and its limit in seconds."""
 
 SHORTEST_S = 0.1
-"""How long it takes where there is no time."""
+"""Minimum time in seconds, even without time left."""
 
 SLOWER = (4.0, 16.0, np.inf)
-"""Makespans that are tried in turn, as multiples of a bound."""
+"""Makespans to try in turn, as multiples of a bound."""
 
 
 class AgentMatching:
-    """A matching of agents with `tasks`, as large as time allows, which serves all that `start` serves.
+    """A matching of agents with `tasks`, as large as time allows, which serves all tasks that `start` serves.
 
     Attributes
     ----------
     task_of_agent : ndarray of int, shape (n,)
-        The task of each agent, no task twice; `IDLE` where it has none.
+        Task of each agent, without repetitions; `IDLE` for none.
     is_largest : bool
-        Whether no matching is larger.
+        Whether the matching is maximum.
     replaceable : ndarray of bool, shape (n,)
-        Agents that some largest matching leaves without a task; all of them if `is_largest`.
+        Agents that some maximum matching leaves idle; complete if `is_largest`.
     their_tasks : ndarray of bool, shape (m,)
-        The tasks within reach of these: every largest matching serves them, by these agents.
+        Tasks within reach of these agents; every maximum matching serves them by these agents.
     """
 
     def __init__(self, instance: Instance, tasks: IntArray, time_left: Clock, start: IntArray | None = None) -> None:
@@ -51,7 +51,7 @@ class AgentMatching:
         )
 
     def _augment(self, agent: int, time_left: Clock) -> bool:
-        """Find a task for `agent` by the fewest moves, or mark all that it could move; False if time runs out."""
+        """Augment `agent` along a shortest path, or mark all agents reached; return False if time runs out."""
         queue, agents = deque([agent]), [agent]
         seen = self.their_tasks.copy()
         wanted_by: dict[int, int] = {}
@@ -84,7 +84,7 @@ class AgentMatching:
 
 
 def _of_sample(instance: Instance, tasks: IntArray, time_left: Clock) -> IntArray:
-    """Return a large matching by a sample of the pairs."""
+    """Return a large matching from a sample of the pairs."""
     everyone = np.arange(instance.n)
     seconds = max(SHORTEST_S, min(LONGEST_S, SAMPLE_SHARE * time_left()))
     pairs, _ = sampled_pairs(instance, everyone, tasks, None, seconds, unlimited)
@@ -92,7 +92,7 @@ def _of_sample(instance: Instance, tasks: IntArray, time_left: Clock) -> IntArra
 
 
 def _fast_matching(pairs: Pairs, bound: float, time_left: Clock) -> IntArray:
-    """Return a large matching, by the faster pairs as far as they will do."""
+    """Return a large matching, preferring fast pairs."""
     matched = np.full(len(pairs.first) - 1, IDLE, dtype=np.intp)
     time_left = share_of(0.5, time_left)
     for factor in SLOWER:

@@ -1,4 +1,4 @@
-"""Agents and tasks one to one: the fastest such assignment, and the cheapest."""
+"""One-to-one assignments of agents to tasks: bottleneck (least makespan) and linear sum (least cost)."""
 
 from dataclasses import dataclass
 
@@ -12,21 +12,21 @@ from alloc.problems.matching.hopcroft_karp import largest_matching
 from alloc.problems.vocabulary import IDLE
 
 SEARCH = 500_000_000
-"""Agents times pairs at which looking for the cheapest assignment takes a second as a rule, ten at the most."""
+"""Agents times pairs for which the cheapest assignment usually takes a second, and at most ten."""
 
 
 @dataclass(frozen=True, eq=False)
 class Pairs:
-    """Pairs of k agents with tasks, agent by agent: those of agent i begin at ``first[i]``.
+    """Pairs of k agents with tasks, grouped by agent: those of agent i start at ``first[i]``.
 
     Attributes
     ----------
     first : ndarray of int, shape (k + 1,)
     task : ndarray of int, shape (p,)
     hours : ndarray, shape (p,)
-        When the agent has done the task alone.
+        Completion time if the agent does the task alone.
     cost : ndarray, shape (p,)
-        Of the flight, see `Reach.costs`.
+        Cost of the flight, see `Reach.costs`.
     """
 
     first: IntArray
@@ -35,31 +35,31 @@ class Pairs:
     cost: FloatArray
 
     def within(self, hours: float) -> "Pairs":
-        """Return the pairs that take at most so many hours."""
+        """Return the pairs that take at most `hours`."""
         return self.chosen(self.hours <= hours)
 
     def chosen(self, which: NDArray[np.bool_]) -> "Pairs":
-        """Return the pairs marked in `which`, shape (p,)."""
+        """Return the pairs in the mask `which`, shape (p,)."""
         first = np.concatenate([[0], np.cumsum(which)])[self.first]
         return Pairs(first, self.task[which], self.hours[which], self.cost[which])
 
     @property
     def row(self) -> IntArray:
-        """The agent of each pair."""
+        """Agent of each pair."""
         return np.repeat(np.arange(len(self.first) - 1), np.diff(self.first))
 
 
 def match_in_time(
     pairs: Pairs, known: IntArray, time_left: Clock, required: BoolArray | None = None
 ) -> IntArray | None:
-    """Return a largest matching of agents with tasks, begun with what `pairs` holds of another; None if time runs out.
+    """Return a maximum matching of agents with tasks, starting from the pairs of `known`; None if time runs out.
 
     Parameters
     ----------
     known : ndarray of int, shape (k,)
-        The other matching.
+        Matching to start from; pairs that are not in `pairs` are dropped.
     required : ndarray of bool, shape (m,), optional
-        Tasks that must have an agent; where that cannot be, no agent has a task in the answer.
+        Tasks that must have an agent; if that is impossible, all agents are idle in the result.
     """
     row = pairs.row
     kept = pairs.task == known[row]
@@ -69,13 +69,13 @@ def match_in_time(
         covering = _covering(pairs, start, required, time_left)
         if covering is None or (required.any() and (covering == IDLE).all()):
             return covering
-        start = covering  # paths from further agents leave no task that has one
+        start = covering  # augmenting paths from further agents keep matched tasks matched
     found, is_largest = largest_matching(pairs.first, pairs.task, start, time_left)
     return found if is_largest else None
 
 
 def _covering(pairs: Pairs, start: IntArray, required: BoolArray, time_left: Clock) -> IntArray | None:
-    """Return a matching of the required tasks, with what `start` adds; idle if there is none, None if time runs out."""
+    """Return a matching of the required tasks, extended by `start`; idle if there is none, None if time runs out."""
     needed, is_needed = np.flatnonzero(required), required[pairs.task]
     place, row = np.searchsorted(needed, pairs.task[is_needed]), pairs.row[is_needed]
     order = np.argsort(place, kind="stable")
@@ -97,25 +97,25 @@ def _covering(pairs: Pairs, start: IntArray, required: BoolArray, time_left: Clo
 def bottleneck(
     pairs: Pairs, known: IntArray, latest: float, time_left: Clock, required: BoolArray | None = None
 ) -> tuple[IntArray, float]:
-    """Return a task for each agent so that the last is done as early as can be, and a bound on when that is.
+    """Return a bottleneck assignment, whose latest completion time is least, and a lower bound on that time.
 
-    By halving the hours in question, with a matching for each; the bound falls short where time runs out.
+    By bisection of the hours, with a matching for each; the bound is not tight if time runs out.
 
     Parameters
     ----------
     pairs : Pairs
-        With a pair for each agent and its task in `known`, or k that are no slower.
+        Pairs, including for each agent its task in `known`, or k pairs that are no slower.
     known : ndarray of int, shape (k,)
-        Some such assignment.
+        An assignment to start from.
     latest : float
-        When the last agent is done in it.
+        Its latest completion time.
     time_left : callable
-        Seconds.
+        Returns the seconds left.
     required : ndarray of bool, shape (m,), optional
-        Tasks that must have an agent, as they have in `known`.
+        Tasks that must have an agent, as in `known`.
     """
     best, least = known, 0.0
-    bound = float(np.minimum.reduceat(pairs.hours, pairs.first[:-1]).max())  # each takes its fastest
+    bound = float(np.minimum.reduceat(pairs.hours, pairs.first[:-1]).max())  # each agent with its fastest task
     low, high = bound, min(latest, float(pairs.hours.max()))
     while time_left() > len(pairs.task) / MATCHED_PER_SECOND:
         in_range = pairs.hours[(pairs.hours >= low) & (pairs.hours <= high)]
@@ -140,12 +140,12 @@ def bottleneck(
 def cheapest(
     pairs: Pairs, known: IntArray, cost: FloatArray, time_left: Clock, required: BoolArray | None = None
 ) -> IntArray:
-    """Return the assignment with the least sum of `cost`, shape (p,) and >= 0; `known` where time does not allow it.
+    """Return the assignment with the least sum of `cost`, shape (p,) and >= 0, or `known` if time is too short.
 
-    All tasks that are `required`, shape (m,), have an agent, as they have in `known`.
+    All `required` tasks, shape (m,), have an agent, as in `known`.
 
-    By shortest augmenting paths (Jonker and Volgenant 1987, doi:10.1007/BF02278710), among the cheapest pairs of each
-    agent where all would take too long.
+    By shortest augmenting paths (Jonker and Volgenant 1987, doi:10.1007/BF02278710), restricted to the cheapest pairs
+    of each agent if all would take too long.
     """
     from scipy.sparse import csr_matrix
     from scipy.sparse.csgraph import min_weight_full_bipartite_matching
@@ -165,9 +165,9 @@ def cheapest(
         few = held | (place < most)
         pairs, cost = pairs.chosen(few), cost[few]
     scale = float(cost.max())
-    weight = 1.0 + (cost / scale if scale > 0 else cost)  # a sparse matrix has no pairs of weight 0
+    weight = 1.0 + (cost / scale if scale > 0 else cost)  # sparse matrices drop entries of weight 0
     if required is not None:
-        weight += np.where(required[pairs.task], 0.0, 2.0 * k)  # as many as can be have an agent, whatever the cost
+        weight += np.where(required[pairs.task], 0.0, 2.0 * k)  # required tasks take precedence over cost
     tasks, column = np.unique(pairs.task, return_inverse=True)
     graph = csr_matrix((weight, column, pairs.first), shape=(k, len(tasks)))
     chosen: IntArray = tasks[min_weight_full_bipartite_matching(graph)[1]]

@@ -1,4 +1,4 @@
-"""A largest matching whose running time is bounded, whatever the graph; that of SciPy may take minutes."""
+"""Maximum bipartite matching with bounded running time on any graph, unlike SciPy's, which may take minutes."""
 
 from collections.abc import Iterator
 
@@ -9,21 +9,21 @@ from alloc.problems.matching.clock import Clock, unlimited
 from alloc.problems.vocabulary import IDLE
 
 CHECK_EVERY = 16
-"""Rows between two looks at the clock."""
+"""Number of rows between two checks of the clock."""
 
 UNSEEN = -1
-"""The level of a row that no alternating path has reached, or that leads to no free column any more."""
+"""Level of a row that no alternating path has reached, or that no longer leads to a free column."""
 
 
 def match(first: IntArray, column: IntArray, time_left: Clock = unlimited) -> tuple[IntArray, bool]:
-    """Do as `largest_matching`, but from whichever side has fewer to match: the others would be tried to no end.
+    """Return a maximum matching as `largest_matching` does, but computed from the smaller side.
 
     Parameters
     ----------
     first : ndarray of int, shape (rows + 1,)
     column : ndarray of int, shape (pairs,)
     time_left : callable
-        Seconds; no limit by default.
+        Returns the seconds left; by default no limit.
     """
     rows, columns = len(first) - 1, int(column.max(initial=-1)) + 1
     matched = np.full(rows, IDLE, dtype=np.intp)
@@ -38,10 +38,10 @@ def match(first: IntArray, column: IntArray, time_left: Clock = unlimited) -> tu
 
 
 def largest_matching(first: IntArray, column: IntArray, start: IntArray, time_left: Clock) -> tuple[IntArray, bool]:
-    """Return a column for each row of compressed pairs, `IDLE` for none, and whether as many rows as can be have one.
+    """Return a maximum matching, the column of each row or `IDLE`, and whether it is known to be maximum.
 
-    Where time runs out, fewer may have one. By phases of shortest augmenting paths (Hopcroft and Karp 1973,
-    doi:10.1137/0202019): O(pairs * sqrt(rows)) time.
+    It may be smaller if time runs out. By phases of shortest augmenting paths (Hopcroft and Karp 1973,
+    doi:10.1137/0202019), in O(pairs * sqrt(rows)) time.
 
     Parameters
     ----------
@@ -49,9 +49,9 @@ def largest_matching(first: IntArray, column: IntArray, start: IntArray, time_le
     column : ndarray of int, shape (pairs,)
         The columns of row i are ``column[first[i]:first[i + 1]]``.
     start : ndarray of int, shape (rows,)
-        A matching to begin with, `IDLE` where a row has no column.
+        Matching to start from, `IDLE` for rows without a column.
     time_left : callable
-        Seconds.
+        Returns the seconds left.
     """
     matching = _Matching(first, column, start, time_left)
     while is_larger := matching.find_levels():
@@ -61,7 +61,7 @@ def largest_matching(first: IntArray, column: IntArray, start: IntArray, time_le
 
 
 class _Matching:
-    """A matching, and how far each row is from a row without a column."""
+    """A matching, and the level of each row: its distance from an unmatched row on alternating paths."""
 
     def __init__(self, first: IntArray, column: IntArray, start: IntArray, time_left: Clock) -> None:
         self.first, self.column, self.time_left = first.tolist(), column, time_left
@@ -82,14 +82,14 @@ class _Matching:
         return columns
 
     def _in_time(self, rows: list[int]) -> Iterator[int]:
-        """Yield one of `rows` after the other until time runs out."""
+        """Yield the rows until time runs out."""
         for count, row in enumerate(rows):
             if count % CHECK_EVERY == 0 and self.time_left() <= 0:
                 return
             yield row
 
     def find_levels(self) -> bool:
-        """Set the level of each row on a shortest augmenting path; False if there is no such path."""
+        """Compute the levels of rows by breadth-first search; return False if there is no augmenting path."""
         self.level = [0 if held == IDLE else UNSEEN for held in self.held]
         front = [row for row, level in enumerate(self.level) if level == 0]
         depth, found = 0, False
@@ -104,17 +104,17 @@ class _Matching:
                         self.level[owner] = depth
                         behind.append(owner)
             front = behind
-            found = found or self.time_left() <= 0  # then nobody knows
+            found = found or self.time_left() <= 0  # unknown
         return found
 
     def augment_all(self) -> bool:
-        """Augment along as many paths of this phase as can be; False if time runs out."""
+        """Augment along a maximal set of shortest paths; return False if time runs out."""
         for row in self._in_time([row for row, held in enumerate(self.held) if held == IDLE]):
             self._augment(row)
         return self.time_left() > 0
 
     def _augment(self, root: int) -> None:
-        """Give `root` a column along a path on which levels rise by one, if there is one left in this phase."""
+        """Match `root` along a path of increasing levels, if one is left in this phase."""
         path, options, steps = [root], [iter(self._columns(root))], 0
         taken: list[int] = []
         while path:

@@ -1,4 +1,4 @@
-"""Pairs of agents and tasks that agents can do alone: all of them, or a sample where there are too many."""
+"""Pairs of agents and tasks that they can do alone: all of them, or a sample if there are too many."""
 
 import sys
 
@@ -12,33 +12,33 @@ from alloc.problems.matching.clock import EVALUATED_PER_SECOND, SAMPLED_PER_SECO
 from alloc.problems.matching.precedence import Precedence
 
 BLOCK_OF_AGENTS = 64
-"""Agents that share a sample of tasks, so that their distances are worked out together."""
+"""Number of agents that share a sample of tasks, so that their distances are computed together."""
 
 TASKS_PER_AGENT = 16
-"""Tasks of a shared sample for each of those agents: with fewer, they would compete for the same tasks."""
+"""Number of tasks in a shared sample per agent; with fewer, agents would compete for the same tasks."""
 
 LARGEST_BLOCK = 1 << 20
-"""Distances that are held at a time."""
+"""Maximum number of distances in memory at a time."""
 
 MOST_PAIRS = 8_000_000
-"""Pairs of a sample that are kept."""
+"""Maximum number of pairs of a sample."""
 
 LOOKED_AT = 1_000
-"""Tasks by which the share of those within reach is estimated."""
+"""Number of tasks from which the share of those within reach is estimated."""
 
 NEAREST = 32
-"""Nearest tasks that a sample for the least energy holds besides."""
+"""Number of nearest tasks that a sample for the least energy also contains."""
 
 
 def hours_alone(instance: Instance, agents: IntArray, tasks: IntArray, distance: FloatArray) -> FloatArray:
-    """Return when each of `agents` is done, alone with the task beside it, which is `distance` away; shape (k,)."""
+    """Return when each agent would finish its task alone, at the given `distance`; shape (k,)."""
     with np.errstate(over="ignore"):
         hours = instance.workload[tasks] / instance.ability[agents] + distance / instance.speed[agents]
         return np.minimum(hours, sys.float_info.max)
 
 
 def bound_by_size(instance: Instance, agents: IntArray, tasks: IntArray) -> float:
-    """Return a bound on the makespan of an assignment: the least work by the least able, wherever they are."""
+    """Return a lower bound on the makespan of an assignment, by the smallest workloads and least able agents."""
     least = np.sort(instance.workload[tasks])[: len(agents)]
     return float((least / np.sort(instance.ability[agents])).max())
 
@@ -53,11 +53,11 @@ def all_pairs(
     by_cost: bool = False,
     precedence: Precedence | None = None,
 ) -> Pairs | None:
-    """Return for each of k agents the k best pairs with `tasks` that it does by `latest`; None if time runs out.
+    """Return the k best pairs with `tasks` of each of k agents that finish by `latest`; None if time runs out.
 
-    The best are the fastest, or the cheapest. No more are needed: whoever has the choice of k tasks finds one of them
-    free, whatever the other k - 1 agents do. Pairs with tasks that `precedence` requires come in addition, and pairs
-    that it forbids are left out.
+    The best are the fastest, or the cheapest with `by_cost`. No more are needed, as an agent with k tasks always finds
+    one that the other k - 1 agents do not take. Pairs with tasks that `precedence` requires are added, and pairs that
+    it forbids are left out.
     """
     reach, wanted = instance.reach, np.zeros(instance.m, dtype=np.bool_)
     wanted[tasks] = True
@@ -97,21 +97,21 @@ def sampled_pairs(
     latest: float = np.inf,
     by_cost: bool = False,
 ) -> tuple[Pairs, bool]:
-    """Return some pairs of `agents` with `tasks`, and whether they are as good as all pairs.
+    """Return a sample of pairs of `agents` with `tasks`, and whether it is as good as all pairs.
 
-    Each agent looks at tasks of every size: at as many of the smallest, as of the next, which are twice as many, and
-    so on. Agents bound to a list look at all of it.
+    Tasks are sampled in geometric strata of their workloads: equally many from each stratum, where each stratum is
+    twice as large as the one before. For agents with a list, all tasks on it are used.
 
     Parameters
     ----------
     known : ndarray of int, shape (k,), optional
-        A task of each agent, whose pair is among those returned.
+        A task of each agent, whose pair is included.
     seconds : float
-        How long that may take, and each matching of the pairs, about.
+        Approximate time limit, also for each matching of the pairs.
     latest : float
-        Hours by which a pair must be done.
+        Latest completion time of a pair.
     by_cost : bool
-        Whether the cheapest pairs are wanted, not the fastest.
+        Whether to prefer the cheapest pairs instead of the fastest.
     """
     found = _Found(instance, agents, latest, by_cost=by_cost)
     list_of = instance.reach.list_of[instance.reach.origin[agents]]
@@ -127,7 +127,7 @@ def sampled_pairs(
 
 
 def _add_listed(found: "_Found", list_of: IntArray, tasks: IntArray) -> None:
-    """Add the pairs of agents bound to a list."""
+    """Add the pairs of agents with a list."""
     rows, lists = np.flatnonzero(list_of >= 0), found.instance.reach.lists
     if not len(rows):
         return
@@ -139,7 +139,7 @@ def _add_listed(found: "_Found", list_of: IntArray, tasks: IntArray) -> None:
 
 
 def _add_sampled(found: "_Found", rows: IntArray, tasks: IntArray, seconds: float, time_left: Clock) -> bool:
-    """Add pairs of the agents at `rows`, the least able first, with tasks of every size; whether that is all pairs."""
+    """Add sampled pairs of the agents at `rows`, the least able first; return whether these are all pairs."""
     work, ability = found.instance.workload, found.instance.ability[found.agents]
     by_work = tasks[np.argsort(work[tasks], kind="stable")]
     rng, complete = np.random.default_rng(0), True
@@ -163,7 +163,7 @@ def _add_sampled(found: "_Found", rows: IntArray, tasks: IntArray, seconds: floa
 
 
 def _share_within_reach(found: "_Found", rows: IntArray, tasks: IntArray, rng: np.random.Generator) -> float:
-    """Return about which share of pairs of agent and task are within reach."""
+    """Return an estimate of the share of pairs within reach."""
     some = found.agents[rng.permutation(rows)[:BLOCK_OF_AGENTS]]
     reach = found.instance.reach
     _, mask = reach.block(reach.origin[some], rng.permutation(tasks)[:LOOKED_AT])
@@ -171,7 +171,7 @@ def _share_within_reach(found: "_Found", rows: IntArray, tasks: IntArray, rng: n
 
 
 class _Found:
-    """Pairs found so far, block by block."""
+    """Accumulator of pairs, block by block."""
 
     def __init__(self, instance: Instance, agents: IntArray, latest: float, *, by_cost: bool) -> None:
         self.instance, self.agents = instance, agents
@@ -190,7 +190,7 @@ class _Found:
         self._keep(rows[row], tasks[column], distance[mask])
 
     def add_pairs(self, rows: IntArray, tasks: IntArray) -> None:
-        """Add the pair of the agent at each of `rows` with the task beside it, where it is within reach."""
+        """Add the pairs of agents at `rows` with their `tasks`, if within reach."""
         reach, origin = self.instance.reach, self.instance.reach.origin[self.agents[rows]]
         distance = reach.distances_between(origin, tasks)
         good = reach.is_within(origin, tasks, distance)
@@ -206,7 +206,7 @@ class _Found:
         self.parts.append((row[keep], task[keep], hours[keep], cost[keep]))
 
     def pairs(self) -> Pairs:
-        """Return the pairs, each once, agent by agent."""
+        """Return the pairs without repetitions, grouped by agent."""
         row, task, hours, cost = (np.concatenate(column) for column in zip(*self.parts, strict=True))
         _, once = np.unique(row * self.instance.m + task, return_index=True)
         first = np.searchsorted(row[once], np.arange(len(self.agents) + 1))
@@ -214,7 +214,7 @@ class _Found:
 
 
 def _first_of_each(row: IntArray, key: FloatArray, most: int) -> IntArray:
-    """Return the places of the entries with the least keys of each row, at most so many a row; `row` ascends."""
+    """Return the indices of the `most` entries with the least keys of each row; `row` is ascending."""
     order = np.lexsort((key, row))
     length = np.bincount(row)
     begin = np.cumsum(length) - length
@@ -223,7 +223,7 @@ def _first_of_each(row: IntArray, key: FloatArray, most: int) -> IntArray:
 
 
 def _of_every_size(count: int, each: int, rng: np.random.Generator) -> IntArray:
-    """Return about `each` of `count` places: equally many of shells that double in size, the first of all."""
+    """Return about `each` of `count` indices: equally many from consecutive ranges that double in size."""
     width = max(1, each)
     while width > 1 and width * (1 + int(np.ceil(np.log2(max(1.0, count / width))))) > each:
         width = max(1, width * 3 // 4)

@@ -1,4 +1,4 @@
-"""Which matchings serve the most priority, as groups of agents and tasks, and tasks that are required."""
+"""The matchings that serve the most priority, described by groups of agents and tasks, and required tasks."""
 
 from dataclasses import dataclass
 
@@ -11,9 +11,9 @@ from alloc.problems.vocabulary import IDLE
 
 @dataclass(frozen=True, eq=False)
 class Precedence:
-    """Which matchings of k agents with one competing task each serve the most priority.
+    """The set of matchings of k agents with one competing task each that serve the most priority.
 
-    Those in which every agent has a task of its own group, and every required task has an agent.
+    These are the matchings in which every agent has a task of its group, and every required task has an agent.
 
     Attributes
     ----------
@@ -29,27 +29,27 @@ class Precedence:
 
     @property
     def tasks(self) -> IntArray:
-        """The tasks that are served in some such matching."""
+        """Tasks that are served in some of these matchings."""
         return np.flatnonzero(self.group_of_task != IDLE)
 
     def allows(self, row: IntArray, task: IntArray) -> BoolArray:
-        """Whether the agent at each of these rows may have the task beside it."""
+        """Return whether the agent at each row may have its task."""
         allowed: BoolArray = self.group_of_agent[row] == self.group_of_task[task]
         return allowed
 
 
 def differs(instance: Instance, tasks: IntArray) -> bool:
-    """Whether some of `tasks` have more priority than others."""
+    """Return whether the priorities of `tasks` differ."""
     return bool(len(tasks) and np.ptp(instance.priority[tasks]) > 0)
 
 
 def urgent_first(instance: Instance, tasks: IntArray) -> IntArray:
-    """Return `tasks` in the order of descending priority, then of ascending workload."""
+    """Return `tasks` sorted by descending priority, then by ascending workload."""
     return tasks[np.lexsort((instance.workload[tasks], -instance.priority[tasks]))]
 
 
 def of_first(instance: Instance, tasks: IntArray, k: int) -> Precedence:
-    """Return the precedence of `tasks` for k agents who can serve the first k in the order of priority."""
+    """Return the precedence of `tasks` for k agents that can serve the first k in order of priority."""
     last = np.partition(-instance.priority[tasks], k - 1)[k - 1] if k else -np.inf
     group, required = np.full(instance.m, IDLE, dtype=np.intp), np.zeros(instance.m, dtype=np.bool_)
     group[tasks[-instance.priority[tasks] <= last]] = 0

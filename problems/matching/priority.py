@@ -1,4 +1,4 @@
-"""Which of the tasks that compete for too few agents are served: those with the most priority."""
+"""Selection of the tasks with the most priority among tasks that compete for too few agents."""
 
 import numpy as np
 
@@ -12,13 +12,13 @@ from alloc.problems.matching.precedence import Precedence, of_first, urgent_firs
 from alloc.problems.vocabulary import IDLE
 
 SAMPLE_SHARE, LONGEST_S = 0.1, 2.0
-"""Share of the time for a sample of the pairs, where they are many, and the longest that it takes."""
+"""Share of the time for a sample of the pairs, if there are many, and its limit in seconds."""
 
 MANY_PAIRS = 1_000_000
-"""Pairs, within reach or not, beyond which a sample of them is tried first."""
+"""Number of all pairs beyond which a sample is tried first."""
 
 MOST_PAIRS = 50_000_000
-"""Pairs beyond which they are not gathered, however much time there is."""
+"""Maximum number of pairs that are collected."""
 
 
 def most_priority(
@@ -29,29 +29,29 @@ def most_priority(
     time_left: Clock = unlimited,
     sampled: IntArray | None = None,
 ) -> tuple[Precedence, IntArray, bool]:
-    """Return which matchings of all `agents` with one of `tasks` each serve the most priority, and one of them.
+    """Return the matchings of all `agents` with one of `tasks` each that serve the most priority, and one of them.
 
-    Sets of tasks that can be served together are a transversal matroid (Edmonds and Fulkerson 1965,
-    doi:10.6028/jres.069B.016). So a set with the most priority in sum has as many as can be of the most urgent ones, of
-    the most urgent two kinds, and so on.
+    Sets of tasks that can be served together form a transversal matroid (Edmonds and Fulkerson 1965,
+    doi:10.6028/jres.069B.016). Hence a set with the largest total priority contains as many as possible of the tasks
+    with the highest priority, of those with the two highest priorities, and so on.
 
     Parameters
     ----------
     agents : ndarray of int, shape (k,)
     tasks : ndarray of int, shape (more than k,)
     known : ndarray of int, shape (k,)
-        Some task for each agent, no task twice.
+        A task of each agent, without repetitions.
     time_left : callable
-        Returns the seconds that are left; no limit by default.
+        Returns the seconds left; by default no limit.
     sampled : ndarray of int, shape (k,), optional
-        A matching with many of the most urgent tasks, where `sampled_matching` has been called.
+        Result of `sampled_matching`, if it has been called.
 
     Returns
     -------
     precedence : Precedence
     task_of_agent : ndarray of int, shape (k,)
     is_proven : bool
-        Whether no matching serves more priority; False where time ran out.
+        Whether no matching serves more priority; False if time ran out.
     """
     start = np.full(len(agents), IDLE, dtype=np.intp) if sampled is None else sampled
     if sampled is None and len(agents) * len(tasks) > MANY_PAIRS:
@@ -65,9 +65,9 @@ def most_priority(
 
 
 def sampled_matching(instance: Instance, agents: IntArray, tasks: IntArray, time_left: Clock) -> IntArray:
-    """Return a matching of the k agents with the k most urgent of the tasks by a sample of the pairs, idle for none.
+    """Return a matching of the k agents with the k most urgent tasks from a sample of the pairs, `IDLE` for none.
 
-    Where all agents have one, there is no matching with more priority.
+    If all agents have a task, no matching serves more priority.
     """
     seconds = min(LONGEST_S, SAMPLE_SHARE * time_left())
     first = urgent_first(instance, tasks)[: len(agents)]
@@ -79,7 +79,7 @@ def sampled_matching(instance: Instance, agents: IntArray, tasks: IntArray, time
 def _all_within_reach(
     instance: Instance, agents: IntArray, tasks: IntArray, time_left: Clock
 ) -> tuple[IntArray, IntArray] | None:
-    """Return the row of the agent and the task of each pair within reach; None where they are too many."""
+    """Return the row of the agent and the task of each pair within reach; None if there are too many."""
     reach, most = instance.reach, min(MOST_PAIRS, GATHERED_PER_SECOND * time_left())
     near = reach.neighbours if reach.has_table or estimated_pairs(reach) <= most else None
     if near is None:
@@ -96,7 +96,7 @@ def _all_within_reach(
 def _completed(
     instance: Instance, start: IntArray, known: IntArray, time_left: Clock
 ) -> tuple[Precedence, IntArray, bool]:
-    """Give tasks to agents that `start` leaves idle, by what `known` says, so that no task of `start` is lost."""
+    """Match the idle agents of `start` by means of `known`, so that no task of `start` is lost."""
     k = len(start)
     row, task = (
         np.concatenate([np.arange(k), np.flatnonzero(start != IDLE)]),
@@ -112,10 +112,10 @@ def _completed(
 
 
 class _Groups:
-    """Agents and tasks, divided again and again by whether the more urgent half of the tasks can be served.
+    """Agents and tasks, recursively divided by whether the more urgent half of the tasks can be served.
 
-    Where it can, it is required. Where not, the tasks that could be left out in place of each other, and all agents who
-    can take one of them, are a part of their own, from which no agent can be spared for less urgent tasks.
+    If it can, it is required. If not, the tasks that could replace each other as unserved ones, and all agents that can
+    take one of them, form a separate part, from which no agent can be spared for less urgent tasks.
     """
 
     def __init__(
@@ -126,7 +126,7 @@ class _Groups:
         self.first, self.row = np.searchsorted(task[order], np.arange(instance.m + 1)), row[order]
         self.rank = np.zeros(instance.m, dtype=np.intp)
         self.rank[tasks] = np.unique(-instance.priority[tasks], return_inverse=True)[1]
-        self.holder = np.full(instance.m, IDLE, dtype=np.intp)  # the row of the agent that a required task has
+        self.holder = np.full(instance.m, IDLE, dtype=np.intp)  # the row of the agent of each required task
         self.group_of_agent = np.full(k, IDLE, dtype=np.intp)
         self.group_of_task = np.full(instance.m, IDLE, dtype=np.intp)
         self.required = np.zeros(instance.m, dtype=np.bool_)
@@ -152,7 +152,7 @@ class _Groups:
     def _divided(
         self, agents: IntArray, required: IntArray, optional: IntArray, rank: int
     ) -> list[tuple[IntArray, IntArray, IntArray]] | None:
-        """Divide a part: its agents, the tasks that these must serve, and those that they may serve."""
+        """Divide a part, given by its agents, the tasks that they must serve, and those that they may serve."""
         urgent = optional[self.rank[optional] <= rank]
         later, tasks = optional[self.rank[optional] > rank], np.concatenate([required, urgent])
         self.holder[optional] = IDLE
@@ -171,7 +171,7 @@ class _Groups:
         ]
 
     def _pairs_of(self, tasks: IntArray, agents: IntArray) -> tuple[IntArray, IntArray]:
-        """Return the pairs of these tasks with these agents, which ascend, as compressed rows of places in `agents`."""
+        """Return the pairs of tasks with agents as compressed rows of indices into `agents`, which is ascending."""
         row = values_of_rows(self.first, self.row, tasks)
         length = self.first[tasks + 1] - self.first[tasks]
         place = np.minimum(np.searchsorted(agents, row), len(agents) - 1)
@@ -180,7 +180,7 @@ class _Groups:
         return np.concatenate([[0], np.cumsum(kept)])[begin], place[kept]
 
     def _completed(self) -> tuple[Precedence, IntArray] | None:
-        """Return the precedence, and a matching that extends that of the required tasks."""
+        """Return the precedence, and a matching that extends the matching of the required tasks."""
         precedence = Precedence(self.group_of_agent, self.group_of_task, self.required)
         row, task = self.pairs
         kept = precedence.allows(row, task)
@@ -192,7 +192,7 @@ class _Groups:
 
 
 def _rivals(first: IntArray, column: IntArray, matched: IntArray, columns: int) -> tuple[BoolArray, BoolArray]:
-    """Return the rows that could be left out in place of an unmatched one, and the columns that these can have."""
+    """Return the rows that could replace an unmatched one, and the columns that these rows can have."""
     rival, met = np.zeros(len(matched), dtype=np.bool_), np.zeros(columns, dtype=np.bool_)
     row_of, held = np.full(columns, IDLE, dtype=np.intp), np.flatnonzero(matched != IDLE)
     row_of[matched[held]] = held
@@ -208,7 +208,7 @@ def _rivals(first: IntArray, column: IntArray, matched: IntArray, columns: int) 
 
 
 def values_of_rows(first: IntArray, values: IntArray, rows: IntArray) -> IntArray:
-    """Return the values of these rows of compressed rows, one row after the other."""
+    """Return the concatenated values of some compressed rows."""
     length = first[rows + 1] - first[rows]
     offset = np.arange(length.sum()) - np.repeat(np.cumsum(length) - length, length)
     found: IntArray = values[np.repeat(first[rows], length) + offset]

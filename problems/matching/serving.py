@@ -1,4 +1,4 @@
-"""Serving tasks by moving few agents: a bipartite matching of tasks with agents that can take them."""
+"""Repair of allocations, to serve more tasks by moving few agents: a bipartite matching of tasks with agents."""
 
 from collections import deque
 from collections.abc import Iterator
@@ -14,23 +14,23 @@ from alloc.problems.matching.clock import EVALUATED_PER_SECOND, GATHERED_PER_SEC
 from alloc.problems.vocabulary import IDLE
 
 SPENT = -1
-"""Mark of agents that a failed search has met: no later path leads through them."""
+"""Mark of agents visited by a failed search, which cannot be on any later path."""
 
 NEARBY = 64
-"""Origins next to a task that are looked at first where there are many."""
+"""Number of nearest origins of a task that are tried first if there are many."""
 
 NEXT = 8
-"""Of these, the origins that will do for most tasks."""
+"""Number of these origins that suffice for most tasks."""
 
 CHUNK = 16_384
-"""Tasks that are looked at together, between two looks at the clock: a tenth of a second, for which there is time."""
+"""Number of tasks processed between two checks of the clock, which take about 0.1 s."""
 
 MANY = 50_000_000
-"""Pairs of agent, or of origin, and unserved task that are too many to look at one by one."""
+"""Number of pairs of agent, or of origin, and unserved task from which they are too many to enumerate."""
 
 
 class _Matching:
-    """One agent kept for each served task, grown by augmenting paths (Berge 1957, doi:10.1073/pnas.43.9.842)."""
+    """Matching of one agent per served task, extended by augmenting paths (Berge 1957, doi:10.1073/pnas.43.9.842)."""
 
     def __init__(self, instance: Instance, task_of_agent: IntArray, unserved: int, time_left: Clock) -> None:
         self.reach, self.time_left = instance.reach, time_left
@@ -41,7 +41,7 @@ class _Matching:
         self.kept_task = np.full(instance.n, IDLE, dtype=np.intp)
         held = np.flatnonzero(self.keeper != IDLE)
         self.kept_task[self.keeper[held]] = held
-        self.met = np.zeros(instance.n, dtype=np.intp)  # the search that met an agent last
+        self.met = np.zeros(instance.n, dtype=np.intp)  # the last search that visited each agent
         self.search = 0
         reach = self.reach
         self._mask_by_task = np.ascontiguousarray(reach.mask.T) if reach.has_table else None
@@ -51,11 +51,11 @@ class _Matching:
         self._rows = None if near is None else near.by_task(instance.m)
 
     def serve(self, task: int) -> IntArray | None:
-        """Serve `task` along a path with the fewest moves; None if done, else the tasks that compete for its agents.
+        """Serve `task` along a shortest augmenting path; return None, or if impossible, the tasks that compete with it.
 
-        Where time runs out, these are not all.
+        If time runs out, these are incomplete.
         """
-        came_from: dict[int, tuple[int, int]] = {}  # task -> (task that wants its keeper, that keeper)
+        came_from: dict[int, tuple[int, int]] = {}  # task -> (task that takes over its agent, that agent)
         self.search += 1
         queue, seen = deque([task]), {task}
         while queue:
@@ -79,7 +79,7 @@ class _Matching:
         return np.array(sorted(seen), dtype=np.intp)
 
     def _able(self, task: int) -> IntArray:
-        """Return the agents that can take `task`; looked up where many tasks will be asked for."""
+        """Return the agents that can take `task`; from precomputed rows if there are many tasks."""
         if self._mask_by_task is not None:
             return np.flatnonzero(self._mask_by_task[task][self.reach.origin])
         if self._rows is None:
@@ -92,7 +92,7 @@ class _Matching:
         return able
 
     def _cheapest(self, agents: IntArray, task: int) -> int:
-        """Prefer an idle agent, then the nearest."""
+        """Return the nearest idle agent or, if none is idle, the nearest agent."""
         idle = agents[self.task_of_agent[agents] == IDLE]
         choice = idle if len(idle) else agents
         distance = self.reach.distance_of(choice, np.full(len(choice), task))
@@ -112,13 +112,13 @@ def needs_agent(instance: Instance) -> IntArray:
 
 
 def _most_urgent_first(instance: Instance) -> IntArray:
-    """Return the tasks with workload in the order of descending priority."""
+    """Return the tasks with workload, sorted by descending priority."""
     tasks = needs_agent(instance)
     return tasks[np.argsort(-instance.priority[tasks], kind="stable")]
 
 
 def only_allowed(instance: Instance, allocation: Allocation) -> Allocation:
-    """Return `allocation` with the agents idle that are sent where they cannot go.
+    """Return `allocation` with those agents idle that are assigned to tasks that they cannot take.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def only_allowed(instance: Instance, allocation: Allocation) -> Allocation:
 
 
 def _allowed(instance: Instance, allocation: Allocation) -> IntArray:
-    """Return the task of each agent, `IDLE` where it cannot go to that of `allocation`."""
+    """Return the task of each agent, or `IDLE` if it cannot take its task in `allocation`."""
     task = require_fit(instance, allocation).copy()
     working = np.flatnonzero(task != IDLE)
     task[working[~instance.reach.allows(working, task[working])]] = IDLE
@@ -141,18 +141,18 @@ def _allowed(instance: Instance, allocation: Allocation) -> IntArray:
 
 
 def serve_all(instance: Instance, allocation: Allocation, time_left: Clock = unlimited) -> Allocation:
-    """Change `allocation` so that as few tasks as possible are unserved, the most urgent first.
+    """Return a changed allocation in which as few tasks as possible are unserved, serving high priorities first.
 
-    Agents sent where they cannot go are idle in the answer. A task that is served stays served. Agents change places
-    along augmenting paths alone, each with the fewest moves, at whose end an idle agent is preferred, then the nearest.
-    Where `time_left` runs out, the tasks that are left may stay unserved.
+    Agents that cannot take their tasks become idle. Served tasks stay served. Agents are moved only along shortest
+    augmenting paths, which end at an idle agent if possible, or else at the nearest one. If `time_left` runs out, the
+    remaining tasks may stay unserved.
 
     Parameters
     ----------
     instance : Instance
     allocation : Allocation
     time_left : callable
-        Returns the seconds that are left; no limit by default.
+        Returns the seconds left; by default no limit.
 
     Returns
     -------
@@ -178,7 +178,7 @@ def serve_all(instance: Instance, allocation: Allocation, time_left: Clock = unl
 
 
 def _serve_by_anyone(instance: Instance, task_of_agent: IntArray, unserved: list[int]) -> IntArray:
-    """Serve tasks where everyone can go everywhere: by the idle first, but by the nearest of them only by chance."""
+    """Serve tasks if all agents can take all tasks: by idle agents first, regardless of distance."""
     keeper = np.full(instance.m, IDLE, dtype=np.intp)
     working = np.flatnonzero(task_of_agent != IDLE)
     keeper[task_of_agent[working]] = working
@@ -193,7 +193,7 @@ def _serve_by_anyone(instance: Instance, task_of_agent: IntArray, unserved: list
 def _serve_nearby(
     instance: Instance, task_of_agent: IntArray, unserved: list[int], time_left: Clock
 ) -> tuple[IntArray, list[int]]:
-    """Serve tasks by idle agents from the `NEARBY` nearest origins that have one; return the tasks that are left."""
+    """Serve tasks by idle agents from the `NEARBY` nearest origins; return the remaining tasks."""
     from scipy.spatial import cKDTree
 
     reach, task_of_agent = instance.reach, task_of_agent.copy()
@@ -208,7 +208,7 @@ def _serve_nearby(
     tree, free, last, served = cKDTree(reach.place[origins]), first.tolist(), end.tolist(), set()
 
     def nearest(some: IntArray, count: int) -> Iterator[list[int]]:
-        """For each of these tasks, the origins within reach among its `count` nearest, the nearest first."""
+        """Yield the origins within reach among the `count` nearest of each task, the nearest first."""
         count = min(count, len(origins))
         near = origins[tree.query(reach.goal[some], k=count)[1].reshape(len(some), count)]
         within = reach.is_within(near, some[:, None], reach.distances_between(near, some[:, None]))
@@ -231,7 +231,7 @@ def _serve_nearby(
 
 
 def _start(instance: Instance, task_of_agent: IntArray, unserved: int, time_left: Clock = unlimited) -> _Matching:
-    """Begin a matching in which tasks without workload keep nobody; `unserved`: how many tasks are to be served."""
+    """Return a matching in which tasks without workload have no agent; `unserved` is the number of tasks to serve."""
     matching = _Matching(instance, task_of_agent, unserved, time_left)
     for j in np.flatnonzero(instance.workload == 0).tolist():
         if matching.keeper[j] != IDLE:
@@ -241,7 +241,7 @@ def _start(instance: Instance, task_of_agent: IntArray, unserved: int, time_left
 
 
 def serve_in_turn(instance: Instance, tasks: IntArray) -> Iterator[IntArray | None]:
-    """Serve one task after the other along with those before; yield what stands in its way, None where nothing does."""
+    """Serve tasks one by one, keeping earlier ones served; yield None or, if impossible, the competing tasks."""
     matching = _start(instance, np.full(instance.n, IDLE, dtype=np.intp), len(tasks))
     for j in tasks.tolist():
         yield matching.serve(j)

@@ -1,9 +1,9 @@
-"""Tasks that too few agents can reach: which of them to serve, and by whom.
+"""Shortage of agents: decide which competing tasks to serve, and by which agents.
 
-Tasks that not every allocation with the fewest unserved tasks serves *compete* for agents. In each such allocation
-every agent that can take a competing task serves exactly one of them, alone (Dulmage and Mendelsohn 1958,
-doi:10.4153/CJM-1958-052-0). So these agents and tasks are an assignment problem, which is solved here, and what is
-left is an instance of its own, in which every task can be served.
+Tasks *compete* for agents if some allocation with the fewest unserved tasks leaves them unserved. In each such
+allocation every agent that can take a competing task serves exactly one of them, alone (Dulmage and Mendelsohn 1958,
+doi:10.4153/CJM-1958-052-0). Hence these agents and tasks form an assignment problem, which is solved here, and the
+rest is an instance in which every task can be served.
 """
 
 from dataclasses import dataclass, replace
@@ -21,34 +21,34 @@ from alloc.problems.matching.unservable import CompetingPart, competing_part
 from alloc.problems.vocabulary import IDLE
 
 SAMPLE_SHARE = 0.3
-"""Share of the time that is left for the pairs of an assignment, where a sample has to do."""
+"""Share of the remaining time for the pairs of an assignment, if they are sampled."""
 
 
 @dataclass(frozen=True, eq=False)
 class Shortage:
-    """Who serves which of the competing tasks, and what is left to be allocated.
+    """An assignment of agents to competing tasks, and the remaining instance.
 
     Attributes
     ----------
     instance : Instance
     agents : ndarray of int, shape (k,)
-        Agents that serve a competing task each, alone.
+        Agents that serve one competing task each, alone.
     tasks : ndarray of int, shape (more than k,)
         The competing tasks.
     task_of_agent : ndarray of int, shape (k,)
         The task of each of `agents`.
     hours : float
-        When the last of these is done.
+        Latest completion time of these.
     bound : float
-        Hours that every allocation needs that leaves as few tasks unserved.
+        Lower bound on the makespan of every allocation with as few unserved tasks.
     rest_agents, rest_tasks : ndarray of int
-        The other agents, and the other tasks with workload: what `rest` is made of.
+        All other agents, and all other tasks with workload, which form `rest`.
     unservable : ndarray of int
-        Competing tasks that fewer agents can reach: a set as small as is at hand.
+        Competing tasks that fewer agents can reach; a small set, if available.
     is_proven : bool
-        Whether no allocation serves more tasks, or as many with more priority; False where time ran out.
+        Whether no allocation serves more tasks, or as many with more priority; False if time ran out.
     precedence : Precedence or None
-        Which matchings of `agents` with `tasks` serve the most priority; None where all serve the same.
+        The matchings of `agents` with `tasks` that serve the most priority; None if all serve the same.
     """
 
     instance: Instance
@@ -65,11 +65,11 @@ class Shortage:
 
     @property
     def rest(self) -> Instance | None:
-        """The instance of `rest_agents` and `rest_tasks`; None where no task is left."""
+        """Instance of `rest_agents` and `rest_tasks`; None if no task is left."""
         return self.instance.restricted(self.rest_agents, self.rest_tasks) if len(self.rest_tasks) else None
 
     def merged(self, rest: Allocation | None = None) -> Allocation:
-        """Return the allocation of the whole instance, with `rest` for what is left; idle without one."""
+        """Return the allocation of the whole instance, with `rest` for the remaining agents, by default idle."""
         task = np.full(self.instance.n, IDLE, dtype=np.intp)
         task[self.agents] = self.task_of_agent
         if rest is not None:
@@ -78,13 +78,13 @@ class Shortage:
         return Allocation(task)
 
     def part_of(self, allocation: Allocation) -> Allocation:
-        """Return what an allocation of the whole instance says of `rest`."""
-        number = np.full(self.instance.m + 1, IDLE, dtype=np.intp)  # the last entry is that of idle agents
+        """Return the part of an allocation of the whole instance that belongs to `rest`."""
+        number = np.full(self.instance.m + 1, IDLE, dtype=np.intp)  # the last entry is for idle agents
         number[self.rest_tasks] = np.arange(len(self.rest_tasks))
         return Allocation(number[allocation.task_of_agent[self.rest_agents]])
 
     def economical(self, hours: float, time_left: Clock) -> "Shortage":
-        """Return the same with the least energy within `hours`, as far as time allows."""
+        """Return the shortage with an assignment of least energy within `hours`, as far as time allows."""
         if not len(self.agents):
             return self
         order = self.precedence
@@ -97,17 +97,17 @@ class Shortage:
 
 
 def find_shortage(instance: Instance, time_left: Clock = unlimited) -> Shortage | None:
-    """Return who serves which of the competing tasks, or None if all tasks can be served.
+    """Return an assignment for the competing tasks, or None if all tasks can be served.
 
-    The most priority is served, at the least makespan that this takes, and, of the allocations with that makespan, one
-    with little work is taken. Where `time_left` runs out, the makespan may be more, the priority less, some task may be
-    unserved that could be served, and None may be returned although some task cannot.
+    It serves the most priority, at the least makespan for that, with preference for little work. If `time_left` runs
+    out, the makespan may be longer and the priority less, a task may be unserved that could be served, and None may be
+    returned although some task cannot be served.
 
     Parameters
     ----------
     instance : Instance
     time_left : callable
-        Returns the seconds that are left; no limit by default.
+        Returns the seconds left; by default no limit.
 
     Returns
     -------
@@ -118,7 +118,7 @@ def find_shortage(instance: Instance, time_left: Clock = unlimited) -> Shortage 
         return None
     agents, tasks, chosen, bound = part.agents, part.tasks, part.task_of_agent, 0.0
     if len(agents) and instance.reach.is_complete and not instance.has_travel_time:
-        bound = float(_hours(instance, agents, chosen).max())  # the least work by the least able: none is faster
+        bound = float(_hours(instance, agents, chosen).max())  # smallest workloads by least able agents: a lower bound
     elif len(agents):
         chosen, bound = _fastest(part, instance, time_left)
     needed = instance.workload > 0
@@ -141,7 +141,7 @@ def find_shortage(instance: Instance, time_left: Clock = unlimited) -> Shortage 
 
 
 def _fastest(part: CompetingPart, instance: Instance, time_left: Clock) -> tuple[IntArray, float]:
-    """Return a matching with the least makespan and, of these, one with little work; and a bound on that makespan."""
+    """Return a matching with the least makespan, preferring little work, and a bound on that makespan."""
     agents, chosen, order = part.agents, part.task_of_agent, part.precedence
     tasks, required = (part.tasks, None) if order is None else (order.tasks, order.required)
     latest, bound = float(_hours(instance, agents, chosen).max()), 0.0
@@ -171,7 +171,7 @@ def _pairs(
     *,
     by_cost: bool = False,
 ) -> tuple[Pairs | None, bool]:
-    """Return pairs that are done by `latest`, None if time runs out, and whether they are as good as all pairs."""
+    """Return pairs that finish by `latest`, None if time runs out, and whether they are as good as all pairs."""
     if instance.reach.has_table:
         return all_pairs(instance, agents, tasks, latest, time_left, by_cost=by_cost, precedence=order), True
     seconds = time_left()
@@ -183,5 +183,5 @@ def _pairs(
 
 
 def _hours(instance: Instance, agents: IntArray, tasks: IntArray) -> FloatArray:
-    """Return when each of `agents` is done, alone with the task beside it."""
+    """Return when each agent would finish its task alone."""
     return hours_alone(instance, agents, tasks, instance.reach.distance_of(agents, tasks))

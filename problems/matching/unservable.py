@@ -1,4 +1,4 @@
-"""The fewest unserved tasks, and which tasks compete for too few agents."""
+"""Least number of unserved tasks, and the tasks that compete for too few agents."""
 
 from dataclasses import dataclass, replace
 
@@ -15,13 +15,13 @@ from alloc.problems.matching.serving import needs_agent, serve_in_turn
 from alloc.problems.vocabulary import IDLE
 
 PROOF_SHARE = 0.5
-"""Share of the time in which it is found out whether all tasks can be served, where agents may be enough."""
+"""Share of the time to determine whether all tasks can be served, if there may be enough agents."""
 
 SHORTEST_S = 0.1
-"""How long a table of all pairs is looked at where there is no time."""
+"""Minimum time in seconds for a table of all pairs, even without time left."""
 
 FEW, SAMPLE = 8, 20
-"""Agents near a task that a quick try looks at, and agents for each task from which they are taken."""
+"""Number of agents near a task that a quick heuristic tries, and of sampled agents per task."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,15 +33,15 @@ class CompetingPart:
     agents : ndarray of int, shape (k,)
         Agents that serve one of `tasks` each, alone, in every allocation with the fewest unserved tasks.
     tasks : ndarray of int, shape (more than k,)
-        All tasks that these serve in such an allocation, or that none serves.
+        All tasks that these agents serve in such an allocation, or that are unserved.
     task_of_agent : ndarray of int, shape (k,)
-        Some task for each of `agents`, no task twice.
+        A task of each of `agents`, without repetitions.
     unservable : ndarray of int
-        Tasks, among `tasks`, that fewer agents can reach.
+        A subset of `tasks` that fewer agents can reach.
     is_proven : bool
-        Whether no allocation serves more tasks, or as many with more priority; False where time ran out.
+        Whether no allocation serves more tasks, or as many with more priority; False if time ran out.
     precedence : Precedence or None
-        Which matchings serve the most priority; None where all serve the same.
+        The matchings that serve the most priority; None if all serve the same.
     """
 
     agents: IntArray
@@ -53,7 +53,7 @@ class CompetingPart:
 
 
 def fewest_unserved(instance: Instance) -> int:
-    """Return how many tasks with workload no allocation can serve, at the least.
+    """Return the least number of tasks with workload that any allocation leaves unserved.
 
     Parameters
     ----------
@@ -72,22 +72,22 @@ def fewest_unserved(instance: Instance) -> int:
     if near is None:
         return sum(rivals is not None for rivals in serve_in_turn(instance, tasks))
     origin = _origin_of_task(instance, near, tasks)
-    assert origin is not None, "there is no limit of time"
+    assert origin is not None, "there is no time limit"
     return int((origin[tasks] == IDLE).sum())
 
 
 def _origin_of_task(
     instance: Instance, near: Neighbours, tasks: IntArray, time_left: Clock = unlimited
 ) -> IntArray | None:
-    """Return the origin of an agent for each of `tasks`, no agent twice, `IDLE` where it has none; shape (m,).
+    """Return the origin of a distinct agent for each of `tasks`, `IDLE` for none, shape (m,), by a maximum matching.
 
-    As many tasks as can be have one; None is returned if time runs out.
+    None if time runs out.
     """
     degree, wanted = np.diff(near.first), np.zeros(instance.m, dtype=np.bool_)
     wanted[tasks] = True
     copies = np.minimum(np.bincount(instance.reach.origin, minlength=len(degree)), degree)
     origin = np.full(instance.m, IDLE, dtype=np.intp)
-    for one in np.flatnonzero((copies == degree) & (degree > 1)).tolist():  # agents for all that it can take
+    for one in np.flatnonzero((copies == degree) & (degree > 1)).tolist():  # enough agents for all its tasks
         task = near.task[near.first[one] : near.first[one + 1]]
         origin[task] = one
     wanted &= origin == IDLE
@@ -109,7 +109,7 @@ def _origin_of_task(
 def competing_part(instance: Instance, time_left: Clock = unlimited) -> CompetingPart | None:
     """Return the tasks that compete for too few agents, and these agents.
 
-    None if all tasks can be served, and where there is no time, or no memory, to tell.
+    None if all tasks can be served, or if time or memory are insufficient to decide.
     """
     tasks, reach = needs_agent(instance), instance.reach
     if reach.is_complete:
@@ -126,7 +126,7 @@ def competing_part(instance: Instance, time_left: Clock = unlimited) -> Competin
 
 
 def _of_urgent_tasks(instance: Instance, tasks: IntArray, time_left: Clock) -> CompetingPart:
-    """The same for more tasks than agents: if all agents can serve the most urgent tasks, by a sample of the pairs."""
+    """Return the competing part for more tasks than agents, by a sample of pairs with the most urgent tasks first."""
     if not differs(instance, tasks):
         return _of_scarce_agents(instance, tasks, time_left)
     everyone = np.arange(instance.n)
@@ -144,7 +144,7 @@ def _of_urgent_tasks(instance: Instance, tasks: IntArray, time_left: Clock) -> C
 def _by_priority(
     instance: Instance, part: CompetingPart, time_left: Clock, sampled: IntArray | None = None
 ) -> CompetingPart:
-    """Return the same with a matching that serves the most priority."""
+    """Return the competing part with a matching that serves the most priority."""
     if not len(part.agents) or not differs(instance, part.tasks):
         return part
     if instance.reach.has_table:
@@ -157,7 +157,7 @@ def _by_priority(
 
 
 def _of_table_or_neighbours(instance: Instance, tasks: IntArray, time_left: Clock) -> CompetingPart | None:
-    """The same where agents may be enough, or all pairs fit a table."""
+    """Return the competing part if there may be enough agents, or if all pairs fit into a table."""
     reach = instance.reach
     time_left = share_of(PROOF_SHARE, time_left)
     if reach.has_table:
@@ -172,7 +172,7 @@ def _of_table_or_neighbours(instance: Instance, tasks: IntArray, time_left: Cloc
 def _of_scarce_agents(
     instance: Instance, tasks: IntArray, time_left: Clock, start: IntArray | None = None
 ) -> CompetingPart:
-    """The same for more tasks than agents, without looking at all pairs, as a rule."""
+    """Return the competing part for more tasks than agents, usually without enumerating all pairs."""
     matching = AgentMatching(instance, tasks, time_left, start)
     if matching.is_largest:
         agents, left = np.flatnonzero(~matching.replaceable), tasks[~matching.their_tasks[tasks]]
@@ -183,7 +183,7 @@ def _of_scarce_agents(
 
 
 def _of_neighbours(instance: Instance, tasks: IntArray, near: Neighbours, time_left: Clock) -> CompetingPart | None:
-    """The same from all pairs within reach."""
+    """Return the competing part from all pairs within reach."""
     origin = _origin_of_task(instance, near, tasks, time_left)
     if origin is None:
         return None
@@ -205,7 +205,7 @@ def _of_neighbours(instance: Instance, tasks: IntArray, near: Neighbours, time_l
 
 
 def _by_size(instance: Instance, agents: IntArray, tasks: IntArray) -> IntArray:
-    """Return one of `tasks` for each of as many agents: the more work, the more able the agent."""
+    """Return one of `tasks` for each of as many agents, with larger workloads for more able agents."""
     chosen = np.empty(len(agents), dtype=np.intp)
     chosen[np.argsort(instance.ability[agents], kind="stable")] = tasks[
         np.argsort(instance.workload[tasks], kind="stable")
@@ -214,9 +214,9 @@ def _by_size(instance: Instance, agents: IntArray, tasks: IntArray) -> IntArray:
 
 
 def _rivals(near: Neighbours, origin: IntArray, tasks: IntArray, m: int) -> tuple[IntArray, IntArray]:
-    """Return all tasks that could be left out in place of one of `tasks`, and the origins of those who can take them.
+    """Return all tasks that could replace one of `tasks` as unserved, and the origins that can take them.
 
-    `origin` is a largest matching of tasks with agents; each of `tasks` is without one.
+    `origin` is a maximum matching of tasks with agents, in which each of `tasks` is unmatched.
     """
     first, by_task = near.by_task(m)
     held = np.flatnonzero(origin != IDLE)
@@ -234,14 +234,14 @@ def _rivals(near: Neighbours, origin: IntArray, tasks: IntArray, m: int) -> tupl
 
 
 def _are_served_simply(instance: Instance, tasks: IntArray, time_left: Clock) -> bool:
-    """Whether a quick try serves all of `tasks`; where agents abound, it does."""
+    """Return whether a quick heuristic serves all of `tasks`, as it does if there are plenty of agents."""
     if instance.n < len(tasks):
         return False
     return (_by_scarcity if instance.reach.has_table else _by_sample)(instance, tasks, time_left)
 
 
 def _by_scarcity(instance: Instance, tasks: IntArray, time_left: Clock) -> bool:
-    """The task with the fewest agents first, by an agent that can take the fewest tasks."""
+    """Return whether a greedy heuristic serves all tasks: rarest first, by agents that can take the fewest tasks."""
     reach = instance.reach
     order = np.argsort(reach.mask[:, tasks].sum(axis=1), kind="stable")
     mask, left = reach.mask[np.ix_(order, tasks)], np.bincount(reach.origin, minlength=len(order))[order]
@@ -255,7 +255,7 @@ def _by_scarcity(instance: Instance, tasks: IntArray, time_left: Clock) -> bool:
 
 
 def _by_sample(instance: Instance, tasks: IntArray, time_left: Clock) -> bool:
-    """Match the tasks with agents of a sample that begin nearby."""
+    """Return whether all tasks can be matched with nearby agents of a sample."""
     from scipy.spatial import cKDTree
 
     reach = instance.reach
@@ -274,8 +274,8 @@ def _by_sample(instance: Instance, tasks: IntArray, time_left: Clock) -> bool:
 def minimal_unservable_set(instance: Instance) -> IntArray | None:
     """Return an inclusion-minimal set of tasks that too few agents can reach, or None if all tasks can be served.
 
-    Such a set has one task more than agents that can take any of them; without any one of its tasks, the rest could
-    be served (Hall 1935, doi:10.1112/jlms/s1-10.37.26).
+    Such a set has one task more than there are agents that can take any of them; every proper subset can be served
+    (Hall 1935, doi:10.1112/jlms/s1-10.37.26).
 
     Parameters
     ----------
@@ -292,7 +292,7 @@ def minimal_unservable_set(instance: Instance) -> IntArray | None:
     near = reach.neighbours
     if near is not None:
         origin = _origin_of_task(instance, near, tasks)
-        assert origin is not None, "there is no limit of time"
+        assert origin is not None, "there is no time limit"
         left_out = tasks[origin[tasks] == IDLE]
         return _rivals(near, origin, left_out[:1], instance.m)[0] if len(left_out) else None
     return next((rivals for rivals in serve_in_turn(instance, tasks) if rivals is not None), None)

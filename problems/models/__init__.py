@@ -1,1 +1,1 @@
-"""The problem as an integer programme for any solver, and the allocation in a solver's solution."""
+"""Integer programmes of instances for any solver, and allocations from solvers' solutions."""

@@ -1,4 +1,4 @@
-"""The comments at the head of a model: what its variables are, and whom its names stand for."""
+"""Comments at the head of a model: meaning of variables and names."""
 
 import json
 from collections.abc import Iterator, Sequence
@@ -10,17 +10,17 @@ from alloc.problems.models.programme import RATIO, Programme
 from alloc.problems.text import counted
 
 IDS_PER_LINE, LONGEST_ID = 8, 60
-"""Members of a class in a line, and characters of an id: some readers cut long lines."""
+"""Maximum number of members of a class per line, and of characters of an id, as some readers cut long lines."""
 
 MEANINGS = {
     Grouping.AGENT: "x_AGENT__TASK: 1 if the agent does the task",
     Grouping.ABILITY: "n_AGENT__TASK: how many agents of the class of AGENT do the task",
-    Grouping.PLACE: "p_AGENT__TASK: how many agents of the class of AGENT, alike in place too, do the task",
+    Grouping.PLACE: "p_AGENT__TASK: how many agents of the class of AGENT, with the same place, do the task",
 }
 
 
 def comments(programme: Programme) -> Iterator[str]:
-    """Yield lines in ASCII: the objective, the meaning of the variables, members of classes, ids that are no names.
+    """Yield lines in ASCII: objective, meaning of variables, members of classes, and ids whose names differ.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def comments(programme: Programme) -> Iterator[str]:
 
 
 def _members(programme: Programme) -> Iterator[str]:
-    """Yield the agents of each class that has a variable and more than one."""
+    """Yield the agents of each class that has a variable and several members."""
     groups, ids = programme.groups, programme.instance.agent_ids
     order = np.argsort(groups.class_of_agent, kind="stable")
     last = np.cumsum(groups.count)
@@ -55,7 +55,7 @@ def _members(programme: Programme) -> Iterator[str]:
 
 
 def _renamed(kind: str, ids: Sequence[str], names: Sequence[str]) -> Iterator[str]:
-    """Yield the id of each name that is another."""
+    """Yield the id of each name that differs from it."""
     yield from (f"{kind} {name}: {_quoted(own)}" for name, own in zip(names, ids, strict=True) if name != own)
 
 

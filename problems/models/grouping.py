@@ -1,4 +1,4 @@
-"""Whom a variable of the model stands for: an agent, or the agents of a class."""
+"""Grouping of agents in models: a variable per agent, or per class of agents."""
 
 from enum import StrEnum
 
@@ -9,11 +9,11 @@ from alloc.problems.errors import RefusedError
 from alloc.problems.instance import Instance
 
 MOST_PAIRS = 2_000_000
-"""Pairs of agent, or class, and task beyond which no model is made."""
+"""Maximum number of pairs of agent, or class, and task in a model."""
 
 
 class Grouping(StrEnum):
-    """Whom a variable stands for, by the first letter of its name."""
+    """Grouping of agents, by the first letter of variable names."""
 
     AGENT = "x"
     ABILITY = "n"
@@ -21,17 +21,17 @@ class Grouping(StrEnum):
 
 
 def grouped(instance: Instance, grouping: Grouping) -> AgentClasses:
-    """Return the classes whose agents the variables count; with `Grouping.AGENT` each agent is a class.
+    """Return the classes whose agents the variables count; with `Grouping.AGENT`, each agent is a class.
 
     Raises
     ------
     RefusedError
-        If there are more than `MOST_PAIRS` pairs of a class and a task.
+        If there are more than `MOST_PAIRS` pairs of class and task.
     """
     is_single, by_place = grouping is Grouping.AGENT, grouping is Grouping.PLACE
     pairs = instance.m * (instance.n if is_single else count_classes(instance, by_place=by_place))
     if pairs > MOST_PAIRS:
-        raise RefusedError(f"the model would have up to {pairs} variables; at most {MOST_PAIRS} are written")
+        raise RefusedError(f"the model would have up to {pairs} variables; the limit is {MOST_PAIRS}")
     if not is_single:
         return agent_classes(instance, by_place=by_place)
     agents, reach = np.arange(instance.n), instance.reach

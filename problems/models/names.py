@@ -1,28 +1,28 @@
-"""Names of variables and rows that every reader of LP and MPS files takes, by the ids of agents and tasks."""
+"""Names of variables and rows from ids of agents and tasks, valid in all readers of LP and MPS files."""
 
 import re
 from collections.abc import Sequence
 
 LONGEST = 40
-"""Characters of an id that enter a name: readers refuse names of more than about a hundred."""
+"""Maximum number of characters of an id in a name, as readers reject names of more than about a hundred."""
 
 SEPARATOR = "__"
-"""Stands between agent and task; no single name has it."""
+"""Separator between agent and task, which does not occur in the name of either."""
 
 
 def plain_names(ids: Sequence[str], default: str) -> list[str]:
-    """Return one name of letters, digits and single underscores for each id, no two alike.
+    """Return a unique name of letters, digits and single underscores for each id.
 
     Parameters
     ----------
     ids : sequence of str
     default : str
-        What ids without a single such letter are called.
+        Name of ids without any such character.
 
     Returns
     -------
     list of str
-        The id itself where it is such a name and not too long.
+        The id itself if it is valid and not too long, or else a similar name.
     """
     names = [re.sub(r"[^A-Za-z0-9]+", "_", name).strip("_")[:LONGEST].rstrip("_") or default for name in ids]
     taken = {name for name, own in zip(names, ids, strict=True) if name == own}

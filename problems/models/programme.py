@@ -4,7 +4,7 @@ Variables
     x_AGENT__TASK   whether the agent does the task, e_ij of (5)
     n_AGENT__TASK   how many agents of the class of AGENT, its first one, do the task: those of a class have the same
                     ability and can take the same tasks
-    p_AGENT__TASK   the same where those of a class also start at the same place, which counts for energy and arrival
+    p_AGENT__TASK   the same for classes of agents that also start at the same place, for energy and arrival times
     y               BOUND / T, where BOUND is a lower bound on the makespan T, so that y is at most 1
 
 Without a makespan, y is maximised, which minimises T = max_j h_j / W_j:
@@ -41,19 +41,19 @@ if TYPE_CHECKING:
     from scipy.sparse import csc_array
 
 RATIO = "y"
-"""The variable BOUND / T."""
+"""Name of the variable BOUND / T."""
 
 
 @dataclass(frozen=True, eq=False)
 class Programme:
-    """The data of the model: classes of agents, the tasks with work, and the pairs of both that are of use.
+    """Data of the model: classes of agents, tasks with workload, and useful pairs of both.
 
     Attributes
     ----------
     instance : Instance
     grouping : Grouping
     groups : AgentClasses
-        The classes whose agents the variables count.
+        Classes whose agents the variables count.
     tasks : ndarray of int, shape (t,)
         Tasks with workload, one row each.
     kind, row : ndarray of int, shape (p,)
@@ -61,11 +61,11 @@ class Programme:
     rate : ndarray, shape (p,)
         Mean work per hour of an agent of the pair until T.
     energy : ndarray, shape (p,), or None
-        What is minimised; None where it is nothing, or the makespan.
+        Energy to be minimised; None if there is no objective, or the makespan is minimised.
     hours : float
-        T, or BOUND where the makespan is minimised.
+        T, or BOUND if the makespan is minimised.
     is_free : bool
-        Whether the makespan is minimised: then y is the last variable.
+        Whether the makespan is minimised; y is then the last variable.
     """
 
     instance: Instance
@@ -81,32 +81,32 @@ class Programme:
 
     @cached_property
     def scale(self) -> float:
-        """Power of two by which abilities and workloads are multiplied: 1 where they are of an ordinary order."""
+        """Power of two by which abilities and workloads are scaled; 1 for ordinary magnitudes."""
         return scale_to_one(float(np.median(self.instance.ability)))
 
     @cached_property
     def need(self) -> FloatArray:
-        """Least ability on each task at `hours`, times `scale`; shape (t,)."""
+        """Least ability that each task needs by `hours`, times `scale`; shape (t,)."""
         return self.instance.workload[self.tasks] / self.hours * self.scale
 
     @cached_property
     def used(self) -> IntArray:
-        """The classes that have a variable, one row each, after those of the tasks."""
+        """Classes that have a variable; their rows follow those of the tasks."""
         return np.unique(self.kind)
 
     @cached_property
     def agent_names(self) -> list[str]:
-        """Name of each agent in those of variables and rows."""
+        """Name of each agent in names of variables and rows."""
         return plain_names(self.instance.agent_ids, "agent")
 
     @cached_property
     def task_names(self) -> list[str]:
-        """Name of each task in those of variables and rows."""
+        """Name of each task in names of variables and rows."""
         return plain_names(self.instance.task_ids, "task")
 
     @cached_property
     def class_names(self) -> list[str]:
-        """Name of each class: that of its first agent."""
+        """Name of each class, which is that of its first agent."""
         first = np.unique(self.groups.class_of_agent, return_index=True)[1]
         return [self.agent_names[agent] for agent in first.tolist()]
 
@@ -117,7 +117,7 @@ class Programme:
         return [*names, RATIO] if self.is_free else names
 
     def row_names(self) -> list[str]:
-        """Return the names of the rows, of tasks first, then of agents or classes."""
+        """Return the names of the rows, first of tasks, then of agents or classes."""
         kind = "agent" if self.grouping is Grouping.AGENT else "class"
         return [
             *(f"task_{self.task_names[j]}" for j in self.tasks.tolist()),
@@ -125,7 +125,7 @@ class Programme:
         ]
 
     def matrix(self) -> "csc_array":
-        """Return the coefficients, a row for each of `row_names`, a column for each of `column_names`."""
+        """Return the coefficients, with rows as in `row_names` and columns as in `column_names`."""
         from scipy.sparse import block_array, csc_array
 
         columns, v = np.arange(len(self.kind)), len(self.kind)
@@ -145,27 +145,27 @@ def build_programme(
     ----------
     instance : Instance
     by_class : bool
-        Whether variables count the agents of a class; else each agent has its own.
+        Whether variables count the agents of a class, or there is one per agent.
     objective : Objective
-        With ``makespan-energy``, the energy is minimised at `makespan`.
+        With ``makespan-energy``, energy is minimised at `makespan`.
     makespan : float, optional
-        Time by which every task must be done, > 0; minimised where it is None.
+        Deadline of all tasks, > 0; if None, it is minimised.
 
     Raises
     ------
     InputError
-        If `makespan` is None with energy or with travel times.
+        If `makespan` is None, but energy is minimised or there are travel times.
     RefusedError
-        If there is no work, not every task can be served, or the model would be too large.
+        If there is no work, a task cannot be served, or the model would be too large.
     """
     if objective not in OBJECTIVES:
         raise InputError(f"must be {' or '.join(OBJECTIVES)}", "objective")
     with_energy, travels = objective is Objective.MAKESPAN_ENERGY, instance.has_travel_time
     if makespan is None and (with_energy or travels):
-        why = "the least energy is that at a makespan" if with_energy else "what an agent adds depends on its arrival"
-        raise InputError(f"is needed, as {why}; `alloc solve` finds one", "makespan")
+        why = "energy is minimised at a makespan" if with_energy else "contributions of agents depend on their arrival"
+        raise InputError(f"is required, as {why}; `alloc solve` finds one", "makespan")
     if not (instance.workload > 0).any():
-        raise RefusedError("there is no work to do, and so no model")
+        raise RefusedError("there is no work to do, so that there is no model")
     if fewest_unserved(instance):
         raise RefusedError("not every task can be served, so that the model has no solution; `alloc solve` says why")
     by_place = Grouping.PLACE if with_energy or travels else Grouping.ABILITY
@@ -178,7 +178,7 @@ def build_programme(
         with np.errstate(over="ignore"):
             travel = groups.distance[kind, tasks[row]] / groups.speed[kind]
             rate = rate * np.maximum(0.0, 1 - travel / hours)
-    useful = rate > 0  # who arrives too late has no variable
+    useful = rate > 0  # no variables for agents that arrive too late
     kind, row = kind[useful], row[useful]
     energy = instance.reach.energy_per_distance * groups.cost[kind, tasks[row]] if with_energy else None
     return Programme(instance, grouping, groups, tasks, kind, row, rate[useful], energy, hours, makespan is None)

@@ -1,4 +1,4 @@
-"""The allocation in a solver's solution of a model: files of HiGHS, CBC, Gurobi and SCIP."""
+"""Parsing of solution files of HiGHS, CBC, Gurobi and SCIP into allocations."""
 
 import re
 from collections.abc import Iterable, Iterator
@@ -18,47 +18,47 @@ HEAD = re.compile(
     r"|stopped|columns\s+index\s+status)",
     re.IGNORECASE,
 )
-"""How such a file begins, in HiGHS (last of all its pretty style), SCIP, Gurobi and CBC."""
+"""Beginnings of solution files of HiGHS (last its pretty style), SCIP, Gurobi and CBC."""
 
 NO_SOLUTION = re.compile(r"(solution status:|model status)?\s*(integer )?(infeasible|unbounded)", re.IGNORECASE)
 NO_SOLUTION_AT_END = re.compile(r"^model status:\s*(primal )?(infeasible|unbounded)", re.IGNORECASE | re.MULTILINE)
-"""The verdict in HiGHS's pretty style, in which empty values stand before it."""
+"""The model status in HiGHS's pretty style, in which it follows a table with empty values."""
 
 PRETTY_HEADER = re.compile(r"\s+Index Status\s+Lower\s+Upper(?P<value>\s+Primal)\s+Dual\b.*\bName")
-"""Above the variables in HiGHS's pretty style: cells may be empty, so that only the place in the line tells them."""
+"""Header of the variables in HiGHS's pretty style; as cells may be empty, columns are found by position."""
 
 VARIABLE = re.compile(rf"([{''.join(Grouping)}])_(\w+?){SEPARATOR}(\w+)", re.ASCII)
 
 WHOLE = 1e-4
-"""How far a value may be from a whole number: solvers take 1e-5 or less for none."""
+"""Tolerance on integrality; solvers use at most 1e-5."""
 
 
 def is_solution(text: str) -> bool:
-    """Return whether a text begins as solvers' solutions do."""
+    """Return whether a text begins like a solution file."""
     return HEAD.match(text.lstrip()) is not None
 
 
 def solution_allocation(text: str, instance: Instance) -> Allocation:
-    """Return the allocation in a solution of a model that `write_model` wrote for `instance`.
+    """Return the allocation in a solution of a model of `write_model` for `instance`.
 
-    Counts of a class are spread over its agents; variables that are left out are 0.
+    Counts of a class are assigned to its agents in order; missing variables are 0.
 
     Parameters
     ----------
     text : str
-        What a solver wrote: a line for each variable, with its name and value.
+        Solution file, with a line for each variable with its name and value.
     instance : Instance
 
     Raises
     ------
     InputError
-        If there is no solution, a variable is not of this instance, or values are no whole numbers or too many.
+        If there is no solution, a variable is not of this instance, or values are not integers or too large.
     """
     if NO_SOLUTION.match(text.lstrip()) or NO_SOLUTION_AT_END.search(text):
         raise InputError("the solver found no solution", "line 1")
     found = list(_values(text))
     if not found:
-        raise InputError("has no variable of a model that `alloc export` writes")
+        raise InputError("has no variable of a model of `alloc export`")
     letters = {letter for _, letter, *_ in found if letter != RATIO}
     if len(letters) > 1:
         raise InputError(f"mixes variables of several models: {', '.join(sorted(letters))}")
@@ -74,7 +74,7 @@ def _values(text: str) -> Iterator[Entry]:
     """Yield the variables of a model with their values."""
     cell = None
     for number, line in enumerate(text.splitlines(), 1):
-        if line.startswith(("# Rows", "# Dual", "Rows")):  # of HiGHS, after the values
+        if line.startswith(("# Rows", "# Dual", "Rows")):  # HiGHS, after the values
             return
         header = PRETTY_HEADER.match(line)
         if header is not None:
@@ -89,13 +89,13 @@ def _values(text: str) -> Iterator[Entry]:
 
 
 def _pairs(line: str, cell: slice | None) -> Iterable[tuple[str, str]]:
-    """Return what may be a name and its value; CBC puts a number, or two asterisks too, before the name.
+    """Return candidates for a name and its value; CBC puts an index, and maybe two asterisks, before the name.
 
     Parameters
     ----------
     line : str
     cell : slice or None
-        Where the value stands, in a file whose lines end with the name.
+        Position of the value in a file whose lines end with the name.
     """
     words = line.split()
     if cell is None:
@@ -111,7 +111,7 @@ def _number(value: str, name: str, line: int) -> float:
 
 
 def _spread(instance: Instance, grouping: Grouping, found: list[Entry]) -> Allocation:
-    """Turn values of variables into an allocation."""
+    """Return the allocation for values of variables."""
     agents = {name: index for index, name in enumerate(plain_names(instance.agent_ids, "agent"))}
     tasks = {name: index for index, name in enumerate(plain_names(instance.task_ids, "task"))}
     groups = grouped(instance, grouping)
@@ -120,18 +120,18 @@ def _spread(instance: Instance, grouping: Grouping, found: list[Entry]) -> Alloc
     for line, _, agent, task, value in found:
         for kind, name, known in (("agent", agent, agents), ("task", task, tasks)):
             if name not in known:
-                message = f"no {kind} of instance {instance.name!r} is called {name!r} in its models"
+                message = f"no {kind} of instance {instance.name!r} has the name {name!r} in its models"
                 raise InputError(message + nearest(name, tuple(known)), f"line {line}")
         number, of = _count(value, line), groups.class_of_agent[agents[agent]]
         counts[of, tasks[task]] += number
         left[of] -= number
         if left[of] < 0:
-            raise InputError(f"with this, agents like {agent} have more tasks than they are", f"line {line}")
+            raise InputError(f"with this, there are more tasks than agents like {agent}", f"line {line}")
     return groups.spread(counts)
 
 
 def _count(value: float, line: int) -> int:
-    """Return a value as the whole number that it should be."""
+    """Return a value rounded to an integer, or raise an error if it is not close to one."""
     if not (-WHOLE <= value <= MOST_PAIRS) or abs(value - round(value)) > WHOLE:
         raise InputError(f"{value:g} is not a number of agents; is this the solution of a relaxation?", f"line {line}")
     return round(value)

@@ -28,7 +28,7 @@ PATHS = [
     ("loop.json", "cannot be read"),
     ("plain.txt", "has no known format; use .json, .npz, or a folder"),
     ("plain", "has no known format"),
-    ("agents.csv", "give the folder of agents.csv and tasks.csv"),
+    ("agents.csv", "give a folder with agents.csv and tasks.csv"),
     ("plain/x.json", "cannot be read: not a directory"),
     ("latin.json", "is not UTF-8 (byte 0xeb); save it as UTF-8"),
     ("utf16.json", "is not UTF-8 (byte 0xff); save it as UTF-8"),
