@@ -1,9 +1,9 @@
-"""Tests that every allocator passes; subclass `AllocatorConformance` in the tests of your own. Needs pytest."""
+"""Conformance tests for allocators: subclass `AllocatorConformance` to test your own. Needs pytest."""
 
 import pytest
 
 for _module in ("runner", "answers", "runs", "isolation"):
-    pytest.register_assert_rewrite(f"alloc.allocators.conformance.{_module}")  # failed checks then show their values
+    pytest.register_assert_rewrite(f"alloc.allocators.conformance.{_module}")  # so that failed checks show values
 
 from alloc.allocators.conformance.suite import AllocatorConformance  # noqa: E402
 

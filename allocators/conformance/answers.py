@@ -1,4 +1,4 @@
-"""Checks of single answers: sound, no better than possible, and no more claimed than holds."""
+"""Checks of single answers: allocations are feasible, scores are correct, and claims hold."""
 
 import re
 
@@ -15,10 +15,10 @@ from alloc.problems import Objective, evaluate, fewest_unserved
 
 
 class AnswerChecks(Runner):
-    """What must hold of every answer."""
+    """Properties that every answer must have."""
 
     def test_method_is_described(self, subject: Allocator) -> None:
-        """Name, summary, objectives and needs are such that ``alloc methods`` can show them."""
+        """Name, summary, objectives and requirements are valid, so that ``alloc methods`` can show them."""
         method = subject.method
         assert re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)*", method.name), "lower-case letters, digits and hyphens"
         assert method.summary.strip(), "the summary is empty"
@@ -28,13 +28,13 @@ class AnswerChecks(Runner):
         assert not method.missing, f"requires {method.missing}, which is not installed"
 
     def test_plain_instance_is_not_refused(self, subject: Allocator) -> None:
-        """A method may refuse what it cannot do, but not a small instance without anything special."""
+        """A method may refuse what it does not support, but not a small instance without special features."""
         assert subject.refusal(CASES["integer"], Objective.MAKESPAN, Budget()) is None
 
     @every_case
     def test_proposal_is_sound(self, subject: Allocator, case: str) -> None:
-        """Before `solve` repairs anything, there is an answer, and every agent in it can do its task."""
-        self.answer(subject, case, subject.method.objectives[0])  # skips what is refused
+        """Before any repair by `solve`, there is an answer in which every agent can do its task."""
+        self.answer(subject, case, subject.method.objectives[0])  # skips refused cases
         search = Search(CASES[case], subject.method.objectives[0], Budget(None, self.iterations))
         proposal = subject.allocate(search)
         assert isinstance(proposal, Proposal)
@@ -47,10 +47,10 @@ class AnswerChecks(Runner):
     @every_case
     @every_objective
     def test_answer_is_sound(self, subject: Allocator, case: str, objective: Objective) -> None:
-        """Scores are those of the allocation, agents can do their tasks, and the fewest, least urgent are unserved."""
+        """Scores match the allocation, agents can do their tasks, and the fewest and least urgent are unserved."""
         instance = CASES[case]
         result = self.answer(subject, case, objective)
-        assert result.allocation is not None, "no allocation, though any would do"
+        assert result.allocation is not None, "no allocation, although one exists"
         assert result.evaluation is not None, "an allocation without scores"
         again = evaluate(instance, result.allocation)
         assert result.evaluation.key(Objective.MAKESPAN_ENERGY) == again.key(Objective.MAKESPAN_ENERGY)
@@ -64,7 +64,7 @@ class AnswerChecks(Runner):
     @every_case
     @every_objective
     def test_claims_hold(self, subject: Allocator, case: str, objective: Objective) -> None:
-        """Bounds lie below the optimum by enumeration, and the status claims no more than they prove."""
+        """Bounds do not exceed the optimum found by enumeration, and the status claims no more than they prove."""
         result, best = self.answer(subject, case, objective), optimum(case, objective)
         assert result.evaluation is not None
         if best.unserved_tasks:
@@ -74,17 +74,17 @@ class AnswerChecks(Runner):
         assert best.makespan is not None
         assert result.makespan is not None
         assert result.lower_bound is not None
-        assert result.lower_bound <= best.makespan * TOLERANCE, "the makespan is proven to be more than it can be"
+        assert result.lower_bound <= best.makespan * TOLERANCE, "the bound on the makespan exceeds the optimum"
         if result.energy_lower_bound is not None:
             least = least_energy(case, result.makespan)
-            assert result.energy_lower_bound <= least * TOLERANCE, "the energy is proven to be more than it can be"
+            assert result.energy_lower_bound <= least * TOLERANCE, "the bound on the energy exceeds the optimum"
         assert result.status in (Status.OPTIMAL, Status.FEASIBLE)
         if result.status is Status.OPTIMAL:
             assert result.makespan <= best.makespan * (1 + 2 * PROVEN)
 
     @every_case
     def test_slack_is_spent_on_energy(self, subject: Allocator, case: str) -> None:
-        """With slack for the makespan, the answer keeps within it, and the bound on the energy holds within it."""
+        """With makespan slack, the answer keeps to the makespan limit, and the energy bound holds under that limit."""
         result = self.solve(subject, CASES[case], objective=Objective.MAKESPAN_ENERGY, makespan_slack=0.5)
         score, fastest = result.evaluation, optimum(case, Objective.MAKESPAN).makespan
         assert score is not None

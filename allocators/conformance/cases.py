@@ -1,4 +1,4 @@
-"""Instances small enough to know their optimum by enumeration, each with a feature that is easy to get wrong."""
+"""Instances small enough to be solved by enumeration, each with a feature that is easy to get wrong."""
 
 from functools import cache
 from itertools import product
@@ -12,7 +12,7 @@ NAN, INF = np.nan, np.inf
 
 
 def _case(name: str, **changes: Any) -> Instance:
-    """Return five agents of integer ability around three tasks, but for `changes`; None takes a field away."""
+    """Return five agents of integer ability and three tasks, with `changes` of fields; None removes a field."""
     fields: dict[str, Any] = {
         "ability": (5, 3, 3, 2, 1),
         "workload": (6, 5, 3),
@@ -84,12 +84,12 @@ CASES: dict[str, Instance] = {
 
 
 def medium_case() -> Instance:
-    """Return an instance that one greedy pass does not solve, and that an exact method solves in a moment."""
+    """Return an instance that a greedy pass does not solve optimally, but an exact method solves quickly."""
     return _scattered("medium", 12, 4)
 
 
 def large_case() -> Instance:
-    """Return an instance that takes every method a while: real numbers, ranges, no two agents alike."""
+    """Return an instance that takes every method some time: real numbers, ranges, all agents different."""
     return _scattered("large", 150, 15)
 
 
@@ -117,7 +117,7 @@ def every_evaluation(case: str) -> tuple[Evaluation, ...]:
 
 @cache
 def optimum(case: str, objective: Objective) -> Evaluation:
-    """Return the best scores that any allocation of a case has."""
+    """Return the scores of the optimal allocation of a case."""
     best, *others = every_evaluation(case)
     for score in others:
         if score.is_better_than(best, objective):

@@ -1,4 +1,4 @@
-"""How the suite loads and runs the allocator under test."""
+"""Loading and running of the allocator under test."""
 
 import re
 import threading
@@ -29,7 +29,7 @@ every_objective = pytest.mark.parametrize("objective", OBJECTIVES)
 
 
 class Runner:
-    """Loads the allocator under test once, and runs it within a budget; `AllocatorConformance` says what may be set."""
+    """Loads the allocator under test once, and runs it within a budget; see `AllocatorConformance` for attributes."""
 
     name: ClassVar[str] = ""
     options: ClassVar[dict[str, object]] = {}
@@ -37,19 +37,19 @@ class Runner:
     patience_s: ClassVar[float] = 20.0
 
     def allocator(self) -> Allocator:
-        """Return the allocator under test; called once, as one object must serve all runs."""
+        """Return the allocator under test; called once, as all runs must be possible with one object."""
         return load(self.name, **self.options)
 
     @pytest.fixture
     def subject(self) -> Allocator:
-        """Return the one allocator of this class."""
+        """Return the allocator under test, which all tests of this class share."""
         cls = type(self)
         if "_subject" not in vars(cls):
             cls._subject = self.allocator()  # type: ignore[attr-defined]
         return cls._subject  # type: ignore[attr-defined, no-any-return]
 
     def solve(self, subject: Allocator, instance: Instance, **settings: Any) -> Result:
-        """Solve by `subject`, with a budget in iterations by default; skip what it refuses, if it has reason to."""
+        """Solve with `subject`, by default with a budget in iterations; skip the test if it refuses consistently."""
         objective = Objective(settings.pop("objective", subject.method.objectives[0]))
         settings = {"iterations": self.iterations, "time_limit_s": None, "threads": 1, **settings}
         budget = Budget(settings["time_limit_s"], settings["iterations"])
@@ -61,25 +61,25 @@ class Runner:
             pytest.skip(f"{subject.method.name}: {str(refused).partition(': ')[2]}")
         with self.guard(settings.setdefault("stop", threading.Event())):
             result = solve(instance, subject, objective=objective, **settings)
-        assert not [note for note in result.notes if STANDS in note], "a stage failed; the log tells where"
+        assert not [note for note in result.notes if STANDS in note], "a stage failed; see the log"
         return result
 
     def answer(self, subject: Allocator, case: str, objective: Objective) -> Result:
-        """Return the answer of `subject` to a case, solved once for all checks."""
+        """Return the answer of `subject` to a case, which is solved once for all checks."""
         return self._once((subject, case, objective), lambda: self.solve(subject, CASES[case], objective=objective))
 
     def seeded_answer(self, subject: Allocator, objective: Objective) -> tuple[Result, list[Improvement]]:
-        """Return the answer of `subject` to the medium case, with seed 7, and what it told meanwhile, likewise once."""
+        """Return the answer of `subject` to the medium case with seed 7, and its improvements; solved once."""
 
         def solve() -> tuple[Result, list[Improvement]]:
-            told: list[Improvement] = []
-            settings = {"objective": objective, "seed": 7, "on_improvement": told.append}
-            return self.solve(subject, medium_case(), **settings), told
+            reported: list[Improvement] = []
+            settings = {"objective": objective, "seed": 7, "on_improvement": reported.append}
+            return self.solve(subject, medium_case(), **settings), reported
 
         return self._once((subject, objective), solve)
 
     def _once(self, key: tuple[object, ...], make: Callable[[], Answer]) -> Answer:
-        """Return what `make` returned for this key when this class first asked."""
+        """Return the cached value of `make` for this key; it is called once per class."""
         cls = type(self)
         if "_answers" not in vars(cls):
             cls._answers = {}  # type: ignore[attr-defined]
@@ -90,7 +90,7 @@ class Runner:
 
     @contextmanager
     def guard(self, stop: threading.Event) -> Iterator[None]:
-        """End a run that takes more than `patience_s`, and let the check fail."""
+        """End a run that takes more than `patience_s` seconds, and fail the test."""
         late = threading.Event()
 
         def end_it() -> None:

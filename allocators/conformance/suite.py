@@ -1,4 +1,4 @@
-"""The suite as one class."""
+"""The conformance suite as one class."""
 
 from alloc.allocators.conformance.answers import AnswerChecks
 from alloc.allocators.conformance.isolation import IsolationChecks
@@ -6,19 +6,19 @@ from alloc.allocators.conformance.runs import RunChecks
 
 
 class AllocatorConformance(AnswerChecks, RunChecks, IsolationChecks):
-    """What the contract of `Allocator` asks for, as tests; subclass it as ``class TestMine(AllocatorConformance)``.
+    """Tests of the contract of `Allocator`; subclass it as ``class TestMine(AllocatorConformance)``.
 
-    Give the subclass either `name` or a method `allocator`. Instances that the method refuses, as its `Method` or its
-    `refusal` says, are checked to be refused.
+    The subclass must define either `name` or a method `allocator`. For instances that the method does not support
+    according to its `Method` or `refusal`, the tests check that `solve` refuses them.
 
     Attributes
     ----------
     name : str
-        What to load; not needed where `allocator` is overridden.
+        Name of the method to load; not needed if `allocator` is overridden.
     options : dict
-        Parameters to load it with.
+        Parameters for loading it.
     iterations : int
-        Budget where answers must be reproducible; choose it so that a run takes some 50 ms.
+        Budget of reproducible runs; choose it so that a run takes about 50 ms.
     patience_s : float
-        Longest time for any run, as all have either few iterations or a short time limit.
+        Maximum time of any run; all have either few iterations or a short time limit.
     """

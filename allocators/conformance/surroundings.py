@@ -1,4 +1,4 @@
-"""What an allocator must leave unchanged: the instance, and the global state of the process."""
+"""State that an allocator must not change: the instance, and the global state of the process."""
 
 import os
 import pickle
@@ -23,7 +23,7 @@ def instance_state(instance: Instance) -> dict[str, object]:
 
 
 def process_state() -> dict[str, object]:
-    """Return the global generators and settings that a method might change, as values that can be compared."""
+    """Return global random generators and settings that a method might change, as values that can be compared."""
     state: dict[str, object] = {
         "random": random.getstate(),
         "numpy.random": pickle.dumps(np.random.get_state()),  # noqa: NPY002 (the global state itself is compared)

@@ -1,4 +1,4 @@
-"""Drawings of results, fronts, fleets, runs and missions, for programs and the command line; needs matplotlib."""
+"""Plots of results, fronts, fleets, runs and missions, for programs and the command line; needs matplotlib."""
 
 from alloc.allocators.plotting.convergence import plot_convergence
 from alloc.allocators.plotting.figure import plot

@@ -1,4 +1,4 @@
-"""Colours of a drawing, distinguishable with any kind of colour vision, and in grey."""
+"""Colours of plots, distinguishable with any kind of colour vision, and in greyscale."""
 
 from typing import TYPE_CHECKING
 
@@ -16,11 +16,11 @@ UNSERVED, MAKESPAN, LIMIT = "#d55e00", "#d55e00", "#56b4e9"
 MOVE = "#56606b"
 
 NEGLIGIBLE = 1e-3
-"""Relative difference of completion times that no colours show."""
+"""Relative difference of completion times up to which tasks are not coloured by time."""
 
 
 def scale() -> "ListedColormap":
-    """Return the colour map of completion times, dark is late: cividis without its two ends."""
+    """Return the colour map of completion times, with late times dark: cividis without its two ends."""
     from matplotlib import colormaps
     from matplotlib.colors import ListedColormap
 
@@ -41,13 +41,13 @@ def _busy_range(result: "Result") -> tuple[float, float]:
 
 
 def is_late_coloured(result: "Result") -> bool:
-    """Return whether completion times differ so much that colours say something: by more than 0.1 %."""
+    """Return whether completion times differ by more than 0.1 %, so that colours are informative."""
     low, high = _busy_range(result)
     return high - low > NEGLIGIBLE * high
 
 
 def shades(result: "Result") -> "FloatArray":
-    """Return the position of each task on the colour map, from 0 (early) to 1 (late), shape (m,); 0 where unserved."""
+    """Return the position of each task on the colour map, from 0 (early) to 1 (late), shape (m,); 0 if unserved."""
     low, high = colour_range(result)
     time = finite_times(result)
     return np.clip((time - low) / (high - low), 0.0, 1.0)
@@ -60,7 +60,7 @@ def colours(result: "Result") -> "FloatArray":
 
 
 def finite_times(result: "Result") -> "FloatArray":
-    """Return completion times, 0 where unserved, shape (m,)."""
+    """Return completion times, 0 if unserved, shape (m,)."""
     if result.evaluation is None:
         return np.zeros(result.instance.m)
     time = result.evaluation.completion_time

@@ -1,4 +1,4 @@
-"""The drawing of runs: how makespan, bound and energy improve over time."""
+"""The plot of runs: makespan, bound and energy over time."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -19,30 +19,30 @@ if TYPE_CHECKING:
 
 
 def plot_convergence(results: "Result | Sequence[Result]", path: str | None = None) -> "Figure":
-    """Draw runs on one instance: makespan and proven bound over time, and energy where it is an objective.
+    """Draw runs on one instance: makespan and proven bound over time, and energy if it is part of the objective.
 
     Parameters
     ----------
     results : Result or sequence of Result
-        Of one instance, by any methods and seeds.
+        Results on one instance, with any methods and seeds.
     path : str, optional
-        A .png, .svg or .pdf file to write as well, whole or not at all.
+        A .png, .svg or .pdf file to write the figure to, atomically.
 
     Returns
     -------
     matplotlib.figure.Figure
-        On a canvas of its own; matplotlib's current figure stays as it is.
+        A figure with its own canvas; matplotlib's current figure is not changed.
 
     Raises
     ------
     InputError
-        If there is no result, they are of several instances, or `path` has another suffix, or cannot be written.
+        If there is no result, the results are on several instances, or `path` has another suffix or cannot be written.
     """
     found = list(results) if isinstance(results, Sequence) else [results]
     if not found:
-        raise InputError("must hold a result at least", "results")
+        raise InputError("must contain at least one result", "results")
     if len({(result.instance.name, result.instance.n, result.instance.m) for result in found}) > 1:
-        raise InputError("must be of one instance", "results")
+        raise InputError("must be on one instance", "results")
     return drawn(lambda: _draw(found), path)
 
 
@@ -74,7 +74,7 @@ def _draw(results: "list[Result]") -> "Figure":
 
 
 def _draw_run(axes: "Axes", result: "Result", field: str, *, label: str, colour: str) -> None:
-    """Draw one figure of a run as steps, from its first answer to its end."""
+    """Draw makespan or energy of a run as a step function, from its first allocation to its end."""
     points = [(point.time_s, value) for point in result.trace if (value := _value(point, field)) is not None]
     if not points:
         return
@@ -89,7 +89,7 @@ def _value(point: "TracePoint", field: str) -> float | None:
 
 
 def _labels(results: "list[Result]") -> list[str]:
-    """Return the methods, with seeds where a method ran several times."""
+    """Return the names of the methods, with seeds if a method ran several times."""
     count = Counter(result.method for result in results)
     return [f"{result.method}, seed {result.seed}" if count[result.method] > 1 else result.method for result in results]
 
@@ -99,4 +99,4 @@ def _colours(count: int) -> list[str]:
 
 
 SHORTEST_S = 1e-4
-"""Time of a first answer that came at once, on a logarithmic axis."""
+"""Smallest time in seconds that is shown on the logarithmic axis."""

@@ -1,4 +1,4 @@
-"""The drawing of a result."""
+"""The plot of a result."""
 
 from typing import TYPE_CHECKING
 
@@ -17,23 +17,23 @@ if TYPE_CHECKING:
 
 
 def plot(result: "Result", path: str | None = None) -> "Figure":
-    """Draw a result: sites and moves, and when each task is done; without positions, completion times alone.
+    """Draw a result: a map with moves, and the completion times of tasks; without positions, only the latter.
 
     Parameters
     ----------
     result : Result
     path : str, optional
-        A .png, .svg or .pdf file to write as well, whole or not at all.
+        A .png, .svg or .pdf file to write the figure to, atomically.
 
     Returns
     -------
     matplotlib.figure.Figure
-        On a canvas of its own; matplotlib's current figure stays as it is.
+        A figure with its own canvas; matplotlib's current figure is not changed.
 
     Raises
     ------
     InputError
-        If `path` has another suffix, or cannot be written.
+        If `path` has another suffix or cannot be written.
     """
     return drawn(lambda: _draw(result), path)
 
@@ -50,7 +50,7 @@ def _draw(result: "Result") -> "Figure":
     left, right = figure.subplots(1, 2, width_ratios=[1.25, 1])
     sites = draw_sites(left, result)
     draw_times(right, result)
-    figure.draw_without_rendering()  # fixes the layout, on which the places of names depend
+    figure.draw_without_rendering()  # fixes the layout, on which the positions of labels depend
     name_sites(left, result, sites)
     return figure
 

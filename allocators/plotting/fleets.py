@@ -1,4 +1,4 @@
-"""The drawing of makespan and energy by size of the fleet."""
+"""The plot of makespan and energy by size of the fleet."""
 
 from collections.abc import Sequence
 from textwrap import wrap
@@ -16,27 +16,27 @@ if TYPE_CHECKING:
     from alloc.allocators.experiments.whatif import Fleet, WhatIf
 
 MOST_LABELS = 12
-"""Fleets that are all labelled below their bars."""
+"""Maximum number of fleets of which each is labelled below its bar."""
 
 
 def plot_whatif(found: "WhatIf", path: str | None = None) -> "Figure":
-    """Draw the makespan of each fleet, with what is proven of it, and the energy below; above, unserved tasks, if any.
+    """Draw makespan and energy of each fleet with their proven bounds, and the number of unserved tasks, if any.
 
     Parameters
     ----------
     found : WhatIf
     path : str, optional
-        A .png, .svg or .pdf file to write as well, whole or not at all.
+        A .png, .svg or .pdf file to write the figure to, atomically.
 
     Returns
     -------
     matplotlib.figure.Figure
-        On a canvas of its own; matplotlib's current figure stays as it is.
+        A figure with its own canvas; matplotlib's current figure is not changed.
 
     Raises
     ------
     InputError
-        If `path` has another suffix, or cannot be written.
+        If `path` has another suffix or cannot be written.
     """
     return drawn(lambda: _draw(found), path)
 
@@ -68,7 +68,7 @@ def _draw(found: "WhatIf") -> "Figure":
 
 
 def _bars(axes: "Axes", values: Sequence[float | None], bounds: Sequence[float | None], colour: str = MAKESPAN) -> None:
-    """Draw a bar for each fleet, and over it what is proven to be needed; nothing where tasks are unserved."""
+    """Draw a bar for each fleet, and its lower bound on top of it; none if tasks are unserved."""
     at = range(len(values))
     axes.bar(at, [value or 0.0 for value in values], color=colour, label="best found", width=0.7)
     if any(bound is not None for bound in bounds):
@@ -81,7 +81,7 @@ def _bars(axes: "Axes", values: Sequence[float | None], bounds: Sequence[float |
 
 
 def _name(axes: "Axes", fleets: Sequence["Fleet"]) -> None:
-    """Write below the bars how many agents the fleets have, and what is changed."""
+    """Label the bars with the numbers of agents of the fleets, and the changes."""
     step = -(-len(fleets) // MOST_LABELS)
     labels = [f"{fleet.result.instance.n}\n{_changed(fleet)}" for fleet in fleets]
     axes.set_xticks(range(0, len(fleets), step), labels[::step])

@@ -1,4 +1,4 @@
-"""The drawing of a front of makespan against energy."""
+"""The plot of a Pareto front of makespan and energy."""
 
 import math
 from typing import TYPE_CHECKING
@@ -19,32 +19,33 @@ WIDE = 3.0
 """Ratio of the largest to the smallest makespan above which the axis is logarithmic."""
 
 MOST_TICKS = 9
-"""Numbers that a logarithmic axis has room for."""
+"""Maximum number of tick labels on a logarithmic axis."""
 
 TENTHS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
-"""Factors of a power of ten at which a short axis has numbers."""
+"""Multiples of powers of ten that are labelled on a short axis."""
 
 
 def plot_front(front: "Front", path: str | None = None) -> "Figure":
-    """Draw a front: the least energy found and the proven bound on it, as steps over the makespan.
+    """Draw a front: the least energy found and its proven bound, as step functions of the makespan.
 
-    Where tasks are unserved, the makespan is that of the others, nothing is proven, and the title says how many.
+    If tasks are unserved, the makespan is that of the served tasks, there are no bounds, and the title gives their
+    number.
 
     Parameters
     ----------
     front : Front
     path : str, optional
-        A .png, .svg or .pdf file to write as well, whole or not at all.
+        A .png, .svg or .pdf file to write the figure to, atomically.
 
     Returns
     -------
     matplotlib.figure.Figure
-        On a canvas of its own; matplotlib's current figure stays as it is.
+        A figure with its own canvas; matplotlib's current figure is not changed.
 
     Raises
     ------
     InputError
-        If `path` has another suffix, or cannot be written.
+        If `path` has another suffix or cannot be written.
     """
     return drawn(lambda: _draw(front), path)
 
@@ -76,7 +77,7 @@ def _draw(front: "Front") -> "Figure":
 
 
 def _draw_bounds(axes: "Axes", front: "Front") -> None:
-    """Shade what is proven impossible: below the energy bound of each run, up to its makespan limit."""
+    """Shade the region that is proven impossible: below the energy bound of each run, up to its makespan limit."""
     proven = [
         (max(result.makespan or 0.0, result.makespan_limit or 0.0), result.energy_lower_bound or 0.0)
         for result in front.points
@@ -99,7 +100,7 @@ def _logarithmic(axes: "Axes") -> None:
 
 
 def log_ticks(low: float, high: float) -> list[float]:
-    """Return as many round numbers in a range as have room for their labels: close ones, or only powers of ten."""
+    """Return round numbers in a range as ticks, at most `MOST_TICKS`; on a long axis, only powers of ten."""
     decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
     choices = [(TENTHS, 1), ((1.0, 2.0, 5.0), 1), *(((1.0,), step) for step in range(1, len(decades) + 1))]
     for factors, step in choices:

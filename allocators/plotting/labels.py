@@ -1,4 +1,4 @@
-"""Positions of labels beside circles, without overlaps."""
+"""Placement of labels beside circles without overlaps."""
 
 from itertools import product
 
@@ -10,27 +10,27 @@ from alloc.problems.instance import FloatArray
 Box = tuple[float, float, float, float]
 
 SIDES = ((0, 1), (0, -1), (1, 0), (-1, 0), (0.75, 0.75), (-0.75, 0.75), (0.75, -0.75), (-0.75, -0.75))
-"""Above, below, right, left, and between."""
+"""Directions from a circle to its label: above, below, right, left, and the diagonals."""
 
 GAPS = (0.0, 9.0)
-"""Points between a circle and its label."""
+"""Distances between a circle and its label, in points."""
 
 
 def place_labels(
     centre: FloatArray, radius: FloatArray, width: FloatArray, height: float, lines: FloatArray
 ) -> FloatArray:
-    """Return the centre of each label, NaN where there is no room for it; the largest circles are labelled first.
+    """Return the centre of each label, NaN if there is no room for it; the largest circles are labelled first.
 
-    Of the places without overlap, the first that the fewest lines cross is taken.
+    Of the positions without overlap, the first that is crossed by the fewest lines is chosen.
 
     Parameters
     ----------
     centre : ndarray, shape (k, 2)
-        Of the circles, in points; NaN rows have no circle.
+        Centres of the circles, in points; NaN rows have no circle.
     radius, width : ndarray, shape (k,)
-        Of the circles, and of their labels, in points.
+        Radii of the circles and widths of their labels, in points.
     height : float
-        Of every label, in points.
+        Height of every label, in points.
     lines : ndarray, shape (l, 2, 2)
         Both ends of each line, in points.
     """
@@ -55,7 +55,7 @@ def place_labels(
 
 
 def visible(centre: FloatArray, radius: FloatArray, room: float) -> NDArray[np.bool_]:
-    """Return whether each centre is free: no smaller circle, drawn on top, comes within `room` points of it."""
+    """Return for each centre whether no smaller circle, which is drawn on top, comes within `room` points of it."""
     distance = np.hypot(*(centre[:, None, :] - centre[None, :, :]).transpose(2, 0, 1))
     rank = np.empty(len(radius), dtype=int)
     rank[np.argsort(-radius, kind="stable")] = np.arange(len(radius))
@@ -74,12 +74,12 @@ def _overlap(one: Box, other: Box) -> bool:
 
 
 def _crosses(box: Box, lines: FloatArray) -> NDArray[np.bool_]:
-    """Return which lines cross the box: where they are within its width, they are within its height, too."""
+    """Return which lines cross the box: those that are within its width and its height at the same time."""
     low, high = np.array(box[:2]), np.array(box[2:])
     begin, step = lines[:, 0], lines[:, 1] - lines[:, 0]
     with np.errstate(divide="ignore", invalid="ignore"):
         ends = np.stack([(low - begin) / step, (high - begin) / step])
-    ends[np.isnan(ends)] = 0.0  # a line along the very edge
+    ends[np.isnan(ends)] = 0.0  # a line exactly along the edge
     first, last = ends.min(axis=0).max(axis=1), ends.max(axis=0).min(axis=1)
     crossed: NDArray[np.bool_] = np.maximum(first, 0.0) < np.minimum(last, 1.0)
     return crossed

@@ -1,4 +1,4 @@
-"""What the marks of a drawing mean."""
+"""The legend of a map."""
 
 from typing import TYPE_CHECKING
 
@@ -15,14 +15,14 @@ if TYPE_CHECKING:
 
 
 def draw_legend(axes: "Axes", result: "Result", begin: list[Base], *, counts: bool, moves: bool, returns: bool) -> None:
-    """Explain below the axes what is drawn, and nothing else.
+    """Draw a legend below the axes with the marks that occur in the drawing.
 
     Parameters
     ----------
     begin : list of Base
-        Those that are drawn.
+        The bases that are drawn.
     counts, moves, returns : bool
-        Whether circles hold numbers of agents, whether somebody moves, and whether to a base then.
+        Whether circles contain numbers of agents, whether moves are drawn, and whether returns to bases are drawn.
     """
     from matplotlib.lines import Line2D
     from matplotlib.patches import Polygon
@@ -63,7 +63,7 @@ def _mark(shape: str, label: str, face: str, size: float, edge: str = "white") -
 
 
 def _wedge_handler() -> object:
-    """Return what draws a wedge in a legend."""
+    """Return a legend handler that draws a wedge."""
     from matplotlib.legend_handler import HandlerPatch
     from matplotlib.patches import Polygon
 

@@ -1,4 +1,4 @@
-"""Moves in a drawing: agents grouped by start and task, as wedges that point to the task."""
+"""Moves on a map: agents grouped by start and task, drawn as wedges that point to the task."""
 
 from dataclasses import dataclass
 
@@ -11,12 +11,12 @@ from alloc.problems.instance import FloatArray, IntArray
 
 @dataclass(frozen=True, eq=False)
 class Flows:
-    """Groups of agents with the same start and the same task, in different places.
+    """Groups of agents with the same start and the same task, which are at different positions.
 
     Attributes
     ----------
     begin, end : ndarray, shape (k, 2)
-        Places of the start and of the task.
+        Positions of the start and of the task.
     count : ndarray of int, shape (k,)
         Number of agents.
     """
@@ -27,7 +27,7 @@ class Flows:
 
 
 def flows(where: Places, allocation: Allocation, agents: IntArray | None = None) -> Flows:
-    """Group the agents that move, or those of `agents` that do, by start and task."""
+    """Group the moving agents, among `agents` if given, by start and task."""
     chosen = slice(None) if agents is None else agents
     task = allocation.task_of_agent[chosen]
     begin = where.starts[chosen]
@@ -46,7 +46,7 @@ def wedges(moves: Flows, extent: float, aspect: float = 1.0) -> list[FloatArray]
         Size of the drawing in units of its horizontal axis; the width of a wedge is a fraction of it that grows with
         the square root of the number of agents.
     aspect : float
-        How long a unit of the vertical axis is drawn, over one of the horizontal axis.
+        Drawn length of a unit of the vertical axis over that of a unit of the horizontal axis.
     """
     stretch = np.array([1.0, aspect])
     along = (moves.end - moves.begin) * stretch

@@ -1,4 +1,4 @@
-"""The left half of a drawing: a map of tasks, groups, bases and moves."""
+"""The map in the left half of a plot: tasks, groups, bases and moves."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -32,26 +32,26 @@ MAX_LABELS = 60
 """Number of tasks above which they are not labelled."""
 
 MAX_AGENTS = 20_000
-"""Number of agents above which the moves of a sample are drawn: more wedges would only overlap."""
+"""Number of agents above which only the moves of a sample are drawn, as more wedges would overlap."""
 
 MAX_LINES = 300
-"""Number of moves, and of returns, that names keep clear of where they can."""
+"""Maximum number of moves, and of returns, that labels avoid if possible."""
 
 WIDTH = 1.25
-"""Width of the map over its height."""
+"""Ratio of the width of the map to its height."""
 
 
 @dataclass(frozen=True, eq=False)
 class Sites:
-    """What is drawn where.
+    """Positions and sizes of the marks on a map.
 
     Attributes
     ----------
     where : Places
     bases : list of Base
-        Where agents begin, but for those at tasks.
+        Places where agents start, other than tasks.
     radius : ndarray, shape (m + bases,)
-        Of the marks of tasks and bases, in points.
+        Radii of the marks of tasks and bases, in points.
     lines : ndarray, shape (l, 2, 2)
         Both ends of moves and returns.
     """
@@ -63,7 +63,7 @@ class Sites:
 
 
 def drawn_agents(result: "Result") -> "IntArray":
-    """Return the agents whose moves are drawn: all, or evenly spaced ones of many."""
+    """Return the agents whose moves are drawn: all, or an evenly spaced sample."""
     n = result.instance.n
     return np.unique(np.linspace(0, n - 1, min(n, MAX_AGENTS)).astype(np.intp))
 
@@ -95,12 +95,12 @@ def _areas(result: "Result", where: Places) -> "FloatArray":
         distance = np.hypot(*(known[:, None, :] - known[None, :, :]).transpose(2, 0, 1))
         np.fill_diagonal(distance, np.inf)
         share = float(np.median(distance.min(axis=1))) / (float(np.ptp(known, axis=0).max()) or 1.0)
-        largest = float(np.clip(np.pi * (330 * share) ** 2, 60, largest))  # the half is some 330 points wide
+        largest = float(np.clip(np.pi * (330 * share) ** 2, 60, largest))  # the map is about 330 points wide
     return np.maximum(12.0, largest * work / max(float(work.max()), 1e-300))
 
 
 def _draw_moves(axes: "Axes", result: "Result", where: Places, extent: float) -> "FloatArray":
-    """Draw a wedge for each group that moves; return both ends of each, those of the largest groups first."""
+    """Draw a wedge for each group that moves; return both ends of each, largest groups first."""
     from matplotlib.collections import PolyCollection
 
     if result.allocation is None:
@@ -171,9 +171,9 @@ def _finish(axes: "Axes", result: "Result", where: Places) -> None:
 
 
 def name_sites(axes: "Axes", result: "Result", sites: Sites) -> None:
-    """Write names beside tasks and bases, and numbers of agents into the circles, where there is room.
+    """Label tasks and bases, and write numbers of agents into the circles, where there is room.
 
-    The layout must be final, since labels are placed by distances on paper.
+    The layout must be final, as labels are placed by distances in points.
     """
     instance, m = result.instance, result.instance.m
     is_named = m <= MAX_LABELS
@@ -184,7 +184,7 @@ def name_sites(axes: "Axes", result: "Result", sites: Sites) -> None:
     size = 8.0 if len([name for name in names if name]) <= MAX_LABELS // 2 else 6.5
     place = np.vstack([sites.where.tasks, *(base.place for base in sites.bases[: len(starts)])])
     radius = sites.radius[: len(place)].copy()
-    radius[: 0 if is_named else m] = 0.0  # many small circles may be written over
+    radius[: 0 if is_named else m] = 0.0  # if there are many small circles, labels may cover them
     centre = axes.transData.transform(place) * 72 / axes.figure.dpi
     width = np.array([0.62 * size * len(name) for name in names])
     lines = axes.transData.transform(sites.lines.reshape(-1, 2)).reshape(-1, 2, 2) * 72 / axes.figure.dpi
@@ -237,5 +237,5 @@ def _write(
 
 
 def plain_text(name: str) -> str:
-    """Return `name` escaped, so that matplotlib reads no part of it as mathematics."""
+    """Return `name` with dollar signs escaped, so that matplotlib does not interpret it as mathematics."""
     return name.replace("$", r"\$")

@@ -1,4 +1,4 @@
-"""Where agents begin and return to: squares for bases with agents, dots for one, diamonds where nobody begins."""
+"""Marks of starts and bases: squares for several agents, dots for a single one, diamonds for bases to return to."""
 
 from typing import TYPE_CHECKING
 
@@ -16,17 +16,17 @@ if TYPE_CHECKING:
     from alloc.problems.instance import FloatArray, IntArray
 
 MAX_NAMES = 40
-"""Number of bases above which they are not named."""
+"""Number of bases above which they are not labelled."""
 
 FEW_AGENTS = 15
-"""Number of agents of a fleet up to which they are named at bases without a name."""
+"""Fleet size up to which bases without a name are labelled with the ids of their agents."""
 
 LONGEST_NAME = 18
-"""Characters of a name before it is shortened."""
+"""Maximum number of characters of a label."""
 
 
 def draw_starts(axes: "Axes", result: "Result", begin: list[Base]) -> "FloatArray":
-    """Draw the bases that are not at tasks, hollow where all are idle; return their sizes in points, shape (k,)."""
+    """Draw the bases, hollow if all their agents are idle; return their sizes in points, shape (k,)."""
     size = sizes(result, begin)
     if not begin:
         return size
@@ -41,7 +41,7 @@ def draw_starts(axes: "Axes", result: "Result", begin: list[Base]) -> "FloatArra
 
 
 def draw_returns(axes: "Axes", result: "Result", where: Places, agents: "IntArray") -> "FloatArray":
-    """Draw a dashed line from the task of each of some agents to its base; return their ends, shape (k, 2, 2)."""
+    """Draw a dashed line from the task of each of `agents` to its base; return their ends, shape (k, 2, 2)."""
     from matplotlib.collections import LineCollection
 
     if result.allocation is None:
@@ -58,14 +58,14 @@ def draw_returns(axes: "Axes", result: "Result", where: Places, agents: "IntArra
 
 
 def sizes(result: "Result", begin: list[Base]) -> "FloatArray":
-    """Return the width of each mark in points: it grows with the number of agents, and shrinks with that of bases."""
+    """Return the width of each mark in points: larger with more agents at the base, smaller with more bases."""
     largest = float(np.clip(36 / np.sqrt(max(len(begin), 1)), 2.0, 6.0))
     count = np.array([len(base.agents) for base in begin], dtype=np.float64)
     return np.minimum(largest * (0.9 + 0.1 * np.sqrt(count)), 2.5 * largest)
 
 
 def start_names(result: "Result", begin: list[Base]) -> list[str]:
-    """Return what is written beside each base: its name and how many agents begin there, or few agents."""
+    """Return the label of each base: its name with the number of its agents, or the ids of few agents."""
     if len(begin) > MAX_NAMES:
         return []
     short = short_names([base.name for base in begin], LONGEST_NAME)
@@ -80,7 +80,7 @@ def start_names(result: "Result", begin: list[Base]) -> list[str]:
 
 
 def is_idle(result: "Result", base: Base) -> bool:
-    """Return whether some begin there, and none of them has a task."""
+    """Return whether the base has agents, all of which are idle."""
     if not len(base.agents):
         return False
     return result.allocation is None or bool((result.allocation.task_of_agent[base.agents] == IDLE).all())

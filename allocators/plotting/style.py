@@ -1,4 +1,4 @@
-"""Settings that all drawings share: figure, fonts, suppressed warnings, and how files are written."""
+"""Settings shared by all plots: figure, fonts, suppressed warnings, and writing of files."""
 
 import io
 import logging
@@ -26,17 +26,17 @@ FONTS = (
     "Arial Unicode MS",
     "Unifont",
 )
-"""Font fallbacks: a glyph comes from the first installed one that has it; the first is shipped with matplotlib."""
+"""Font fallbacks: each glyph is taken from the first installed font that has it; the first is part of matplotlib."""
 
 DATES = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
-"""Left out of files, so that the same drawing gives the same file."""
+"""Metadata that is left out of files, so that the same figure gives the same file."""
 
 SUPPRESSED = r"Glyph .* missing|Matplotlib currently does not support|constrained_layout not applied"
-"""Warnings that a user can do nothing about: a missing glyph is drawn as a box, a crowded layout stays crowded."""
+"""Warnings that users cannot act on: missing glyphs are drawn as boxes, and crowded layouts stay crowded."""
 
 
 def check_plot(path: str) -> None:
-    """Raise an `InputError` if the suffix of `path` is not one that drawings have."""
+    """Raise an `InputError` if the suffix of `path` is not that of a plot."""
     from alloc.problems import InputError
 
     if Path(path).suffix.lower() not in SUFFIXES:
@@ -45,7 +45,7 @@ def check_plot(path: str) -> None:
 
 
 def drawn(draw: Callable[[], "Figure"], path: str | None) -> "Figure":
-    """Return the figure that `draw` makes, and write it to `path` if there is one."""
+    """Return the figure that `draw` creates, and write it to `path` if given."""
     if path is not None:
         check_plot(path)
     with in_style():
@@ -57,10 +57,10 @@ def drawn(draw: Callable[[], "Figure"], path: str | None) -> "Figure":
 
 @contextmanager
 def in_style() -> Iterator[None]:
-    """Draw inside with fonts for all scripts, and without output of matplotlib on standard error."""
+    """Use fonts for all scripts in the block, and suppress output of matplotlib on standard error."""
     logger = logging.getLogger("matplotlib")
     level = logger.level
-    logger.setLevel(logging.ERROR)  # it reports folders that it cannot write to, from its import on
+    logger.setLevel(logging.ERROR)  # on import, it already reports folders that are not writable
     try:
         import matplotlib
         from matplotlib.font_manager import fontManager
@@ -75,7 +75,7 @@ def in_style() -> Iterator[None]:
 
 
 def new_figure(width: float, height: float) -> "Figure":
-    """Return a figure of this size in inches, on a canvas of its own."""
+    """Return a figure of this size in inches, with its own canvas."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

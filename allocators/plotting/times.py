@@ -1,4 +1,4 @@
-"""The right half of a drawing: the completion time of each task."""
+"""The right half of a plot: completion times of tasks."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -19,16 +19,16 @@ if TYPE_CHECKING:
     from alloc.problems.instance import IntArray
 
 MAX_ROWS = 40
-"""Number of tasks above which bars are vertical and without labels."""
+"""Number of tasks above which bars are vertical and not labelled."""
 
 MOST_LETTERS = 70
-"""Letters of 7 points that a bar over the whole axis has room for."""
+"""Number of letters of 7 points that fit into a bar over the whole axis."""
 
 MARGIN = 1.06
-"""End of the axis over the latest time."""
+"""Ratio of the end of the axis to the latest time."""
 
 MAX_BARS = 1_000
-"""Number of tasks above which bars are single lines."""
+"""Number of tasks above which bars are drawn as thin lines."""
 
 
 def draw_times(axes: "Axes", result: "Result") -> None:
@@ -38,7 +38,7 @@ def draw_times(axes: "Axes", result: "Result") -> None:
     time, unserved = finite_times(result), unserved_tasks(result)
     order = np.lexsort((-time, ~unserved))
     top = max(float(time.max()), result.makespan or 0.0, result.lower_bound or 0.0) or 1.0
-    height, hatched = np.where(unserved, MARGIN * top, time)[order], unserved[order]  # never done: to the end
+    height, hatched = np.where(unserved, MARGIN * top, time)[order], unserved[order]  # unserved: to the axis end
     fill = colours(result)[order]
     fill[hatched] = 1.0
     rows = result.instance.m <= MAX_ROWS
@@ -59,7 +59,7 @@ def draw_times(axes: "Axes", result: "Result") -> None:
 
 
 def _lines(axes: "Axes", result: "Result", rows: bool) -> "list[Line2D]":
-    """Draw makespan and lower bound, with a white edge to be visible on dark bars."""
+    """Draw makespan and lower bound as lines with white edges, which are visible on dark bars."""
     from matplotlib.patheffects import withStroke
 
     draw = axes.axvline if rows else axes.axhline
@@ -93,7 +93,7 @@ def _name_rows(axes: "Axes", result: "Result", order: "IntArray", top: float) ->
 
 
 def _name_groups(axes: "Axes", result: "Result", order: "IntArray", top: float) -> None:
-    """Write into each bar who is on the task, as many as it has room for."""
+    """Write the names of the agents into the bar of each task, as far as there is room."""
     size = 7.0 if result.instance.m <= 25 else 6.0
     room = MOST_LETTERS * 7.0 / size * finite_times(result) / top
     dark = shades(result) > 0.5
@@ -105,7 +105,7 @@ def _name_groups(axes: "Axes", result: "Result", order: "IntArray", top: float) 
 
 
 def listed(names: Sequence[str], longest: int) -> str:
-    """Return as many names as fit into this many characters, and how many there are; nothing if none fits."""
+    """Return as many names as fit into `longest` characters, and the number of others; only a number if none fits."""
     short = short_names(names, 18)
     for count in range(len(short), 0, -1):
         more = f" and {len(short) - count} more" if count < len(short) else ""

@@ -1,1 +1,1 @@
-"""Missions as pictures, films, and pages that play them."""
+"""Missions as figures, animations and interactive pages."""

@@ -1,4 +1,4 @@
-"""A film of a mission: its map from hour to hour, as .gif or .mp4."""
+"""An animation of a mission: its map over time, as .gif or .mp4."""
 
 import tempfile
 from collections.abc import Callable
@@ -37,11 +37,11 @@ FRAMES, PER_SECOND = 120, 12
 DPI = 90
 
 TRAIL = 0.08
-"""Share of the mission over which the way behind an agent is drawn."""
+"""Length of the trail behind an agent, as a share of the mission's duration."""
 
 
 def check_animation(path: str) -> None:
-    """Raise an `InputError` if the suffix of `path` is not one of an animation, or what writes it is missing."""
+    """Raise an `InputError` if the suffix of `path` is not that of an animation, or ffmpeg is needed but missing."""
     suffix = Path(path).suffix.lower()
     if suffix not in SUFFIXES:
         raise InputError(f"must end in {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}", source=path)
@@ -55,21 +55,21 @@ def check_animation(path: str) -> None:
 
 
 def animate_mission(course: Course, path: str, frames: int = FRAMES) -> None:
-    """Write a mission as a film (.gif, .mp4), or as a page that plays it (.html).
+    """Write a mission as an animation (.gif, .mp4), or as an interactive page (.html).
 
     Parameters
     ----------
     course : Course
-        Of a `Recorder`, or by `course_of` from a log.
+        The course from a `Recorder`, or from a log by `course_of`.
     path : str
     frames : int
-        Pictures of a film, evenly spaced in time.
+        Number of frames, evenly spaced in time; for .gif and .mp4.
 
     Raises
     ------
     InputError
-        If `path` has another suffix, or cannot be written, or ffmpeg is missing for .mp4; or if no places are known
-        that a film could show.
+        If `path` has another suffix or cannot be written, ffmpeg is missing for .mp4, or no positions are known, which
+        .gif and .mp4 need.
     """
     check_animation(path)
     if Path(path).suffix.lower() == ".html":
@@ -79,17 +79,17 @@ def animate_mission(course: Course, path: str, frames: int = FRAMES) -> None:
         return
     plane = plane_of(course.mission.instance)
     if plane.is_empty:
-        raise InputError("cannot show a mission without places of agents or tasks; write .html", source=path)
+        raise InputError("cannot show a mission without positions of agents or tasks; write .html", source=path)
     with in_style():
-        write_bytes_atomically(path, _film(course, plane, Path(path).suffix.lower(), frames))
+        write_bytes_atomically(path, _animation_bytes(course, plane, Path(path).suffix.lower(), frames))
 
 
-def _film(course: Course, plane: Plane, suffix: str, frames: int) -> bytes:
+def _animation_bytes(course: Course, plane: Plane, suffix: str, frames: int) -> bytes:
     from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
 
     hours = np.linspace(0, course.end, frames)
     figure = new_figure(8, 7.2)
-    show = draw_film(figure, course, plane, hours)
+    show = draw_animation(figure, course, plane, hours)
     film = FuncAnimation(figure, show, frames=frames, init_func=list, blit=False, cache_frame_data=False)
     writer = (
         PillowWriter(fps=PER_SECOND)
@@ -102,8 +102,10 @@ def _film(course: Course, plane: Plane, suffix: str, frames: int) -> bytes:
         return written.read_bytes()
 
 
-def draw_film(figure: "Figure", course: Course, plane: Plane, hours: np.ndarray) -> "Callable[[int], list[Artist]]":
-    """Draw what stays, and return what shows the hour of a number; a task has a name from when it appears."""
+def draw_animation(
+    figure: "Figure", course: Course, plane: Plane, hours: np.ndarray
+) -> "Callable[[int], list[Artist]]":
+    """Draw the static parts, and return a function that draws a frame, given its number."""
     from matplotlib.collections import LineCollection
 
     axes = figure.subplots()
@@ -124,7 +126,7 @@ def draw_film(figure: "Figure", course: Course, plane: Plane, hours: np.ndarray)
     most = np.maximum([max(level.left for level in levels) for levels in course.levels], 1e-300)
     _explain(axes)
     figure.draw_without_rendering()
-    figure.set_layout_engine("none")  # so that nothing moves but agents
+    figure.set_layout_engine("none")  # so that the layout is the same in all frames
     names = name_tasks(axes, course, plane)
 
     def show(number: int) -> "list[Artist]":
@@ -147,7 +149,7 @@ def draw_film(figure: "Figure", course: Course, plane: Plane, hours: np.ndarray)
 
 
 def _move(course: Course, plane: Plane, hour: float, agents: "Artist", failed: "Artist", trails: "Artist") -> None:
-    """Put agents where they are at an hour, those that have failed as crosses, and draw the ways behind them."""
+    """Draw the agents at their positions at an hour, failed ones as crosses, with their trails."""
     places, colours, ways, over = [], [], [], []
     for agent, legs in enumerate(course.legs):
         leg = course.leg(agent, hour)

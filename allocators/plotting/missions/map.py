@@ -1,4 +1,4 @@
-"""The map of a mission: the plane that it is drawn on, tasks, and the ways that agents flew."""
+"""The map of a mission: its plane, the tasks, and the tracks of agents."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -23,16 +23,16 @@ if TYPE_CHECKING:
     from matplotlib.text import Annotation
 
 MOST_NAMES = 40
-"""Tasks beyond which none is named."""
+"""Number of tasks above which none is labelled."""
 
 MARKS = {DONE: "o", MISSED: "X", CANCELLED: "s"}
-"""Shapes of tasks that are over; those that are left are circles without a filling."""
+"""Markers of tasks that are done, missed or cancelled; open ones are hollow circles."""
 
 FAILED = "x"
-"""Mark of agents that have failed."""
+"""Marker of agents that have failed."""
 
 MARGIN = 0.06
-"""Of the drawing around all places, as a share of its longer side."""
+"""Margin around all positions, as a share of the longer side of the drawing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,11 +42,11 @@ class Plane:
     Attributes
     ----------
     where : Places
-        Of all tasks, and of the starts of agents.
+        Positions of all tasks and of the starts of agents.
     axes : (int, int)
-        Which coordinates of a position are drawn.
+        The two coordinates of a position that are drawn.
     wraps : bool
-        Whether longitudes go on beyond 180 degrees, as the mission lies around the date line.
+        Whether longitudes range from 0 to 360 degrees, as the mission lies around the date line.
     """
 
     where: Places
@@ -54,7 +54,7 @@ class Plane:
     wraps: bool
 
     def point(self, position: Position | None) -> tuple[float, float]:
-        """Return where a position is drawn, NaN where it is unknown."""
+        """Return the coordinates at which a position is drawn, NaN if it is unknown."""
         if position is None:
             return np.nan, np.nan
         x, y = position[self.axes[0]], position[self.axes[1]]
@@ -62,11 +62,11 @@ class Plane:
 
     @property
     def is_empty(self) -> bool:
-        """Whether no place is known at all."""
+        """Whether all positions are unknown."""
         return bool(np.isnan(self.where.tasks[:, 0]).all() and np.isnan(self.where.starts[:, 0]).all())
 
     def window(self, more: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the lower left and upper right corner of a drawing of all places, and `more`, shape (k, 2)."""
+        """Return the lower left and upper right corner of a drawing of all positions and `more`, shape (k, 2)."""
         known = np.vstack([self.where.tasks, self.where.starts, more])
         known = known[~np.isnan(known[:, 0])]
         low, high = known.min(axis=0), known.max(axis=0)
@@ -85,7 +85,7 @@ def plane_of(instance: Instance) -> Plane:
 
 
 def track(course: Course, agent: int, plane: Plane) -> FloatArray:
-    """Return the corners of an agent's way, shape (k, 2); NaN rows where it is unknown."""
+    """Return the vertices of an agent's track, shape (k, 2); unknown ones are rows of NaN."""
     legs = course.legs[agent]
     corners = [plane.point(leg.source) for leg in legs]
     corners += [plane.point(legs[-1].goal)] if legs else []
@@ -93,19 +93,19 @@ def track(course: Course, agent: int, plane: Plane) -> FloatArray:
 
 
 def agent_colours(n: int) -> list[str]:
-    """Return the colour of each agent: its own where there are few."""
+    """Return the colour of each agent: distinct ones if there are few agents, else the same."""
     return list(SERIES[:n]) if n <= len(SERIES) else [MOVE] * n
 
 
 def task_areas(course: Course) -> FloatArray:
-    """Return the area of each task's mark in square points: in proportion to most work that it ever had."""
+    """Return the area of each task's marker in square points, proportional to the most work that it ever had left."""
     most = np.array([max(level.left for level in levels) for levels in course.levels])
     largest = float(np.clip(9_000 / max(len(most), 1), 30, 420))
     return np.maximum(12.0, largest * most / (float(most.max(initial=0.0)) or 1.0))
 
 
 def prepare(axes: "Axes", course: Course, plane: Plane) -> None:
-    """Set window, aspect and labels of a map."""
+    """Set the limits, aspect and labels of a map."""
     corners = [track(course, agent, plane) for agent in range(len(course.legs))]
     low, high = plane.window(np.vstack(corners) if corners else np.empty((0, 2)))
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel=plain_text(plane.where.axes[0]))
@@ -116,7 +116,7 @@ def prepare(axes: "Axes", course: Course, plane: Plane) -> None:
 
 
 def draw_map(axes: "Axes", course: Course, plane: Plane) -> None:
-    """Draw the ways of all agents, where they began and ended, and what has become of each task."""
+    """Draw the tracks of all agents with their starts and ends, and the final state of each task."""
     prepare(axes, course, plane)
     _draw_tracks(axes, course, plane)
     (states,) = zip(*task_states(course, np.array([course.end])), strict=True)
@@ -173,7 +173,7 @@ def _draw_tracks(axes: "Axes", course: Course, plane: Plane) -> None:
 
 
 def name_tasks(axes: "Axes", course: Course, plane: Plane) -> "dict[int, Annotation]":
-    """Write names beside tasks where there is room, and return them by task; the layout must be final."""
+    """Label tasks where there is room, and return the labels by task; the layout must be final."""
     instance = course.mission.instance
     if instance.m > MOST_NAMES:
         return {}
@@ -187,14 +187,14 @@ def name_tasks(axes: "Axes", course: Course, plane: Plane) -> "dict[int, Annotat
 
 
 def _frame(axes: "Axes") -> FloatArray:
-    """Return both ends of the four lines around a map, in points: names are rather beside them than on them."""
+    """Return both ends of the four lines around a map, in points, so that labels can avoid them."""
     (left, bottom), (right, top) = axes.bbox.get_points() * 72 / axes.figure.dpi
     corners = np.array([(left, bottom), (right, bottom), (right, top), (left, top)])
     return np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
 
 
 def write(axes: "Axes", text: str, place: FloatArray, offset: FloatArray, size: float) -> "Annotation":
-    """Write a name beside a place, by an offset in points."""
+    """Write a label at an offset in points from a position."""
     from matplotlib.patheffects import withStroke
 
     return axes.annotate(

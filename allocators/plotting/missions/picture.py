@@ -1,4 +1,4 @@
-"""The picture of a mission that is over."""
+"""The plot of a completed mission."""
 
 from typing import TYPE_CHECKING
 
@@ -18,24 +18,24 @@ if TYPE_CHECKING:
 
 
 def plot_mission(course: "Course", path: str | None = None) -> "Figure":
-    """Draw a mission: the ways of agents on a map, tasks by state, work left, messages, and who was where.
+    """Draw a mission: the tracks of agents on a map, and tasks by state, work left, messages and agents over time.
 
     Parameters
     ----------
     course : Course
-        Of a `Recorder`, or by `course_of` from a log.
+        The course from a `Recorder`, or from a log by `course_of`.
     path : str, optional
-        A .png, .svg or .pdf file to write as well, whole or not at all.
+        A .png, .svg or .pdf file to write the figure to, atomically.
 
     Returns
     -------
     matplotlib.figure.Figure
-        On a canvas of its own; matplotlib's current figure stays as it is.
+        A figure with its own canvas; matplotlib's current figure is not changed.
 
     Raises
     ------
     InputError
-        If `path` has another suffix, or cannot be written.
+        If `path` has another suffix or cannot be written.
     """
     return drawn(lambda: _draw(course), path)
 
@@ -68,7 +68,7 @@ def _draw(course: "Course") -> "Figure":
     panels[-1].set_xlabel(gantt.get_xlabel())
     for axes in (gantt, *panels):
         axes.spines[["top", "right"]].set_visible(False)
-    figure.draw_without_rendering()  # fixes the layout, on which the places of names depend
+    figure.draw_without_rendering()  # fixes the layout, on which the positions of labels depend
     if not plane.is_empty:
         name_tasks(sites, course, plane)
     name_work(gantt, course)
@@ -89,7 +89,7 @@ def _explain(axes: "Axes") -> None:
 
 
 def title(course: "Course") -> str:
-    """Return what was simulated, and how it went."""
+    """Return a title with the mission, the policy and the outcome."""
     instance, result = course.mission.instance, course.result
     name = plain_text(shortened(instance.name, 60))
     size = f"{counted(instance.n, 'agent')}, {counted(instance.m, 'task')}"

@@ -1,4 +1,4 @@
-"""A page that plays a mission; a browser opens it from disk, without a network."""
+"""A self-contained interactive page that plays a mission; a browser opens it from disk without a network."""
 
 import base64
 import json
@@ -20,10 +20,10 @@ from alloc.problems.text import one_line
 from alloc.problems.vocabulary import Knowledge
 
 MOST_MESSAGES = 60_000
-"""Messages beyond which every so many are left out of the page."""
+"""Maximum number of messages on the page; of more, every k-th is kept."""
 
 STEPS = 65_534
-"""Hours of reports are kept as whole numbers up to one more than this; 0 is for what was not known."""
+"""Number of steps for quantising the hours of reports, as integers from 1 to this number plus 1; 0 is unknown."""
 
 Entry = dict[str, object]
 
@@ -40,13 +40,13 @@ def write_player(course: Course, path: str) -> None:
     Raises
     ------
     InputError
-        If it cannot be written.
+        If the file cannot be written.
     """
     write_text_atomically(path, to_html(course))
 
 
 def to_html(course: Course) -> str:
-    """Return the page: its parts lie beside this module, and the mission goes in as JSON."""
+    """Return the page, made from the templates beside this module with the mission as JSON."""
     data = json.dumps(document(course), allow_nan=False, ensure_ascii=False).replace("<", "\\u003c")
     parts = {"TITLE": escape(one_line(course.mission.name)), "MISSION": data, "LIBRARY": _text_of("d3.min.js")}
     parts |= {"STYLE": _text_of("player.css"), "SCRIPT": _text_of("player.js")}
@@ -58,7 +58,7 @@ def _text_of(name: str) -> str:
 
 
 def document(course: Course) -> Entry:
-    """Return what the page shows: places on the map, hours, and states by their number."""
+    """Return the content of the page: positions on the map, hours, and states as indices."""
     instance, plane = course.mission.instance, plane_of(course.mission.instance)
     every = -(-len(course.messages) // MOST_MESSAGES) or 1
     sensing, radius = course.mission.sensing, course.mission.radio.radius
@@ -143,7 +143,7 @@ def _tasks(course: Course, plane: Plane) -> list[Entry]:
 
 
 def _knowledge(awareness: Awareness, end: float) -> Entry:
-    """Return the hours of reports as numbers of two bytes, row by row."""
+    """Return the hours of reports as two-byte integers, row by row, in base64."""
     known = ~np.isnan(awareness.reports)
     steps = np.zeros(awareness.reports.shape, dtype="<u2")
     steps[known] = 1 + np.round(awareness.reports[known] / (end or 1.0) * STEPS).clip(0, STEPS)

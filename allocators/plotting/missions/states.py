@@ -1,4 +1,4 @@
-"""What agents do and what becomes of tasks: names and colours in all drawings of missions, and when each was so."""
+"""States of agents and tasks over time, with their names and colours in all plots of missions."""
 
 import numpy as np
 
@@ -31,14 +31,14 @@ _OVER = {TaskStatus.DONE: DONE, TaskStatus.MISSED: MISSED, TaskStatus.CANCELLED:
 
 
 def doing(leg: Leg) -> str | None:
-    """Return what an agent does, in the words of the drawings; None where it is not in the mission."""
+    """Return the name of an agent's state; None if it is not in the mission."""
     if leg.status is AgentStatus.FLYING:
         return FLYING if leg.task >= 0 else ELSEWHERE
     return {AgentStatus.WORKING: WORKING, AgentStatus.IDLE: IDLE, AgentStatus.AWAY: AWAY}.get(leg.status)
 
 
 def workers(course: Course, hours: FloatArray) -> IntArray:
-    """Return how many agents work on each task at some hours that ascend, shape (m, hours)."""
+    """Return how many agents work on each task at the given ascending hours, shape (m, hours)."""
     change = np.zeros((len(course.levels), len(hours) + 1), dtype=np.intp)
     for legs in course.legs:
         for leg in legs:
@@ -51,7 +51,7 @@ def workers(course: Course, hours: FloatArray) -> IntArray:
 
 
 def task_states(course: Course, hours: FloatArray) -> list[list[str | None]]:
-    """Return the state of each task at some hours that ascend; None before it appears."""
+    """Return the state of each task at the given ascending hours; None before the task appears."""
     count = workers(course, hours)
     return [
         [_state(status, int(here)) for status, here in zip(statuses, row, strict=True)]

@@ -1,4 +1,4 @@
-"""What is drawn over the hours of a mission: tasks by state, work left, messages, and who was where."""
+"""Plots over the hours of a mission: tasks by state, work left, messages, and a Gantt chart of agents."""
 
 from typing import TYPE_CHECKING
 
@@ -21,24 +21,24 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 POINTS = 700
-"""Hours at which curves are drawn."""
+"""Number of hours at which curves are evaluated."""
 
 MOST_ROWS = 45
-"""Agents beyond which their rows have no names."""
+"""Number of agents above which their rows are not labelled."""
 
 LETTER = 0.62
-"""Width of a letter over its height."""
+"""Ratio of the width of a letter to its height."""
 
 
 def _hours(course: Course) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    """Return evenly spaced hours, and all at which something becomes of a task."""
+    """Return evenly spaced hours, and the hours at which tasks change unless these are too many."""
     even = np.linspace(0, course.end or 1.0, POINTS)
     changes = np.array([level.hour for levels in course.levels for level in levels])
     return np.unique(np.concatenate([even, changes])) if len(changes) < 5 * POINTS else even
 
 
 def draw_tasks(axes: "Axes", course: Course) -> None:
-    """Draw how many tasks there are in each state, done ones at the bottom."""
+    """Draw the number of tasks in each state as a stacked plot, with done tasks at the bottom."""
     hours = _hours(course)
     states = np.array(task_states(course, hours), dtype=object).reshape(len(course.levels), len(hours))
     counts = {state: (states == state).sum(axis=0) for state in TASK_COLOURS}
@@ -64,7 +64,7 @@ def draw_tasks(axes: "Axes", course: Course) -> None:
 
 
 def draw_work(axes: "Axes", course: Course) -> None:
-    """Draw the work left of all tasks that have appeared."""
+    """Draw the total work left of the tasks that have appeared."""
     hours = _hours(course)
     left = course.work_left(hours).sum(axis=0)
     axes.fill_between(hours, left, color=TASK_COLOURS[WAITING], alpha=0.25, linewidth=0)
@@ -74,7 +74,7 @@ def draw_work(axes: "Axes", course: Course) -> None:
 
 
 def draw_messages(axes: "Axes", course: Course) -> None:
-    """Draw how many messages were sent, and how many of them somebody heard."""
+    """Draw the rate of messages sent, and of those received by any agent."""
     sent = np.array([hour for hour, _, _ in course.messages])
     heard = np.array([hour for hour, _, hearers in course.messages if hearers])
     period = course.mission.radio.period
@@ -89,7 +89,7 @@ def draw_messages(axes: "Axes", course: Course) -> None:
 
 
 def _beside(axes: "Axes") -> None:
-    """Explain the colours on the right of the axes, in the order in which they lie."""
+    """Draw a legend on the right of the axes, in the order of the stacked areas."""
     handles, labels = axes.get_legend_handles_labels()
     axes.legend(
         handles[::-1],
@@ -103,7 +103,7 @@ def _beside(axes: "Axes") -> None:
 
 
 def draw_gantt(axes: "Axes", course: Course) -> None:
-    """Draw a row for each agent: when it was flying, working, idle and away."""
+    """Draw a Gantt chart with a row for each agent: when it was flying, working, idle and away."""
     from matplotlib.patches import Patch
 
     n = len(course.legs)
@@ -144,7 +144,7 @@ def draw_gantt(axes: "Axes", course: Course) -> None:
 
 
 def name_work(axes: "Axes", course: Course) -> None:
-    """Write into the rows where agents work, where there is room; the layout must be final."""
+    """Write the names of tasks into the bars of working agents where there is room; the layout must be final."""
     n = len(course.legs)
     if n > MOST_ROWS:
         return

@@ -274,7 +274,7 @@ def test_runs_are_drawn_over_time(small):
 def test_runs_on_several_instances_are_refused(small):
     """There is one axis of makespans, so that runs of other instances, or none, are an error."""
     other = solve(fleet(), "greedy", handle_signals=False)
-    with pytest.raises(InputError, match="results: must be of one instance"):
+    with pytest.raises(InputError, match="results: must be on one instance"):
         plot_convergence([other, solve(small, "greedy", handle_signals=False)])
-    with pytest.raises(InputError, match="results: must hold"):
+    with pytest.raises(InputError, match="results: must contain"):
         plot_convergence([])

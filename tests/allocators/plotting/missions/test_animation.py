@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from alloc.allocators import simulate
-from alloc.allocators.plotting.missions.animation import draw_film
+from alloc.allocators.plotting.missions.animation import draw_animation
 from alloc.allocators.plotting.missions.map import plane_of
 from alloc.problems import MissionParameters, Recorder, random_mission
 from alloc.problems.missions.events import EventKind
@@ -16,7 +16,7 @@ def test_a_picture_shows_what_has_happened_by_then() -> None:
     recorder = Recorder()
     course = recorder.course(simulate(mission, "nearest", deadline_ms=None, observe=recorder).result)
     figure = Figure(figsize=(6, 5))
-    show = draw_film(figure, course, plane_of(mission.instance), np.array([0.0, course.end]))
+    show = draw_animation(figure, course, plane_of(mission.instance), np.array([0.0, course.end]))
     axes = figure.axes[0]
     names = {text.get_text(): text for text in axes.texts}
     *_, squares, crosses = axes.collections
