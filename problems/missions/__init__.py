@@ -1,4 +1,4 @@
-"""Missions: allocation that goes on in time, while tasks appear, agents fail and not everybody knows everything.
+"""Missions: allocation over time, while tasks appear, agents fail and knowledge may be local.
 
-`mission` and `events` say what happens, `simulation` what comes of it, `files` and `families` where missions come from.
+`mission` and `events` define missions, `simulation` runs them, `files`, `families` and `readers` provide them.
 """

@@ -1,14 +1,14 @@
-"""Random numbers that depend on a key alone, so that all policies meet the same chances in whatever order they come."""
+"""Counter-based random numbers: they depend only on a key, so all policies face the same ones in whatever order."""
 
 _MASK = (1 << 64) - 1
 _GOLDEN = 0x9E3779B97F4A7C15
 
 LOSS, BURST, PACE, EXPLORING = 1, 2, 3, 4
-"""First part of a key: what the number is for."""
+"""First part of a key: the purpose of the number."""
 
 
 def uniform(*key: int) -> float:
-    """Return a number in [0, 1) that is as good as random, always the same one for a key.
+    """Return a pseudo-random number in [0, 1) that is a function of the key.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The course of a mission: where everybody was, what was left of each task, and who knew of what since when."""
+"""The course of a mission, for plots: trajectories of agents, work left of tasks, messages and knowledge over time."""
 
 import math
 from collections.abc import Iterator
@@ -15,7 +15,7 @@ from alloc.problems.missions.simulation.state import AgentStatus, TaskStatus
 
 @dataclass(slots=True)
 class Leg:
-    """What one agent did between two hours; it went straight from one position to the other, at one speed.
+    """An activity of one agent between two hours, with uniform straight motion between two positions.
 
     Attributes
     ----------
@@ -23,9 +23,9 @@ class Leg:
         Hours.
     status : AgentStatus
     source, goal : tuple of float, or None
-        Where it was at both; None where unknown.
+        Positions at both; None if unknown.
     task : int
-        Where it flew or worked; -1 for none.
+        Index of the task to which it flew or at which it worked; -1 for none.
     """
 
     begin: float
@@ -36,7 +36,7 @@ class Leg:
     task: int = -1
 
     def position(self, hour: float) -> Position | None:
-        """Return where the agent was at an hour between the two."""
+        """Return the agent's position at an hour between the two."""
         if self.source is None or self.goal is None or self.end <= self.begin:
             return self.source
         share = min(1.0, max(0.0, (hour - self.begin) / (self.end - self.begin)))
@@ -46,9 +46,9 @@ class Leg:
 
 @dataclass(frozen=True, slots=True)
 class Level:
-    """Work left of one task, and its status, from an hour on; between two of them work left is linear.
+    """Work left and status of one task from an hour on; work left is linear between two levels.
 
-    A change at once, such as a task that is cancelled, has two at the same hour.
+    A jump, such as a cancellation, is two levels at the same hour.
     """
 
     hour: float
@@ -58,16 +58,16 @@ class Level:
 
 @dataclass(frozen=True, eq=False)
 class Awareness:
-    """Who knew of what, at some moments: all that is known of an agent or a task was true at an hour that is kept.
+    """Hours of the reports that agents had at some moments.
 
     Attributes
     ----------
     agents : tuple of int
-        Whose knowledge was recorded.
+        Agents whose knowledge was recorded.
     hours : ndarray, shape (k,)
         The moments.
     reports : ndarray, shape (len(agents), k, n + m)
-        Hour of the last report of each agent, and of each task; NaN where nothing was known.
+        Hour of the last report of each agent and each task; NaN if there was none.
     """
 
     agents: tuple[int, ...]
@@ -77,7 +77,7 @@ class Awareness:
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """A mission that is over, to be drawn.
+    """The course of a finished mission, for plots.
 
     Attributes
     ----------
@@ -86,13 +86,13 @@ class Course:
     end : float
         Hour at which it ended.
     legs : tuple of list of Leg
-        Of each agent, in the order of time.
+        Legs of each agent, in chronological order.
     levels : tuple of list of Level
-        Of each task, in the order of time.
+        Levels of each task, in chronological order.
     messages : tuple of (float, int, int)
-        Hour, agent, and number of agents that heard it.
+        Hour, sender, and number of receivers.
     awareness : Awareness or None
-        None where all know all, or where it was not recorded: a log does not hold it.
+        None with full knowledge, or if it was not recorded, as in courses made from a log.
     """
 
     mission: Mission
@@ -104,11 +104,11 @@ class Course:
     awareness: Awareness | None = None
 
     def statuses(self, hours: FloatArray) -> list[list[TaskStatus]]:
-        """Return the status of each task at some hours, which ascend."""
+        """Return the status of each task at the given hours, in ascending order."""
         return [[level.status for level in _at(levels, hours)] for levels in self.levels]
 
     def work_left(self, hours: FloatArray) -> FloatArray:
-        """Return the work left of each task at some hours, shape (m, hours)."""
+        """Return the work left of each task at the given hours, shape (m, hours)."""
         left = np.zeros((len(self.levels), len(hours)))
         for row, levels in zip(left, self.levels, strict=True):
             last = {level.hour: level.left for level in levels}  # the later one of two at the same hour
@@ -120,7 +120,7 @@ class Course:
         return left
 
     def leg(self, agent: int, hour: float) -> Leg | None:
-        """Return what an agent did at an hour; None before it joined, or after it failed."""
+        """Return the leg of an agent at an hour; None before it joined, or after it failed."""
         found = None
         for leg in self.legs[agent]:
             if leg.begin > hour:

@@ -1,4 +1,4 @@
-"""What happens in a mission, whatever agents do, and whether it can happen in this order."""
+"""Exogenous events of a mission, and checks that their sequence is consistent."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -10,11 +10,11 @@ from alloc.problems.changes.move import position
 from alloc.problems.errors import InputError, nearest
 
 LATEST = 1e60
-"""Hours beyond which nothing happens."""
+"""Largest hour of an event."""
 
 
 class EventKind(StrEnum):
-    """What can happen."""
+    """Kinds of events."""
 
     AGENT_JOINS = "agent-joins"
     AGENT_FAILS = "agent-fails"
@@ -40,7 +40,7 @@ FIELDS: Mapping[EventKind, tuple[str, ...]] = {
     EventKind.TASK_CHANGES: ("task", "workload"),
     EventKind.RADIO_SILENT: ("agent", "center", "radius", "until"),
 }
-"""Fields of each kind besides the hour; a silence has an agent, or a center and a radius."""
+"""Fields of each kind besides the hour; a silence has either an agent, or a center and a radius."""
 
 
 @dataclass(frozen=True)
@@ -52,13 +52,13 @@ class Event:
     hour : float
     kind : EventKind or str
     agent, task : str or None
-        Id of whom or what it is about.
+        Id of the agent or task concerned.
     amount : float or None
-        Energy that an agent is recharged by.
+        Energy added to the agent's battery.
     workload : float or None
-        Work left of a task from then on.
+        Work left of the task from then on.
     center : tuple of float, or None
-        Three coordinates of the place around which no radio works.
+        Three coordinates of the centre of the region in which no radio works.
     radius : float or None
     until : float or None
         Hour at which a silence ends.
@@ -66,7 +66,7 @@ class Event:
     Raises
     ------
     InputError
-        If a value is wrong, or is one that this kind of event does not have; its place is the field.
+        If a value is invalid, or the kind of event does not have the field; the error's ``place`` is the field.
     """
 
     hour: float
@@ -107,7 +107,7 @@ class Event:
         object.__setattr__(self, name, value)
 
     def to_dict(self) -> dict[str, object]:
-        """Return the event as in a file, agents and tasks by their ids."""
+        """Return the event as in a mission file."""
         fields: dict[str, object] = {"hour": self.hour, "event": str(self.kind)}
         for name in FIELDS[self.kind]:
             value = getattr(self, name)
@@ -131,7 +131,7 @@ def _checked(name: str, value: object) -> object:
 
 
 def check_references(events: Iterable[Event], agents: Mapping[str, int], tasks: Mapping[str, int]) -> None:
-    """Raise `InputError` for the first event about an agent or a task that there is not."""
+    """Raise `InputError` for the first event about an unknown agent or task."""
     for number, event in enumerate(events):
         for kind, name, known in (("agent", event.agent, agents), ("task", event.task, tasks)):
             if name is not None and name not in known:
@@ -149,16 +149,16 @@ BEFORE = {
     EventKind.TASK_CANCELLED: ({"there"}, "cancelled"),
     EventKind.TASK_CHANGES: ({"there"}, None),
 }
-"""What an agent or a task must be for an event, and what it is then; None: the same as before."""
+"""States of an agent or a task in which an event can happen, and the state after it; None: unchanged."""
 
 
 def check_sequence(timeline: Iterable[tuple[int, Event]]) -> None:
-    """Raise `InputError` for the first event that cannot happen, such as a return of who was not recalled.
+    """Raise `InputError` for the first event that cannot happen, such as the return of an agent that is not away.
 
     Parameters
     ----------
     timeline : iterable of (int, Event)
-        In the order of time; the number of each event in the file, -1 where it is a field of an agent or a task.
+        In chronological order; the number of each event in the file, -1 if it stems from a field of an agent or task.
     """
     now: dict[tuple[str, str | None], str] = {}
     for number, event in timeline:

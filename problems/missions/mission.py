@@ -1,4 +1,4 @@
-"""A mission: agents, tasks, and what happens in time."""
+"""Definition of a mission: agents, tasks, and events over time."""
 
 import math
 from collections.abc import Callable, Iterable, Sequence
@@ -18,38 +18,38 @@ from alloc.problems.missions.radio import Pace, Radio
 from alloc.problems.vocabulary import Knowledge
 
 PATIENCE = 2.0
-"""A mission without a horizon ends after this many times the hours that the weakest agent needs to do all tasks."""
+"""A mission without a horizon lasts this many times the hours that the weakest agent needs for all tasks."""
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
 class Mission(fields.ReadOnly):
-    """An instance at hour 0, and what happens later; validated once and read-only from then on.
+    """An instance at hour 0, and events over time; validated once and read-only from then on.
 
-    The instance holds all agents and tasks there will ever be; `joins` and `appears` say from which hour on. Events at
-    one hour happen in this order: who joins and what appears by the arrays, then `events` as they are given.
+    The instance holds all agents and tasks of the mission; `joins` and `appears` say from which hour on. At equal
+    hours, agents join and tasks appear by these arrays first, then `events` happen in the given order.
 
     Parameters
     ----------
     instance : Instance
     joins : array_like, shape (n,), optional
-        Hour at which each agent joins; NaN for 0, or for that of its event.
+        Hour at which each agent joins; NaN for 0, or for the hour of its event.
     appears : array_like, shape (m,), optional
-        Hour at which each task appears, likewise.
+        Hour at which each task appears; NaN as for `joins`.
     deadline : array_like, shape (m,), optional
-        Hour after which nobody can work on a task; NaN and ``inf`` for none.
+        Hour after which a task can no longer be worked on; NaN or ``inf`` for none.
     growth : array_like, shape (m,), optional
-        Work added per hour until somebody works there for the first time, >= 0.
+        Work added per hour until an agent first works there, >= 0.
     events : iterable of Event
     horizon : float
-        Hour at which the mission ends, > 0; see `end` for what ``inf`` means.
+        Hour at which the mission ends, > 0; see `end` for the meaning of ``inf``.
     knowledge : {"full", "local"}
         What agents know.
     sensing : float
-        Distance up to which an agent sees tasks and agents by itself, >= 0; ``inf`` for all.
+        Sensing radius, within which an agent sees tasks and agents, >= 0; ``inf`` for all.
     radio : Radio, optional
     pace : Pace, optional
     seed : int
-        Seed of pace and radio, so that all policies meet the same, from 0 to 2^63 - 1.
+        Seed of pace and radio, which are the same for all policies, from 0 to 2^63 - 1.
 
     Raises
     ------
@@ -113,7 +113,7 @@ class Mission(fields.ReadOnly):
 
     @classmethod
     def from_instance(cls, instance: Instance) -> "Mission":
-        """Return the mission in which all of an instance is there from hour 0, everybody knows all, nothing happens.
+        """Return the mission with all agents and tasks of an instance from hour 0, full knowledge and no events.
 
         Parameters
         ----------
@@ -127,7 +127,7 @@ class Mission(fields.ReadOnly):
         _require(self.deadline, late, "tasks[{}].deadline", "after the hour at which the task appears")
         if self.instance.distances is not None and self.instance.returns.any():
             row = int(np.argmax(self.instance.returns))
-            message = "cannot be combined with distances of one's own: who stops on the way has no way back"
+            message = "cannot be combined with own distances: an agent that stops on the way has no distance home"
             raise InputError(message, f"agents[{row}].returns")
         check_sequence(self._numbered_timeline)
 
@@ -136,17 +136,17 @@ class Mission(fields.ReadOnly):
 
     @property
     def name(self) -> str:
-        """That of the instance."""
+        """Name of the instance."""
         return self.instance.name
 
     @cached_property
     def timeline(self) -> tuple[Event, ...]:
-        """All that happens, in the order in which it does: who joins and what appears as well."""
+        """All events in order, including agents that join and tasks that appear."""
         return tuple(event for _, event in self._numbered_timeline)
 
     @property
     def _numbered_timeline(self) -> list[tuple[int, Event]]:
-        """The timeline, and the number of each event among `events`, -1 where it is none of them."""
+        """The timeline, with the number of each event in `events`, or -1."""
         begun = [
             *_beginnings(EventKind.AGENT_JOINS, self.instance.agent_ids, self.joins, self.events),
             *_beginnings(EventKind.TASK_APPEARS, self.instance.task_ids, self.appears, self.events),
@@ -156,10 +156,10 @@ class Mission(fields.ReadOnly):
 
     @cached_property
     def end(self) -> float:
-        """Hour at which the mission ends at the latest.
+        """Latest hour at which the mission ends.
 
-        The horizon; without one, some time after everything has happened, in which the weakest agent could do all
-        tasks one after the other.
+        The horizon; without one, the last event plus twice the time in which the weakest agent could do all tasks one
+        after another.
         """
         if self.horizon < math.inf:
             return self.horizon
@@ -173,7 +173,7 @@ class Mission(fields.ReadOnly):
 
     @cached_property
     def longest_flight(self) -> float:
-        """A distance that no flight between agents' starts and tasks exceeds by the metric."""
+        """Upper bound on the length of flights between agents' starts and tasks."""
         low, high = self.area
         if self.instance.metric == "geographic":
             from alloc.problems.distances.geodesic import METRES
@@ -186,7 +186,7 @@ class Mission(fields.ReadOnly):
 
     @cached_property
     def area(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Least and largest coordinates of all places of agents and tasks: where the mission is, which all know."""
+        """Smallest and largest coordinates of all places of agents and tasks, which all agents know."""
         places = np.concatenate([self.instance.start_position, self.instance.task_position])
         places = places[~np.isnan(places[:, 0])]
         if not len(places):
@@ -195,7 +195,7 @@ class Mission(fields.ReadOnly):
 
 
 def _beginnings(kind: EventKind, ids: Sequence[str], hours: FloatArray, events: Sequence[Event]) -> list[Event]:
-    """Return the events by which agents join or tasks appear that have no event of their own."""
+    """Return events for agents that join, or tasks that appear, without an explicit event."""
     own = {_subject(event) for event in events if event.kind is kind}
     make: Callable[[float, str], Event] = (
         (lambda hour, name: Event(hour, kind, agent=name))
@@ -212,7 +212,7 @@ def _subject(event: Event) -> str | None:
 def _hours(
     given: ArrayLike | None, ids: Sequence[str], place: str, events: Sequence[Event], kind: EventKind
 ) -> FloatArray:
-    """Return the hour at which each agent joins or each task appears, by its event where it has one."""
+    """Return the hour at which each agent joins or each task appears, from its event if it has one."""
     hours = np.full(len(ids), np.nan) if given is None else fields.vector(given, place.partition("}].")[2], len(ids))
     index = {name: row for row, name in enumerate(ids)}
     for event in events:

@@ -1,4 +1,4 @@
-"""Who hears whom, and how fast groups work: what a mission says of radio and pace."""
+"""Parameters of a mission's radio and pace: who hears whom, and how fast groups work."""
 
 import math
 from dataclasses import dataclass
@@ -9,14 +9,14 @@ from alloc.problems.errors import InputError
 
 @dataclass(frozen=True)
 class Burst:
-    """Losses that come in bursts: each link is good or bad for a while (Gilbert-Elliott).
+    """Burst losses: each link alternates between a good and a bad state (Gilbert-Elliott model).
 
     Attributes
     ----------
     good, bad : float
-        Mean hours that a link stays good, and bad, > 0.
+        Mean hours that a link stays in the good and the bad state, > 0.
     loss_good, loss_bad : float
-        Share of the messages that is lost in each, from 0 to 1.
+        Loss probability of a message in each state, from 0 to 1.
 
     References
     ----------
@@ -36,31 +36,31 @@ class Burst:
 
     @property
     def share_bad(self) -> float:
-        """Share of the time that a link is bad."""
+        """Share of the time in which a link is bad."""
         return self.bad / (self.good + self.bad)
 
     def probability_bad(self, was_bad: bool, hours: float) -> float:
-        """Return how probable it is that a link is bad, some hours after it was bad or good."""
+        """Return the probability that a link is bad `hours` after it was bad or good."""
         forgotten = -math.expm1(-hours * (1 / self.good + 1 / self.bad))
         return self.share_bad + (was_bad - self.share_bad) * (1 - forgotten)
 
 
 @dataclass(frozen=True)
 class Radio:
-    """How agents talk.
+    """Parameters of the radio.
 
     Attributes
     ----------
     radius : float
-        Distance up to which a message is heard, by the places at the moment of sending; ``inf`` for everybody.
+        Distance up to which a message is heard, by the places when it is sent; ``inf`` for no limit.
     period : float
-        Hours between the messages of an agent, > 0; it looks around as often.
+        Hours between the messages of an agent, > 0; it senses its surroundings as often.
     loss : float
-        Share of the messages that is lost, each independently, from 0 to 1.
+        Probability that a message is lost, independently of others, from 0 to 1.
     delay : float
-        Hours until a message is heard.
+        Hours from sending to receiving a message.
     burst : Burst or None
-        Losses that come on top in bursts.
+        Additional burst losses.
     """
 
     radius: float = math.inf
@@ -81,14 +81,14 @@ class Radio:
 
 @dataclass(frozen=True)
 class Pace:
-    """How fast groups work: by a factor that is drawn anew for each task and period, uniformly from low to high.
+    """Random factor on the work of groups, drawn for each task and period uniformly from low to high.
 
     Attributes
     ----------
     low, high : float
         0 <= low <= high and high > 0.
     period : float
-        Hours, > 0.
+        Hours for which a factor applies, > 0.
     """
 
     low: float = 1.0

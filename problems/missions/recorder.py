@@ -1,4 +1,4 @@
-"""What a simulation does, recorded while it goes on, so that it can be drawn; the log stays what it is."""
+"""Recording of the course of a simulation for plots, beside its log."""
 
 import math
 
@@ -17,14 +17,14 @@ from alloc.problems.missions.simulation.state import AgentState, AgentStatus, Mi
 from alloc.problems.vocabulary import Knowledge
 
 MOST_MOMENTS = 240
-"""Moments beyond which every other one is dropped."""
+"""Number of recorded moments beyond which every other one is dropped."""
 
 MOST_REPORTS = 1_500_000
-"""Hours of reports that are kept at most: of many agents the knowledge of some is recorded."""
+"""Limit on the number of recorded report hours; with many agents, only the knowledge of some is recorded."""
 
 
 def course_of(log: MissionLog) -> Course:
-    """Return the course of a mission from its log, by the same simulation again.
+    """Return the course of a mission by replaying its log.
 
     Parameters
     ----------
@@ -33,12 +33,12 @@ def course_of(log: MissionLog) -> Course:
     Returns
     -------
     Course
-        Without what agents knew, as a log does not hold what messages said.
+        Without agents' knowledge, as a log does not contain the contents of messages.
 
     Raises
     ------
     InputError
-        If the log says anything else than comes of its orders; its place is the line.
+        If the log contradicts the replay of its orders; the error's ``place`` is the line.
     """
     recorder = Recorder()
     result, _ = replay(log, recorder)
@@ -46,12 +46,12 @@ def course_of(log: MissionLog) -> Course:
 
 
 class Recorder:
-    """Records the simulation that it is called with; the course is complete when that has come to its end.
+    """Records the simulation that it is called with; the course is complete once that has ended.
 
     Parameters
     ----------
     with_knowledge : bool
-        Whether to record what agents know as well, where their knowledge is local.
+        Whether to record agents' knowledge as well, if it is local.
     """
 
     def __init__(self, *, with_knowledge: bool = False) -> None:
@@ -59,7 +59,7 @@ class Recorder:
         self._simulation: Simulation | None = None
 
     def __call__(self, simulation: Simulation) -> None:
-        """Begin to record."""
+        """Start recording a simulation."""
         state = simulation.state
         self._simulation = simulation
         simulation.log = _RecordedLog(state, self)
@@ -80,7 +80,7 @@ class Recorder:
         return self._simulation.state
 
     def note(self, record: Record) -> None:
-        """Take notice of a record: an event is going to happen, all else has happened."""
+        """Process a record of the log: an event is about to happen, anything else has just happened."""
         self._catch_up()
         kind, hour = record["record"], self._state.hour
         agent = self._state.agent(str(record["agent"])) if record.get("agent") is not None else None
@@ -104,14 +104,14 @@ class Recorder:
             self._note_task(named, hour)
 
     def _note_amount(self, task: TaskState, record: Record) -> None:
-        """Note the work of a task that appears or is changed now; what is recorded next may come much later."""
+        """Note the work left of a task that appears or changes now, as its next record may come much later."""
         amount = task.workload if record["event"] == EventKind.TASK_APPEARS else record.get("workload")
         is_over = task.status not in (TaskStatus.TO_COME, TaskStatus.OPEN)
         if isinstance(amount, int | float) and not is_over:
             self._add_level(task, Level(self._state.hour, float(amount), TaskStatus.OPEN))
 
     def before(self) -> None:
-        """Look at what goes on by itself, before a record is made: what agents know, and work at a pace."""
+        """Record continuous changes before a record is added: agents' knowledge, and work at a random pace."""
         hour = self._state.hour
         if self._knowledge is not None:
             self._knowledge.look(hour)
@@ -122,7 +122,7 @@ class Recorder:
                     self._add_level(task, Level(hour, work_left(self._state, task), task.status))
 
     def _catch_up(self) -> None:
-        """Note what came of events, which are recorded before they happen."""
+        """Note the effects of events, which are logged before they happen."""
         changed, self._changed = self._changed, []
         for hour, one in changed:
             if isinstance(one, AgentState):
@@ -153,7 +153,7 @@ class Recorder:
             self._workers[after].add(agent.index)
 
     def _begin(self, agent: AgentState, leg: Leg) -> None:
-        """End what an agent did, where it is now, and begin something else, unless it goes on."""
+        """End an agent's leg where the agent is now and begin another one, unless the activity is the same."""
         legs = self._legs[agent.index]
         if legs:
             last = legs[-1]
@@ -179,19 +179,19 @@ class Recorder:
             levels.append(level)
 
     def course(self, result: MissionResult) -> Course:
-        """Return what was recorded.
+        """Return the recorded course.
 
         Parameters
         ----------
         result : MissionResult
-            Of the simulation.
+            Result of the simulation.
         """
         self._catch_up()
         state = self._state
         for task in state.tasks:
             self._add_level(task, Level(state.hour, task.left, task.status))
         for legs in self._legs:
-            if len(legs) > 1 and legs[-1].begin == state.hour:  # what it would have done next
+            if len(legs) > 1 and legs[-1].begin == state.hour:  # a leg of length 0
                 legs.pop()
             for leg in legs[-1:]:
                 leg.goal, leg.end = leg.position(state.hour), state.hour
@@ -201,7 +201,7 @@ class Recorder:
 
 
 class _RecordedLog(Log):
-    """A log that tells a recorder of each record."""
+    """A log that notifies a recorder of each record."""
 
     def __init__(self, state: MissionState, recorder: Recorder) -> None:
         super().__init__(state)
@@ -214,7 +214,7 @@ class _RecordedLog(Log):
 
 
 class _Knowledge:
-    """What some agents know, at moments that are further apart the longer a mission takes."""
+    """Knowledge of some agents over time; the longer the mission, the larger the intervals between moments."""
 
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
@@ -227,7 +227,7 @@ class _Knowledge:
         self._reports: list[FloatArray] = []
 
     def look(self, hour: float) -> None:
-        """Record what agents know at an hour, unless that was recorded shortly before."""
+        """Record the agents' knowledge at an hour, unless it was recorded shortly before."""
         if self._hours and hour < self._hours[-1] + 0.999 * self._interval:
             return
         self._hours.append(hour)
@@ -245,5 +245,5 @@ class _Knowledge:
         return row + [news.hour if (news := view.tasks.get(name)) is not None else math.nan for name in tasks]
 
     def awareness(self) -> Awareness:
-        """Return what was recorded."""
+        """Return the recorded knowledge."""
         return Awareness(tuple(self._agents), np.array(self._hours), np.array(self._reports).transpose(1, 0, 2))

@@ -1,4 +1,4 @@
-"""The log of a simulation, and the same simulation again from its log."""
+"""Logs of simulations, and their replay."""
 
 import math
 from collections.abc import Callable
@@ -15,7 +15,7 @@ from alloc.problems.missions.simulation.state import Order
 
 
 def log_of(simulation: Simulation, result: MissionResult) -> MissionLog:
-    """Return the log of a simulation that has come to its end.
+    """Return the log of a finished simulation.
 
     Parameters
     ----------
@@ -36,25 +36,24 @@ def log_of(simulation: Simulation, result: MissionResult) -> MissionLog:
 def _version() -> str:
     try:
         return version("alloc-mrta")
-    except PackageNotFoundError:  # run from a checkout that is not installed
+    except PackageNotFoundError:  # run from a checkout without installation
         return "unknown"
 
 
 @dataclass(frozen=True)
 class Laws:
-    """What is conserved, as found in a replay: the two sides of each law.
+    """Conservation laws of work and energy, as found in a replay: the two sides of each.
 
     Attributes
     ----------
     work_appeared : float
         Work that appeared or grew.
     work_done, work_left, work_cancelled, work_missed : float
-        What has become of it.
+        What became of that work; the four add up to `work_appeared`.
     energy : float
-        Of all flights.
-    battery_lost : float
-        Of the agents with a battery, and energy flown by those.
-    battery_energy : float
+        Energy of all flights.
+    battery_lost, battery_energy : float
+        Energy that batteries lost, and energy of the flights of agents with a battery; the two are equal.
     """
 
     work_appeared: float
@@ -68,26 +67,26 @@ class Laws:
 
 
 def replay(log: MissionLog, observe: Callable[[Simulation], None] | None = None) -> tuple[MissionResult, Laws]:
-    """Simulate a mission again by the orders and messages of its log; all laws are checked on the way.
+    """Simulate a mission again with the orders and messages of its log, and check all conservation laws.
 
     Parameters
     ----------
     log : MissionLog
     observe : callable, optional
-        Called with the simulation before it begins, such as a `Recorder`.
+        Called with the simulation before it begins, e.g. a `Recorder`.
 
     Returns
     -------
     result : MissionResult
-        The same as in the log; seconds are taken from there.
+        The same as in the log, from which times in seconds are taken.
     laws : Laws
 
     Raises
     ------
     InputError
-        If the log says anything else than comes of its orders; its place is the line.
+        If the log contradicts the replay of its orders; the error's ``place`` is the line.
     ConservationError
-        If a law is broken.
+        If a conservation law is violated.
     """
     header, result = log.header, log.result
     mission = mission_from_document(header["mission"])
@@ -104,7 +103,7 @@ def replay(log: MissionLog, observe: Callable[[Simulation], None] | None = None)
 
 
 def _follow(simulation: Simulation, wanted: Wanted, records: tuple[Record, ...]) -> None:
-    """Send the messages, or give the orders, that come next in the log."""
+    """Send the messages or give the orders that come next in the log."""
     kinds = ("message",) if wanted is Wanted.MESSAGES else ("order", "refused")
     while (number := len(simulation.log.records)) < len(records) and records[number].get("record") in kinds:
         record, line = records[number], number + 2
@@ -122,7 +121,7 @@ def _follow(simulation: Simulation, wanted: Wanted, records: tuple[Record, ...])
         else:
             simulation.order(str(agent), order, trusted=True)
         if len(simulation.log.records) == number:
-            raise InputError("orders what the agent does already", f"line {line}")
+            raise InputError("orders what the agent already does", f"line {line}")
 
 
 def _order(record: Record, simulation: Simulation, line: int) -> Order:
@@ -142,7 +141,7 @@ def _require_same(log: MissionLog, again: MissionLog, made_by: str) -> None:
     header = {**again.header, "version": made_by}
     for line, (one, other) in enumerate(zip((log.header, *log.records), (header, *again.records), strict=False), 1):
         if one != other:
-            raise InputError(f"is not what comes of the orders before it: {_difference(one, other)}", f"line {line}")
+            raise InputError(f"does not follow from the orders before it: {_difference(one, other)}", f"line {line}")
     if len(log.records) != len(again.records):
         message = f"has {len(log.records)} records, but the mission has {len(again.records)}"
         raise InputError(message, f"line {len(log.records) + 2}")

@@ -1,4 +1,4 @@
-"""What is left of a mission at an hour, as an instance, so that allocators can be applied to it."""
+"""Snapshot of a mission at an hour as an instance, to which allocators can be applied."""
 
 import math
 
@@ -17,9 +17,9 @@ from alloc.problems.vocabulary import GEOGRAPHIC
 
 
 def snapshot(view: View, name: str = "snapshot") -> Instance | None:
-    """Return what is left by what is known: the agents in the mission where they are, and the work of open tasks.
+    """Return the agents in the mission at their present places and the open tasks with the work left, as known.
 
-    The way back of agents that return is part of what they cannot reach, not of the cost of their flights.
+    Flights home of agents that return limit the tasks that they can reach, but do not count as energy.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ def snapshot(view: View, name: str = "snapshot") -> Instance | None:
     Returns
     -------
     Instance or None
-        None where no agent is in the mission, or no task is open.
+        None if no agent is in the mission or no task is open.
     """
     agents = [report for report in view.agents.values() if report.status in ACTIVE]
     tasks = [report for report in view.tasks.values() if report.status is TaskStatus.OPEN]
@@ -60,7 +60,7 @@ def snapshot(view: View, name: str = "snapshot") -> Instance | None:
 
 
 def snapshot_at(mission: Mission, hour: float) -> Instance | None:
-    """Return the snapshot of a mission at an hour up to which nobody has had an order.
+    """Return the snapshot of a mission at an hour, without any orders up to then.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def snapshot_at(mission: Mission, hour: float) -> Instance | None:
     Returns
     -------
     Instance or None
-        None where no agent is in the mission, or no task is open.
+        None if no agent is in the mission or no task is open.
     """
     state = MissionState(mission)
     for event in mission.timeline:
@@ -88,7 +88,7 @@ def snapshot_at(mission: Mission, hour: float) -> Instance | None:
 
 
 def _whole(left: float) -> float:
-    """Return a workload that an instance takes: what is almost nothing is nothing."""
+    """Return a valid workload: tiny values are rounded to 0."""
     return left if left >= 1e-60 else 0.0
 
 
@@ -97,7 +97,7 @@ def _positions(agents: list[AgentReport]) -> np.ndarray[tuple[int, ...], np.dtyp
 
 
 def _allowed(view: View, agents: list[AgentReport], tasks: list[TaskReport]) -> list[list[int] | None]:
-    """Return the tasks that each agent may do: by its list, and by whether it could return from there."""
+    """Return the tasks that each agent may do: those on its list from which it can return home."""
     allowed: list[list[int] | None] = []
     for report in agents:
         names = report.facts.tasks
@@ -109,7 +109,7 @@ def _allowed(view: View, agents: list[AgentReport], tasks: list[TaskReport]) -> 
 
 
 def _table(view: View, agents: list[AgentReport], tasks: list[TaskReport]) -> DistanceTable:
-    """Return all distances from where agents are; pairs without a way are left out."""
+    """Return all distances from the agents' present places; pairs without a path are left out."""
     rows = [
         (agent.facts.id, task.facts.id, distance)
         for agent in agents

@@ -1,1 +1,1 @@
-"""Seeded random missions of many kinds."""
+"""Generators of random missions."""

@@ -13,13 +13,13 @@ SIDE = 50
 WORKLOAD, DEADLINE = (10, 50), (5, 600)
 
 PACE = Pace(low=1.0, high=2.0, period=1.0)
-"""A coalition does as much work a step as it has agents, times a number from 1 to 2 that is drawn anew each step."""
+"""In each step, a coalition does as much work as it has agents, times a factor drawn uniformly from 1 to 2."""
 
 
 def random_cfstp(agents: int = 20, tasks: int = 300, seed: int = 0, *, name: str | None = None) -> Mission:
-    """Return a random CFSTP as lcpz/cfstp draws them: all positions, workloads and deadlines are uniform.
+    """Return a random CFSTP instance, distributed as in lcpz/cfstp: uniform positions, workloads and deadlines.
 
-    Places are cells of a grid of 50 x 50, workloads from 10 to 50, deadlines from 5 to 600 steps.
+    Positions are cells of a 50 x 50 grid, workloads range from 10 to 50, deadlines from 5 to 600 steps.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def random_cfstp(agents: int = 20, tasks: int = 300, seed: int = 0, *, name: str
 
 
 def cfstp_mission(name: str, agents: FloatArray, tasks: FloatArray, demands: FloatArray, seed: int) -> Mission:
-    """Return the mission of a CFSTP: time in steps, one cell of the grid per step, agents alike.
+    """Return a CFSTP instance as a mission: time in steps, speed one cell per step, identical agents.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def cfstp_mission(name: str, agents: FloatArray, tasks: FloatArray, demands: Flo
     demands : ndarray, shape (m, 2)
         Deadline and workload of each task.
     seed : int
-        Of the pace.
+        Seed of the pace.
     """
     instance = Instance(
         name=name,

@@ -1,4 +1,4 @@
-"""Drawing missions: places, work, and what happens when."""
+"""Generation of random missions: positions, workloads and events."""
 
 from dataclasses import dataclass
 
@@ -21,20 +21,20 @@ SPEED = 0.5
 ENERGY_PER_DISTANCE = 6.0
 BATTERY, SMALL_BATTERY = 40.0, 10.0
 WAVES = (0.3, 0.7, 1.1)
-"""Hours at which waves come, over the ideal mission time."""
+"""Hours at which waves of tasks appear, relative to the ideal mission time."""
 SPOTS, SPREAD = 3, 0.06
-"""Hot spots, and how far tasks lie from them, in units of distance."""
+"""Number of hot spots, and standard deviation of the tasks' positions around them."""
 PAPER = {MissionFamily.PAPER_1: 1, MissionFamily.PAPER_2: 2, MissionFamily.PAPER_3: 3, MissionFamily.PAPER_4: 4}
 
 
 @dataclass
 class _Draft:
-    """A mission in the making.
+    """A mission under construction.
 
     Attributes
     ----------
     ideal : float
-        Hours that all agents together would need for all work if flights took no time: the unit of when things happen.
+        Hours that all agents together would need for all work if flights took no time: the time unit of a family.
     """
 
     place: FloatArray
@@ -49,7 +49,7 @@ class _Draft:
 
 
 def random_mission(parameters: MissionParameters, seed: int, *, name: str | None = None) -> Mission:
-    """Return a random mission; the same seed gives the same one.
+    """Return a random mission, reproducible by its seed.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def random_mission(parameters: MissionParameters, seed: int, *, name: str | None
     Raises
     ------
     InputError
-        If the seed is wrong, or sizes are given that the paper's scenario fixes.
+        If the seed is invalid, or sizes are given for a scenario of the paper, which fixes them.
     """
     of_type(parameters, MissionParameters, "parameters")
     number = whole(seed, "seed", 0, 2**63 - 1)
@@ -117,7 +117,7 @@ def _drawn(parameters: MissionParameters, family: MissionFamily, name: str, rng:
 
 
 def _steady(draft: _Draft, later: BoolArray, rng: np.random.Generator) -> None:
-    """Leave it as it is."""
+    """Leave the draft unchanged."""
 
 
 def _waves(draft: _Draft, later: BoolArray, rng: np.random.Generator) -> None:
@@ -187,7 +187,7 @@ _CHANGES = {
     MissionFamily.DEADLINES: _deadlines,
     MissionFamily.SILENCE: _silence,
 }
-"""What each family changes of a draft."""
+"""Change that each family makes to the draft."""
 
 
 def _paper(parameters: MissionParameters, scenario: int, seed: int, name: str, rng: np.random.Generator) -> Mission:
@@ -209,6 +209,6 @@ def _paper(parameters: MissionParameters, scenario: int, seed: int, name: str, r
 
 
 def _some(count: int, share: float, rng: np.random.Generator) -> list[int]:
-    """Return a share of the numbers below `count`, but never all of them."""
+    """Return a random share of the indices below `count`, but never all of them."""
     order: list[int] = rng.permutation(count).tolist()
     return order[: min(round(share * count), count - 1)]

@@ -1,4 +1,4 @@
-"""What a generated mission is like."""
+"""Parameters of generated missions."""
 
 import math
 from dataclasses import dataclass
@@ -11,31 +11,31 @@ MOST = 1_000_000
 
 @dataclass(frozen=True)
 class MissionParameters:
-    """Parameters of a random mission in the unit square; `random_mission` draws from them.
+    """Parameters of `random_mission`; missions are in the unit square.
 
     Attributes
     ----------
     family : MissionFamily or str
-        What makes it hard. ``steady``: half of the tasks are there from the start, the others appear one by one, as
-        they do in all others but the last four. ``waves``: they come in three waves. ``hot-spots``: around three
+        What makes the mission hard. ``steady``: half of the tasks are there from the start, the others appear one by
+        one, as in all families except the paper's. ``waves``: they appear in three waves. ``hot-spots``: around three
         places, one after the other. ``failures``: a fifth of the agents fail. ``recharging``: a fifth of the agents
-        join late, a fifth are recalled for a while, and small batteries are recharged. ``growth``: tasks grow until
-        somebody works there. ``deadlines``: most tasks have one. ``silence``: the radio of some agents and of a region
-        is silent for a while. ``paper-1`` to ``paper-4``: a scenario of the paper, in which 30 % of the tasks emerge
-        and 20 % of the agents fail.
+        join late, a fifth are recalled for a while, and small batteries are recharged. ``growth``: tasks grow until an
+        agent works there. ``deadlines``: most tasks have one. ``silence``: the radio of some agents and of a region
+        fails for a while. ``paper-1`` to ``paper-4``: a scenario of the paper, in which 30 % of the tasks emerge and
+        20 % of the agents fail.
     agents, tasks : int or None
-        None for 20 and 40, or those of the paper's scenario, which cannot be changed.
+        None for 20 and 40, or for the sizes of the paper's scenario, which cannot be changed.
     knowledge : Knowledge or str
         ``local``, or ``full``.
     radius, sensing : float
-        How far agents hear each other, and see.
+        Radio radius and sensing radius.
     loss : float
-        Share of the messages that is lost.
+        Probability that a message is lost.
 
     Raises
     ------
     InputError
-        If a value is out of its range; the error's place is the field.
+        If a value is out of range; the error's ``place`` is the field.
     """
 
     family: MissionFamily | str = MissionFamily.STEADY

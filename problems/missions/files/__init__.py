@@ -1,1 +1,1 @@
-"""Missions as files: alloc-mission/1."""
+"""File formats of missions and of their logs."""

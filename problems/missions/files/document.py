@@ -1,4 +1,4 @@
-"""Missions as plain objects, as JSON holds them (alloc-mission/1)."""
+"""Conversion between missions and JSON documents (alloc-mission/1)."""
 
 import math
 import re
@@ -41,14 +41,14 @@ Made = TypeVar("Made")
 
 
 def mission_from_document(document: object, *, default_name: str = DEFAULT_NAME) -> Mission:
-    """Return the mission that a document of plain objects describes.
+    """Return the mission in a JSON document.
 
     Parameters
     ----------
     document : dict
-        As `json.load` gives it; an instance is a mission without events.
+        As returned by `json.load`; an instance is a mission without events.
     default_name : str
-        The name of the mission where the document gives none.
+        Name of the mission if the document gives none.
 
     Raises
     ------
@@ -92,13 +92,13 @@ def mission_from_document(document: object, *, default_name: str = DEFAULT_NAME)
 
 
 class _Events:
-    """The events of a document, and the agents and tasks that come with them.
+    """The events of a document, and the agents and tasks defined in them.
 
     Attributes
     ----------
     made : list of Event
     agents, tasks : list of dict
-        As in the lists of the document, behind which they are put.
+        In the form of the document's lists, to which they are appended.
     """
 
     def __init__(self, given: object, n: int, m: int) -> None:
@@ -132,7 +132,7 @@ class _Events:
             raise InputError(error.message, f"{place}.{error.place}") from error
 
     def _whole(self, row: object, number: int, kind: str, known: Sequence[str]) -> str:
-        """Put an agent or a task that comes with its event behind those of the document, and return its id."""
+        """Append an agent or a task defined in its event to the document's list, and return its id."""
         place, rows = f"events[{number}].{kind}", self.agents if kind == "agent" else self.tasks
         fields = require_object(row, place)
         require_known(fields, known, place)
@@ -143,20 +143,20 @@ class _Events:
         return str(fields["id"])
 
     def place(self, place: str) -> str:
-        """Return where in the document something is that stands behind the lists of agents and tasks."""
+        """Return the place in the document of an entry that was appended to the lists of agents and tasks."""
         row = re.match(r"(agents|tasks)\[\d+\]", place)
         return place if row is None else self._owner.get(row[0], row[0]) + place[row.end() :]
 
 
 def mission_to_document(mission: Mission) -> Row:
-    """Return `mission` as plain objects, ready for `json.dump`; `mission_from_document` is the inverse.
+    """Return `mission` as a document for `json.dump`; `mission_from_document` is the inverse.
 
-    Agents and tasks that come by an event stand in it.
+    Agents that join and tasks that appear by an event are defined in it.
 
     Raises
     ------
     InputError
-        If an id holds what no file can keep.
+        If an id contains characters that no file can hold.
     """
     document = to_document(mission.instance)
     agents, tasks = document.pop("agents"), document.pop("tasks")
@@ -212,7 +212,7 @@ def _settings(mission: Mission) -> Row:
 
 
 def _add(rows: object, name: str, values: FloatArray, usual: float) -> None:
-    """Add a field to rows, unless it has its usual value everywhere."""
+    """Add a field to rows, unless it has its default value everywhere."""
     assert isinstance(rows, list)
     if (values != usual).any():
         for row, value in zip(rows, plain_numbers(values), strict=True):
@@ -252,7 +252,7 @@ def _whole(header: Row, name: str) -> int:
 
 
 def _made(kind: Callable[..., Made], given: object, place: str, known: Sequence[str]) -> Made | None:
-    """Return the settings in an object, their defaults where it has null; None where there is no object."""
+    """Return the settings in an object, with defaults for null fields; None if there is no object."""
     if given is None:
         return None
     fields = require_object(given, place)

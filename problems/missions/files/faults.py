@@ -1,4 +1,4 @@
-"""All faults of a mission's document, where reading it stops at the first."""
+"""Detection of all faults in a mission's document, where reading it would stop at the first."""
 
 import re
 
@@ -20,17 +20,17 @@ KNOWN = {"agents": (*AGENT_FIELDS, *HOURS_OF_AGENT), "tasks": (*TASK_FIELDS, *HO
 
 
 def mission_faults(document: object, *, default_name: str = DEFAULT_NAME) -> tuple[Mission | None, list[InputError]]:
-    """Return the mission that a document describes, or what is wrong with it, one error for each fault.
+    """Return the mission in a document, or one error for each fault.
 
-    After each fault the document is read again without what is wrong: an event, or a field of an agent, a task or the
-    mission. What may only follow from that is not told, and after a fault in anything else nothing more is.
+    After each fault, the document is read again without the faulty part: an event, or a field of an agent, a task or
+    the mission. Errors that may be mere consequences are not reported, and the search ends at a fault elsewhere.
 
     Parameters
     ----------
     document : dict
-        As `json.load` gives it.
+        As returned by `json.load`.
     default_name : str
-        The name of the mission where the document gives none.
+        Name of the mission if the document gives none.
 
     Returns
     -------
@@ -53,12 +53,12 @@ def mission_faults(document: object, *, default_name: str = DEFAULT_NAME) -> tup
 
 
 class _Repair:
-    """A document from which faults are left out one by one.
+    """A document from which faulty parts are removed one by one.
 
     Attributes
     ----------
     document : object
-        What is left; the one that was given is not changed.
+        What remains; the original document is not modified.
     """
 
     def __init__(self, document: object) -> None:
@@ -68,17 +68,17 @@ class _Repair:
         self._is_event_gone = False
 
     def place(self, place: str) -> str:
-        """Return where in the whole document a place is."""
+        """Return the place in the original document."""
         row = re.match(r"events\[(\d+)\]", place)
         return place if row is None else f"events[{self._kept[int(row[1])]}]{place[row.end() :]}"
 
     def is_consequence(self, error: InputError) -> bool:
-        """Whether an error about an event may only come of another event that was left out."""
+        """Whether an error about an event may be a consequence of the removal of another event."""
         is_sequence = re.fullmatch(r"events\[\d+\]", error.place) is not None and " to be " in error.message
         return self._is_event_gone and (is_sequence or error.message.startswith("there is no "))
 
     def leave_out(self, place: str) -> bool:
-        """Leave out what is wrong; return whether that is possible."""
+        """Remove the faulty part; return whether that is possible."""
         if not isinstance(self.document, dict):
             return False
         before = self.document
@@ -86,7 +86,7 @@ class _Repair:
         if row is not None:
             return self._leave_row_out(before, row[1], int(row[2]), row[3])
         name = re.split(r"[.\[]", place)[0]
-        if not name:  # a field that there is not, or one that is there twice
+        if not name:  # an unknown or a repeated field
             known = {key: value for key, value in before.items() if key in MISSION_FIELDS}
             self.document = known
             return len(known) < len(before) or isinstance(before, RepeatedKey)
@@ -107,6 +107,6 @@ class _Repair:
         if not isinstance(old, dict) or field == "id":
             return False
         new = {name: value for name, value in old.items() if name in KNOWN[kind] and name != field}
-        new.setdefault("ability" if kind == "agents" else "workload", 1.0)  # which must be there
+        new.setdefault("ability" if kind == "agents" else "workload", 1.0)  # required
         self.document = {**before, kind: [*rows[:number], new, *rows[number + 1 :]]}
         return new != old or isinstance(old, RepeatedKey)

@@ -1,4 +1,4 @@
-"""Logs of missions as text: JSON lines, alloc-mission-log/1."""
+"""Logs of missions as JSON lines (alloc-mission-log/1)."""
 
 import json
 from dataclasses import dataclass
@@ -19,14 +19,14 @@ Record = dict[str, object]
 
 @dataclass(frozen=True)
 class MissionLog:
-    """A log: what was simulated, what happened, and the result.
+    """A log of a mission: header, records of what happened, and result.
 
     Attributes
     ----------
     header : dict
         Format, mission, policy, knowledge, seed and version.
     records : tuple of dict
-        In the order of time; see `simulation.log.Log`.
+        In chronological order; see `simulation.log.Log`.
     result : dict
         As in ``alloc-mission-result/1``.
     """
@@ -70,7 +70,7 @@ def read_log(path: PathLike) -> MissionLog:
     Raises
     ------
     InputError
-        If it cannot be read, or is no log.
+        If it cannot be read, or is not a log.
     """
     source = named(path)
     try:
@@ -94,7 +94,7 @@ def is_log(text: str) -> bool:
 
 
 def log_from_text(text: str) -> MissionLog:
-    """Return the log that JSON lines hold.
+    """Return the log in a text of JSON lines.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def log_from_text(text: str) -> MissionLog:
     Raises
     ------
     InputError
-        If it is no log.
+        If it is not a log.
     """
     _refuse_document(text)
     documents = [_line(line, number) for number, line in enumerate(text.split("\n"), 1) if line.strip()]
@@ -124,7 +124,7 @@ def log_from_text(text: str) -> MissionLog:
 
 
 def _refuse_document(text: str) -> None:
-    """Raise an error for one JSON object, such as a mission: its first line alone is no JSON, but that is not wrong."""
+    """Raise an error for a text that is a single JSON object, e.g. a mission, whose first line alone is not JSON."""
     try:
         found = json.loads(text)
     except (ValueError, RecursionError):

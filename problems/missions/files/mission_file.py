@@ -13,7 +13,7 @@ from alloc.problems.missions.mission import Mission
 
 
 def read_mission(path: PathLike) -> Mission:
-    """Read a mission, or an instance, which is a mission without events.
+    """Read a mission, or an instance as a mission without events.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ def read_mission(path: PathLike) -> Mission:
     Raises
     ------
     InputError
-        If it cannot be read or breaks the rules of its format: one line with source, place and mend.
+        If it cannot be read or breaks the rules of its format: one line with source, place and remedy.
     """
     if not is_stream(path) and Path(path).suffix.lower() != ".json":
         return Mission(read_instance(path))
@@ -39,13 +39,13 @@ def read_mission(path: PathLike) -> Mission:
 
 
 def write_mission(mission: Mission, path: PathLike) -> None:
-    """Write a mission, such that `read_mission` gives back the same.
+    """Write a mission; `read_mission` returns an equal one.
 
     Parameters
     ----------
     mission : Mission
     path : str or path
-        ``*.json``, or ``-`` for standard output; a file that exists is replaced whole or not at all.
+        ``*.json``, or ``-`` for standard output; an existing file is replaced atomically.
 
     Raises
     ------

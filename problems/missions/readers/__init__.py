@@ -1,1 +1,1 @@
-"""Missions from files of others: benchmarks, configurations of simulators, and records of what really happened."""
+"""Import of missions from third-party files: benchmarks, configurations of simulators, and real records."""

@@ -1,4 +1,4 @@
-"""Columns of a table of others, by their names, and what stands in them."""
+"""Access to the cells of a third-party table by column name."""
 
 import math
 import re
@@ -11,19 +11,19 @@ from alloc.problems.tables.grid import Grid, as_text
 EMPTY = ("", "NULL", "NA", "None", "NaN")
 
 DATES = ("%d/%m/%Y %H:%M", "%d/%m/%Y %H:%M:%S", "%d/%m/%Y", "%Y-%m-%d", "%Y-%m-%d %H:%M", "%Y-%m-%d %H:%M:%S")
-"""Day first, as both sources have it, or as ISO 8601."""
+"""Day first, as in both sources, or ISO 8601."""
 
 
 class Table:
-    """A table whose first row names its columns, whatever their case and punctuation.
+    """A table with column names in its first row; case and punctuation of names do not matter.
 
     Parameters
     ----------
     grid : Grid
     wanted : mapping of str to str
-        Name of each column in the source, by what it is called here.
+        Column name in the source, by the name used here.
     optional : sequence of str
-        Those of `wanted` that may be missing.
+        Keys of `wanted` whose columns may be missing.
 
     Raises
     ------
@@ -47,18 +47,18 @@ class Table:
         self._grid = grid
 
     def text(self, row: int, name: str) -> str:
-        """Return a cell as text; empty where there is nothing."""
+        """Return a cell as text, "" if it is empty or missing."""
         column, cells = self._columns.get(name), self._grid.rows[row]
         text = "" if column is None or column >= len(cells) else as_text(cells[column])
         return "" if text in EMPTY else text
 
     def number(self, row: int, name: str) -> float | None:
-        """Return a cell as a number; None where there is nothing.
+        """Return a cell as a number, None if it is empty or missing.
 
         Raises
         ------
         InputError
-            If it is no finite number.
+            If it is not a finite number.
         """
         text = self.text(row, name)
         if not text:
@@ -72,12 +72,12 @@ class Table:
         return value
 
     def hour(self, row: int, name: str) -> datetime | None:
-        """Return a cell as date and hour; None where there is nothing.
+        """Return a cell as date and hour, None if it is empty or missing.
 
         Raises
         ------
         InputError
-            If it is no date.
+            If it is not a date.
         """
         text = self.text(row, name)
         for pattern in DATES if text else ():

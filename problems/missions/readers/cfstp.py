@@ -1,4 +1,4 @@
-"""Instances of coalition formation with spatial and temporal constraints, as the tests of lcpz/cfstp print them."""
+"""Instances of coalition formation with spatial and temporal constraints (CFSTP), as the tests of lcpz/cfstp print."""
 
 import re
 
@@ -14,7 +14,7 @@ DEMANDS = re.compile(r"task\[\s*(\d+)\] has demands \[\s*(\d+),\s*(\d+)\]")
 
 
 def read_cfstp(path: str, name: str, seed: int) -> Mission:
-    """Read an instance: places on a grid, and deadline and workload of each task.
+    """Read a CFSTP instance: grid positions, and deadline and workload of each task.
 
     Parameters
     ----------
@@ -23,12 +23,12 @@ def read_cfstp(path: str, name: str, seed: int) -> Mission:
         demands [322, 41]``; all other lines are ignored.
     name : str
     seed : int
-        Of the pace.
+        Seed of the pace.
 
     Raises
     ------
     InputError
-        If it cannot be read, or something is missing in it.
+        If it cannot be read or is incomplete.
     """
     places: dict[str, dict[int, tuple[float, float]]] = {"agent": {}, "task": {}}
     demands: dict[int, tuple[float, float]] = {}
@@ -39,7 +39,7 @@ def read_cfstp(path: str, name: str, seed: int) -> Mission:
             demands[int(demand[1])] = (float(demand[2]), float(demand[3]))
     tasks, agents = sorted(places["task"]), sorted(places["agent"])
     if not tasks or not agents:
-        raise InputError("is no CFSTP instance: it has no lines such as 'task[  0] at ( 13,   7)'", source=named(path))
+        raise InputError("is not a CFSTP instance: no lines such as 'task[  0] at ( 13,   7)'", source=named(path))
     for task in tasks:
         if task not in demands:
             raise InputError("is missing; add a line such as 'task[  0] has demands [322, 41]'", f"task[{task}]", path)

@@ -1,4 +1,4 @@
-"""Calls of the London Fire Brigade to animals, as the London Datastore and TidyTuesday publish them."""
+"""Animal rescues of the London Fire Brigade, as published by the London Datastore and TidyTuesday."""
 
 from alloc.problems.errors import InputError
 from alloc.problems.formats.spreadsheet import read_grid
@@ -18,20 +18,20 @@ COLUMNS = {
 FLEET = {"id": "Fleet No", "status": "Operational Status", "kind": "Type of Vehicle"}
 
 SPEED_KM_H = 30.0
-"""Of a vehicle in town; the records do not have it."""
+"""Speed of a vehicle in town; not part of the records."""
 
 USUAL_HOURS = 1.0
-"""Pump hours of nearly all calls, for those without."""
+"""Pump hours assumed for calls without; nearly all calls have this value."""
 
 
 def read_london(path: str, options: RecordOptions) -> Records:
-    """Read calls: place to 50 m, hour, and pump hours as the work.
+    """Read calls: place to within 50 m, hour, and pump hours as the workload.
 
     Parameters
     ----------
     path : str
     options : RecordOptions
-        With the list of the fleet, if there is one.
+        With the file of the fleet, if there is one.
 
     Raises
     ------

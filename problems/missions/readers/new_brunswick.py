@@ -11,22 +11,22 @@ from alloc.problems.text import counted
 COLUMNS = {"x": "x", "y": "y", "year": "year", "day": "dis.julian", "when": "dis.date", "size": "fnl.size"}
 
 KM = 0.403716
-"""Of the unit of length in `nbfires`."""
+"""Kilometres per unit of length in `nbfires`."""
 
 SPEED_KM_H = 60.0
-"""Of a crew on the road; the records do not have it."""
+"""Speed of a crew on the road; not part of the records."""
 
 LEAST_HA = 0.1
-"""Work of a fire that is recorded as smaller, or without a size."""
+"""Minimum workload, also for fires without a recorded size."""
 
 
 def read_new_brunswick(path: str, options: RecordOptions) -> Records:
-    """Read fires: place, day of discovery, and final size as the work.
+    """Read fires: place, day of discovery, and final size as the workload.
 
     Parameters
     ----------
     path : str
-        What ``write.csv(as.data.frame(nbfires), "nbfires.csv")`` writes in R.
+        Output of ``write.csv(as.data.frame(nbfires), "nbfires.csv")`` in R.
     options : RecordOptions
 
     Raises
@@ -50,7 +50,7 @@ def read_new_brunswick(path: str, options: RecordOptions) -> Records:
 
 
 def _discovered(table: Table, row: int) -> datetime | None:
-    """Return the day of discovery: as a date, or as a day of the year."""
+    """Return the day of discovery, given as a date or as a day of the year."""
     when = table.hour(row, "when")
     if when is not None:
         return when

@@ -1,4 +1,4 @@
-"""What files of others leave open."""
+"""Options for the import of records."""
 
 from dataclasses import dataclass
 from datetime import date
@@ -9,27 +9,27 @@ from alloc.problems.errors import InputError
 
 @dataclass(frozen=True, kw_only=True)
 class RecordOptions:
-    """What records of calls or fires do not say: who answers them, and what part of them is wanted.
+    """Options for the import of records of calls or fires: the fleet, the period of time, and its compression.
 
     Attributes
     ----------
     agents : int or None
-        Number of agents; None for 10, or for those of a list of the fleet.
+        Number of agents; None for 10, or for all vehicles in the file of the fleet.
     ability : float
         Work per hour of each agent, > 0.
     speed : float or None
-        In km per hour, > 0; None for that of the format.
+        In km per hour, > 0; None for the default of the format.
     compress : float
-        Hours between records are divided by this, > 0: real ones are so sparse that agents would mostly wait.
+        Divisor of the hours between records, > 0: real records are so sparse that agents would mostly wait.
     first, last : date or None
-        Days that are wanted, the last one included.
+        First and last day of the records to import, both included.
     fleet : str or None
-        List of the vehicles, for ``london``.
+        File with the list of vehicles, for ``london``.
 
     Raises
     ------
     InputError
-        If a value is out of its range; its place is the field.
+        If a value is out of range; the error's ``place`` is the field.
     """
 
     agents: int | None = None

@@ -1,4 +1,4 @@
-"""Reading a file of others as a mission, by the name of its format."""
+"""Import of a mission from a third-party file, by the name of its format."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -35,22 +35,22 @@ def import_mission(
     name: str | None = None,
     report: Callable[[str], None] | None = None,
 ) -> Mission:
-    """Read a mission from a file of others, which the user has.
+    """Import a mission from a third-party file, which the user has to provide.
 
     Parameters
     ----------
     file_format : {"cfstp", "space", "london", "new-brunswick"}
-        An instance that the tests of lcpz/cfstp print; a configuration of the SPACE simulator; calls of the London Fire
-        Brigade to animals; forest fires in New Brunswick.
+        An instance as printed by the tests of lcpz/cfstp; a configuration of the SPACE simulator; animal rescues of the
+        London Fire Brigade; forest fires in New Brunswick.
     path : str or path
     options : RecordOptions, optional
-        Of the last two: who answers, which days, how much time is compressed.
+        For the last two formats: fleet, days, compression of time.
     seed : int
-        Of what the file leaves to chance.
+        Seed of everything random that the file does not fix.
     name : str, optional
-        Of the mission; that of the file by default.
+        Name of the mission; by default that of the file.
     report : callable, optional
-        Called with a line for what was left out or filled in.
+        Called with a line of text for everything that was left out or filled in.
 
     Returns
     -------
@@ -59,9 +59,9 @@ def import_mission(
     Raises
     ------
     InputError
-        If the file cannot be read, or options are given that the format does not take.
+        If the file cannot be read, or the format does not take the given options.
     MissingPackageError
-        If PyYAML is needed, and not installed.
+        If PyYAML is needed and not installed.
     """
     kind, number = choice(ForeignFormat, file_format, "file_format"), whole(seed, "seed", 0, 2**63 - 1)
     called, source = name or Path(path).stem or str(kind), str(path)

@@ -1,4 +1,4 @@
-"""Records of calls or fires as a mission: each is a task that appears at its hour."""
+"""Conversion of records of calls or fires into a mission: each is a task that appears at its hour."""
 
 from collections import Counter
 from dataclasses import dataclass, field
@@ -27,10 +27,10 @@ class Record:
     id : str
     when : datetime
     place : tuple of two floats
-        In km.
+        Coordinates in km.
     work : float
     district : str
-        Whose it is, for those who begin there; empty where the source has none.
+        District, used to place the agents; empty if the source has none.
     """
 
     id: str
@@ -47,16 +47,16 @@ class Records:
     Attributes
     ----------
     source : str
-        What messages call the file.
+        Name of the file in messages.
     work : str
         Unit of work.
     speed : float
-        Of agents, in km per hour, where nothing else is wanted.
+        Default speed of agents in km per hour.
     records : list of Record
     notes : list of str
-        What was left out or filled in.
+        Remarks on what was left out or filled in.
     vehicles : list of str
-        Names of the agents; empty where there is no list of them.
+        Names of the agents; empty if there is no file of the fleet.
     """
 
     source: str
@@ -68,7 +68,7 @@ class Records:
 
 
 def mission_of_records(found: Records, options: RecordOptions, name: str, seed: int) -> Mission:
-    """Return the mission of the records that are wanted.
+    """Return the mission of the selected records.
 
     Parameters
     ----------
@@ -76,16 +76,16 @@ def mission_of_records(found: Records, options: RecordOptions, name: str, seed: 
     options : RecordOptions
     name : str
     seed : int
-        By which places are drawn where agents begin, if the records have no districts.
+        Seed of the agents' starts, which are drawn if the records have no districts.
 
     Raises
     ------
     InputError
-        If no record is wanted.
+        If there is no record in the selected days.
     """
     kept = sorted((one for one in found.records if _is_wanted(one, options)), key=lambda one: one.when)
     if not kept:
-        raise InputError("has no record in the days that are wanted", source=found.source)
+        raise InputError("has no record in the selected days", source=found.source)
     begin = kept[0].when if options.first is None else datetime.combine(options.first, time())
     vehicles = _vehicles(found, options)
     places = np.array([one.place for one in kept])
@@ -118,7 +118,7 @@ def _vehicles(found: Records, options: RecordOptions) -> list[str]:
 
 
 def _starts(kept: list[Record], places: FloatArray, count: int, rng: np.random.Generator) -> FloatArray:
-    """Return where agents begin: in the middle of a district's calls, busy districts first, or at places of records."""
+    """Return the agents' starts: centroids of districts, those with most records first, or random places of records."""
     districts = [name for name, _ in Counter(one.district for one in kept).most_common() if name]
     if not districts:
         return places[rng.choice(len(places), count, replace=len(places) < count)]
@@ -127,7 +127,7 @@ def _starts(kept: list[Record], places: FloatArray, count: int, rng: np.random.G
 
 
 def _ids(kept: list[Record]) -> list[str]:
-    """Return the ids of the records, with a number behind those that come again."""
+    """Return the ids of the records, with a number appended to repeated ones."""
     ids: dict[str, None] = {}
     for one in kept:
         name, number = one.id, 1

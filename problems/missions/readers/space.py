@@ -1,4 +1,4 @@
-"""Missions as the configuration files of the SPACE simulator describe them: drawn by a seed."""
+"""Random missions from configuration files of the SPACE simulator."""
 
 import math
 
@@ -17,13 +17,13 @@ from alloc.problems.vocabulary import Knowledge
 YAML_MISSING = "needs PyYAML; install it with: pip install 'alloc-mrta[tables]'"
 
 STEPS_PER_MESSAGE = 10
-"""Agents of SPACE talk at every step, which changes little and costs much; here once in so many."""
+"""Steps between two messages; in SPACE agents send one in every step, which changes little and costs much."""
 
 
 def read_space(path: str, name: str, seed: int) -> Mission:
-    """Read a configuration, and draw a mission: places and amounts of work are uniform, tasks come in waves.
+    """Read a configuration and draw a mission from it: uniform positions and workloads, tasks in waves.
 
-    Acceleration, turning, and the radius in which a task counts as reached are left out: agents fly at full speed.
+    Acceleration, turning, and the radius within which a task counts as reached are ignored: agents fly at full speed.
 
     Parameters
     ----------
@@ -31,12 +31,12 @@ def read_space(path: str, name: str, seed: int) -> Mission:
         YAML.
     name : str
     seed : int
-        Of all that is drawn.
+        Seed of all random numbers.
 
     Raises
     ------
     InputError
-        If it cannot be read, or a field is missing or wrong.
+        If it cannot be read, or a field is missing or invalid.
     MissingPackageError
         If PyYAML is not installed.
     """
@@ -88,7 +88,7 @@ def _parsed(path: str) -> object:
 
 
 def _hours(config: "_Config") -> FloatArray:
-    """Return when tasks appear: those of the beginning, and those of each later generation."""
+    """Return the hour at which each task appears: initial ones, then those of each later generation."""
     first = config.whole("tasks.quantity", low=0)
     place = "tasks.dynamic_task_generation"
     waves = each = 0
@@ -111,7 +111,7 @@ def _places(config: "_Config", kind: str, count: int, rng: np.random.Generator) 
 
 
 class _Config:
-    """The fields of a configuration, by their places, such as ``agents.quantity``."""
+    """The fields of a configuration by their paths, such as ``agents.quantity``."""
 
     def __init__(self, document: object, source: str) -> None:
         self._document, self._source = document, source
@@ -121,7 +121,7 @@ class _Config:
         return InputError(message, place, self._source)
 
     def number(self, place: str, default: float | None = None, low: float = 0.0, *, above: bool = False) -> float:
-        """Return a finite number from `low`; `above`: `low` itself is out."""
+        """Return a finite number >= `low`, or > `low` if `above`."""
         value = self._value(place)
         value = default if value is None else value
         number = float(value) if isinstance(value, int | float) and not isinstance(value, bool) else math.nan
@@ -140,7 +140,7 @@ class _Config:
         raise self.error(f"{problem} must be a whole number >= {low}", place)
 
     def flag(self, place: str) -> bool:
-        """Return whether something is on; not where it is missing."""
+        """Return a flag, False if it is missing."""
         return self._value(place) is True
 
     def _value(self, place: str) -> object:

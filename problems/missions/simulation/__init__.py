@@ -1,6 +1,6 @@
-"""What comes of a mission and of orders: the reference simulation.
+"""The reference simulation of missions.
 
-To be read in this order: `places` (how far apart), `state` (agents and tasks now, and their ledgers), `motion` (flights
-and work between two events), `changes` (what an event does), `channel` (radio), `reports` and `awareness` (who knows
-what), `simulation` (from event to event), and beside it `conservation`, `log` and `measures`.
+Suggested order of reading: `places` (distances), `state` (agents and tasks now, and their ledgers), `motion` (flights
+and work between two events), `changes` (effects of events and orders), `channel` (radio), `reports` and `awareness`
+(knowledge), `simulation` (the event loop); beside these `conservation`, `log` and `measures`.
 """

@@ -1,4 +1,4 @@
-"""What is to come in a simulation: the agenda, and what stands on it."""
+"""The event queue of a simulation, called the agenda, and its entries."""
 
 import heapq
 import math
@@ -12,7 +12,7 @@ from alloc.problems.missions.simulation.state import AgentState, Flight, Mission
 
 
 class Turn(IntEnum):
-    """What comes first of all that happens at one hour."""
+    """Order of entries at the same hour."""
 
     COMPLETION = 0
     DEADLINE = 1
@@ -23,7 +23,7 @@ class Turn(IntEnum):
 
 
 class Wanted(StrEnum):
-    """What a simulation waits for: messages to be sent, or orders."""
+    """What a simulation asks for: messages or orders."""
 
     MESSAGES = "messages"
     ORDERS = "orders"
@@ -31,14 +31,14 @@ class Wanted(StrEnum):
 
 @dataclass(frozen=True)
 class Request:
-    """An hour at which agents may send messages, or get orders.
+    """A request of the simulation for messages or orders.
 
     Attributes
     ----------
     wanted : Wanted
     hour : float
     agents : tuple of str
-        Ids of those who may.
+        Ids of the agents that may send messages or get orders.
     """
 
     wanted: Wanted
@@ -48,7 +48,7 @@ class Request:
 
 @dataclass(frozen=True, eq=False)
 class Arrival:
-    """The end of a flight, unless the agent is diverted before."""
+    """The end of a flight; void if the agent has been diverted."""
 
     agent: AgentState
     flight: Flight
@@ -56,7 +56,7 @@ class Arrival:
 
 @dataclass(frozen=True, eq=False)
 class Completion:
-    """The end of a task's work, unless something changes before."""
+    """The completion of a task; void if the task has changed."""
 
     task: TaskState
     version: int
@@ -64,14 +64,14 @@ class Completion:
 
 @dataclass(frozen=True, eq=False)
 class Delivery:
-    """A message that is heard."""
+    """The delivery of a message."""
 
     message: Message
     hearers: list[AgentState]
 
 
 class Agenda:
-    """What is to come, in the order of hours and turns, and then as it was put there."""
+    """Priority queue of future entries, by hour, then turn, then order of insertion."""
 
     def __init__(self) -> None:
         self._entries: list[tuple[float, Turn, int, object]] = []
@@ -82,22 +82,22 @@ class Agenda:
 
     @property
     def hour(self) -> float:
-        """Hour of the first entry, ``inf`` where there is none."""
+        """Hour of the first entry, ``inf`` if there is none."""
         return self._entries[0][0] if self._entries else math.inf
 
     def push(self, hour: float, turn: Turn, item: object) -> None:
-        """Put an entry on the agenda."""
+        """Add an entry."""
         self._count += 1
         heapq.heappush(self._entries, (hour, turn, self._count, item))
 
     def pop(self) -> tuple[Turn, object]:
-        """Take the first entry off the agenda."""
+        """Remove and return the first entry."""
         _, turn, _, item = heapq.heappop(self._entries)
         return turn, item
 
 
 class Changes:
-    """Agents and tasks for which something has changed, so that their flights and work end at other hours.
+    """Agents and tasks that have changed, so that arrivals and completions have to be scheduled anew.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ class Changes:
         self._tasks: dict[int, TaskState] = {}
 
     def note_agent(self, agent: AgentState, task: TaskState | None = None) -> None:
-        """Note an agent, the task where it works now, and the one where it did before."""
+        """Note an agent, the task where it works, and the task where it worked before."""
         self._agents[agent.index] = agent
         for one in (task, agent.task):
             if one is not None:
@@ -122,7 +122,7 @@ class Changes:
         self._tasks[task.index] = task
 
     def balance(self) -> None:
-        """Check the ledgers of all that changed, and put the ends of their flights and work on the agenda."""
+        """Check the ledgers of all that have changed, and schedule their arrivals and completions."""
         agents, tasks = [*self._agents.values()], [*self._tasks.values()]
         self._agents.clear()
         self._tasks.clear()

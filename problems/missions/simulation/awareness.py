@@ -1,4 +1,4 @@
-"""Who knows what: all that is so now, or what each agent sensed and heard."""
+"""Knowledge of agents: the full present state, or what each agent has sensed and heard."""
 
 from types import MappingProxyType
 from typing import Protocol
@@ -17,26 +17,26 @@ Tasks = dict[str, TaskReport]
 
 
 class Awareness(Protocol):
-    """What agents know; a simulation keeps it up to date."""
+    """Knowledge of agents, kept up to date by the simulation."""
 
     def look_around(self, agents: list[AgentState]) -> None:
-        """Let agents sense what is near."""
+        """Let agents sense their surroundings."""
 
     def hear(self, agent: AgentState, message: Message) -> None:
-        """Let an agent hear a message."""
+        """Let an agent receive a message."""
 
     def refresh(self) -> None:
-        """Take notice of what has happened, before anybody decides."""
+        """Update knowledge before agents decide."""
 
     def view(self, agent: AgentState | None, *, is_glance: bool = False) -> View:
-        """Return what an agent knows now, or who leads all of them."""
+        """Return the present view of an agent; None stands for a central policy."""
 
     def objection(self, agent: AgentState, task: str) -> str | None:
-        """Return why an agent does not go to a task by what it knows; None if it does."""
+        """Return why an agent refuses to go to a task by what it knows; None if it does not."""
 
 
 class FullAwareness:
-    """Everybody knows all that is so now, and nothing of the future; orders too, as soon as they are given."""
+    """Full knowledge: all agents know the present state, orders included, but nothing of the future."""
 
     def __init__(self, state: MissionState) -> None:
         self._state = state
@@ -44,15 +44,15 @@ class FullAwareness:
         self._tasks: Tasks = {}
 
     def look_around(self, agents: list[AgentState]) -> None:
-        """Take notice of the agents' new orders: all else is known already."""
+        """Update the agents' orders: everything else is already known."""
         for agent in agents:
             self._agents[agent.facts.id] = report_agent(self._state, agent)
 
     def hear(self, agent: AgentState, message: Message) -> None:
-        """Do nothing: there is nothing that it does not know."""
+        """Do nothing, as the agent already knows everything."""
 
     def refresh(self) -> None:
-        """Report everybody and everything anew."""
+        """Renew the reports of all agents and tasks."""
         for agent in self._state.agents:
             if agent.status is not AgentStatus.ABSENT:
                 self._agents[agent.facts.id] = report_agent(self._state, agent)
@@ -61,18 +61,18 @@ class FullAwareness:
                 self._tasks[task.facts.id] = report_task(self._state, task)
 
     def view(self, agent: AgentState | None, *, is_glance: bool = False) -> View:
-        """Return the same for all."""
+        """Return the present view, which is the same for all agents."""
         name = None if agent is None else agent.facts.id
         agents, tasks = MappingProxyType(self._agents), MappingProxyType(self._tasks)
         return View(self._state.hour, name, agents, tasks, self._state.distances)
 
     def objection(self, agent: AgentState, task: str) -> str | None:
-        """Return why an agent does not go to a task: it is to come, or over."""
+        """Return why an agent refuses to go to a task: it is still to come, or closed."""
         return _objection(self._tasks.get(task))
 
 
 class LocalAwareness:
-    """Each agent knows itself, what it sensed and what it was told; newer reports replace older ones."""
+    """Local knowledge: each agent knows itself and what it has sensed and heard; newer reports replace older ones."""
 
     def __init__(self, state: MissionState) -> None:
         self._state, self._radius = state, state.mission.sensing
@@ -81,7 +81,7 @@ class LocalAwareness:
         self._heard: list[list[Message]] = [[] for _ in state.agents]
 
     def look_around(self, agents: list[AgentState]) -> None:
-        """Let agents see all tasks and all agents in the mission within their sensing radius, themselves first."""
+        """Let agents report themselves, and all tasks and agents of the mission within their sensing radius."""
         if not agents:
             return
         state = self._state
@@ -104,7 +104,7 @@ class LocalAwareness:
         return self._state.distances.table(places, goals) <= self._radius + TOLERANCE
 
     def hear(self, agent: AgentState, message: Message) -> None:
-        """Let an agent take over what is newer in a message than what it knows."""
+        """Let an agent adopt those reports of a message that are newer than its own."""
         agents, tasks = self._agents[agent.index], self._tasks[agent.index]
         for report in message.agents:
             known = agents.get(report.facts.id)
@@ -117,10 +117,10 @@ class LocalAwareness:
         self._heard[agent.index].append(message)
 
     def refresh(self) -> None:
-        """Do nothing: each agent has looked around by itself."""
+        """Do nothing, as agents sense by themselves."""
 
     def view(self, agent: AgentState | None, *, is_glance: bool = False) -> View:
-        """Return what an agent knows now; what it heard is handed over once, unless it is only to glance at it."""
+        """Return the present view of an agent; messages are handed over only once, unless `is_glance`."""
         assert agent is not None
         index = agent.index
         self._agents[index][agent.facts.id] = report_agent(self._state, agent)
@@ -131,7 +131,7 @@ class LocalAwareness:
         return View(self._state.hour, agent.facts.id, agents, tasks, self._state.distances, heard)
 
     def objection(self, agent: AgentState, task: str) -> str | None:
-        """Return why an agent does not go to a task: it knows nothing of it, or that it is over."""
+        """Return why an agent refuses to go to a task: it does not know the task, or knows that it is closed."""
         return _objection(self._tasks[agent.index].get(task))
 
 

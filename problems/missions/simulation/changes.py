@@ -1,4 +1,4 @@
-"""What an event of the mission, and an order, do to agents and tasks."""
+"""Effects of events and orders on agents and tasks."""
 
 from alloc.problems.missions.events import Event, EventKind
 from alloc.problems.missions.simulation.motion import (
@@ -27,7 +27,7 @@ from alloc.problems.missions.simulation.state import (
 
 
 def happen(state: MissionState, event: Event) -> None:
-    """Let an event happen now; what it is about may have ended before, and then nothing changes."""
+    """Apply an event now; if its agent has failed or its task is closed, nothing changes."""
     if event.agent is not None and event.kind is not EventKind.RADIO_SILENT:
         _happen_to_agent(state, state.agent(event.agent), event)
     elif event.task is not None:
@@ -67,13 +67,13 @@ def _happen_to_task(state: MissionState, task: TaskState, event: Event) -> None:
 
 
 def stand_still(state: MissionState, agent: AgentState) -> None:
-    """Let an agent end its flight or its work where it is."""
+    """End an agent's flight or work at its present place."""
     stop_work(state, agent)
     break_off(state, agent)
 
 
 def goal_of(state: MissionState, order: Order) -> tuple[Place, TaskState | None]:
-    """Return where an order leads to."""
+    """Return the place and the task to which an order leads."""
     if order.task is None:
         return Place(order.position), None
     task = state.task(order.task)
@@ -81,10 +81,10 @@ def goal_of(state: MissionState, order: Order) -> tuple[Place, TaskState | None]
 
 
 def obey(state: MissionState, agent: AgentState, order: Order) -> str | None:
-    """Let an agent follow an order as far as it can now; return why it refuses, None if it does not.
+    """Let an agent follow an order as far as possible now; return why it refuses, None if it does not.
 
-    It flies to a task that is over, too: it may not know that, and will see it there. An agent in flight on a way that
-    a table of distances gives follows the order from where that way ends.
+    An agent also flies to a closed task, which it may not know to be closed until it arrives. If distances are given by
+    a table, an agent in flight follows the order only from the end of that flight.
     """
     if agent.status not in ACTIVE:
         return f"the agent is {agent.status}"
@@ -115,7 +115,7 @@ def obey(state: MissionState, agent: AgentState, order: Order) -> str | None:
 
 
 def go(state: MissionState, agent: AgentState, goal: Place, task: TaskState | None) -> None:
-    """Let an agent that stands still fly to a goal; where that takes no time, it is there."""
+    """Let a stationary agent fly to a goal; if the flight takes no time, it arrives at once."""
     depart(state, agent, goal, task)
     flight = agent.flight
     assert flight is not None
@@ -124,7 +124,7 @@ def go(state: MissionState, agent: AgentState, goal: Place, task: TaskState | No
 
 
 def land(state: MissionState, agent: AgentState) -> None:
-    """End a flight at its goal: the agent works there, goes on by a later order, or is idle."""
+    """End a flight at its goal: the agent works there, follows a later order, or is idle."""
     flight = agent.flight
     assert flight is not None
     break_off(state, agent)

@@ -1,4 +1,4 @@
-"""The radio: who hears a message, after losses, bursts and silence."""
+"""The radio channel: who receives a message, given losses, bursts and silences."""
 
 import math
 
@@ -13,15 +13,15 @@ from alloc.problems.missions.simulation.state import ACTIVE, AgentState, Mission
 
 
 class Channel:
-    """Links between all agents, and where there is silence.
+    """Radio links between all agents, and silences.
 
-    Chances depend on the seeds, the two agents and the number of the message alone: all policies meet the same.
+    Losses depend only on the seeds, the two agents and the number of the message, and are the same for all policies.
 
     Parameters
     ----------
     state : MissionState
     seed : int
-        Of the run; that of the mission is added to it.
+        Seed of the run, combined with that of the mission.
     """
 
     def __init__(self, state: MissionState, seed: int) -> None:
@@ -34,11 +34,11 @@ class Channel:
         self._links: dict[tuple[int, int], tuple[int, bool]] = {}
 
     def silence(self, event: Event) -> None:
-        """Let an agent or a region be silent until the hour that the event says."""
+        """Silence an agent or a region until the hour given by the event."""
         self._silences.append(event)
 
     def is_silent(self, agent: AgentState) -> bool:
-        """Whether an agent can neither send nor hear now."""
+        """Whether an agent can neither send nor receive now."""
         return any(self._concerns(event, agent) for event in self._silences)
 
     def _concerns(self, event: Event, agent: AgentState) -> bool:
@@ -54,17 +54,17 @@ class Channel:
         return self._state.distances.by_metric(place.position, (x, y, z)) <= event.radius + TOLERANCE
 
     def open(self) -> None:
-        """Take notice of who is where, before the messages of an hour are sent."""
+        """Update which agents are in range of each other, before the messages of an hour are sent."""
         self._agents = [agent for agent in self._state.agents if agent.status in ACTIVE]
         self._row = {agent.index: row for row, agent in enumerate(self._agents)}
         places = [place_at(self._state, agent).position for agent in self._agents]
         self._near = self._state.distances.table(places, places) <= self._radio.radius + TOLERANCE
 
     def hearers(self, sender: AgentState, number: int) -> list[AgentState]:
-        """Return who will hear message `number` of an agent that sends now.
+        """Return the receivers of message `number` of an agent that sends now.
 
-        Hearers must be in the mission and within the radius when it is sent; whether they can hear when it comes is
-        for `is_silent` to say.
+        They must be in the mission and within the radius when it is sent. Whether they can receive it when it arrives
+        is decided by `is_silent`.
         """
         near = [self._agents[row] for row in np.flatnonzero(self._near[self._row[sender.index]]).tolist()]
         return [agent for agent in near if agent is not sender and not self._is_lost(sender.index, agent.index, number)]
@@ -80,7 +80,7 @@ class Channel:
         return uniform(LOSS, *self._seeds, sender, hearer, number, 1) < loss
 
     def _is_bad(self, sender: int, hearer: int, number: int) -> bool:
-        """Whether a link is bad at a message; a Markov chain over all messages up to it, whether sent or not."""
+        """Whether a link is bad at a message: a Markov chain over all message numbers up to it, sent or not."""
         burst = self._radio.burst
         assert burst is not None
         last, bad = self._links.get((sender, hearer), (-1, False))

@@ -1,4 +1,4 @@
-"""Laws that no mission may break: nothing is lost, and nobody is where it cannot be."""
+"""Conservation laws and consistency checks of a simulation."""
 
 import math
 from collections.abc import Iterator
@@ -15,21 +15,21 @@ from alloc.problems.missions.simulation.state import (
 )
 
 TOLERANCE = 1e-9
-"""Relative error that a ledger may have."""
+"""Relative tolerance of a ledger."""
 
 
 class ConservationError(AllocError):
-    """A simulation broke a law: a defect of the program, or a log that was tampered with."""
+    """A simulation violated a conservation law: a defect of the program, or a manipulated log."""
 
 
 def check(state: MissionState, agents: list[AgentState] | None = None, tasks: list[TaskState] | None = None) -> None:
-    """Raise a `ConservationError` where a law is broken.
+    """Raise `ConservationError` if a law is violated.
 
     Parameters
     ----------
     state : MissionState
     agents, tasks : list, optional
-        Those for which something has changed; all by default.
+        Agents and tasks to check, e.g. those that have changed; all by default.
     """
     for broken in violations(
         state, state.agents if agents is None else agents, state.tasks if tasks is None else tasks
@@ -38,7 +38,7 @@ def check(state: MissionState, agents: list[AgentState] | None = None, tasks: li
 
 
 def violations(state: MissionState, agents: list[AgentState], tasks: list[TaskState]) -> Iterator[str]:
-    """Yield what is wrong with the ledgers and the whereabouts of some agents and tasks."""
+    """Yield descriptions of inconsistent ledgers, states and places of some agents and tasks."""
     for agent in agents:
         yield from _of_agent(agent)
     for task in tasks:

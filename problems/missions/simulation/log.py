@@ -1,4 +1,4 @@
-"""What happened, line by line: alloc-mission-log/1."""
+"""Records of what happens in a simulation (alloc-mission-log/1)."""
 
 from alloc.problems.missions.events import Event
 from alloc.problems.missions.simulation.state import AgentState, MissionState, Order, TaskState, TaskStatus
@@ -7,16 +7,16 @@ Record = dict[str, object]
 
 
 class Log:
-    """Records of a simulation in the order of time.
+    """Records of a simulation in chronological order.
 
-    Each has its hour and what it is: ``event`` of the mission; ``order`` to an agent; ``refused``, an order that was
-    not followed; ``arrival`` of an agent at a task or a place; ``completion`` of a task, which is done; ``missed``;
-    ``message`` that an agent sent.
+    Each has an hour and a kind: ``event`` of the mission; ``order`` to an agent; ``refused``, an order that was not
+    followed; ``arrival`` of an agent at a task or a place; ``completion`` of a task; ``missed``, for a task whose
+    deadline passed; ``message`` sent by an agent.
 
     Parameters
     ----------
     state : MissionState
-        Whose hour the records get.
+        State of the simulation, which provides the hour of each record.
 
     Attributes
     ----------
@@ -28,11 +28,11 @@ class Log:
         self.records: list[Record] = []
 
     def event(self, event: Event) -> None:
-        """Record that something happened."""
+        """Record an event of the mission."""
         self._add("event", **{name: value for name, value in event.to_dict().items() if name != "hour"})
 
     def order(self, agent: AgentState, order: Order, refusal: str | None) -> None:
-        """Record an order, and why it was not followed, if it was not."""
+        """Record an order, with the reason if it is refused."""
         target: Record = {"agent": agent.facts.id, "task": order.task}
         if order.position is not None:
             target["position"] = list(order.position)
@@ -47,14 +47,14 @@ class Log:
         self._add("arrival", agent=agent.facts.id, task=name, distance=agent.distance, energy=agent.energy)
 
     def closed(self, task: TaskState) -> None:
-        """Record that a task is done or missed; that one is cancelled is an event."""
+        """Record that a task is done or missed; cancellations are recorded as events."""
         if task.status is TaskStatus.DONE:
             self._add("completion", task=task.facts.id)
         elif task.status is TaskStatus.MISSED:
             self._add("missed", task=task.facts.id, work=task.missed)
 
     def message(self, agent: AgentState, size: int, heard: list[str]) -> None:
-        """Record a message, its bytes, and who will hear it."""
+        """Record a message, its size in bytes, and its receivers."""
         self._add("message", agent=agent.facts.id, bytes=size, heard=heard)
 
     def _add(self, record: str, **fields: object) -> None:

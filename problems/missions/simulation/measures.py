@@ -1,4 +1,4 @@
-"""How well a mission went: alloc-mission-result/1."""
+"""Measures of a finished mission (alloc-mission-result/1)."""
 
 import math
 from dataclasses import dataclass, fields
@@ -14,18 +14,18 @@ RESULT_FORMAT = "alloc-mission-result/1"
 
 @dataclass(frozen=True)
 class DecisionTimes:
-    """How long a policy took for its decisions.
+    """Statistics of a policy's decision times.
 
     Attributes
     ----------
     count : int
-        Decisions.
+        Number of decisions.
     late : int
-        Those that came after the deadline, and were not followed.
+        Number of decisions after the deadline, which were ignored.
     mean_ms, p99_ms, worst_ms : float or None
-        None where there was none.
+        None if there were no decisions.
     runtime_s : float
-        Of the whole simulation.
+        Runtime of the whole simulation.
     """
 
     count: int = 0
@@ -37,7 +37,7 @@ class DecisionTimes:
 
     @classmethod
     def of(cls, seconds: list[float], late: int, runtime_s: float) -> "DecisionTimes":
-        """Return the figures of some decisions that took so many seconds each."""
+        """Return the statistics of decisions with these durations in seconds."""
         if not seconds:
             return cls(runtime_s=runtime_s)
         ms = 1000 * np.array(seconds)
@@ -47,33 +47,33 @@ class DecisionTimes:
 
 @dataclass(frozen=True)
 class MissionResult:
-    """Measures of a mission that is over.
+    """Measures of a finished mission.
 
     Attributes
     ----------
     mission, policy, knowledge : str
     seed : int
     status : {"done", "unfinished"}
-        Whether all tasks are done that were not cancelled.
+        ``done`` if all tasks are done, except cancelled ones.
     mission_time : float or None
-        Hour at which the last task was done; None if one was missed or is left.
+        Hour at which the last task was done; None if a task was missed or is left.
     tasks_done, tasks_missed, tasks_left : int
     priority_done_share : float
-        Priority of the tasks that are done, over that of all that were not cancelled.
+        Priority of the tasks done, relative to that of all tasks except cancelled ones.
     completion_hours_mean, completion_hours_p95 : float or None
-        Hours from appearance to completion, weighted by priority.
+        Mean and 95th percentile of the hours from appearance to completion, weighted by priority.
     energy, distance, distance_worst_agent : float
     battery_remaining_percent : float or None
-        Mean over agents with a battery, of what they had and were recharged by.
+        Battery left, relative to the initial charge plus recharges; mean over agents with a battery.
     switches : int
-        Orders that sent a flying or working agent elsewhere while its task had work left.
+        Number of orders that sent a flying or working agent elsewhere while its task had work left.
     messages, bytes, messages_busiest_agent : int
     decisions, decisions_late, orders_refused : int
     decision_ms_mean, decision_ms_p99, decision_ms_worst : float or None
     work_given_up : float
-        Work left at the end of tasks that somebody had begun.
+        Work left at the end of tasks that had been begun.
     mission_time_lower_bound : float or None
-        On the mission time of any policy, if it is proven.
+        Proven lower bound on the mission time of any policy; None if there is none.
     runtime_s : float
     """
 
@@ -113,26 +113,26 @@ class MissionResult:
 
     @property
     def times(self) -> DecisionTimes:
-        """What no replay can find out anew."""
+        """Decision times, which a replay cannot reproduce."""
         times = (self.decision_ms_mean, self.decision_ms_p99, self.decision_ms_worst, self.runtime_s)
         return DecisionTimes(self.decisions, self.decisions_late, *times)
 
     @property
     def is_done(self) -> bool:
-        """Whether all tasks are done that were not cancelled."""
+        """Whether all tasks are done, except cancelled ones."""
         return self.status == "done"
 
 
 def measured(simulation: Simulation, policy: str, seed: int, times: DecisionTimes) -> MissionResult:
-    """Return the measures of a simulation that has come to its end.
+    """Return the measures of a finished simulation.
 
     Parameters
     ----------
     simulation : Simulation
     policy : str
-        Its name.
+        Name of the policy.
     seed : int
-        Of the run.
+        Seed of the run.
     times : DecisionTimes
     """
     state = simulation.state
@@ -201,10 +201,10 @@ def _battery_percent(agents: list[AgentState]) -> float | None:
 
 
 def lower_bound(mission: Mission) -> float | None:
-    """Return an hour before which no policy can have done all tasks; None if events make that doubtful.
+    """Return a lower bound on the mission time of any policy; None if events may invalidate it.
 
-    All agents together cannot do all work faster, nor any single task after it has appeared; flights take no time in
-    this bound, and nobody joins late or fails.
+    The bound is the larger of the time that all agents together need for all work, and that which they need for any
+    single task after it appears, with flights that take no time and without late or failing agents.
     """
     if any(event.task is not None and event.workload is not None for event in mission.events):
         return None

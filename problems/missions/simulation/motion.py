@@ -1,4 +1,4 @@
-"""Flights and work between two events: everything is straight or linear, so nothing needs a step size."""
+"""Flights and work between two events: both are linear in time, so no step size is needed."""
 
 import math
 
@@ -20,7 +20,7 @@ from alloc.problems.missions.simulation.state import (
 )
 
 CLOSE = 1e-9
-"""Part of a task's work that is forgiven at its deadline, against rounding errors."""
+"""Share of a task's work that may be left at its deadline, to allow for rounding errors."""
 
 
 def refusal(
@@ -28,8 +28,8 @@ def refusal(
 ) -> str | None:
     """Return why an agent at a place cannot fly to a goal, and work there if it is a task; None if it can.
 
-    It must be allowed to, within its range, and its battery must be enough for the flight, and for the way home if it
-    returns.
+    The agent must be allowed to do the task, the goal within its range, and its battery sufficient for the flight, and
+    for the flight home if it returns.
     """
     if task is not None:
         if agent.tasks is not None and task.id not in agent.tasks:
@@ -49,7 +49,7 @@ def refusal(
 
 
 def place_at(state: MissionState, agent: AgentState) -> Place:
-    """Return where an agent is now; in flight that is no node of a table."""
+    """Return the present place of an agent; in flight, it is not a node of a distance table."""
     flight = agent.flight
     if flight is None:
         return agent.place
@@ -58,7 +58,7 @@ def place_at(state: MissionState, agent: AgentState) -> Place:
 
 
 def battery_at(state: MissionState, agent: AgentState) -> float:
-    """Return the battery of an agent now."""
+    """Return the present battery of an agent."""
     if agent.flight is None:
         return agent.battery
     flown = agent.flight.distance * agent.flight.share(state.hour)
@@ -66,7 +66,7 @@ def battery_at(state: MissionState, agent: AgentState) -> float:
 
 
 def depart(state: MissionState, agent: AgentState, goal: Place, task: TaskState | None) -> None:
-    """Let an agent that stands still begin a flight."""
+    """Begin the flight of a stationary agent."""
     distance = state.distances.between(agent.place, goal)
     hours = distance / agent.facts.speed
     agent.flight = Flight(agent.place, goal, task, distance, state.hour, state.hour + hours)
@@ -74,7 +74,7 @@ def depart(state: MissionState, agent: AgentState, goal: Place, task: TaskState 
 
 
 def break_off(state: MissionState, agent: AgentState) -> None:
-    """End a flight where the agent is now."""
+    """End a flight at the agent's present place."""
     flight = agent.flight
     if flight is not None:
         share = flight.share(state.hour)
@@ -84,7 +84,7 @@ def break_off(state: MissionState, agent: AgentState) -> None:
 
 
 def _reached(source: Place, goal: Place) -> Place:
-    """Return the goal; an agent that goes to an unknown place is still where it was."""
+    """Return the place reached by a flight to a goal; with an unknown goal, the agent stays at its source."""
     return goal if goal.position is not None else Place(source.position, goal.nodes)
 
 
@@ -97,7 +97,7 @@ def _land(agent: AgentState, flight: Flight, flown: float, place: Place) -> None
 
 
 def begin_work(state: MissionState, agent: AgentState, task: TaskState) -> None:
-    """Let an agent that is at an open task join those who work there."""
+    """Let an agent at an open task start to work there."""
     bring_up_to_date(state, task)
     task.workers[agent.index] = agent
     task.begun = True
@@ -106,7 +106,7 @@ def begin_work(state: MissionState, agent: AgentState, task: TaskState) -> None:
 
 
 def stop_work(state: MissionState, agent: AgentState) -> None:
-    """Let an agent leave the task where it works, if there is one."""
+    """Let an agent stop working, if it does."""
     task = agent.task
     if task is not None:
         bring_up_to_date(state, task)
@@ -116,7 +116,7 @@ def stop_work(state: MissionState, agent: AgentState) -> None:
 
 
 def close(state: MissionState, task: TaskState, status: TaskStatus) -> None:
-    """Let a task be done, missed or cancelled now: what is left is written off, and who worked there is idle."""
+    """Close a task as done, missed or cancelled: the work left is written off, and its agents become idle."""
     bring_up_to_date(state, task)
     if status is TaskStatus.DONE:
         task.done += task.left  # rounding
@@ -132,14 +132,14 @@ def close(state: MissionState, task: TaskState, status: TaskStatus) -> None:
 
 
 def status_at_deadline(state: MissionState, task: TaskState) -> TaskStatus:
-    """Return what becomes of an open task at its deadline: it is missed, unless only rounding errors are left."""
+    """Return the status of an open task at its deadline: missed, unless only a rounding error is left."""
     bring_up_to_date(state, task)
     is_done = task.left <= CLOSE * (task.appeared + task.grown)
     return TaskStatus.DONE if is_done else TaskStatus.MISSED
 
 
 def bring_up_to_date(state: MissionState, task: TaskState) -> None:
-    """Count what was worked, or grew, on an open task since it was brought up to date."""
+    """Update the work left of an open task to the present hour by the work done, or growth, since its last update."""
     if task.status is TaskStatus.OPEN:
         if task.workers:
             ability = sum(agent.facts.ability for agent in task.workers.values())
@@ -154,7 +154,7 @@ def bring_up_to_date(state: MissionState, task: TaskState) -> None:
 
 
 def work_left(state: MissionState, task: TaskState) -> float:
-    """Return the work left of a task now, without a change to it."""
+    """Return the present work left of a task, without updating it."""
     if task.status is TaskStatus.OPEN and task.workers:
         ability = sum(agent.facts.ability for agent in task.workers.values())
         return max(0.0, task.left - ability * paced_hours(state, task, task.since, state.hour))
@@ -164,7 +164,7 @@ def work_left(state: MissionState, task: TaskState) -> float:
 
 
 def completion_hour(state: MissionState, task: TaskState) -> float:
-    """Return when a task that is up to date will be done if nothing changes; ``inf`` if it will not in the mission."""
+    """Return the hour at which an up-to-date task is done if nothing changes; ``inf`` if not within the mission."""
     if not task.workers:
         return math.inf
     needed = task.left / sum(agent.facts.ability for agent in task.workers.values())
@@ -184,7 +184,7 @@ def completion_hour(state: MissionState, task: TaskState) -> float:
 
 
 def paced_hours(state: MissionState, task: TaskState, begin: float, end: float) -> float:
-    """Return the hours between two hours, each counted as often as the pace says."""
+    """Return the integral of a task's pace factor between two hours."""
     pace = state.mission.pace
     if pace is None:
         return end - begin
@@ -198,14 +198,14 @@ def paced_hours(state: MissionState, task: TaskState, begin: float, end: float) 
 
 
 def pace_factor(seed: int, task: int, period: int, pace: Pace) -> float:
-    """Return how fast any group works on a task in a period."""
+    """Return the pace factor of a task in a period."""
     return pace.low + (pace.high - pace.low) * uniform(PACE, seed, task, period)
 
 
 def end_flights(state: MissionState) -> None:
-    """Let agents in flight land at their goals after the end of the mission, and those that return fly home.
+    """After the end of the mission, let agents in flight reach their goals, and those that return fly home.
 
-    Who has flown can afford that; who has not is still where it began, whatever its base.
+    An agent that has flown has enough battery for that; one that has not stays at its start, whatever its base.
     """
     for agent in state.agents:
         if agent.flight is not None:

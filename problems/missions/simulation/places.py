@@ -1,4 +1,4 @@
-"""Where agents and tasks are, and how far apart, by the metric or the table of distances of the instance."""
+"""Places of agents and tasks, and distances by the instance's metric or distance table."""
 
 import math
 from dataclasses import dataclass
@@ -20,9 +20,9 @@ class Place:
     Attributes
     ----------
     position : tuple of float, or None
-        Three coordinates; None where unknown: 0 away from everywhere.
+        Three coordinates; None if unknown, with distance 0 from everywhere.
     nodes : tuple of int
-        What a table of distances may call it, best first: the start of agent i is i, task j is n + j.
+        Nodes of the distance table, in order of preference: the start of agent i is i, task j is n + j.
     """
 
     position: Position | None
@@ -30,9 +30,9 @@ class Place:
 
 
 class Distances:
-    """How far places of a mission are apart.
+    """Distances between places of a mission.
 
-    With a table of distances, agents keep to the ways that it gives, so that none is turned round in flight.
+    With a distance table, agents follow its paths to the end and cannot be diverted in flight.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class Distances:
                 self._given[instance.n + task, node] = back
 
     def between(self, source: Place, goal: Place) -> float:
-        """Return the length of the flight from one place to another, ``inf`` where there is none."""
+        """Return the length of the flight from one place to another, ``inf`` if there is no path."""
         for node in source.nodes if self.has_table else ():
             for other in goal.nodes:
                 if node == other:
@@ -69,7 +69,7 @@ class Distances:
         return self.by_metric(source.position, goal.position)
 
     def by_metric(self, source: Position | None, goal: Position | None) -> float:
-        """Return the distance of two positions by the metric alone, 0 where one is unknown (1)."""
+        """Return the distance of two positions by the metric (1), 0 if one is unknown."""
         if source is None or goal is None:
             return 0.0
         if self.metric == GEOGRAPHIC:
@@ -79,7 +79,7 @@ class Distances:
         return math.dist(source, goal)
 
     def table(self, sources: list[Position | None], goals: list[Position | None]) -> FloatArray:
-        """Return distances by the metric alone, shape (sources, goals)."""
+        """Return distances by the metric, shape (sources, goals)."""
         if not sources or not goals:
             return np.zeros((len(sources), len(goals)))
         by_metric = {
@@ -89,7 +89,7 @@ class Distances:
         return distance_table(_array(sources), _array(goals), by_metric.get(self.metric, distances))
 
     def on_the_way(self, source: Position | None, goal: Position | None, share: float) -> Position | None:
-        """Return where an agent is that has flown a share of the way, on a straight line or on a geodesic."""
+        """Return the position after a share of a flight, on a straight line or a geodesic."""
         if source is None or goal is None:
             return source
         if self.metric == GEOGRAPHIC:
@@ -112,7 +112,7 @@ def _on_geodesic(source: Position, goal: Position, share: float) -> Position:
 
 
 def starting_places(instance: Instance) -> list[Place]:
-    """Return where each agent begins; a table's row of its start task holds for it where it has no place of its own."""
+    """Return the start of each agent; where an agent has no node of its own, that of its start task applies."""
     unknown = np.isnan(instance.agent_position[:, 0])
     starts = np.where(unknown, instance.start_task, IDLE).tolist()
     positions = _positions(instance.start_position)
@@ -129,7 +129,7 @@ def bases_of_agents(instance: Instance) -> list[Place | None]:
 
 
 def task_places(instance: Instance) -> list[Place]:
-    """Return where each task is."""
+    """Return the place of each task."""
     return [Place(position, (instance.n + task,)) for task, position in enumerate(_positions(instance.task_position))]
 
 

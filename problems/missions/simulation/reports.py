@@ -1,4 +1,4 @@
-"""What can be known of agents and tasks: reports, each with the hour at which it was true."""
+"""Knowledge of agents and tasks: reports, each with the hour at which it was true, messages and views."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,8 +19,8 @@ from alloc.problems.missions.simulation.state import (
 )
 
 BYTES_OF_MESSAGE, BYTES_OF_AGENT, BYTES_OF_TASK, BYTES_OF_VALUE = 16, 40, 48, 8
-"""What a message takes on the air, packed in numbers of 4 bytes: sender and hour; place, battery, order and hour of an
-agent; place, work left, priority, deadline and hour of a task; and each value that a policy adds."""
+"""Size of a message, packed in 4-byte numbers: header with sender and hour; place, battery, order and hour of an agent;
+place, work left, priority, deadline and hour of a task; and each value added by a policy."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +35,7 @@ class AgentReport:
     place : Place
     battery : float
     task : str or None
-        Id of the task to which it was going or where it was working.
+        Id of the task to which it was flying or at which it was working.
     """
 
     facts: AgentFacts
@@ -58,7 +58,7 @@ class TaskReport:
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """What an agent sends: what it knows of agents and tasks, and what its policy adds.
+    """A message of an agent: its knowledge of agents and tasks, and notes of its policy.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ class Message:
     agents : tuple of AgentReport
     tasks : tuple of TaskReport
     notes : tuple of str and float
-        Of the policy, such as bids; of 8 bytes each.
+        Values added by the policy, such as bids, of 8 bytes each.
     """
 
     sender: str
@@ -78,24 +78,24 @@ class Message:
 
     @property
     def size(self) -> int:
-        """Bytes that it takes on the air."""
+        """Size in bytes."""
         reports = BYTES_OF_AGENT * len(self.agents) + BYTES_OF_TASK * len(self.tasks)
         return BYTES_OF_MESSAGE + reports + BYTES_OF_VALUE * len(self.notes)
 
 
 class View:
-    """What an agent, or who leads all agents, knows when it is to decide.
+    """Knowledge of an agent, or of a central policy, at a decision.
 
     Attributes
     ----------
     hour : float
     id : str or None
-        Whose view it is; None for who leads all.
+        Id of the agent whose view it is; None for a central policy.
     agents : mapping of str to AgentReport
         By id, the agent itself included.
     tasks : mapping of str to TaskReport
     heard : tuple of Message
-        What came since the last decision, oldest first.
+        Messages received since the last decision, oldest first.
     """
 
     def __init__(
@@ -112,7 +112,7 @@ class View:
 
     @property
     def metric(self) -> str:
-        """How far places are apart; see `Instance`."""
+        """Metric of distances; see `Instance`."""
         return self._distances.metric
 
     @property
@@ -127,28 +127,28 @@ class View:
 
     @property
     def own(self) -> AgentReport:
-        """The report of the agent whose view it is, as it is now."""
+        """The present report of the agent whose view this is."""
         if self.id is None:
-            raise TypeError("who leads all agents is none of them")
+            raise TypeError("the view of a central policy has no own agent")
         return self.agents[self.id]
 
     def distance(self, agent: AgentReport, task: TaskReport) -> float:
-        """Return how far an agent was from a task by what is known of both."""
+        """Return the distance from an agent to a task by their reports."""
         return self._distances.between(agent.place, task.facts.place)
 
     def hours(self, agent: AgentReport, task: TaskReport) -> float:
-        """Return how long the flight of an agent to a task takes."""
+        """Return the hours of an agent's flight to a task."""
         return self.distance(agent, task) / agent.facts.speed
 
     def distances(self, places: Sequence[Place], tasks: Sequence[TaskReport]) -> FloatArray:
-        """Return how far places are from tasks, shape (places, tasks)."""
+        """Return the distances from places to tasks, shape (places, tasks)."""
         goals = [task.facts.place for task in tasks]
         if self._distances.has_table:
             return np.array([[self._distances.between(place, goal) for goal in goals] for place in places])
         return self._distances.table([place.position for place in places], [goal.position for goal in goals])
 
     def distance_to_place(self, agent: AgentReport, place: Place) -> float:
-        """Return how far an agent was from a place."""
+        """Return the distance from an agent's reported place to another place."""
         return self._distances.between(agent.place, place)
 
     def between(self, one: TaskReport, other: TaskReport) -> float:
@@ -156,7 +156,7 @@ class View:
         return self._distances.between(one.facts.place, other.facts.place)
 
     def refusal(self, agent: AgentReport, task: TaskReport) -> str | None:
-        """Return why an agent cannot take a task, by what is known of both; None if it can."""
+        """Return why an agent cannot take a task, by their reports; None if it can."""
         if task.status is not TaskStatus.OPEN:
             return f"the task is {task.status}"
         if agent.task == task.facts.id:
@@ -168,28 +168,28 @@ class View:
         return refusal(self._distances, agent.facts, agent.place, agent.battery, place, None)
 
     def open_tasks(self, agent: AgentReport) -> list[TaskReport]:
-        """Return the tasks that an agent can take, by what is known, in the order in which they became known."""
+        """Return the tasks that an agent can take, as known, in the order in which they became known."""
         return [task for task in self.tasks.values() if self.refusal(agent, task) is None]
 
     def of(self, agents: Mapping[str, AgentReport], tasks: Mapping[str, TaskReport]) -> "View":
-        """Return the view of who leads some agents, with reports of these agents and tasks in place of all."""
+        """Return a central view restricted to the given reports of agents and tasks."""
         return View(self.hour, None, agents, tasks, self._distances)
 
     def message(self, notes: tuple[str | float, ...] = ()) -> Message:
-        """Return a message that tells all that is known, and `notes`."""
+        """Return a message with all reports of this view and with `notes`."""
         assert self.id is not None
         return Message(self.id, self.hour, tuple(self.agents.values()), tuple(self.tasks.values()), notes)
 
 
 def report_agent(state: MissionState, agent: AgentState) -> AgentReport:
-    """Return what is true of an agent now."""
+    """Return the present report of an agent."""
     place, battery = place_at(state, agent), battery_at(state, agent)
-    if state.distances.has_table and agent.flight is not None:  # it can be sent on from there alone
+    if state.distances.has_table and agent.flight is not None:  # it cannot be diverted before
         place = agent.flight.goal
         battery = agent.battery - agent.facts.energy_per_distance * agent.flight.distance
     return AgentReport(agent.facts, state.hour, agent.status, place, battery, agent.order.task)
 
 
 def report_task(state: MissionState, task: TaskState) -> TaskReport:
-    """Return what is true of a task now."""
+    """Return the present report of a task."""
     return TaskReport(task.facts, state.hour, task.status, work_left(state, task))

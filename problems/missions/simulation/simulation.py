@@ -1,4 +1,4 @@
-"""From event to event: a mission, and the orders that agents get on the way."""
+"""The event loop of a mission, with requests for messages and orders."""
 
 import math
 from collections.abc import Iterator
@@ -42,22 +42,22 @@ from alloc.problems.vocabulary import Knowledge
 
 
 class Simulation:
-    """A mission as it goes on; it stops wherever agents may send messages or get orders.
+    """A running simulation of a mission, which pauses whenever agents may send messages or get orders.
 
-    At one hour tasks are completed first, then deadlines pass, events happen as the mission says, flights end, messages
-    are heard, and those of the hour sent. Then orders are given. With full knowledge that is whenever something
-    happened, for all agents; with local knowledge for each agent every `Radio.period`, and when its own task or flight
-    ends, it joins, returns or is recharged. Before that it looks around.
+    At equal hours the order is: tasks are completed, deadlines pass, events of the mission happen, flights end,
+    messages are received, new ones are sent, and orders are given. With full knowledge, all agents get orders whenever
+    something has happened. With local knowledge, an agent senses its surroundings and then decides every
+    `Radio.period`, when its own task or flight ends, and when it joins, returns or is recharged.
 
     Parameters
     ----------
     mission : Mission
     knowledge : {"full", "local"}, optional
-        That of the mission by default.
+        By default that of the mission.
     seed : int
-        Of the radio's chances, beside that of the mission.
+        Seed of message losses, together with that of the mission.
     aware : bool
-        Whether agents get to know anything; in a replay nobody asks what they know.
+        Whether to keep track of agents' knowledge, which a replay does not need.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class Simulation:
     knowledge : Knowledge
     log : Log
     messages, bytes : list of int
-        Sent so far by each agent.
+        Number of messages and of bytes that each agent has sent so far.
     """
 
     def __init__(
@@ -98,31 +98,31 @@ class Simulation:
         self._requests = self._run()
 
     def advance(self) -> Request | None:
-        """Go on to where agents may send messages or get orders; None at the end of the mission."""
+        """Run up to the next request for messages or orders, and return it; None at the end of the mission."""
         return next(self._requests, None)
 
     def view(self, agent: str | None, *, is_glance: bool = False) -> View:
-        """Return what an agent knows now, or, for None, who leads all agents.
+        """Return the present view of an agent, or of a central policy.
 
         Parameters
         ----------
         agent : str or None
-            Its id.
+            Id of the agent; None for a central policy.
         is_glance : bool
-            Whether the messages that it heard are to be handed over once more.
+            Whether to hand over the received messages once more in the next view.
         """
         assert self._awareness is not None
         return self._awareness.view(None if agent is None else self.state.agent(agent), is_glance=is_glance)
 
     def send(self, agent: str, message: Message | int) -> None:
-        """Let an agent send a message, in a request for messages.
+        """Send a message of an agent, at a request for messages.
 
         Parameters
         ----------
         agent : str
             Its id.
         message : Message or int
-            Or its bytes alone, in a replay.
+            The message; in a replay only its size in bytes.
         """
         sender, size = self.state.agent(agent), message if isinstance(message, int) else message.size
         hearers = self._channel.hearers(sender, self._tick)
@@ -133,16 +133,16 @@ class Simulation:
             self._agenda.push(self.state.hour + self.mission.radio.delay, Turn.DELIVERY, Delivery(message, hearers))
 
     def order(self, agent: str, order: Order, *, trusted: bool = False) -> str | None:
-        """Give an agent an order, in a request for orders; return why it is not followed, None if it is.
+        """Give an agent an order, at a request for orders; return why it is refused, None if it is followed.
 
         Parameters
         ----------
         agent : str
             Its id.
         order : Order
-            Where it is to go; what it does already needs no order.
+            The new order; no order is needed to continue the present one.
         trusted : bool
-            Whether the agent is taken to know the task.
+            Whether to skip the check that the agent knows the task.
         """
         receiver = self.state.agent(agent)
         if order == receiver.order:
@@ -156,14 +156,14 @@ class Simulation:
             if problem is None:
                 self._changes.note_agent(receiver, left)
         self.log.order(receiver, order, problem)
-        if problem is None and receiver.flight is None and order != STAY:  # it is there at once
+        if problem is None and receiver.flight is None and order != STAY:  # arrived at once
             self.log.arrival(receiver, receiver.task)
         if problem is None and self._awareness is not None and not self._is_local:
             self._awareness.look_around([receiver])
         return problem
 
     def refuse(self, agent: str, order: Order, reason: str) -> None:
-        """Record an order that is not followed, in a replay.
+        """Record a refused order, in a replay.
 
         Parameters
         ----------
@@ -196,7 +196,7 @@ class Simulation:
         self._finish()
 
     def _take(self, turn: Turn, item: object) -> None:
-        """Let one entry of the agenda happen, unless it is void by now."""
+        """Process an entry of the agenda, unless it is void by now."""
         if isinstance(item, Event):
             self._happen(item)
         elif isinstance(item, Arrival):
@@ -240,7 +240,7 @@ class Simulation:
         self._is_news = True
 
     def _ended(self, task: TaskState, workers: tuple[AgentState, ...]) -> None:
-        """Take notice of a task that has changed; who worked there and no longer does is to decide."""
+        """Note a changed task; agents that no longer work there have to decide."""
         self._changes.note_task(task)
         for agent in workers:
             self._changes.note_agent(agent)
@@ -257,7 +257,7 @@ class Simulation:
             self._is_news = True
 
     def _talk(self) -> Iterator[Request]:
-        """Let all agents that can look around and send a message, and then decide."""
+        """Let all agents in the mission sense and send messages, and schedule their decisions."""
         active = [agent for agent in self.state.agents if agent.status in ACTIVE]
         self._look(active)
         self._channel.open()
@@ -269,25 +269,25 @@ class Simulation:
         self._agenda.push(self._tick * self.mission.radio.period, Turn.RADIO, None)
 
     def _look(self, agents: list[AgentState]) -> None:
-        """Let agents look around that have not done so at this hour."""
+        """Let those agents sense that have not done so at this hour."""
         if self._is_local and self._awareness is not None:
             self._awareness.look_around([agent for agent in agents if agent.index not in self._looked])
             self._looked.update(agent.index for agent in agents)
 
     def _who_decides(self) -> list[AgentState]:
-        """Return the agents that are to get orders now, in their order in the mission."""
+        """Return the agents that get orders now, in the order of the mission."""
         deciding, self._deciding = self._deciding, {}
         if self._is_local:
             return [deciding[index] for index in sorted(deciding) if deciding[index].status in ACTIVE]
         return [agent for agent in self.state.agents if agent.status in ACTIVE] if self._is_news else []
 
     def _is_over(self) -> bool:
-        """Whether no task is open or to come, or nobody is left to do one."""
+        """Whether no task is open or still to come, or no agent is left, now or later."""
         left = any(task.status in (TaskStatus.OPEN, TaskStatus.TO_COME) for task in self.state.tasks)
         return not left or all(agent.status is AgentStatus.FAILED for agent in self.state.agents)
 
     def _finish(self) -> None:
-        """End the mission: whoever is in flight lands, whoever returns is home, and all ledgers are checked."""
+        """End the mission: flights end, agents that return fly home, and all ledgers are checked."""
         if not self._is_over() and self.mission.end < self._agenda.hour < math.inf:
             self.state.hour = self.mission.end
         for task in self.state.tasks:

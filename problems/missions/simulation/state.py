@@ -1,7 +1,7 @@
-"""Agents and tasks as they are now, and their ledgers: what was flown and worked so far.
+"""Present state of agents and tasks, and their ledgers of distance, energy and work.
 
-Agents and tasks are brought up to date where something changes for them, not at every event: `since` is the hour up to
-which a task's ledger goes, and a flight counts when it ends.
+Agents and tasks are updated only when something changes for them, not at every event: `since` is the hour of a task's
+last update, and a flight is booked when it ends.
 """
 
 import math
@@ -20,7 +20,7 @@ from alloc.problems.missions.simulation.places import (
 
 
 class AgentStatus(StrEnum):
-    """What an agent does."""
+    """Status of an agent."""
 
     ABSENT = "absent"
     IDLE = "idle"
@@ -31,11 +31,11 @@ class AgentStatus(StrEnum):
 
 
 ACTIVE = frozenset({AgentStatus.IDLE, AgentStatus.FLYING, AgentStatus.WORKING})
-"""What an agent does that is in the mission: it hears, sees and takes orders."""
+"""Statuses of agents in the mission, which sense, communicate and take orders."""
 
 
 class TaskStatus(StrEnum):
-    """What has become of a task."""
+    """Status of a task."""
 
     TO_COME = "to come"
     OPEN = "open"
@@ -46,18 +46,18 @@ class TaskStatus(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class AgentFacts:
-    """What never changes of an agent.
+    """Constant properties of an agent.
 
     Attributes
     ----------
     id : str
     ability, speed, energy_per_distance, range : float
-        ``inf`` for a speed means that flights take no time; for a range, that there is none.
+        A speed of ``inf`` means that flights take no time, a range of ``inf`` that it is unlimited.
     start : Place
     returns : bool
-        Whether it must be able to fly home, and does so at the end if it has flown at all.
+        Whether it must always be able to fly home, and does so at the end if it has flown at all.
     base : Place or None
-        Where home is; None for its start.
+        Its home; None for its start.
     skills : frozenset of str
     tasks : frozenset of str, or None
         Ids of the tasks that it may do; None for all.
@@ -76,13 +76,13 @@ class AgentFacts:
 
     @property
     def home(self) -> Place:
-        """Where it returns to, if it does."""
+        """Place to which it returns, if it does."""
         return self.start if self.base is None else self.base
 
 
 @dataclass(frozen=True, slots=True)
 class TaskFacts:
-    """What never changes of a task: see `Mission` and `Instance`."""
+    """Constant properties of a task: see `Mission` and `Instance`."""
 
     id: str
     place: Place
@@ -95,14 +95,14 @@ class TaskFacts:
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """Where an agent is to go: to a task, to work there; to a place; or nowhere, which is to stay where it is.
+    """An order of an agent: go to a task and work there, go to a place, or, with neither, stay.
 
     Attributes
     ----------
     task : str or None
         Id of the task.
     position : tuple of float, or None
-        Three coordinates, where there is no task.
+        Three coordinates of a place, instead of a task.
     """
 
     task: str | None = None
@@ -114,7 +114,7 @@ STAY = Order()
 
 @dataclass(frozen=True, slots=True)
 class Flight:
-    """A flight that goes on; `task` is None for one to a mere place."""
+    """A flight in progress; `task` is None for a flight to a place."""
 
     source: Place
     goal: Place
@@ -124,35 +124,35 @@ class Flight:
     arrives: float
 
     def share(self, hour: float) -> float:
-        """Return the share of the way that is flown at an hour."""
+        """Return the share of the distance flown by an hour."""
         length = self.arrives - self.departs
         return 1.0 if length <= 0 else min(1.0, max(0.0, (hour - self.departs) / length))
 
 
 @dataclass(eq=False, slots=True)
 class AgentState:
-    """An agent now.
+    """Present state of an agent.
 
     Attributes
     ----------
     index : int
     facts : AgentFacts
     place : Place
-        Where it is, or where its flight began.
+        Its place, or the source of its flight.
     battery : float
-        At that place.
+        Energy left at that place.
     capacity : float
-        What it had at the beginning and was recharged by.
+        Initial energy plus recharges.
     status : AgentStatus
     order : Order
-        The last one.
+        Its last order.
     flight : Flight or None
     task : TaskState or None
-        Where it works.
+        Task where it works.
     distance, energy : float
-        Flown so far, and what that took.
+        Distance flown so far, and the energy used.
     has_flown : bool
-        Whether a flight of it has ended anywhere but where it began.
+        Whether it has ended a flight at another place than its start.
     """
 
     index: int
@@ -171,27 +171,27 @@ class AgentState:
 
 @dataclass(eq=False, slots=True)
 class TaskState:
-    """A task now; each unit of work that appeared, grew or was added is left, done, cancelled or missed.
+    """Present state of a task; all work that appeared, grew or was added is left, done, cancelled or missed.
 
     Attributes
     ----------
     index : int
     facts : TaskFacts
     workload : float
-        With which it appears.
+        Initial work when it appears.
     status : TaskStatus
     workers : dict
-        Agents present, by index, in the order in which they came.
+        Agents that work there, by index, in the order of their arrival.
     left, since : float
-        Work left, and the hour at which that was so.
+        Work left, and the hour of that value.
     begun : bool
-        Whether somebody has worked there, so that it grows no more.
+        Whether an agent has worked there, so that it no longer grows.
     appeared, grown, done, cancelled, missed : float
-        Work in all.
+        Total amounts of work.
     closed : float
         Hour at which it was done, missed or cancelled.
     version : int
-        Changes whenever the hour of its completion may.
+        Incremented whenever the hour of its completion may change.
     """
 
     index: int
@@ -212,7 +212,7 @@ class TaskState:
 
 
 class MissionState:
-    """All agents and tasks of a mission now.
+    """Present state of all agents and tasks of a mission.
 
     Parameters
     ----------
@@ -226,7 +226,7 @@ class MissionState:
     agents : list of AgentState
     tasks : list of TaskState
     switches : int
-        Orders that sent a flying or working agent elsewhere while its task had work left.
+        Number of orders that sent a flying or working agent elsewhere while its task had work left.
     """
 
     def __init__(self, mission: Mission) -> None:

@@ -239,7 +239,7 @@ def test_each_fault_of_a_mission_is_a_line(alloc, mission):
     Path("run.jsonl").write_text("".join([*lines[:3], *lines[4:]]))
     ran = alloc("validate", "run.jsonl")
     assert (ran.code, ran.err.count("\n")) == (2, 1)
-    assert "run.jsonl: line 4: is not what comes of the orders before it" in ran.err
+    assert "run.jsonl: line 4: does not follow from the orders before it" in ran.err
 
 
 def test_cfstp_is_generated(alloc):

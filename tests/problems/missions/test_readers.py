@@ -74,7 +74,7 @@ def test_days_can_be_chosen(file):
     wanted = RecordOptions(first=date(2020, 2, 2), last=date(2020, 2, 3))
     mission = import_mission("london", file(CALLS), wanted)
     assert mission.appears.tolist() == [0, 42]
-    with pytest.raises(InputError, match="no record in the days"):
+    with pytest.raises(InputError, match="no record in the selected days"):
         import_mission("london", file(CALLS), RecordOptions(first=date(2021, 1, 1)))
 
 
@@ -144,7 +144,7 @@ def test_space_needs_yaml(file, monkeypatch):
         ("london", CALLS.replace("01/02/2020", "soon"), "line 2: DateTimeOfCall: must be a date"),
         ("london", CALLS.replace(",2,530000", ",-2,530000"), "line 2: PumpHoursTotal: must be >= 0"),
         ("new-brunswick", FIRES.replace(",124,", ",999,"), "line 3: dis.julian: must be a day of a year"),
-        ("cfstp", "nothing", "is no CFSTP instance"),
+        ("cfstp", "nothing", "is not a CFSTP instance"),
         ("cfstp", PRINTED.replace("task[  1] has", "thing"), "task[1]: is missing"),
         ("cfstp", PRINTED.replace("[40, 5]", "[0, 5]"), "deadline: must be after the hour"),
         ("space", "agents: [", "line 1"),
